@@ -14,14 +14,14 @@ class Clock:
     def __init__(self):
         self.now = Now(time.monotonic(), time.time_ns())
 
-    def goes_on(self, seconds):
+    def advance(self, seconds):
         self.now = Now(self.now.monotonic_s + seconds, self.now.wall_ns + round(seconds * 1e9))
 
 
 @pytest.fixture
 def clock(monkeypatch):
     """In place of both of control's clocks; the lease's alarm and the disk go by their own."""
-    it = Clock()
+    clock = Clock()
     for module in (control, stop_handler):
-        monkeypatch.setattr(module, "read_clocks", lambda: it.now)
-    return it
+        monkeypatch.setattr(module, "read_clocks", lambda: clock.now)
+    return clock

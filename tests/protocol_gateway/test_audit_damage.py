@@ -17,7 +17,7 @@ from protocol_gateway.audit.persisted_state import UNKNOWN
 from protocol_gateway.audit.search import Query, find
 from protocol_gateway.errors import AuditError
 from tests.conftest import run
-from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
+from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, simulator, until
 
 
 def entry(request="HOME", outcome=Outcome.ACCEPTED, **values):
@@ -184,25 +184,25 @@ def test_whichever_bytes_are_changed_a_stop_that_was_latched_is_not_forgotten(tm
 def test_a_gateway_whose_log_was_damaged_is_stopped_until_its_operator_says_otherwise(mesh, tmp_path):
     async def main():
         async with simulator() as port:
-            async with gateway(mesh, tmp_path, port) as plant:
-                await plant.lease(A.ACQUIRE, ttl_s=5)
-                await plant.stop(by="wang", reason="dog")
-                await until(lambda: len(plant.seen["audit"]) >= 2)
-            live = plant.audit
+            async with gateway(mesh, tmp_path, port) as site:
+                await site.lease(A.ACQUIRE, ttl_s=5)
+                await site.stop(by="wang", reason="dog")
+                await until(lambda: len(site.seen["audit"]) >= 2)
+            live = site.audit
             live.write_bytes(live.read_bytes().replace(b'"request":"STOP"', b'"request":"STOQ"'))
-            async with gateway(mesh, tmp_path, port) as plant:
-                stop = plant.controller.stop
+            async with gateway(mesh, tmp_path, port) as site:
+                stop = site.controller.stop
                 assert (stop.by, stop.reason) == ("gateway", UNKNOWN)
-                assert "the chain is broken at entry 2" in (await plant.event("audit.damaged", 0)).text
-                assert await plant.event("stop.remembered", 0)
-                await until(lambda: "STOP" in [each.request for each in plant.seen["audit"]])
-                await plant.lease(A.ACQUIRE, ttl_s=5)
-                assert UNKNOWN in await refusal(plant.command(C.HOME))
-                await plant.command(C.RESET, stop_id=stop.id)
-                await until(lambda: not plant.controller.HasField("stop"))
-            async with gateway(mesh, tmp_path, port) as plant:
-                assert not plant.controller.HasField("stop")
-                assert plant.controller.link == STATE.UP
+                assert "the chain is broken at entry 2" in (await site.event("audit.damaged", 0)).text
+                assert await site.event("stop.remembered", 0)
+                await until(lambda: "STOP" in [each.request for each in site.seen["audit"]])
+                await site.lease(A.ACQUIRE, ttl_s=5)
+                assert UNKNOWN in await refusal(site.command(C.HOME))
+                await site.command(C.RESET, stop_id=stop.id)
+                await until(lambda: not site.controller.HasField("stop"))
+            async with gateway(mesh, tmp_path, port) as site:
+                assert not site.controller.HasField("stop")
+                assert site.controller.link == STATE.UP
 
     run(main())
 
@@ -214,12 +214,12 @@ def test_a_read_only_robot_shows_no_stop_that_nobody_could_reset_and_its_log_rem
 
     async def main():
         async with simulator() as port:
-            async with gateway(mesh, tmp_path, port, stop_proven=False) as plant:
-                await until(lambda: plant.events("audit.damaged"))
-                await until(lambda: plant.seen["audit"] and plant.seen["audit"][-1].request == "STOP")
-                assert not plant.controller.HasField("stop")
-            async with gateway(mesh, tmp_path, port) as plant:
-                assert plant.controller.stop.reason == UNKNOWN
+            async with gateway(mesh, tmp_path, port, stop_proven=False) as site:
+                await until(lambda: site.events("audit.damaged"))
+                await until(lambda: site.seen["audit"] and site.seen["audit"][-1].request == "STOP")
+                assert not site.controller.HasField("stop")
+            async with gateway(mesh, tmp_path, port) as site:
+                assert site.controller.stop.reason == UNKNOWN
 
     run(main())
 

@@ -19,7 +19,17 @@ from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
 from tests.conftest import run
-from tests.protocol_gateway.hall import STATE, A, C, Plant, gateway, refusal, simulator, until, watch
+from tests.protocol_gateway.gateway_site import (
+    STATE,
+    A,
+    C,
+    GatewaySite,
+    gateway,
+    refusal,
+    simulator,
+    until,
+    watch,
+)
 from tests.site import robomesh
 from tests.soak.audit_kills import Controller
 
@@ -40,15 +50,15 @@ async def robomesh_to(router, *arguments):
 def test_the_head_is_told_with_the_controllers_state_and_at_once_after_a_restart(mesh, tmp_path):
     async def main():
         async with simulator() as port:
-            async with gateway(mesh, tmp_path, port) as plant:
-                assert not plant.controller.HasField("audit_head")
-                await plant.lease(A.ACQUIRE)
-                await until(lambda: plant.controller.audit_head.number == 1)
-            number, last = [(e.number, e.hash) for e in read_entries(plant.audit)][-1]
-            async with gateway(mesh, tmp_path, port, up=False) as plant:
-                head = plant.seen["controller"][0].audit_head
+            async with gateway(mesh, tmp_path, port) as site:
+                assert not site.controller.HasField("audit_head")
+                await site.lease(A.ACQUIRE)
+                await until(lambda: site.controller.audit_head.number == 1)
+            number, last = [(e.number, e.hash) for e in read_entries(site.audit)][-1]
+            async with gateway(mesh, tmp_path, port, up=False) as site:
+                head = site.seen["controller"][0].audit_head
                 assert (head.number, head.hash.hex()) == (number, last)
-                assert verify(plant.audit, head=head.hash.hex()).ok
+                assert verify(site.audit, head=head.hash.hex()).ok
 
     run(main())
 
@@ -57,19 +67,19 @@ def test_a_flood_of_refusals_is_written_as_a_count_and_none_is_forgotten(mesh, t
     flood = 400
 
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             for _ in range(flood // 20):
-                await asyncio.gather(*(refusal(plant.command(C.HOME)) for _ in range(20)))
-            await plant.lease(A.ACQUIRE)
+                await asyncio.gather(*(refusal(site.command(C.HOME)) for _ in range(20)))
+            await site.lease(A.ACQUIRE)
             counted = await until(
-                lambda: [e for e in plant.seen["audit"] if e.repeated_count and e.request == "HOME"]
+                lambda: [e for e in site.seen["audit"] if e.repeated_count and e.request == "HOME"]
             )
-        told = [entry for entry in read_entries(plant.audit) if entry.request == "HOME"]
+        told = [entry for entry in read_entries(site.audit) if entry.request == "HOME"]
         assert sum(1 + entry.repeated for entry in told) == flood
         assert len(told) < 40
         (logged,) = [entry for entry in told if entry.number == counted[0].number]
         assert (logged.repeated, logged.text) == (counted[0].repeated_count, told[0].text)
-        assert verify(plant.audit).ok
+        assert verify(site.audit).ok
 
     run(main())
 
@@ -84,40 +94,40 @@ def test_of_a_flood_of_stops_of_many_the_last_is_the_one_that_a_restart_remember
         controller = Controller()
         async with await asyncio.start_server(controller.serve, "127.0.0.1", 0) as server:
             port = server.sockets[0].getsockname()[1]
-            async with gateway(mesh, tmp_path, port) as plant:
-                answers = await asyncio.gather(*[plant.stop(by=by(number)) for number in range(flood)])
+            async with gateway(mesh, tmp_path, port) as site:
+                answers = await asyncio.gather(*[site.stop(by=by(number)) for number in range(flood)])
                 assert {answer.text for answer in answers if not answer.sent} == set()
                 # Those within a tenth of a second share a unit, so they break no link.
                 await until(lambda: controller.stops)
                 assert controller.stops < flood
                 last = max(answer.stop_id for answer in answers)
                 assert last > flood // 2
-            told = [entry for entry in read_entries(plant.audit) if entry.request == "STOP"]
+            told = [entry for entry in read_entries(site.audit) if entry.request == "STOP"]
             assert sum(1 + entry.repeated for entry in told) == flood
             assert len(told) < 40
-            async with gateway(mesh, tmp_path, port) as plant:
-                assert plant.controller.stop.id == last
-                await plant.lease(A.ACQUIRE, ttl_s=5)
-                stops = [await plant.stop(by=by(number)) for number in range(20)]
-                await plant.command(C.RESET, stop_id=stops[-1].stop_id)
-            async with gateway(mesh, tmp_path, port) as plant:
+            async with gateway(mesh, tmp_path, port) as site:
+                assert site.controller.stop.id == last
+                await site.lease(A.ACQUIRE, ttl_s=5)
+                stops = [await site.stop(by=by(number)) for number in range(20)]
+                await site.command(C.RESET, stop_id=stops[-1].stop_id)
+            async with gateway(mesh, tmp_path, port) as site:
                 # What was counted was written before the RESET that cleared it.
-                assert not plant.controller.HasField("stop")
+                assert not site.controller.HasField("stop")
 
     run(main())
 
 
 def test_entries_are_found_over_the_mesh_by_who_what_and_when(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await refusal(plant.command(C.HOME, operator="wang"))
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            await plant.command(C.TRACE_ON)
-            await plant.stop(by="wang")
-            await until(lambda: len(plant.seen["audit"]) >= 4)
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await refusal(site.command(C.HOME, operator="wang"))
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            await site.command(C.TRACE_ON)
+            await site.stop(by="wang")
+            await until(lambda: len(site.seen["audit"]) >= 4)
 
             async def numbers(**query):
-                answer = await plant.session.ask(FIND, schema.AuditQuery(**query))
+                answer = await site.session.ask(FIND, schema.AuditQuery(**query))
                 return [entry.number for entry in answer.entries]
 
             assert await numbers() == [1, 2, 3, 4]
@@ -125,11 +135,11 @@ def test_entries_are_found_over_the_mesh_by_who_what_and_when(mesh, tmp_path):
             assert await numbers(operator="wang", outcome="REFUSED") == [1]
             assert await numbers(request="ACQUIRE") == [2]
             assert await numbers(most=2) == [3, 4]
-            second = plant.seen["audit"][1].timestamp
+            second = site.seen["audit"][1].timestamp
             assert await numbers(since=second, until=second) == [2]
-            (found,) = (await plant.session.ask(FIND, schema.AuditQuery(request="TRACE_ON"))).entries
-            assert found == plant.seen["audit"][2]
-            text = await refusal(plant.session.ask(FIND, schema.AuditQuery(most=20_000)))
+            (found,) = (await site.session.ask(FIND, schema.AuditQuery(request="TRACE_ON"))).entries
+            assert found == site.seen["audit"][2]
+            text = await refusal(site.session.ask(FIND, schema.AuditQuery(most=20_000)))
             assert "most = 20000: at most 10000" in text
 
     run(main())
@@ -139,14 +149,14 @@ def test_people_list_what_was_asked_of_one_robot_of_all_and_of_a_log_without_its
     mesh, router, tmp_path
 ):
     async def main():
-        async with simulator() as one, simulator() as two, gateway(mesh, tmp_path, one, two) as plant:
-            await refusal(plant.command(C.HOME))
-            await plant.session.ask("robomesh/hall/arm-2/stop", schema.StopRequest(by="wang", reason="dog"))
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            await until(lambda: len(plant.seen["audit"]) >= 2)
+        async with simulator() as one, simulator() as two, gateway(mesh, tmp_path, one, two) as site:
+            await refusal(site.command(C.HOME))
+            await site.session.ask("robomesh/hall/arm-2/stop", schema.StopRequest(by="wang", reason="dog"))
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            await until(lambda: len(site.seen["audit"]) >= 2)
             # What attaches to the mesh finds robots by who is present for them.
             for robot in ("arm", "arm-2"):
-                plant.session.declare_presence("hall", robot, "gateway")
+                site.session.declare_presence("hall", robot, "gateway")
             lines = await robomesh_to(router, "audit", "list", "arm", "--outcome", "refused")
             assert len(lines) == 1
             assert "li            HOME           REFUSED   Not sent: nobody is in control" in lines[0]
@@ -158,11 +168,11 @@ def test_people_list_what_was_asked_of_one_robot_of_all_and_of_a_log_without_its
             ]
             assert rows[1]["values"] == {"stop_id": "1", "reason": "dog"}
             # A robot whose gateway is gone hides no other.
-            plant.session.declare_presence("hall", "arm-3", "kinematics")
+            site.session.declare_presence("hall", "arm-3", "kinematics")
             done = await asyncio.to_thread(robomesh, "audit", "list", "--connect", router)
             assert "hall/arm-3: no gateway answers" in done.stderr
             assert len(done.stdout.splitlines()) >= 3
-        done = await asyncio.to_thread(robomesh, "audit", "list", str(plant.audit), "--since", "10m")
+        done = await asyncio.to_thread(robomesh, "audit", "list", str(site.audit), "--since", "10m")
         assert [line.split()[4] for line in done.stdout.splitlines()][:2] == ["HOME", "ACQUIRE"]
 
     run(main())
@@ -170,15 +180,15 @@ def test_people_list_what_was_asked_of_one_robot_of_all_and_of_a_log_without_its
 
 def test_people_read_degrees_and_millimetres_and_how_often_and_programs_si(mesh, router, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await refusal(plant.command(C.MOVE_ABSOLUTE, joint_positions=POSITIONS))
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=POSITIONS))
             for _ in range(20):
-                await refusal(plant.command(C.HOME))
-            await until(lambda: [e for e in plant.seen["audit"] if e.repeated_count])
-            plant.session.declare_presence("hall", "arm", "gateway")
+                await refusal(site.command(C.HOME))
+            await until(lambda: [e for e in site.seen["audit"] if e.repeated_count])
+            site.session.declare_presence("hall", "arm", "gateway")
             (line,) = await robomesh_to(router, "audit", "list", "arm", "--request", "move_absolute")
             assert f"joint_positions={SI} [rad, m]" in line
-            publisher = plant.session.declare_publisher("hall", "arm", "description")
+            publisher = site.session.declare_publisher("hall", "arm", "description")
             publisher.put(JOINTS)
             (line,) = await robomesh_to(router, "audit", "list", "arm", "--request", "move_absolute")
             assert "joint_positions=180.00° 250.00mm" in line
@@ -186,7 +196,7 @@ def test_people_read_degrees_and_millimetres_and_how_often_and_programs_si(mesh,
             (row,) = await robomesh_to(router, *arguments)
             assert json.loads(row)["values"]["joint_positions"] == SI
             lines = await robomesh_to(router, "audit", "list", "arm", "--request", "home")
-            counted = next(e for e in plant.seen["audit"] if e.repeated_count)
+            counted = next(e for e in site.seen["audit"] if e.repeated_count)
             assert f"REFUSED   x {counted.repeated_count}  {counted.text}" in "\n".join(lines)
 
     run(main())
@@ -231,13 +241,13 @@ async def gateway_process(mesh, folder, port, *, wrapped=()):
     command = ("-m", "services.command_line.main", "gateway", "--site", site, "--connect", *mesh.connect)
     process = await asyncio.create_subprocess_exec(*wrapped, sys.executable, *map(str, command))
     async with open_session(mesh) as monitor:
-        plant = Plant(monitor, folder / "audit" / "hall" / "arm.jsonl")
+        site = GatewaySite(monitor, folder / "audit" / "hall" / "arm.jsonl")
         topics = ("joints", "controller", "lease", "events")
-        watching = [asyncio.create_task(watch(monitor, plant, topic)) for topic in topics]
+        watching = [asyncio.create_task(watch(monitor, site, topic)) for topic in topics]
         try:
-            await until(lambda: plant.seen.get("controller"), timeout_s=30.0)
-            await until(lambda: plant.controller.link == STATE.UP)
-            yield plant, process.pid
+            await until(lambda: site.seen.get("controller"), timeout_s=30.0)
+            await until(lambda: site.controller.link == STATE.UP)
+            yield site, process.pid
         finally:
             process.terminate()
             await process.wait()
@@ -266,25 +276,25 @@ def filled(pid, log):
     filler.unlink()
 
 
-async def on_a_full_disk(plant, log, full, words):
-    await plant.home()
+async def on_a_full_disk(site, log, full, words):
+    await site.home()
     with full:
         # What is left of the log's last page is still to be had.
         with contextlib.suppress(RefusedError):
             for _ in range(40):
-                await plant.lease(A.RENEW, ttl_s=5)
-                await plant.command(C.TRACE_ON)
-        text = await refusal(plant.command(C.HOME))
+                await site.lease(A.RENEW, ttl_s=5)
+                await site.command(C.TRACE_ON)
+        text = await refusal(site.command(C.HOME))
         assert f"{words}: make space on its disk), and what is not written down is not done" in text
-        stop = await plant.stop(by="wang")
+        stop = await site.stop(by="wang")
         assert stop.sent
-        await until(lambda: plant.controller.activity == STATE.STOPPED)
-        await until(lambda: plant.events("audit.failed"))
+        await until(lambda: site.controller.activity == STATE.STOPPED)
+        await until(lambda: site.events("audit.failed"))
         assert "STOP" not in [entry.request for entry in read_entries(log)]
-    await until(lambda: plant.events("audit.mended"))
+    await until(lambda: site.events("audit.mended"))
     assert "STOP" in [entry.request for entry in read_entries(log)]
-    await plant.lease(A.RENEW, ttl_s=5)
-    await plant.command(C.RESET, stop_id=stop.stop_id)
+    await site.lease(A.RENEW, ttl_s=5)
+    await site.command(C.RESET, stop_id=stop.stop_id)
     assert verify(log).ok
 
 
@@ -292,9 +302,9 @@ def test_when_its_file_cannot_grow_stop_works_and_motion_is_refused_in_words(mes
     async def main():
         async with (
             simulator() as port,
-            gateway_process(mesh, tmp_path, port) as (plant, pid),
+            gateway_process(mesh, tmp_path, port) as (site, pid),
         ):
-            await on_a_full_disk(plant, plant.audit, limited(pid, plant.audit), "File too large")
+            await on_a_full_disk(site, site.audit, limited(pid, site.audit), "File too large")
 
     run(main(), timeout_s=60.0)
 
@@ -309,18 +319,18 @@ def test_on_a_disk_that_is_really_full_stop_works_and_motion_is_refused_in_words
     async def main():
         async with (
             simulator() as port,
-            gateway_process(mesh, tmp_path, port, wrapped=wrapped) as (plant, pid),
+            gateway_process(mesh, tmp_path, port, wrapped=wrapped) as (site, pid),
         ):
-            log = Path(f"/proc/{pid}/root") / plant.audit.relative_to("/")
-            await on_a_full_disk(plant, log, filled(pid, log), "No space left on device")
+            log = Path(f"/proc/{pid}/root") / site.audit.relative_to("/")
+            await on_a_full_disk(site, log, filled(pid, log), "No space left on device")
 
     run(main(), timeout_s=60.0)
 
 
 def test_a_disk_that_hangs_delays_no_stop_and_what_it_took_then_is_told(mesh, tmp_path, monkeypatch):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await plant.home()
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.home()
             answers_again, fsync = threading.Event(), os.fsync
 
             def hang(file):
@@ -331,20 +341,20 @@ def test_a_disk_that_hangs_delays_no_stop_and_what_it_took_then_is_told(mesh, tm
                 with monkeypatch.context() as patched:
                     patched.setattr(os, "fsync", hang)
                     late = "the audit log's disk takes longer than 1 s"
-                    assert late in await refusal(plant.command(C.TRACE_ON))
-                    assert (await plant.stop(by="wang")).sent
-                    await until(lambda: plant.controller.activity == STATE.STOPPED)
-                    assert late in await refusal(plant.command(C.TRACE_OFF))
+                    assert late in await refusal(site.command(C.TRACE_ON))
+                    assert (await site.stop(by="wang")).sent
+                    await until(lambda: site.controller.activity == STATE.STOPPED)
+                    assert late in await refusal(site.command(C.TRACE_OFF))
             finally:
                 answers_again.set()
-            await until(lambda: plant.events("audit.mended"))
-        told = [(entry.request, entry.outcome) for entry in read_entries(plant.audit)]
+            await until(lambda: site.events("audit.mended"))
+        told = [(entry.request, entry.outcome) for entry in read_entries(site.audit)]
         assert told[2:6] == [
             ("TRACE_ON", "ACCEPTED"),
             ("TRACE_ON", "FAILED"),
             ("STOP", "ACCEPTED"),
             ("TRACE_OFF", "REFUSED"),
         ]
-        assert verify(plant.audit).ok
+        assert verify(site.audit).ok
 
     run(main())

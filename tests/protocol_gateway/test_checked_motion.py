@@ -18,7 +18,7 @@ from robots.schema import Pose, Units
 from services.site_file import fixtures
 from services.watch.rules import RULES
 from tests.conftest import run
-from tests.protocol_gateway.hall import STATE, A, C, gateway, kept_control, refusal, simulator, until
+from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, kept_control, refusal, simulator, until
 from tests.robots.boxes import bar_arm
 
 # Beside the arm, which at home reaches out along x: waist at +90 degrees is in it.
@@ -46,59 +46,59 @@ TWO = CellDescription(
 )
 
 
-async def checked(plant):
+async def checked(site):
     """Wait until motions can be checked, and be homed."""
-    await until(lambda: not plant.controller.check_text, timeout_s=60)
-    await plant.home()
+    await until(lambda: not site.controller.check_text, timeout_s=60)
+    await site.home()
 
 
 @contextlib.asynccontextmanager
 async def all_checked(arm):
     """The arm and the others of its hall, homed one after the other, and each under control to the end."""
     async with contextlib.AsyncExitStack() as stack:
-        for plant in (arm, *arm.others):
-            await checked(plant)
-            await stack.enter_async_context(kept_control(plant))
+        for site in (arm, *arm.others):
+            await checked(site)
+            await stack.enter_async_context(kept_control(site))
         yield arm, *arm.others
 
 
-async def move(plant, target):
+async def move(site, target):
     """Asked again while this machine is too busy to check it in time, as anybody would."""
     async with asyncio.timeout(60):
         while True:
             try:
-                return await plant.command(C.MOVE_ABSOLUTE, joint_positions=target)
+                return await site.command(C.MOVE_ABSOLUTE, joint_positions=target)
             except RefusedError as error:
                 if "took longer" not in str(error) and "waited" not in str(error):
                     raise
-            await plant.lease(A.RENEW, ttl_s=5)
+            await site.lease(A.RENEW, ttl_s=5)
 
 
-async def standing(plant, target):
-    await until(lambda: np.allclose(plant.joints, target, atol=1e-3), timeout_s=20)
-    await until(lambda: plant.controller.activity == STATE.IDLE)
+async def standing(site, target):
+    await until(lambda: np.allclose(site.joints, target, atol=1e-3), timeout_s=20)
+    await until(lambda: site.controller.activity == STATE.IDLE)
 
 
 def test_required_what_collides_is_refused_and_the_arm_has_not_moved(mesh, tmp_path):
     async def main():
         async with (
             simulator() as port,
-            gateway(mesh, tmp_path, port, check="require", cell=alone(POST)) as plant,
+            gateway(mesh, tmp_path, port, check="require", cell=alone(POST)) as site,
         ):
-            assert plant.controller.check == STATE.REQUIRE
-            await checked(plant)
-            before, units = list(plant.joints), plant.controller.counters.units_sent
-            text = await refusal(move(plant, INTO_POST))
+            assert site.controller.check == STATE.REQUIRE
+            await checked(site)
+            before, units = list(site.joints), site.controller.counters.units_sent
+            text = await refusal(move(site, INTO_POST))
             assert "post" in text
             assert "arm/" in text
             entry = await until(
-                lambda: next((each for each in plant.seen["audit"] if "post" in each.text), None)
+                lambda: next((each for each in site.seen["audit"] if "post" in each.text), None)
             )
             assert (entry.request, entry.outcome) == ("MOVE_ABSOLUTE", schema.AuditEntry.REFUSED)
-            await move(plant, AWAY)
-            await until(lambda: plant.joints[0] < before[0] - 0.1)
-            assert plant.controller.counters.units_sent <= units + 1
-            text = await refusal(move(plant, [0, 0, 0, 0, 0]))
+            await move(site, AWAY)
+            await until(lambda: site.joints[0] < before[0] - 0.1)
+            assert site.controller.counters.units_sent <= units + 1
+            text = await refusal(move(site, [0, 0, 0, 0, 0]))
             assert "wait until it stands" in text
 
     run(main(), timeout_s=90)
@@ -106,11 +106,11 @@ def test_required_what_collides_is_refused_and_the_arm_has_not_moved(mesh, tmp_p
 
 def test_required_a_motion_below_the_floor_is_refused(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port, check="require", cell=alone()) as plant:
-            await checked(plant)
-            text = await refusal(move(plant, [0, 0, radians(-60), 0, 0]))
+        async with simulator() as port, gateway(mesh, tmp_path, port, check="require", cell=alone()) as site:
+            await checked(site)
+            text = await refusal(move(site, [0, 0, radians(-60), 0, 0]))
             assert "mm below the floor" in text
-            await move(plant, AWAY)
+            await move(site, AWAY)
 
     run(main(), timeout_s=120)
 
@@ -119,17 +119,17 @@ def test_warned_what_collides_is_made_and_said(mesh, tmp_path):
     async def main():
         async with (
             simulator() as port,
-            gateway(mesh, tmp_path, port, check="warn", cell=alone(POST)) as plant,
+            gateway(mesh, tmp_path, port, check="warn", cell=alone(POST)) as site,
         ):
-            assert plant.controller.check == STATE.WARN
-            await checked(plant)
-            answer = await move(plant, INTO_POST)
+            assert site.controller.check == STATE.WARN
+            await checked(site)
+            answer = await move(site, INTO_POST)
             assert answer.accepted
             assert "post" in answer.text
-            event = (await until(lambda: plant.events("check.failed")))[0]
+            event = (await until(lambda: site.events("check.failed")))[0]
             assert event.severity == schema.Event.WARNING
             assert "post" in event.text
-            await until(lambda: plant.joints[0] > 0.1)
+            await until(lambda: site.joints[0] > 0.1)
 
     run(main(), timeout_s=90)
 
@@ -138,18 +138,18 @@ def test_required_while_nothing_can_check_nothing_moves_and_a_killed_worker_come
     async def main():
         async with (
             simulator() as port,
-            gateway(mesh, tmp_path, port, check="require", cell=alone(POST)) as plant,
+            gateway(mesh, tmp_path, port, check="require", cell=alone(POST)) as site,
         ):
-            await checked(plant)
+            await checked(site)
             os.kill(worker_of(os.getpid()), signal.SIGKILL)
-            text = await refusal(move(plant, AWAY))
+            text = await refusal(move(site, AWAY))
             assert 'check = "require"' in text
-            assert plant.controller.counters.units_sent == 1
+            assert site.controller.counters.units_sent == 1
             async with asyncio.timeout(60):
-                while plant.joints[0] > -0.1:
-                    await plant.lease(A.RENEW, ttl_s=5)
+                while site.joints[0] > -0.1:
+                    await site.lease(A.RENEW, ttl_s=5)
                     with contextlib.suppress(RefusedError):
-                        await move(plant, AWAY)
+                        await move(site, AWAY)
                     await asyncio.sleep(0.1)
 
     run(main(), timeout_s=120)
@@ -173,11 +173,11 @@ def test_required_a_robot_without_shapes_is_not_moved(mesh, tmp_path):
         bare = CellDescription((CellRobot("arm", urdf, np.eye(4)),))
         async with (
             simulator(robot=str(urdf)) as port,
-            gateway(mesh, tmp_path, port, check="require", cell=bare, description=str(urdf)) as plant,
+            gateway(mesh, tmp_path, port, check="require", cell=bare, description=str(urdf)) as site,
         ):
-            await until(lambda: "no link a shape" in plant.controller.check_text, timeout_s=60)
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            assert "no link a shape" in await refusal(plant.command(C.HOME))
+            await until(lambda: "no link a shape" in site.controller.check_text, timeout_s=60)
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            assert "no link a shape" in await refusal(site.command(C.HOME))
 
     run(main(), timeout_s=90)
 
@@ -189,11 +189,11 @@ def test_required_a_moving_link_without_a_shape_keeps_the_arm_where_it_is(mesh, 
         half = CellDescription((CellRobot("arm", model, np.eye(4)),))
         async with (
             simulator(robot=str(model)) as port,
-            gateway(mesh, tmp_path, port, check="require", cell=half, description=str(model)) as plant,
+            gateway(mesh, tmp_path, port, check="require", cell=half, description=str(model)) as site,
         ):
-            await until(lambda: not plant.controller.check_text, timeout_s=60)
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            text = await refusal(plant.command(C.HOME))
+            await until(lambda: not site.controller.check_text, timeout_s=60)
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            text = await refusal(site.command(C.HOME))
             assert "cannot be checked" in text
             assert "elbow moves and has no shape" in text
 
@@ -208,15 +208,15 @@ def test_a_motion_that_was_not_checked_is_not_said_to_pass_near_something(mesh, 
         bare = CellDescription((CellRobot("arm", urdf, np.eye(4)),))
         async with (
             simulator(robot=str(urdf)) as port,
-            gateway(mesh, tmp_path, port, check="warn", cell=bare, description=str(urdf)) as plant,
+            gateway(mesh, tmp_path, port, check="warn", cell=bare, description=str(urdf)) as site,
         ):
             # Also at once, while the check is getting ready.
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            await plant.command(C.HOME)
-            event = (await until(lambda: plant.events("check.skipped")))[0]
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            await site.command(C.HOME)
+            event = (await until(lambda: site.events("check.skipped")))[0]
             assert event.text.startswith("HOME: not checked: ")
             assert "unchecked" in RULES[event.code].advice
-            assert not plant.events("check.warning")
+            assert not site.events("check.warning")
 
     run(main(), timeout_s=90)
 
@@ -231,8 +231,8 @@ def test_robots_of_a_cell_are_checked_where_they_are_and_where_they_have_been_to
         async with (
             simulator() as port,
             simulator() as other_port,
-            gateway(mesh, tmp_path, port, other_port, check="require", each=[{"cell": TWO}] * 2) as hall,
-            all_checked(hall) as (arm, other),
+            gateway(mesh, tmp_path, port, other_port, check="require", each=[{"cell": TWO}] * 2) as cell_site,
+            all_checked(cell_site) as (arm, other),
         ):
             await move(arm, OUT)
             # While it goes there, and when it is there, the other may not swing through it.
@@ -261,11 +261,11 @@ def test_required_a_cell_mate_that_nobody_hears_of_keeps_an_arm_where_it_is(mesh
     async def main():
         async with (
             simulator() as port,
-            gateway(mesh, tmp_path, port, check="require", cell=TWO) as plant,
+            gateway(mesh, tmp_path, port, check="require", cell=TWO) as site,
         ):
-            await until(lambda: not plant.controller.check_text, timeout_s=60)
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            text = await refusal(plant.command(C.HOME))
+            await until(lambda: not site.controller.check_text, timeout_s=60)
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            text = await refusal(site.command(C.HOME))
             assert "where arm-2 is or goes (this gateway does not serve it)" in text
 
     run(main(), timeout_s=90)

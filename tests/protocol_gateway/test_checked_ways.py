@@ -16,8 +16,8 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robots.description import load
 from robots.joints import joints_of
 from tests.conftest import run
-from tests.protocol_gateway.hall import A, C, gateway, simulator, until
-from tests.protocol_gateway.place import place
+from tests.protocol_gateway.control_bench import control_bench
+from tests.protocol_gateway.gateway_site import A, C, gateway, simulator, until
 from tests.protocol_gateway.test_checked_motion import OUT, TWO, all_checked, move, standing
 from tests.protocol_gateway.test_program_runs import RUN, ended, start, states
 
@@ -26,9 +26,9 @@ READY = StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=True)
 HERE, FAR, NEAR = (0.0,) * 5, (1.0, 0.0, 0.0, 0.0, 0.0), (0.1, 0.0, 0.0, 0.0, 0.0)
 
 
-def occupied_path(it):
-    """As the cell's other robots get it."""
-    context = it.control._context
+def occupied_path(bench):
+    """As the cell's other robots get bench."""
+    context = bench.control._context
     cell_occupancy = CellOccupancy()
     Checks(
         "arm",
@@ -52,11 +52,11 @@ def occupied_path(it):
 )
 def test_of_a_unit_of_two_motions_the_others_are_kept_out_of_both(tmp_path, second, path):
     async def main():
-        async with place(tmp_path) as it:
-            await it.lease(A.ACQUIRE)
-            it.status = READY
-            await it.commands((C.MOVE_ABSOLUTE, {"joint_positions": FAR}), second)
-            told = occupied_path(it)
+        async with control_bench(tmp_path) as bench:
+            await bench.lease(A.ACQUIRE)
+            bench.status = READY
+            await bench.commands((C.MOVE_ABSOLUTE, {"joint_positions": FAR}), second)
+            told = occupied_path(bench)
             assert [tuple(round(value, 9) for value in each) for each in told] == list(path)
 
     run(main())
@@ -64,14 +64,14 @@ def test_of_a_unit_of_two_motions_the_others_are_kept_out_of_both(tmp_path, seco
 
 def test_resume_and_another_motion_are_two_units(tmp_path):
     async def main():
-        async with place(tmp_path) as it:
-            await it.lease(A.ACQUIRE)
-            it.status = READY
-            await it.commands((C.MOVE_ABSOLUTE, {"joint_positions": FAR}))
-            it.status = replace(READY, activity=Activity.HOLDING)
+        async with control_bench(tmp_path) as bench:
+            await bench.lease(A.ACQUIRE)
+            bench.status = READY
+            await bench.commands((C.MOVE_ABSOLUTE, {"joint_positions": FAR}))
+            bench.status = replace(READY, activity=Activity.HOLDING)
             with pytest.raises(RefusedError, match="two units"):
-                await it.commands((C.RESUME, {}), (C.MOVE_ABSOLUTE, {"joint_positions": NEAR}), first_id=2)
-            assert len(it.socket) == 1
+                await bench.commands((C.RESUME, {}), (C.MOVE_ABSOLUTE, {"joint_positions": NEAR}), first_id=2)
+            assert len(bench.socket) == 1
 
     run(main())
 
@@ -82,8 +82,8 @@ def test_who_is_not_checked_himself_still_meets_nobody_who_is(mesh, tmp_path):
         async with (
             simulator() as port,
             simulator() as other_port,
-            gateway(mesh, tmp_path, port, other_port, each=policies) as hall,
-            all_checked(hall) as (arm, other),
+            gateway(mesh, tmp_path, port, other_port, each=policies) as cell_site,
+            all_checked(cell_site) as (arm, other),
         ):
             await move(arm, [radians(-90), 0, 0, 0, 0])
             await standing(arm, [radians(-90), 0, 0, 0, 0])
@@ -103,19 +103,19 @@ def test_who_is_not_checked_himself_still_meets_nobody_who_is(mesh, tmp_path):
 
 def test_a_stop_that_is_reset_at_once_ends_a_program_that_waits(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await plant.home()
-            await start(plant, "wait 2\nmove_joints -60 90 -90 0 0\n")
-            await until(lambda: states(plant)[-1].outcome == RUN.RUNNING)
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.home()
+            await start(site, "wait 2\nmove_joints -60 90 -90 0 0\n")
+            await until(lambda: states(site)[-1].outcome == RUN.RUNNING)
             for _ in range(3):
-                stop = await plant.stop(by="wang")
-                plant.id += 1
+                stop = await site.stop(by="wang")
+                site.id += 1
                 request = schema.CommandRequest(
-                    command=C.RESET, lease=plant.secret, id=plant.id, stop_id=stop.stop_id
+                    command=C.RESET, lease=site.secret, id=site.id, stop_id=stop.stop_id
                 )
                 # No sooner than the answer to the stop: within one look of the program's.
-                await plant.session.ask(plant.key("command/li"), request)
-            state = await ended(plant, RUN.ENDED)
+                await site.session.ask(site.key("command/li"), request)
+            state = await ended(site, RUN.ENDED)
             assert state.text.startswith("stopped")
 
     run(main(), timeout_s=60)
@@ -123,12 +123,12 @@ def test_a_stop_that_is_reset_at_once_ends_a_program_that_waits(mesh, tmp_path):
 
 def test_a_program_is_planned_from_where_the_robot_stands_whatever_the_policy(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await plant.home()
-            await plant.command(C.SPEED, speed_percent=5)
-            await plant.command(C.MOVE_ABSOLUTE, joint_positions=[radians(-60), 1.57, -1.57, 0, 0])
-            await until(lambda: plant.joints[0] < -0.02)
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.home()
+            await site.command(C.SPEED, speed_percent=5)
+            await site.command(C.MOVE_ABSOLUTE, joint_positions=[radians(-60), 1.57, -1.57, 0, 0])
+            await until(lambda: site.joints[0] < -0.02)
             with pytest.raises(RefusedError, match="wait until it stands"):
-                await start(plant, "move_joints -20 90 -90 0 0\n")
+                await start(site, "move_joints -20 90 -90 0 0\n")
 
     run(main(), timeout_s=60)

@@ -14,8 +14,8 @@ from robomesh.session import SessionSettings
 from services.simulator.errors import SimulatorError
 from services.simulator.fault_requests import Mesh
 from tests.conftest import run
-from tests.protocol_gateway.faulty import faulty
-from tests.protocol_gateway.hall import STATE, gateway, refusal, simulator, until
+from tests.protocol_gateway.faulty_site import faulty_site
+from tests.protocol_gateway.gateway_site import STATE, gateway, refusal, simulator, until
 
 HOUSE = Path(__file__).resolve().parents[2]
 
@@ -24,72 +24,72 @@ def test_of_a_frozen_controller_old_states_are_silent_within_a_second_then_it_is
     mesh, tmp_path
 ):
     async def main():
-        async with faulty(mesh, tmp_path) as (plant, fault):
+        async with faulty_site(mesh, tmp_path) as (site, fault):
             await fault("freeze")
             begin_s = time.monotonic()
-            await until(lambda: plant.controller.link == STATE.SILENT)
+            await until(lambda: site.controller.link == STATE.SILENT)
             # 1 s after the last unit, and what a busy machine adds.
             assert time.monotonic() - begin_s < 1.0 + 1.5
-            assert "sends nothing" in (await plant.event("link.silent", -1)).text
-            joints = len(plant.seen["joints"])
-            await until(lambda: plant.controller.link == STATE.DOWN)
-            assert "sends nothing; connecting again" in (await plant.event("link.down", -1)).text
-            assert len(plant.seen["joints"]) == joints
+            assert "sends nothing" in (await site.event("link.silent", -1)).text
+            joints = len(site.seen["joints"])
+            await until(lambda: site.controller.link == STATE.DOWN)
+            assert "sends nothing; connecting again" in (await site.event("link.down", -1)).text
+            assert len(site.seen["joints"]) == joints
             await fault("freeze", off=True)
-            await until(lambda: plant.controller.link == STATE.UP, timeout_s=40.0)
+            await until(lambda: site.controller.link == STATE.UP, timeout_s=40.0)
 
     run(main())
 
 
 def test_a_controller_that_drops_its_connections_is_connected_to_again_and_again(mesh, tmp_path):
     async def main():
-        async with faulty(mesh, tmp_path) as (plant, fault):
+        async with faulty_site(mesh, tmp_path) as (site, fault):
             await fault("drop")
-            await until(lambda: plant.controller.counters.connections >= 3, timeout_s=40.0)
-            assert "the controller closed the connection" in (await plant.event("link.down", -1)).text
+            await until(lambda: site.controller.counters.connections >= 3, timeout_s=40.0)
+            assert "the controller closed the connection" in (await site.event("link.down", -1)).text
             await fault("drop", off=True)
-            await until(lambda: plant.controller.link == STATE.UP, timeout_s=40.0)
-            before = len(plant.seen["joints"])
-            await until(lambda: len(plant.seen["joints"]) > before + 20)
+            await until(lambda: site.controller.link == STATE.UP, timeout_s=40.0)
+            before = len(site.seen["joints"])
+            await until(lambda: len(site.seen["joints"]) > before + 20)
 
     run(main())
 
 
 def test_a_controller_that_restarts_comes_back_and_is_not_taken_for_homed(mesh, tmp_path):
     async def main():
-        async with faulty(mesh, tmp_path) as (plant, fault):
-            assert plant.controller.homed == STATE.YES
+        async with faulty_site(mesh, tmp_path) as (site, fault):
+            assert site.controller.homed == STATE.YES
             await fault("restart")
-            await until(lambda: plant.events("link.down"))
-            await until(lambda: plant.controller.link == STATE.UP and plant.controller.homed == STATE.NO)
-            assert plant.controller.controller_time_s < 10.0
+            await until(lambda: site.events("link.down"))
+            await until(lambda: site.controller.link == STATE.UP and site.controller.homed == STATE.NO)
+            assert site.controller.controller_time_s < 10.0
 
     run(main())
 
 
 def test_a_controller_that_lets_nobody_in_is_told_in_its_own_words(mesh, tmp_path):
     async def main():
-        async with faulty(mesh, tmp_path) as (plant, fault):
+        async with faulty_site(mesh, tmp_path) as (site, fault):
             await fault("refuse")
-            await until(lambda: "refused the connection: too many clients" in plant.controller.link_text)
-            assert plant.controller.link == STATE.DOWN
-            await until(lambda: plant.events("link.down"))
+            await until(lambda: "refused the connection: too many clients" in site.controller.link_text)
+            assert site.controller.link == STATE.DOWN
+            await until(lambda: site.events("link.down"))
             await fault("refuse", off=True)
-            await until(lambda: plant.controller.link == STATE.UP, timeout_s=40.0)
+            await until(lambda: site.controller.link == STATE.UP, timeout_s=40.0)
 
     run(main())
 
 
 def test_a_fault_that_there_is_not_is_refused_in_words_and_what_there_is_is_told(mesh, tmp_path):
     async def main():
-        async with faulty(mesh, tmp_path) as (plant, fault):
+        async with faulty_site(mesh, tmp_path) as (site, fault):
             assert "'melt' is unknown; there are freeze, " in await refusal(fault("melt"))
             assert "both in seconds" in await refusal(fault("freeze@-1"))
             answer = await fault("split+60")
             assert list(answer.active) == ["split"]
             assert {"freeze", "garbage", "flood", "jump", "local"} < set(answer.known)
             assert list((await fault("split", off=True)).active) == []
-            assert plant.controller.link == STATE.UP
+            assert site.controller.link == STATE.UP
 
     run(main())
 
@@ -98,8 +98,8 @@ def test_without_a_router_a_simulator_serves_all_the_same(mesh, tmp_path):
     async def main():
         nowhere = SessionSettings(connect=("tcp/127.0.0.1:9",))
         own = Mesh(site="hall", robot="arm", session=nowhere)
-        async with simulator(mesh=own) as port, gateway(mesh, tmp_path, port) as plant:
-            assert plant.controller.link == STATE.UP
+        async with simulator(mesh=own) as port, gateway(mesh, tmp_path, port) as site:
+            assert site.controller.link == STATE.UP
 
     run(main())
 
@@ -164,21 +164,21 @@ def test_of_a_host_that_vanished_without_a_word_the_link_is_down_in_seconds_and_
         with another_host() as (name, cable):
             async with (
                 simulator_there(name),
-                gateway(mesh, tmp_path, 5400, host="10.219.77.2") as plant,
+                gateway(mesh, tmp_path, 5400, host="10.219.77.2") as site,
             ):
                 ip("-n", name, "link", "set", cable, "down")
-                await until(lambda: plant.controller.link == STATE.SILENT)
-                joints = len(plant.seen["joints"])
-                await until(lambda: plant.controller.link == STATE.DOWN)
-                await until(lambda: plant.events("link.down"))
+                await until(lambda: site.controller.link == STATE.SILENT)
+                joints = len(site.seen["joints"])
+                await until(lambda: site.controller.link == STATE.DOWN)
+                await until(lambda: site.events("link.down"))
                 await until(
                     lambda: (
-                        "cannot connect" in plant.controller.link_text
-                        or "does not answer" in plant.controller.link_text
+                        "cannot connect" in site.controller.link_text
+                        or "does not answer" in site.controller.link_text
                     )
                 )
-                assert len(plant.seen["joints"]) == joints
+                assert len(site.seen["joints"]) == joints
                 ip("-n", name, "link", "set", cable, "up")
-                await until(lambda: plant.controller.link == STATE.UP, timeout_s=20.0)
+                await until(lambda: site.controller.link == STATE.UP, timeout_s=20.0)
 
     run(main(), timeout_s=60.0)

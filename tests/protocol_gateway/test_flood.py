@@ -12,18 +12,18 @@ from protocol_gateway.link.flood import EventDispatcher, FloodDetector
 from protocol_gateway.link.timestamping import Received
 from robomesh.keys import robot_key
 from tests.conftest import run
-from tests.protocol_gateway.bare import bare_controller, repeated
-from tests.protocol_gateway.hall import STATE, A, C, gateway, none_left_out, refusal, simulator, until
-from tests.protocol_gateway.old_program import legacy, program
+from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, none_left_out, refusal, simulator, until
+from tests.protocol_gateway.old_client import legacy, program
+from tests.protocol_gateway.scripted_controller import repeated, scripted_controller
 
 
 def flooded(rate_hz, seconds, flood=None, begin_s=10.0):
-    it = flood or FloodDetector()
+    detector = flood or FloodDetector()
     for number in range(int(rate_hz * seconds)):
-        it.add_bytes(100, begin_s + number / rate_hz, more_waits=False)
-        assert not it.deluge
-        it.add_units(1)
-    return it
+        detector.add_bytes(100, begin_s + number / rate_hz, more_waits=False)
+        assert not detector.deluge
+        detector.add_units(1)
+    return detector
 
 
 def test_a_thousand_units_a_second_are_no_flood_and_three_thousand_are():
@@ -32,17 +32,17 @@ def test_a_thousand_units_a_second_are_no_flood_and_three_thousand_are():
 
 
 def test_a_flood_is_over_after_half_a_second_of_calm_and_not_before():
-    it = flooded(3000, 1)
-    assert flooded(100, 0.4, it, 11.0).active
-    assert not flooded(100, 1.2, it, 11.4).active
+    detector = flooded(3000, 1)
+    assert flooded(100, 0.4, detector, 11.0).active
+    assert not flooded(100, 1.2, detector, 11.4).active
 
 
 def test_more_than_a_mebibyte_in_half_a_second_is_a_deluge_until_half_a_second_is_calm():
-    it = FloodDetector()
+    detector = FloodDetector()
 
     def deluge(length, now_s, *, more_waits=False):
-        it.add_bytes(length, now_s, more_waits=more_waits)
-        return it.deluge
+        detector.add_bytes(length, now_s, more_waits=more_waits)
+        return detector.deluge
 
     assert not deluge(1 << 20, 10.0)
     assert deluge(1, 10.4)
@@ -50,18 +50,18 @@ def test_more_than_a_mebibyte_in_half_a_second_is_a_deluge_until_half_a_second_i
     assert deluge(1, 11.0)
     assert deluge(1, 11.2, more_waits=True)  # few bytes, but more of them wait
     assert deluge(1, 11.7)
-    assert it.active
+    assert detector.active
     assert not deluge(1, 12.3)
-    assert not it.active
+    assert not detector.active
 
 
 def test_units_so_many_that_others_would_wait_for_their_reading_are_a_deluge_too():
-    it = FloodDetector()
-    it.add_bytes(10_000, 10.0, more_waits=False)
-    it.add_units(10_000)
-    assert not it.deluge
-    it.add_units(1)
-    assert it.deluge
+    detector = FloodDetector()
+    detector.add_bytes(10_000, 10.0, more_waits=False)
+    detector.add_units(10_000)
+    assert not detector.deluge
+    detector.add_units(1)
+    assert detector.deluge
 
 
 class Timers:
@@ -81,13 +81,13 @@ class Timers:
 def handed_over(*reads, burst):
     """What is handed over of the events of reads, before and after a time without more."""
     seen, timers, now = [], Timers(), Received(1.0, 10**9)
-    it = EventDispatcher(lambda event, date: seen.append(event), timers.later)
+    dispatcher = EventDispatcher(lambda event, date: seen.append(event), timers.later)
     for events in reads:
-        it.dispatch(events, [now] * len(events), burst=burst)
+        dispatcher.dispatch(events, [now] * len(events), burst=burst)
     before = list(seen)
     (call,) = timers.calls or [lambda: None]
     call()
-    return before, seen[len(before) :], it.skipped
+    return before, seen[len(before) :], dispatcher.skipped
 
 
 def joints(number):
@@ -144,24 +144,24 @@ def test_a_status_told_once_in_the_midst_of_a_flood_is_heeded_and_reaches_old_cl
     async def main():
         settings = legacy(commanders={})
         async with (
-            bare_controller() as (port, say, heard),
-            gateway(mesh, tmp_path, port, up=False, legacy_clients=settings) as plant,
+            scripted_controller() as (port, say, heard),
+            gateway(mesh, tmp_path, port, up=False, legacy_clients=settings) as site,
         ):
-            await until(lambda: plant.controller.link == STATE.SILENT)
+            await until(lambda: site.controller.link == STATE.SILENT)
             say("1#STATUS*idle;remote;homed@" + UNIT % 1.0)
-            await until(lambda: plant.controller.mode == STATE.REMOTE)
+            await until(lambda: site.controller.mode == STATE.REMOTE)
             async with program(settings) as old, flooding(say):
-                await until(lambda: plant.controller.health.flooding)
-                await plant.lease(A.ACQUIRE, ttl_s=5)
+                await until(lambda: site.controller.health.flooding)
+                await site.lease(A.ACQUIRE, ttl_s=5)
                 for mode, known in (("local", STATE.LOCAL), ("remote", STATE.REMOTE)) * 3:
                     say(UNIT % 1.0 * 3 + f"1#STATUS*idle;{mode};homed@" + UNIT % 1.0 * 3)
-                    await until(lambda known=known: plant.controller.mode == known)
+                    await until(lambda known=known: site.controller.mode == known)
                     await until(lambda mode=mode: mode in old.words)
                 say("1#STATUS*idle;local;homed@1#STATUS*idle;remote;homed@" + UNIT % 1.0)
-                await until(lambda: len(plant.events("controller.local")) == 4)  # not even one of a moment
+                await until(lambda: len(site.events("controller.local")) == 4)  # not even one of a moment
                 say("1#STATUS*idle;local;homed@" + UNIT % 1.0)
-                await until(lambda: len(plant.events("controller.local")) == 5)
-                move = plant.command(C.MOVE_ABSOLUTE, joint_positions=[0.1, 0, 0, 0, 0])
+                await until(lambda: len(site.events("controller.local")) == 5)
+                move = site.command(C.MOVE_ABSOLUTE, joint_positions=[0.1, 0, 0, 0, 0])
                 assert "local mode" in await refusal(move)
             assert b"ABSOLUTE" not in heard
 
@@ -172,27 +172,27 @@ def test_of_a_flood_the_newest_is_published_some_two_hundred_times_a_second(mesh
     async def main():
         settings = legacy(commanders={})
         async with (
-            bare_controller() as (port, say, _),
-            gateway(mesh, tmp_path, port, up=False, legacy_clients=settings) as plant,
+            scripted_controller() as (port, say, _),
+            gateway(mesh, tmp_path, port, up=False, legacy_clients=settings) as site,
         ):
-            await until(lambda: plant.controller.link == STATE.SILENT)
+            await until(lambda: site.controller.link == STATE.SILENT)
             async with program(settings) as old, flooding(say):
-                await until(lambda: plant.controller.health.flooding)
+                await until(lambda: site.controller.health.flooding)
                 rates: tuple[list[float], list[float]] = ([], [])
                 for _ in range(5):
-                    before, told, begin_s = len(plant.seen["joints"]), len(old.units), time.monotonic()
+                    before, told, begin_s = len(site.seen["joints"]), len(old.units), time.monotonic()
                     await asyncio.sleep(0.5)
                     elapsed_s = time.monotonic() - begin_s
-                    rates[0].append((len(plant.seen["joints"]) - before) / elapsed_s)
+                    rates[0].append((len(site.seen["joints"]) - before) / elapsed_s)
                     rates[1].append((len(old.units) - told) / elapsed_s)
                 # On a busy machine what was sent in one half second may be read in the next.
                 for each in rates:
                     assert max(each) > 0
                     assert min(each) < 250
-            assert plant.controller.counters.units_skipped > 1000
+            assert site.controller.counters.units_skipped > 1000
             # Not even the last of a flood is left out.
             say(UNIT % 2.0)
-            await until(lambda: plant.joints[0] == pytest.approx(math.radians(2.0)))
+            await until(lambda: site.joints[0] == pytest.approx(math.radians(2.0)))
 
     run(main())
 
@@ -235,58 +235,58 @@ def test_in_a_deluge_a_stop_is_sent_at_once_another_robot_keeps_its_rate_and_all
         async with (
             deluging() as (port, on, heard),
             simulator(demo=True) as calm_port,
-            gateway(mesh, tmp_path, port, calm_port, up=False) as plant,
+            gateway(mesh, tmp_path, port, calm_port, up=False) as site,
         ):
-            await until(lambda: "sends far too much: nothing of it is taken" in plant.controller.link_text)
-            assert plant.controller.link == STATE.SILENT
+            await until(lambda: "sends far too much: nothing of it is taken" in site.controller.link_text)
+            assert site.controller.link == STATE.SILENT
             for number in range(3):
-                assert (await plant.stop(by="wang")).sent
+                assert (await site.stop(by="wang")).sent
                 await until(lambda number=number: heard.count(b"1#COMMAND*stop@") == number + 1)
-                assert plant.controller.link == STATE.SILENT
+                assert site.controller.link == STATE.SILENT
                 await asyncio.sleep(0.15)
             # By now the last state from before the deluge is here: it goes another way than the link's state.
-            joints = len(plant.seen["joints"])
-            calm = plant.session.subscribe(robot_key("hall", "arm-2", "joints"), newest=1000)
+            joints = len(site.seen["joints"])
+            calm = site.session.subscribe(robot_key("hall", "arm-2", "joints"), newest=1000)
             await anext(calm)
-            taken, begin_s = plant.controller.counters.bytes_received, time.monotonic()
+            taken, begin_s = site.controller.counters.bytes_received, time.monotonic()
             for _ in range(300):
                 await anext(calm)
             elapsed_s = time.monotonic() - begin_s
-            assert await none_left_out(plant.session, calm, "arm-2")
+            assert await none_left_out(site.session, calm, "arm-2")
             # The state is told each second.
-            await until(lambda: plant.controller.counters.bytes_received > taken)
-            taken = plant.controller.counters.bytes_received - taken
+            await until(lambda: site.controller.counters.bytes_received > taken)
+            taken = site.controller.counters.bytes_received - taken
             assert taken < 5e6 * (elapsed_s + 2.0)
-            assert len(plant.seen["joints"]) == joints
+            assert len(site.seen["joints"]) == joints
             # Longer than the link waits for a controller that sends nothing.
             await asyncio.sleep(max(0.0, 4.5 - elapsed_s))
-            assert plant.controller.counters.connections == 1
-            await until(lambda: len(plant.events("link.deluge")) == 1)
+            assert site.controller.counters.connections == 1
+            await until(lambda: len(site.events("link.deluge")) == 1)
             on.clear()
-            await until(lambda: plant.controller.link == STATE.UP, timeout_s=40.0)
-            await until(lambda: len(plant.seen["joints"]) > joints + 20)
-            await until(lambda: plant.events("link.flooding_ended"))
-            assert plant.controller.counters.connections == 1
+            await until(lambda: site.controller.link == STATE.UP, timeout_s=40.0)
+            await until(lambda: len(site.seen["joints"]) > joints + 20)
+            await until(lambda: site.events("link.flooding_ended"))
+            assert site.controller.counters.connections == 1
 
     run(main(), timeout_s=180.0)
 
 
 def test_of_what_was_held_back_without_a_clock_the_newest_alone_is_published(mesh, tmp_path):
     async def main():
-        async with bare_controller() as (port, say, _), gateway(mesh, tmp_path, port, up=False) as plant:
-            await until(lambda: plant.controller.link == STATE.SILENT)
+        async with scripted_controller() as (port, say, _), gateway(mesh, tmp_path, port, up=False) as site:
+            await until(lambda: site.controller.link == STATE.SILENT)
             for first in (1.0, 2.0):
                 say(UNIT % first)
-                await until(lambda: plant.seen["joints"])
-                await until(lambda first=first: plant.joints[0] == pytest.approx(math.radians(first)))
-                before = len(plant.seen["joints"])
+                await until(lambda: site.seen["joints"])
+                await until(lambda first=first: site.joints[0] == pytest.approx(math.radians(first)))
+                before = len(site.seen["joints"])
                 await asyncio.sleep(0.5)
-                skipped = plant.controller.counters.units_skipped + 198
+                skipped = site.controller.counters.units_skipped + 198
                 for begin in (10, 110):  # in two pieces, as networks do
                     say("".join(UNIT % (begin + number) for number in range(100)))
-                await until(lambda: plant.joints[0] == pytest.approx(math.radians(209.0)))
-                assert len(plant.seen["joints"]) - before <= 2
-                await until(lambda skipped=skipped: plant.controller.counters.units_skipped >= skipped)
+                await until(lambda: site.joints[0] == pytest.approx(math.radians(209.0)))
+                assert len(site.seen["joints"]) - before <= 2
+                await until(lambda skipped=skipped: site.controller.counters.units_skipped >= skipped)
 
     run(main())
 
@@ -300,13 +300,13 @@ def test_live_positions_after_a_gap_are_all_published(mesh, tmp_path):
             waist += 1
             return UNIT % (0.1 * waist)
 
-        async with bare_controller() as (port, say, _), gateway(mesh, tmp_path, port, up=False) as plant:
-            await until(lambda: plant.controller.link == STATE.SILENT)
+        async with scripted_controller() as (port, say, _), gateway(mesh, tmp_path, port, up=False) as site:
+            await until(lambda: site.controller.link == STATE.SILENT)
             say(state())
             await asyncio.sleep(0.5)
             async with repeated(say, state):
-                await until(lambda: len(plant.seen["joints"]) > 60)
+                await until(lambda: len(site.seen["joints"]) > 60)
             # What two of which came at once is a burst, on a busy machine.
-            assert len(plant.seen["joints"]) > 0.7 * waist
+            assert len(site.seen["joints"]) > 0.7 * waist
 
     run(main())

@@ -15,7 +15,7 @@ from protocol_gateway.robot import Robot
 from robomesh.endpoints import router_config
 from robomesh.session import SessionSettings
 from tests.conftest import free_port, last_value, run
-from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
+from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, simulator, until
 
 FAR = [2.4, 0.2, -0.2, 0.1, 0.5]
 HOUSE = Path(__file__).resolve().parents[2]
@@ -48,37 +48,37 @@ async def simulator_process():
 
 def test_a_frozen_controller_falls_silent_and_old_states_are_not_dated_anew(mesh, tmp_path):
     async def main():
-        async with simulator_process() as (process, port), gateway(mesh, tmp_path, port) as plant:
+        async with simulator_process() as (process, port), gateway(mesh, tmp_path, port) as site:
             process.send_signal(signal.SIGSTOP)
-            await until(lambda: plant.controller.link == STATE.SILENT)
-            count, last = len(plant.seen["joints"]), plant.seen["joints"][-1]
-            await plant.lease(A.ACQUIRE)
-            assert "silent" in await refusal(plant.command(C.HOME))
-            await until(lambda: plant.controller.last_unit_age_s > 2.0)
-            assert len(plant.seen["joints"]) == count
-            assert plant.seen["joints"][-1].timestamp == last.timestamp
+            await until(lambda: site.controller.link == STATE.SILENT)
+            count, last = len(site.seen["joints"]), site.seen["joints"][-1]
+            await site.lease(A.ACQUIRE)
+            assert "silent" in await refusal(site.command(C.HOME))
+            await until(lambda: site.controller.last_unit_age_s > 2.0)
+            assert len(site.seen["joints"]) == count
+            assert site.seen["joints"][-1].timestamp == last.timestamp
             process.send_signal(signal.SIGCONT)
-            await until(lambda: plant.controller.link == STATE.UP)
+            await until(lambda: site.controller.link == STATE.UP)
 
     run(main())
 
 
 def test_a_stop_while_the_link_is_down_is_latched_and_sent_when_it_is_back(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             pass
-        async with gateway(mesh, tmp_path, port, up=False) as plant:
-            await until(lambda: plant.controller.link_text.startswith("cannot connect"))
-            assert plant.controller.mode == STATE.MODE_UNKNOWN
-            stop = await plant.stop(reason="try")
+        async with gateway(mesh, tmp_path, port, up=False) as site:
+            await until(lambda: site.controller.link_text.startswith("cannot connect"))
+            assert site.controller.mode == STATE.MODE_UNKNOWN
+            stop = await site.stop(reason="try")
             assert not stop.sent
             assert "connection refused; it is sent as soon as the link is back" in stop.text
-            await plant.lease(A.ACQUIRE)
-            assert "the link to the controller is down" in await refusal(plant.command(C.TRACE_ON))
-            assert plant.controller.stop.sent is False
+            await site.lease(A.ACQUIRE)
+            assert "the link to the controller is down" in await refusal(site.command(C.TRACE_ON))
+            assert site.controller.stop.sent is False
             async with simulator(listen=f"127.0.0.1:{port}"):
-                await until(lambda: plant.controller.activity == STATE.STOPPED)
-                assert plant.controller.stop.sent is True
+                await until(lambda: site.controller.activity == STATE.STOPPED)
+                assert site.controller.stop.sent is True
 
     run(main())
 
@@ -89,14 +89,14 @@ def test_without_its_router_the_gateway_still_stops_a_motion_whose_operator_is_g
         endpoint = f"tcp/127.0.0.1:{free_port()}"
         mesh = SessionSettings(connect=(endpoint,), wait_s=5.0)
         router = zenoh.open(router_config((endpoint,)))
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await plant.home()
-            await plant.lease(A.RENEW, ttl_s=1)
-            await plant.command(C.MOVE_ABSOLUTE, joint_positions=FAR)
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.home()
+            await site.lease(A.RENEW, ttl_s=1)
+            await site.command(C.MOVE_ABSOLUTE, joint_positions=FAR)
             await asyncio.to_thread(router.close)
-            await until(lambda: [e.request for e in read_entries(plant.audit)][-2:] == ["STOP", "EXPIRE"])
+            await until(lambda: [e.request for e in read_entries(site.audit)][-2:] == ["STOP", "EXPIRE"])
             router = await asyncio.to_thread(zenoh.open, router_config((endpoint,)))
-            await until(lambda: plant.controller.activity == STATE.STOPPED, timeout_s=40.0)
+            await until(lambda: site.controller.activity == STATE.STOPPED, timeout_s=40.0)
             await asyncio.to_thread(router.close)
 
     run(main())
@@ -104,11 +104,11 @@ def test_without_its_router_the_gateway_still_stops_a_motion_whose_operator_is_g
 
 def test_one_robots_dead_controller_does_not_hurt_another(mesh, tmp_path):
     async def main():
-        async with simulator(demo=True) as alive, gateway(mesh, tmp_path, alive, free_port()) as plant:
-            other = await last_value(plant.session, "robomesh/hall/arm-2/controller")
+        async with simulator(demo=True) as alive, gateway(mesh, tmp_path, alive, free_port()) as site:
+            other = await last_value(site.session, "robomesh/hall/arm-2/controller")
             assert other.link == STATE.DOWN
-            await until(lambda: len(plant.seen["joints"]) > 100)
-            assert plant.controller.counters.connections == 1
+            await until(lambda: len(site.seen["joints"]) > 100)
+            assert site.controller.counters.connections == 1
 
     run(main())
 
@@ -126,16 +126,16 @@ def test_a_failure_at_one_robot_is_said_and_neither_ends_it_nor_another(mesh, tm
         async with (
             simulator(demo=True) as one,
             simulator(demo=True) as two,
-            gateway(mesh, tmp_path, one, two) as plant,
+            gateway(mesh, tmp_path, one, two) as site,
         ):
             monkeypatch.setattr(Robot, "_observe", sometimes)
-            await until(lambda: plant.events("gateway.failed"))
-            other = plant.session.subscribe("robomesh/hall/arm-2/joints")
+            await until(lambda: site.events("gateway.failed"))
+            other = site.session.subscribe("robomesh/hall/arm-2/joints")
             for _ in range(20):
                 await anext(other)
             failing = False
-            states = len(plant.seen["controller"])
-            await until(lambda: len(plant.seen["controller"]) > states)
-            await plant.lease(A.ACQUIRE)
+            states = len(site.seen["controller"])
+            await until(lambda: len(site.seen["controller"]) > states)
+            await site.lease(A.ACQUIRE)
 
     run(main())

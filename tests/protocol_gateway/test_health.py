@@ -9,37 +9,37 @@ IDLE, MOVING = StatusReceived(activity=Activity.IDLE), StatusReceived(activity=A
 
 
 def arrivals(*spans_s):
-    it, now_s = Arrivals(), 100.0
+    times, now_s = Arrivals(), 100.0
     for span_s in spans_s:
         now_s += span_s
-        it.count(1, now_s)
-    return it, now_s
+        times.count(1, now_s)
+    return times, now_s
 
 
 def test_units_in_step_have_no_jitter_and_a_rate():
-    it, now_s = arrivals(*[0.01] * 300)
-    assert it.jitter_s(now_s) == pytest.approx(0.0, abs=1e-9)
-    assert it.rate_hz(now_s) == pytest.approx(100.0, rel=0.02)
+    times, now_s = arrivals(*[0.01] * 300)
+    assert times.jitter_s(now_s) == pytest.approx(0.0, abs=1e-9)
+    assert times.rate_hz(now_s) == pytest.approx(100.0, rel=0.02)
 
 
 def test_jitter_is_the_99th_percentile_less_the_median():
-    it, now_s = arrivals(*([0.01] * 49 + [0.03]) * 8)
-    assert it.jitter_s(now_s) == pytest.approx(0.02)
+    times, now_s = arrivals(*([0.01] * 49 + [0.03]) * 8)
+    assert times.jitter_s(now_s) == pytest.approx(0.02)
 
 
 def test_what_few_units_or_old_ones_tell_of_jitter_and_rate_is_nothing():
-    it, now_s = arrivals(*[0.01] * 15)
-    assert it.jitter_s(now_s) is None
-    it, now_s = arrivals(*[0.01] * 200)
-    assert it.jitter_s(now_s + 6.0) is None
-    assert it.rate_hz(now_s + 2.5) == 0.0
+    times, now_s = arrivals(*[0.01] * 15)
+    assert times.jitter_s(now_s) is None
+    times, now_s = arrivals(*[0.01] * 200)
+    assert times.jitter_s(now_s + 6.0) is None
+    assert times.rate_hz(now_s + 2.5) == 0.0
 
 
 def losses(*times_s):
-    it = LossCounter()
+    losses = LossCounter()
     for time_s in times_s:
-        it.add(time_s)
-    return it.lost
+        losses.add(time_s)
+    return losses.lost
 
 
 REGULAR = [number * 0.01 for number in range(100)]
@@ -63,26 +63,26 @@ def test_units_that_never_came_are_gaps_in_a_clock_that_beats_regularly(times_s,
 
 
 def test_an_answer_is_a_refusal_or_a_status_that_changes_after_a_command():
-    it = ResponseTimer()
-    it.event_received(IDLE, 1.0)
-    it.event_received(MOVING, 1.1)
-    assert it.answer_s is None  # nothing was asked
-    it.command_sent(2.0)
-    it.event_received(JointsReceived((0.0,)), 2.01)
-    it.event_received(MOVING, 2.02)
-    assert it.answer_s is None
-    it.event_received(IDLE, 2.03)
-    assert it.answer_s == pytest.approx(0.03)
-    it.event_received(MOVING, 2.5)
-    assert it.answer_s == pytest.approx(0.03)
-    it.command_sent(3.0)
-    it.event_received(Refused(5, "limit"), 3.2)
-    assert it.answer_s == pytest.approx(0.2)
+    timer = ResponseTimer()
+    timer.event_received(IDLE, 1.0)
+    timer.event_received(MOVING, 1.1)
+    assert timer.answer_s is None  # nothing was asked
+    timer.command_sent(2.0)
+    timer.event_received(JointsReceived((0.0,)), 2.01)
+    timer.event_received(MOVING, 2.02)
+    assert timer.answer_s is None
+    timer.event_received(IDLE, 2.03)
+    assert timer.answer_s == pytest.approx(0.03)
+    timer.event_received(MOVING, 2.5)
+    assert timer.answer_s == pytest.approx(0.03)
+    timer.command_sent(3.0)
+    timer.event_received(Refused(5, "limit"), 3.2)
+    assert timer.answer_s == pytest.approx(0.2)
 
 
 def test_what_comes_more_than_two_seconds_after_a_command_is_no_answer_to_it():
-    it = ResponseTimer()
-    it.event_received(IDLE, 0.0)
-    it.command_sent(1.0)
-    it.event_received(MOVING, 3.5)
-    assert it.answer_s is None
+    timer = ResponseTimer()
+    timer.event_received(IDLE, 0.0)
+    timer.command_sent(1.0)
+    timer.event_received(MOVING, 3.5)
+    assert timer.answer_s is None

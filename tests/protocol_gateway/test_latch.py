@@ -18,7 +18,7 @@ from protocol_gateway.authority.lease_rules import Stop
 from protocol_gateway.errors import AuditError
 from robomesh import reason_codes as codes
 from tests.conftest import run
-from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
+from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, simulator, until
 from tests.soak import latch_kills
 
 HOUSE = Path(__file__).resolve().parents[2]
@@ -311,25 +311,25 @@ def test_where_it_cannot_be_allocated_motion_is_refused_with_the_reason_and_stop
         latch = tmp_path / "hall" / "arm.latch"
         latch.parent.mkdir(parents=True)
         latch.symlink_to(tmp_path / "gone" / "arm.latch")  # its disk is not there
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            assert await refusal(plant.command(C.HOME)) == (
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            assert await refusal(site.command(C.HOME)) == (
                 "Not sent: the latch file arm.latch cannot be allocated (No such file or directory: "
                 "check its disk), so a restart would forget a stop."
             )
-            await plant.command(C.TRACE_ON)  # moves nothing
-            first = await plant.stop(by="wang")
-            second = await plant.stop(by="zhao")
+            await site.command(C.TRACE_ON)  # moves nothing
+            first = await site.stop(by="wang")
+            second = await site.stop(by="zhao")
             assert first.sent
             assert second.stop_id > first.stop_id > 10**15  # no disk reserved a small one
-            await until(lambda: plant.events("audit.failed"))
-            await until(lambda: plant.controller.activity == STATE.STOPPED)
+            await until(lambda: site.events("audit.failed"))
+            await until(lambda: site.controller.activity == STATE.STOPPED)
             latch.unlink()
-            await until(lambda: plant.events("audit.mended"))
-            await plant.lease(A.RENEW, ttl_s=5)
-            await plant.command(C.RESET, stop_id=second.stop_id)
-            await until(lambda: plant.controller.activity == STATE.IDLE)
-            await plant.command(C.HOME)
+            await until(lambda: site.events("audit.mended"))
+            await site.lease(A.RENEW, ttl_s=5)
+            await site.command(C.RESET, stop_id=second.stop_id)
+            await until(lambda: site.controller.activity == STATE.IDLE)
+            await site.command(C.HOME)
         # The way home ran when the gateway was ended: that stop is in the file that is there now.
         assert LatchFile(latch).found.stop.reason == "dead-man: the gateway is being ended"
 

@@ -3,64 +3,64 @@
 import asyncio
 import contextlib
 
-from tests.protocol_gateway.hall import STATE, A, gateway, refusal, simulator, until
-from tests.protocol_gateway.old_program import ME, hall, in_loop, legacy, program
+from tests.protocol_gateway.gateway_site import STATE, A, gateway, refusal, simulator, until
+from tests.protocol_gateway.old_client import ME, in_loop, legacy, legacy_site, program
 
 PAPER = b"2# COMMAND* trace; home&ABSOLUTE.DEG* 100.00; 30.45; 92.66; - 67.10; - 25.85@"
 SAMPLE = [100.00, 30.45, 92.66, -67.10, -25.85]
 
 
-def degrees(plant):
-    return [joint.position * 57.29577951308232 for joint in plant.seen["joints"][-1].joints]
+def degrees(site):
+    return [joint.position * 57.29577951308232 for joint in site.seen["joints"][-1].joints]
 
 
 @in_loop
 async def test_old_programs_read_what_the_mesh_reads_in_step(mesh, tmp_path):
     settings = legacy(commanders={})
     async with (
-        hall(mesh, tmp_path, settings, simulated={"demo": True}) as plant,
+        legacy_site(mesh, tmp_path, settings, simulated={"demo": True}) as site,
         program(settings) as one,
         program(settings) as two,
     ):
         await until(lambda: len(one.positions) > 100 and len(two.positions) > 100)
         published = [
             tuple(round(joint.position * 57.29577951308232, 6) for joint in message.joints)
-            for message in plant.seen["joints"]
+            for message in site.seen["joints"]
         ]
         first = published.index(one.positions[0])
         count = min(len(published) - first, len(one.positions))
         assert count > 50
         assert one.positions[:count] == published[first : first + count]
         assert set(one.bytes[:2000].split(b"@")[1:-1]) & set(two.bytes.split(b"@"))
-        await until(lambda: plant.controller.legacy_clients.attached == 2)
+        await until(lambda: site.controller.legacy_clients.attached == 2)
 
 
 @in_loop
 async def test_the_papers_unit_homes_and_moves_the_robot_in_its_operators_name(mesh, tmp_path):
     settings = legacy()
-    async with hall(mesh, tmp_path, settings) as plant, program(settings) as one:
+    async with legacy_site(mesh, tmp_path, settings) as site, program(settings) as one:
         one.say(PAPER)
-        await until(lambda: plant.seen["lease"][-1].holder == "li")
+        await until(lambda: site.seen["lease"][-1].holder == "li")
         await until(lambda: "homing" in one.words)
 
         def there():
             one.say(b"1#TIME*1@")
-            return [round(value, 2) for value in degrees(plant)] == SAMPLE
+            return [round(value, 2) for value in degrees(site)] == SAMPLE
 
         await until(there, timeout_s=30)
-        assert plant.controller.homed == STATE.YES
-        assert plant.controller.trace == STATE.YES
+        assert site.controller.homed == STATE.YES
+        assert site.controller.trace == STATE.YES
         source = "legacy {}:{}".format(*one.writer.get_extra_info("sockname"))
-        done = [(e.request, e.operator, e.source) for e in plant.seen["audit"]]
+        done = [(e.request, e.operator, e.source) for e in site.seen["audit"]]
         assert done == [(name, "li", source) for name in ("ACQUIRE", "TRACE_ON", "HOME", "MOVE_ABSOLUTE")]
         assert one.errors == []
-        assert plant.events("stop.latched") == []
+        assert site.events("stop.latched") == []
 
 
 # --------------------------------------------------------------------- authority
 
 
-async def homed_by_li(plant, one):
+async def homed_by_li(site, one):
     """A robot that an old program of li's has homed, and still controls."""
     one.say(b"1#COMMAND*home@")
 
@@ -73,24 +73,24 @@ async def homed_by_li(plant, one):
 
 @in_loop
 async def test_two_seconds_of_silence_in_a_motion_stop_the_robot(mesh, tmp_path):
-    async with hall(mesh, tmp_path, settings := legacy()) as plant, program(settings) as one:
-        await homed_by_li(plant, one)
+    async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
+        await homed_by_li(site, one)
         one.say(b"2#COMMAND*speed=5&ABSOLUTE.DEG*140;0;0;0;0@")
         await until(lambda: "moving" in one.words)
         spoke_s = asyncio.get_running_loop().time()
-        await until(lambda: plant.events("stop.latched"))
+        await until(lambda: site.events("stop.latched"))
         silent_s = asyncio.get_running_loop().time() - spoke_s
         assert 1.5 < silent_s < 5.0
-        assert "was not renewed" in (await plant.event("stop.latched", 0)).text
+        assert "was not renewed" in (await site.event("stop.latched", 0)).text
         await until(lambda: "stopped" in one.words)
         assert await one.asks(b"1#ABSOLUTE.DEG*0;0;0;0;0@") == (8, one.errors[-1].text)
 
 
 @in_loop
 async def test_traffic_that_asks_for_nothing_keeps_the_lease(mesh, tmp_path):
-    async with hall(mesh, tmp_path, settings := legacy()) as plant, program(settings) as one:
+    async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         one.say(b"1#COMMAND*trace@")
-        await until(lambda: plant.seen["lease"][-1].holder == "li")
+        await until(lambda: site.seen["lease"][-1].holder == "li")
         began_s = asyncio.get_running_loop().time()
 
         def long_enough():
@@ -98,42 +98,42 @@ async def test_traffic_that_asks_for_nothing_keeps_the_lease(mesh, tmp_path):
             return asyncio.get_running_loop().time() - began_s > 3.5
 
         await until(long_enough)
-        await until(lambda: plant.seen["lease"][-1].holder == "li")
-        await until(lambda: not plant.seen["lease"][-1].holder)
+        await until(lambda: site.seen["lease"][-1].holder == "li")
+        await until(lambda: not site.seen["lease"][-1].holder)
 
 
 @in_loop
 async def test_a_killed_connection_stops_the_motion_at_once(mesh, tmp_path):
-    async with hall(mesh, tmp_path, settings := legacy()) as plant, program(settings) as watcher:
+    async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as watcher:
         async with program(settings) as one:
-            await homed_by_li(plant, one)
+            await homed_by_li(site, one)
             one.say(b"2#COMMAND*speed=5&ABSOLUTE.DEG*140;0;0;0;0@")
             await until(lambda: "moving" in watcher.words)
             one.writer.transport.abort()
-            await until(lambda: plant.events("stop.latched"))
-        assert "has gone" in (await plant.event("stop.latched", 0)).text
+            await until(lambda: site.events("stop.latched"))
+        assert "has gone" in (await site.event("stop.latched", 0)).text
         await until(lambda: "stopped" in watcher.words)
-        await until(lambda: not plant.seen["lease"][-1].holder)
+        await until(lambda: not site.seen["lease"][-1].holder)
 
 
 @in_loop
 async def test_operators_of_the_mesh_and_of_old_programs_refuse_each_other(mesh, tmp_path):
-    async with hall(mesh, tmp_path, settings := legacy()) as plant, program(settings) as one:
-        await plant.lease(A.ACQUIRE, operator="wang", ttl_s=5)
+    async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
+        await site.lease(A.ACQUIRE, operator="wang", ttl_s=5)
         number, text = await one.asks(b"1#COMMAND*home@")
         assert (number, "wang is in control" in text) == (7, True)
-        await plant.lease(A.RELEASE, operator="wang")
+        await site.lease(A.RELEASE, operator="wang")
         one.say(b"1#COMMAND*home@")
-        await until(lambda: plant.seen["lease"][-1].holder == "li")
-        assert "li is in control" in await refusal(plant.lease(A.ACQUIRE, operator="wang"))
+        await until(lambda: site.seen["lease"][-1].holder == "li")
+        assert "li is in control" in await refusal(site.lease(A.ACQUIRE, operator="wang"))
         async with program(settings) as other:
             number, text = await other.asks(b"1#COMMAND*hold@")
             assert (number, "another lease" in text) == (7, True)
         # Taken away with a reason, it is told so with its next command.
-        await plant.lease(A.TAKE, operator="wang", ttl_s=5, reason="the shift is over")
+        await site.lease(A.TAKE, operator="wang", ttl_s=5, reason="the shift is over")
         number, text = await one.asks(b"1#COMMAND*home@")
         assert (number, "wang is in control" in text) == (7, True)
-        refused = [entry for entry in plant.seen["audit"] if entry.source.startswith("legacy") and entry.text]
+        refused = [entry for entry in site.seen["audit"] if entry.source.startswith("legacy") and entry.text]
         assert refused
 
 
@@ -141,7 +141,7 @@ async def test_operators_of_the_mesh_and_of_old_programs_refuse_each_other(mesh,
 async def test_who_is_no_commander_reads_and_stops_and_moves_nothing(mesh, tmp_path):
     settings = legacy(commanders={"10.0.0.9": "li"})
     simulated = {"demo": True}
-    async with hall(mesh, tmp_path, settings, simulated=simulated) as plant, program(settings) as one:
+    async with legacy_site(mesh, tmp_path, settings, simulated=simulated) as site, program(settings) as one:
         await until(lambda: one.positions)
         number, text = await one.asks(b"1#COMMAND*home@")
         assert (number, "commanders" in text) == (7, True)
@@ -150,21 +150,21 @@ async def test_who_is_no_commander_reads_and_stops_and_moves_nothing(mesh, tmp_p
         assert (await one.asks(b"1#ABSOLUTE.DEG*1;2;3;4;5@"))[0] == 7
         assert (await one.asks(b"1#THERMAL*1@"))[0] == 7
         one.say(b"1#STATUS*idle@", b"1#TIME*1@", b"1#ERROR*9;nothing@")
-        await until(lambda: plant.controller.legacy_clients.units_refused == 4)
+        await until(lambda: site.controller.legacy_clients.units_refused == 4)
         assert len(one.errors) == 4
-        await until(lambda: len([e for e in plant.seen["audit"] if e.outcome == e.REFUSED]) >= 1)
-        assert plant.controller.counters.units_sent == 0
+        await until(lambda: len([e for e in site.seen["audit"] if e.outcome == e.REFUSED]) >= 1)
+        assert site.controller.counters.units_sent == 0
         # Its stop is done, whatever stands beside it.
         one.say(b"2#THERMAL*1&COMMAND*sing;stop@")
         await until(lambda: "stopped" in one.words)
-        stop = await plant.event("stop.latched", 0)
+        stop = await site.event("stop.latched", 0)
         assert stop.values["by"] == "legacy 127.0.0.1"
-        assert plant.controller.counters.units_sent == 1
+        assert site.controller.counters.units_sent == 1
 
 
 @in_loop
 async def test_a_commanders_refusals_have_the_protocols_numbers(mesh, tmp_path):
-    async with hall(mesh, tmp_path, settings := legacy()) as plant, program(settings) as one:
+    async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         await until(lambda: one.positions)
         answers = {
             b"2#COMMAND*home@": (2, "the count says 2 records"),
@@ -180,17 +180,17 @@ async def test_a_commanders_refusals_have_the_protocols_numbers(mesh, tmp_path):
             answer, text = await one.asks(unit)
             assert (answer, words in text) == (number, True), (unit, answer, text)
         # All of a unit or nothing: neither the homing nor the trace was done.
-        assert plant.controller.counters.units_sent == 0
+        assert site.controller.counters.units_sent == 0
         # Its own state, echoed, moves nothing either.
         assert (await one.asks(one.last_state))[0] == 7
-        assert plant.controller.counters.units_sent == 0
+        assert site.controller.counters.units_sent == 0
         # The controller's own refusals: ours are found first, so there is none left here to pass on.
-        assert plant.controller.counters.refusals == 0
+        assert site.controller.counters.refusals == 0
 
 
 @in_loop
 async def test_reset_clears_a_stop_that_can_have_been_seen_and_no_fresh_one(mesh, tmp_path):
-    async with hall(mesh, tmp_path, settings := legacy()) as plant, program(settings) as one:
+    async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         await until(lambda: one.positions)
         number, text = await one.asks(b"1#COMMAND*stop@1#COMMAND*reset@")
         assert (number, "stop request 1" in text) == (8, True)
@@ -198,35 +198,35 @@ async def test_reset_clears_a_stop_that_can_have_been_seen_and_no_fresh_one(mesh
 
         def reset():
             one.say(b"1#COMMAND*reset@")
-            return not plant.controller.HasField("stop")
+            return not site.controller.HasField("stop")
 
         await until(reset)
-        assert len([entry for entry in plant.seen["audit"] if entry.request == "STOP"]) == 1
+        assert len([entry for entry in site.seen["audit"] if entry.request == "STOP"]) == 1
         one.say(b"1#COMMAND*home@")
         await until(lambda: "homing" in one.words)
 
 
 @in_loop
 async def test_a_stop_is_done_before_what_was_sent_ahead_of_it(mesh, tmp_path):
-    async with hall(mesh, tmp_path, settings := legacy()) as plant, program(settings) as one:
+    async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         await until(lambda: one.positions)
         one.say(b"1#COMMAND*home@" * 20 + b"1#COMMAND*stop@")
         await until(lambda: len(one.errors) >= 20)
         assert {error.number for error in one.errors} <= {8, 9}
-        assert plant.controller.counters.units_sent == 1
-        assert plant.controller.homed == STATE.NO
+        assert site.controller.counters.units_sent == 1
+        assert site.controller.homed == STATE.NO
 
 
 @in_loop
 async def test_a_read_only_robot_is_read_and_nothing_else(mesh, tmp_path):
     settings = legacy()
-    async with hall(mesh, tmp_path, settings, stop_proven=False) as plant, program(settings) as one:
+    async with legacy_site(mesh, tmp_path, settings, stop_proven=False) as site, program(settings) as one:
         await until(lambda: one.positions)
         number, text = await one.asks(b"1#COMMAND*home@")
         assert (number, "read-only" in text) == (7, True)
         one.say(b"1#COMMAND*stop@")
-        await until(lambda: plant.events("stop.not_sent"))
-        assert plant.controller.counters.units_sent == 0
+        await until(lambda: site.events("stop.not_sent"))
+        assert site.controller.counters.units_sent == 0
 
 
 @in_loop
@@ -234,7 +234,7 @@ async def test_clients_speak_the_controllers_codes(mesh, tmp_path):
     codes = {2: "ABSOLUTE.DEG", 6: "ERROR", 101: "COMMAND:home", 102: "COMMAND:stop", 104: "COMMAND:reset"}
     simulated, settings = {"codes": codes}, legacy()
     async with (
-        hall(mesh, tmp_path, settings, simulated=simulated, codes=codes) as plant,
+        legacy_site(mesh, tmp_path, settings, simulated=simulated, codes=codes) as site,
         program(settings) as one,
     ):
         await until(lambda: one.bytes.count(b"@") > 3)
@@ -245,7 +245,7 @@ async def test_clients_speak_the_controllers_codes(mesh, tmp_path):
         await until(lambda: b"homing" in one.bytes)
         one.say(b"1#102@")
         await until(lambda: b"stopped" in one.bytes)
-        await until(lambda: plant.seen["lease"] and plant.seen["lease"][-1].holder == "li")
+        await until(lambda: site.seen["lease"] and site.seen["lease"][-1].holder == "li")
 
 
 # -------------------------------------------------------------------------- link
@@ -257,14 +257,14 @@ async def test_a_link_that_goes_down_closes_who_was_told_states_and_lets_others_
     async with contextlib.AsyncExitStack() as stack:
         first = contextlib.AsyncExitStack()
         port = await first.enter_async_context(simulator())
-        plant = await stack.enter_async_context(gateway(mesh, tmp_path, port, legacy_clients=settings))
+        site = await stack.enter_async_context(gateway(mesh, tmp_path, port, legacy_clients=settings))
         async with program(settings) as one:
             await until(lambda: one.positions)
             await first.aclose()
             await until(lambda: one.ended)
             assert [error.number for error in one.errors] == [9]
         async with program(settings) as two:
-            await until(lambda: plant.controller.legacy_clients.attached == 1)
+            await until(lambda: site.controller.legacy_clients.attached == 1)
             assert two.bytes == b""
             number, text = await two.asks(b"1#COMMAND*home@")
             assert (number, "link" in text) == (9, True)
@@ -292,12 +292,12 @@ async def test_what_the_controller_refuses_is_told_to_who_is_in_control_alone(me
     async with await asyncio.start_server(controller, ME, 0) as server:
         port = server.sockets[0].getsockname()[1]
         async with (
-            gateway(mesh, tmp_path, port, legacy_clients=settings) as plant,
+            gateway(mesh, tmp_path, port, legacy_clients=settings) as site,
             program(settings) as one,
             program(settings) as two,
         ):
             await until(lambda: one.positions and two.positions)
             assert await one.asks(b"1#COMMAND*trace@") == (5, "not today")
-            await until(lambda: plant.events("controller.refused"))
+            await until(lambda: site.events("controller.refused"))
             assert b"WEATHER*fine" in two.bytes
             assert two.errors == []

@@ -14,28 +14,28 @@ import pytest
 from protocol_gateway.core.stream import UnitStream
 from protocol_gateway.serving.rate_limit import Budget, Limits
 from robomesh.schemas import robomesh_pb2 as schema
-from tests.protocol_gateway.hall import STATE, until
-from tests.protocol_gateway.old_program import ME, Program, hall, in_loop, legacy, program
+from tests.protocol_gateway.gateway_site import STATE, until
+from tests.protocol_gateway.old_client import ME, Program, in_loop, legacy, legacy_site, program
 
 
 @in_loop
 async def test_one_too_many_is_told_so_and_a_hundred_harm_nobody(mesh, tmp_path):
     settings = legacy(most=2)
     simulated = {"demo": True}
-    async with hall(mesh, tmp_path, settings, simulated=simulated) as plant, program(settings) as one:
+    async with legacy_site(mesh, tmp_path, settings, simulated=simulated) as site, program(settings) as one:
         async with program(settings):
-            await until(lambda: plant.controller.legacy_clients.attached == 2)
+            await until(lambda: site.controller.legacy_clients.attached == 2)
             async with program(settings) as third:
                 third.say(b"1#COMMAND*home@")
                 await until(lambda: third.ended)
                 assert third.bytes == b"1#ERROR*1;too many clients@"
             crowd = [await asyncio.open_connection(ME, settings.port) for _ in range(100)]
             before = len(one.positions)
-            await until(lambda: plant.controller.legacy_clients.turned_away == 101)
+            await until(lambda: site.controller.legacy_clients.turned_away == 101)
             await until(lambda: len(one.positions) > before + 50)
             for _, writer in crowd:
                 writer.close()
-        await until(lambda: plant.controller.legacy_clients.attached == 1)
+        await until(lambda: site.controller.legacy_clients.attached == 1)
         async with program(settings) as again:
             await until(lambda: again.positions)
 
@@ -44,33 +44,33 @@ async def test_one_too_many_is_told_so_and_a_hundred_harm_nobody(mesh, tmp_path)
 async def test_who_does_not_read_delays_nobody_and_is_closed(mesh, tmp_path):
     settings = legacy()
     simulated = {"demo": True, "rate_hz": 1000.0}
-    async with hall(mesh, tmp_path, settings, simulated=simulated) as plant, program(settings) as one:
+    async with legacy_site(mesh, tmp_path, settings, simulated=simulated) as site, program(settings) as one:
         with socket.socket() as deaf:
             deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
             deaf.connect((ME, settings.port))
-            await until(lambda: plant.controller.legacy_clients.states_skipped > 100)
-            before, skipped = len(one.units), plant.controller.legacy_clients.states_skipped
-            await until(lambda: plant.controller.legacy_clients.closed == 1, timeout_s=20)
+            await until(lambda: site.controller.legacy_clients.states_skipped > 100)
+            before, skipped = len(one.units), site.controller.legacy_clients.states_skipped
+            await until(lambda: site.controller.legacy_clients.closed == 1, timeout_s=20)
             gained = len(one.units) - before
-            kept_from_it = plant.controller.legacy_clients.states_skipped - skipped
+            kept_from_it = site.controller.legacy_clients.states_skipped - skipped
             assert gained > 100
             assert kept_from_it > 0.5 * gained
-        assert plant.controller.legacy_clients.attached == 1
-        assert "does not read" in (await plant.event("legacy.closed", 0)).text
+        assert site.controller.legacy_clients.attached == 1
+        assert "does not read" in (await site.event("legacy.closed", 0)).text
 
 
 @in_loop
 async def test_who_reads_slowly_gets_the_newest_state_when_he_has_read(mesh, tmp_path):
     settings = legacy()
     simulated = {"demo": True, "rate_hz": 1000.0}
-    async with hall(mesh, tmp_path, settings, simulated=simulated) as plant:
+    async with legacy_site(mesh, tmp_path, settings, simulated=simulated) as site:
         with socket.socket() as slow:
             slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
             slow.connect((ME, settings.port))
             slow.setblocking(False)
-            await until(lambda: plant.controller.legacy_clients.states_skipped > 500)
+            await until(lambda: site.controller.legacy_clients.states_skipped > 500)
             loop, stream, times = asyncio.get_running_loop(), UnitStream(), []
-            while not times or plant.controller.controller_time_s - times[-1] > 0.3:
+            while not times or site.controller.controller_time_s - times[-1] > 0.3:
                 for unit in stream.receive(await asyncio.wait_for(loop.sock_recv(slow, 4096), 5)):
                     times += [r.seconds for r in unit.records if hasattr(r, "seconds")]
             jumps = [later - earlier for earlier, later in pairwise(times)]
@@ -82,32 +82,32 @@ async def test_who_reads_slowly_gets_the_newest_state_when_he_has_read(mesh, tmp
 async def test_a_flood_is_not_read_on_and_ends_and_its_stop_is_done(mesh, tmp_path):
     settings = legacy(commanders={})
     simulated = {"demo": True}
-    async with hall(mesh, tmp_path, settings, simulated=simulated) as plant, program(settings) as one:
+    async with legacy_site(mesh, tmp_path, settings, simulated=simulated) as site, program(settings) as one:
         async with program(settings) as flood:
             flood.say(b"1#COMMAND*stop@", b"1#ABSOLUTE.DEG*1;2;3;4;5@" * 200_000)
-            await until(lambda: plant.events("stop.latched"))
-            assert plant.controller.legacy_clients.closed == 0
+            await until(lambda: site.events("stop.latched"))
+            assert site.controller.legacy_clients.closed == 0
             before = len(one.positions)
-            await until(lambda: plant.controller.legacy_clients.closed == 1, timeout_s=20)
-            assert plant.controller.legacy_clients.units_refused < 5000
+            await until(lambda: site.controller.legacy_clients.closed == 1, timeout_s=20)
+            assert site.controller.legacy_clients.units_refused < 5000
             assert len(one.positions) - before > 200
-        assert "more than it may" in (await plant.event("legacy.closed", 0)).text
-        await until(lambda: plant.controller.legacy_clients.attached == 1)
+        assert "more than it may" in (await site.event("legacy.closed", 0)).text
+        await until(lambda: site.controller.legacy_clients.attached == 1)
 
 
 @in_loop
 async def test_rubbish_is_counted_and_answered_and_the_next_unit_is_heard(mesh, tmp_path):
-    async with hall(mesh, tmp_path, settings := legacy()) as plant, program(settings) as one:
+    async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         one.say(b"\xff\x00#@", b"hello\r\n@", b"1#COMMAND*trace@")
-        await until(lambda: plant.controller.trace == STATE.YES)
+        await until(lambda: site.controller.trace == STATE.YES)
         assert [error.number for error in one.errors] == [2, 2]
-        assert plant.controller.legacy_clients.units_refused == 2
-        event = await plant.event("legacy.malformed", 0)
+        assert site.controller.legacy_clients.units_refused == 2
+        event = await site.event("legacy.malformed", 0)
         assert (event.values["offset"], event.values["bytes"]) == ("0", "\\xff\\x00#")
         one.say(b"1#COMMAND*dance@", b"1#MOOD*fine@")
         await until(lambda: len(one.errors) >= 4)
-        await until(lambda: len([e for e in plant.seen["audit"] if e.request == "UNIT"]) >= 4)
-        told = [e for e in plant.seen["audit"] if e.request == "UNIT"]
+        await until(lambda: len([e for e in site.seen["audit"] if e.request == "UNIT"]) >= 4)
+        told = [e for e in site.seen["audit"] if e.request == "UNIT"]
         assert [(e.operator, e.outcome, e.values["unit"]) for e in told] == [
             ("li", schema.AuditEntry.REFUSED, unit)
             for unit in ("\\xff\\x00#", "hello\\x0d\\x0a", "1#COMMAND*dance", "1#MOOD*fine")
@@ -118,8 +118,8 @@ async def test_rubbish_is_counted_and_answered_and_the_next_unit_is_heard(mesh, 
 @in_loop
 async def test_who_asks_and_goes_before_the_answers_leaves_no_line_for_each(mesh, tmp_path, caplog):
     settings = legacy(commanders={})
-    async with hall(mesh, tmp_path, settings) as plant:
-        clients = lambda: plant.controller.legacy_clients  # noqa: E731
+    async with legacy_site(mesh, tmp_path, settings) as site:
+        clients = lambda: site.controller.legacy_clients  # noqa: E731
         for _ in range(5):
             before = clients().units_refused
             with socket.create_connection((ME, settings.port)) as hasty:
@@ -178,7 +178,7 @@ def cable():
 async def test_a_pulled_cable_ends_control_and_is_noticed_in_seconds(mesh, tmp_path, cable):
     here, far, connect, pull_out = cable
     settings = legacy(host=here, commanders={far: "li"})
-    async with hall(mesh, tmp_path, settings) as plant:
+    async with legacy_site(mesh, tmp_path, settings) as site:
         far_socket = await asyncio.to_thread(connect, settings.port)
         far_program = Program(*await asyncio.open_connection(sock=far_socket))
 
@@ -189,11 +189,11 @@ async def test_a_pulled_cable_ends_control_and_is_noticed_in_seconds(mesh, tmp_p
         far_program.say(b"1#COMMAND*home@")
         await until(homed, timeout_s=30)
         far_program.say(b"2#COMMAND*speed=5&ABSOLUTE.DEG*140;0;0;0;0@")
-        await until(lambda: plant.controller.activity == STATE.MOVING)
+        await until(lambda: site.controller.activity == STATE.MOVING)
         await asyncio.to_thread(pull_out)
-        await until(lambda: plant.events("stop.latched"))
-        assert "was not renewed" in (await plant.event("stop.latched", 0)).text
-        await until(lambda: plant.controller.legacy_clients.attached == 0, timeout_s=30)
+        await until(lambda: site.events("stop.latched"))
+        assert "was not renewed" in (await site.event("stop.latched", 0)).text
+        await until(lambda: site.controller.legacy_clients.attached == 0, timeout_s=30)
         far_program.writer.transport.abort()
         await far_program.close()
 

@@ -27,7 +27,7 @@ from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from robots.description import load
 from robots.joints import joints_of
 from tests.conftest import run
-from tests.protocol_gateway.place import place
+from tests.protocol_gateway.control_bench import control_bench
 
 JOINTS = joints_of(load("pt600"))
 A = LeaseRequest.Action
@@ -43,12 +43,12 @@ def requests(text):
     return requests_of(read_records(text.encode()), JOINTS)
 
 
-async def refused(it, unit, *, first_id=1, **fields):
+async def refused(bench, unit, *, first_id=1, **fields):
     """The number of the refusal that control gives a unit's requests."""
     asked = requests(unit)
     for number, request in enumerate(asked):
-        request.MergeFrom(CommandRequest(lease=it.secret, id=first_id + number, **fields))
-    answer = await it.control.attempt(asked, operator="li", source="test")
+        request.MergeFrom(CommandRequest(lease=bench.secret, id=first_id + number, **fields))
+    answer = await bench.control.attempt(asked, operator="li", source="test")
     assert not answer.accepted
     return number_of(answer)
 
@@ -134,23 +134,23 @@ def test_a_unit_is_refused_whole_with_its_number(unit, number):
 )
 def test_a_refusal_has_the_number_of_its_reason(tmp_path, unit, controller, number):
     async def main():
-        async with place(tmp_path) as it:
-            await it.lease(A.ACQUIRE)
-            it.known = controller
-            assert await refused(it, unit) == number
-            assert it.socket == []
+        async with control_bench(tmp_path) as bench:
+            await bench.lease(A.ACQUIRE)
+            bench.known = controller
+            assert await refused(bench, unit) == number
+            assert bench.socket == []
 
     run(main())
 
 
 def test_who_is_not_in_control_is_told_to_read_only(tmp_path):
     async def main():
-        async with place(tmp_path) as it:
-            assert await refused(it, "1#COMMAND*home") == 7
-            await it.lease(A.ACQUIRE)
-            asked = asyncio.create_task(refused(it, "1#COMMAND*home"))
+        async with control_bench(tmp_path) as bench:
+            assert await refused(bench, "1#COMMAND*home") == 7
+            await bench.lease(A.ACQUIRE)
+            asked = asyncio.create_task(refused(bench, "1#COMMAND*home"))
             await asyncio.sleep(0)  # it is being written down now
-            it.control.leases.end(codes.ENDED_GATEWAY())
+            bench.control.leases.end(codes.ENDED_GATEWAY())
             assert await asked == 7
 
     run(main())
@@ -158,12 +158,12 @@ def test_who_is_not_in_control_is_told_to_read_only(tmp_path):
 
 def test_motion_under_a_latched_stop_and_a_reset_while_the_robot_moves_are_refused_as_stopped(tmp_path):
     async def main():
-        async with place(tmp_path) as it:
-            await it.lease(A.ACQUIRE)
-            it.control.stop(by="wang", reason="smoke", source="test")
-            assert await refused(it, "1#COMMAND*home", first_id=1) == 8
-            it.control.observe(moving=True)
-            assert await refused(it, "1#COMMAND*reset", first_id=2, stop_id=1) == 8
+        async with control_bench(tmp_path) as bench:
+            await bench.lease(A.ACQUIRE)
+            bench.control.stop(by="wang", reason="smoke", source="test")
+            assert await refused(bench, "1#COMMAND*home", first_id=1) == 8
+            bench.control.observe(moving=True)
+            assert await refused(bench, "1#COMMAND*reset", first_id=2, stop_id=1) == 8
 
     run(main())
 

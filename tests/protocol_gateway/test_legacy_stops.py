@@ -4,8 +4,8 @@ import asyncio
 import contextlib
 
 from protocol_gateway.serving.rate_limit import Limits
-from tests.protocol_gateway.hall import STATE, until
-from tests.protocol_gateway.old_program import ME, Program, hall, in_loop, legacy, program
+from tests.protocol_gateway.gateway_site import STATE, until
+from tests.protocol_gateway.old_client import ME, Program, in_loop, legacy, legacy_site, program
 
 TIME, STOP = b"1#TIME*1@", b"1#COMMAND*stop@"
 
@@ -13,27 +13,27 @@ TIME, STOP = b"1#TIME*1@", b"1#COMMAND*stop@"
 @in_loop
 async def test_a_program_over_its_limits_is_heard_for_a_stop_at_once_and_for_nothing_else(mesh, tmp_path):
     settings = legacy(limits=Limits(units_per_s=10.0, burst_s=20.0))
-    async with hall(mesh, tmp_path, settings) as plant, program(settings) as one:
+    async with legacy_site(mesh, tmp_path, settings) as site, program(settings) as one:
         number, text = await one.asks(TIME * 250)
         assert number == 9
         assert "10 units/s" in text
         # For 10 s or more it is over them.
         one.say(b"1#COMMAND*trace@", TIME * 250, STOP)
-        await until(lambda: plant.events("stop.latched"), timeout_s=30)
-        await until(lambda: plant.controller.stop.by == "li")
-        assert plant.controller.trace == STATE.NO
-        await until(lambda: plant.seen["lease"][-1].holder == "")
+        await until(lambda: site.events("stop.latched"), timeout_s=30)
+        await until(lambda: site.controller.stop.by == "li")
+        assert site.controller.trace == STATE.NO
+        await until(lambda: site.seen["lease"][-1].holder == "")
 
 
 @in_loop
 async def test_a_program_that_was_over_its_limits_is_heard_again(mesh, tmp_path):
     settings = legacy(limits=Limits(units_per_s=200.0, burst_s=0.5))
-    async with hall(mesh, tmp_path, settings) as plant, program(settings) as one:
+    async with legacy_site(mesh, tmp_path, settings) as site, program(settings) as one:
         assert (await one.asks(TIME * 110))[0] == 9
 
         def traced():
             one.say(b"1#COMMAND*trace@")
-            return plant.controller.trace == STATE.YES
+            return site.controller.trace == STATE.YES
 
         await until(traced)
 
@@ -41,22 +41,22 @@ async def test_a_program_that_was_over_its_limits_is_heard_again(mesh, tmp_path)
 @in_loop
 async def test_a_stop_behind_the_flood_for_which_a_program_is_closed_is_done(mesh, tmp_path):
     settings = legacy(commanders={}, limits=Limits(burst_s=0.1, patience_s=0.0))
-    async with hall(mesh, tmp_path, settings) as plant, program(settings) as one:
+    async with legacy_site(mesh, tmp_path, settings) as site, program(settings) as one:
         one.say(TIME * 1500, STOP)
-        await until(lambda: plant.events("stop.latched"))
-        await until(lambda: plant.controller.stop.by == f"legacy {ME}")
-        await until(lambda: plant.controller.legacy_clients.closed == 1)
+        await until(lambda: site.events("stop.latched"))
+        await until(lambda: site.controller.stop.by == f"legacy {ME}")
+        await until(lambda: site.controller.legacy_clients.closed == 1)
         await until(lambda: one.ended)
 
 
 @in_loop
 async def test_a_stop_of_one_too_many_is_done(mesh, tmp_path):
     settings = legacy(commanders={}, most=1)
-    async with hall(mesh, tmp_path, settings) as plant, program(settings):
-        await until(lambda: plant.controller.legacy_clients.attached == 1)
+    async with legacy_site(mesh, tmp_path, settings) as site, program(settings):
+        await until(lambda: site.controller.legacy_clients.attached == 1)
         async with program(settings) as second:
             second.say(b"2#ABSOLUTE.DEG*1;2;3;4;5&COMMAND*stop@")
-            await until(lambda: plant.events("stop.latched"))
+            await until(lambda: site.events("stop.latched"))
             await until(lambda: second.ended)
             assert second.bytes == b"1#ERROR*1;too many clients@"
 
@@ -66,13 +66,13 @@ async def test_a_stop_by_its_code_is_done_as_well_of_one_too_many(mesh, tmp_path
     codes = {2: "ABSOLUTE.DEG", 5: "STATUS", 102: "COMMAND:stop"}
     simulated, settings = {"codes": codes}, legacy(commanders={}, most=1)
     async with (
-        hall(mesh, tmp_path, settings, simulated=simulated, codes=codes) as plant,
+        legacy_site(mesh, tmp_path, settings, simulated=simulated, codes=codes) as site,
         program(settings),
     ):
-        await until(lambda: plant.controller.legacy_clients.attached == 1)
+        await until(lambda: site.controller.legacy_clients.attached == 1)
         async with program(settings) as second:
             second.say(b"1#0102@")
-            await until(lambda: plant.events("stop.latched"))
+            await until(lambda: site.events("stop.latched"))
 
 
 @contextlib.asynccontextmanager
@@ -87,11 +87,11 @@ async def program_from(address, settings):
 @in_loop
 async def test_readers_leave_a_place_to_the_first_that_may_command(mesh, tmp_path):
     settings = legacy(commanders={"127.0.0.2": "li"}, most=2)
-    async with hall(mesh, tmp_path, settings) as plant, program(settings) as reader:
+    async with legacy_site(mesh, tmp_path, settings) as site, program(settings) as reader:
         await until(lambda: reader.positions)
         async with program(settings) as second:
             await until(lambda: second.ended)
             assert [error.number for error in second.errors] == [1]
         async with program_from("127.0.0.2", settings) as commander:
             commander.say(b"1#COMMAND*trace@")
-            await until(lambda: plant.controller.trace == STATE.YES)
+            await until(lambda: site.controller.trace == STATE.YES)

@@ -32,15 +32,15 @@ class Controller:
 
 @contextlib.asynccontextmanager
 async def controller(port=0):
-    it = Controller()
-    server = await asyncio.start_server(it.joined, "127.0.0.1", port)
-    it.port = server.sockets[0].getsockname()[1]
+    peer = Controller()
+    server = await asyncio.start_server(peer.joined, "127.0.0.1", port)
+    peer.port = server.sockets[0].getsockname()[1]
     writers = []
     try:
-        yield it
+        yield peer
     finally:
-        while not it.connections.empty():
-            writers.append(it.connections.get_nowait()[1])
+        while not peer.connections.empty():
+            writers.append(peer.connections.get_nowait()[1])
         for writer in writers:
             writer.transport.abort()
         server.close()
@@ -65,15 +65,15 @@ class Seen:
 @contextlib.asynccontextmanager
 async def link(port, **settings):
     seen = Seen()
-    it = ControllerLink(
+    arm_link = ControllerLink(
         LinkSettings(host="127.0.0.1", port=port, **settings),
         UnitDriver((JointType.ROTARY, JointType.ROTARY)),
         on_event=seen.event,
         on_status=seen.statuses.append,
     )
-    task = asyncio.create_task(it.run())
+    task = asyncio.create_task(arm_link.run())
     try:
-        yield it, seen
+        yield arm_link, seen
     finally:
         task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
@@ -86,14 +86,14 @@ async def until(condition, timeout_s=30.0):
             await asyncio.sleep(0.005)
 
 
-def send_often(it, unit):
+def send_often(arm_link, unit):
     for _ in range(10_000):
-        it.send(unit)
+        arm_link.send(unit)
 
 
-async def send_on(it):
+async def send_on(arm_link):
     for _ in range(10_000):
-        it.send(STOP)
+        arm_link.send(STOP)
         await asyncio.sleep(0)
 
 
@@ -105,16 +105,16 @@ async def end(writer):
 
 def test_the_link_is_up_when_units_come_and_events_are_dated_when_they_came():
     async def main():
-        async with controller() as arm, link(arm.port) as (it, seen):
+        async with controller() as arm, link(arm.port) as (arm_link, seen):
             _, writer = await arm.next()
             await until(lambda: seen.states == [LinkState.SILENT])
             before = time.time_ns()
             writer.write(STATE + STATE)
             await until(lambda: len(seen.events) >= 2)
-            assert it.status.state is LinkState.UP
+            assert arm_link.status.state is LinkState.UP
             assert all(isinstance(event, JointsReceived) for event in seen.events)
             assert before <= seen.received[0].wall_ns <= time.time_ns()
-            assert it.last_received == seen.received[-1]
+            assert arm_link.last_received == seen.received[-1]
             await end(writer)
 
     run(main())
@@ -137,7 +137,7 @@ def test_a_unit_in_pieces_is_dated_when_its_last_byte_came():
 
 def test_what_goes_wrong_is_counted():
     async def main():
-        async with controller() as arm, link(arm.port) as (it, seen):
+        async with controller() as arm, link(arm.port) as (arm_link, seen):
             reader, writer = await arm.next()
             writer.write(STATE + b"nonsense@" + b"1#FORCE*1@" + b"1#ERROR*5;joint 1@")
             await until(lambda: len(seen.events) >= 4)
@@ -147,9 +147,9 @@ def test_what_goes_wrong_is_counted():
                 UnknownReceived,
                 Refused,
             ]
-            it.send(STOP)
+            arm_link.send(STOP)
             assert await reader.readexactly(len(STOP)) == STOP
-            counters = it.counters
+            counters = arm_link.counters
             assert (counters.units_received, counters.units_malformed) == (3, 1)
             assert (counters.records_unknown, counters.refusals, counters.connections) == (1, 1, 1)
             assert (counters.units_sent, counters.bytes_sent) == (1, len(STOP))
@@ -162,17 +162,17 @@ def test_what_goes_wrong_is_counted():
 def test_a_controller_that_falls_silent_is_told_and_then_connected_to_anew():
     async def main():
         patience = {"stale_after_s": 0.2, "reconnect_after_s": 0.5}
-        async with controller() as arm, link(arm.port, **patience) as (it, seen):
+        async with controller() as arm, link(arm.port, **patience) as (arm_link, seen):
             _, writer = await arm.next()
             writer.write(STATE)
-            await until(lambda: it.status.state is LinkState.SILENT and LinkState.UP in seen.states)
-            assert "sends nothing" in it.status.text
+            await until(lambda: arm_link.status.state is LinkState.SILENT and LinkState.UP in seen.states)
+            assert "sends nothing" in arm_link.status.text
             # The socket is still open: a stop is worth trying.
-            it.send(STOP)
+            arm_link.send(STOP)
             _, again = await arm.next()
             again.write(STATE)
-            await until(lambda: it.status.state is LinkState.UP)
-            assert it.counters.connections == 2
+            await until(lambda: arm_link.status.state is LinkState.UP)
+            assert arm_link.counters.connections == 2
             assert LinkState.DOWN in seen.states
             await end(writer)
             await end(again)
@@ -182,12 +182,12 @@ def test_a_controller_that_falls_silent_is_told_and_then_connected_to_anew():
 
 def test_garbage_alone_does_not_make_a_link_look_alive():
     async def main():
-        async with controller() as arm, link(arm.port) as (it, seen):
+        async with controller() as arm, link(arm.port) as (arm_link, seen):
             _, writer = await arm.next()
             writer.write(b"nonsense@" * 10)
             await until(lambda: len(seen.events) >= 10)
-            assert it.status.state is LinkState.SILENT
-            assert it.last_received is None
+            assert arm_link.status.state is LinkState.SILENT
+            assert arm_link.last_received is None
             await end(writer)
 
     run(main())
@@ -195,12 +195,12 @@ def test_garbage_alone_does_not_make_a_link_look_alive():
 
 def test_a_lost_connection_is_made_again_and_half_a_unit_of_it_is_forgotten():
     async def main():
-        async with controller() as arm, link(arm.port) as (it, seen):
+        async with controller() as arm, link(arm.port) as (arm_link, seen):
             _, writer = await arm.next()
             writer.write(STATE + STATE[:12])
             await until(lambda: len(seen.events) >= 1)
             await end(writer)
-            await until(lambda: it.status.state is LinkState.DOWN)
+            await until(lambda: arm_link.status.state is LinkState.DOWN)
             _, again = await arm.next()
             again.write(STATE)
             await until(lambda: len(seen.events) >= 2)
@@ -213,16 +213,16 @@ def test_a_lost_connection_is_made_again_and_half_a_unit_of_it_is_forgotten():
 def test_a_controller_that_is_not_there_is_told_in_words_and_found_when_it_comes():
     async def main():
         port = free_port()
-        async with link(port) as (it, seen):
+        async with link(port) as (arm_link, seen):
             await until(lambda: seen.statuses)
-            assert it.status.state is LinkState.DOWN
-            assert it.status.text == f"cannot connect to 127.0.0.1:{port}: connection refused"
+            assert arm_link.status.state is LinkState.DOWN
+            assert arm_link.status.text == f"cannot connect to 127.0.0.1:{port}: connection refused"
             with pytest.raises(LinkDownError, match="connection refused"):
-                it.send(STOP)
+                arm_link.send(STOP)
             async with controller(port) as arm:
                 _, writer = await arm.next()
                 writer.write(STATE)
-                await until(lambda: it.status.state is LinkState.UP)
+                await until(lambda: arm_link.status.state is LinkState.UP)
                 await end(writer)
 
     run(main())
@@ -230,12 +230,12 @@ def test_a_controller_that_is_not_there_is_told_in_words_and_found_when_it_comes
 
 def test_a_refused_connection_is_told_with_the_controllers_own_words():
     async def main():
-        async with controller() as arm, link(arm.port) as (it, seen):
+        async with controller() as arm, link(arm.port) as (arm_link, seen):
             _, writer = await arm.next()
             writer.write(b"1#ERROR*1;too many clients@")
             writer.close()
             await until(lambda: LinkState.DOWN in seen.states)
-            assert "too many clients" in it.status.text
+            assert "too many clients" in arm_link.status.text
             assert LinkState.UP not in seen.states
             await end(writer)
 
@@ -244,13 +244,13 @@ def test_a_refused_connection_is_told_with_the_controllers_own_words():
 
 def test_an_answer_alone_does_not_bring_a_silent_link_up_but_the_state_after_it_does():
     async def main():
-        async with controller() as arm, link(arm.port, stale_after_s=0.1) as (it, seen):
+        async with controller() as arm, link(arm.port, stale_after_s=0.1) as (arm_link, seen):
             _, writer = await arm.next()
             writer.write(b"1#ERROR*8;stopped@")
             await until(lambda: seen.events)
-            assert it.status.state is LinkState.SILENT
+            assert arm_link.status.state is LinkState.SILENT
             writer.write(b"2#STATUS*idle&ERROR*8;stopped@")
-            await until(lambda: it.status.state is LinkState.UP)
+            await until(lambda: arm_link.status.state is LinkState.UP)
             await end(writer)
 
     run(main())
@@ -268,18 +268,18 @@ def test_while_something_could_not_be_sent_a_connection_is_tried_without_long_pa
                 writer.write(b"1#ERROR*1;too many clients@")
                 writer.close()
 
-        async with controller() as arm, link(arm.port) as (it, _):
+        async with controller() as arm, link(arm.port) as (arm_link, _):
             refusing = asyncio.create_task(refuse(arm))
             # The next pause is 1.6 s, the one after it 3.2 s.
-            await until(lambda: tries >= 4 and it.status.state is LinkState.DOWN)
+            await until(lambda: tries >= 4 and arm_link.status.state is LinkState.DOWN)
             with pytest.raises(LinkDownError):
-                it.send(STOP)
+                arm_link.send(STOP)
             before, begin_s = tries, time.monotonic()
             await until(lambda: tries >= before + 5, timeout_s=10.0)
             assert time.monotonic() - begin_s > 0.5  # no hammer either
             refusing.cancel()
             reader, writer = await arm.next()
-            it.send(STOP)
+            arm_link.send(STOP)
             assert await reader.readexactly(len(STOP)) == STOP
             await end(writer)
 
@@ -288,18 +288,18 @@ def test_while_something_could_not_be_sent_a_connection_is_tried_without_long_pa
 
 def test_a_unit_that_does_not_fit_is_an_error_and_is_never_completed_later():
     async def main():
-        async with controller() as arm, link(arm.port) as (it, _):
+        async with controller() as arm, link(arm.port) as (arm_link, _):
             reader, writer = await arm.next()
             writer.transport.pause_reading()
             writer.write(STATE)
-            await until(lambda: it.status.state is LinkState.UP)
+            await until(lambda: arm_link.status.state is LinkState.UP)
             unit = STOP.rjust(4000)
             with pytest.raises(LinkCloggedError):
-                send_often(it, unit)
-            sent = it.counters.units_sent
+                send_often(arm_link, unit)
+            sent = arm_link.counters.units_sent
             with pytest.raises(LinkDownError):
-                it.send(STOP)
-            await until(lambda: it.status.state is LinkState.DOWN)
+                arm_link.send(STOP)
+            await until(lambda: arm_link.status.state is LinkState.DOWN)
             writer.transport.resume_reading()
             with contextlib.suppress(ConnectionError):
                 assert (await reader.read()).count(b"@") <= sent
@@ -311,13 +311,13 @@ def test_a_unit_that_does_not_fit_is_an_error_and_is_never_completed_later():
 def test_what_was_sent_last_arrives_although_the_controller_goes_on_sending():
     async def main():
         async with controller() as arm:
-            async with link(arm.port) as (it, _):
+            async with link(arm.port) as (arm_link, _):
                 reader, writer = await arm.next()
                 writer.write(STATE)
-                await until(lambda: it.status.state is LinkState.UP)
+                await until(lambda: arm_link.status.state is LinkState.UP)
                 writer.transport.pause_reading()
                 writer.write(STATE * 500)  # still unread when the link is closed
-                it.send(STOP)
+                arm_link.send(STOP)
             writer.transport.resume_reading()
             assert await reader.read() == STOP
             await end(writer)
@@ -327,14 +327,14 @@ def test_what_was_sent_last_arrives_although_the_controller_goes_on_sending():
 
 def test_nothing_is_sent_over_a_connection_that_has_just_broken():
     async def main():
-        async with controller() as arm, link(arm.port) as (it, _):
+        async with controller() as arm, link(arm.port) as (arm_link, _):
             _, writer = await arm.next()
             writer.write(STATE)
-            await until(lambda: it.status.state is LinkState.UP)
+            await until(lambda: arm_link.status.state is LinkState.UP)
             await end(writer)
             # A first unit may still go to a socket whose end is not known yet; the link finds out.
             with pytest.raises(LinkDownError):
-                await send_on(it)
+                await send_on(arm_link)
 
     run(main())
 
@@ -346,8 +346,8 @@ def test_bad_code_behind_the_link_ends_it_with_its_own_exception():
 
         async with controller() as arm:
             driver = UnitDriver((JointType.ROTARY, JointType.ROTARY))
-            it = ControllerLink(LinkSettings(host="127.0.0.1", port=arm.port), driver, on_event=broken)
-            task = asyncio.create_task(it.run())
+            arm_link = ControllerLink(LinkSettings(host="127.0.0.1", port=arm.port), driver, on_event=broken)
+            task = asyncio.create_task(arm_link.run())
             _, writer = await arm.next()
             writer.write(STATE)
             with pytest.raises(ZeroDivisionError):
@@ -359,15 +359,15 @@ def test_bad_code_behind_the_link_ends_it_with_its_own_exception():
 
 def test_the_rate_is_told_after_a_second_and_is_none_when_nothing_comes():
     async def main():
-        async with controller() as arm, link(arm.port) as (it, _):
+        async with controller() as arm, link(arm.port) as (arm_link, _):
             _, writer = await arm.next()
             begin = time.monotonic()
             while time.monotonic() - begin < 1.5:
                 writer.write(STATE)
                 await asyncio.sleep(0.02)
-            assert 20.0 < it.rate_hz <= 50.0
+            assert 20.0 < arm_link.rate_hz <= 50.0
             await end(writer)
-            await until(lambda: it.rate_hz == 0.0)
+            await until(lambda: arm_link.rate_hz == 0.0)
 
     run(main())
 
@@ -377,20 +377,20 @@ def test_what_the_network_held_back_is_not_dated_as_new_and_does_not_look_live()
         return b"2#ABSOLUTE.DEG*10.00;20.00&TIME*%.2f@" % clock_s
 
     async def main():
-        async with controller() as arm, link(arm.port, stale_after_s=0.4) as (it, seen):
+        async with controller() as arm, link(arm.port, stale_after_s=0.4) as (arm_link, seen):
             _, writer = await arm.next()
             writer.write(told(50.0))
-            await until(lambda: it.status.state is LinkState.UP)
+            await until(lambda: arm_link.status.state is LinkState.UP)
             begin = seen.received[0]
-            await until(lambda: it.status.state is LinkState.SILENT)
+            await until(lambda: arm_link.status.state is LinkState.SILENT)
             await asyncio.sleep(0.6)
             writer.write(told(50.1) + told(50.2))
             await until(lambda: len(seen.events) >= 3)
-            assert it.status.state is LinkState.SILENT
+            assert arm_link.status.state is LinkState.SILENT
             assert seen.received[2].monotonic_s == pytest.approx(begin.monotonic_s + 0.2)
             assert seen.received[2].wall_ns == pytest.approx(begin.wall_ns + 2e8, abs=5e6)
             writer.write(told(50.0 + time.monotonic() - begin.monotonic_s))
-            await until(lambda: it.status.state is LinkState.UP)
+            await until(lambda: arm_link.status.state is LinkState.UP)
             await end(writer)
 
     run(main())
@@ -401,23 +401,23 @@ def test_the_link_tells_its_round_trip_its_answers_and_what_never_came():
         return b"3#ABSOLUTE.DEG*10.00;20.00&STATUS*%b;remote&TIME*%.2f@" % (activity, clock_s)
 
     async def main():
-        async with controller() as arm, link(arm.port) as (it, seen):
+        async with controller() as arm, link(arm.port) as (arm_link, seen):
             reader, writer = await arm.next()
             for number in range(60):
                 if number not in (20, 21):
                     writer.write(told(50.0 + 0.01 * number, b"idle"))
                     await asyncio.sleep(0.005)
             await until(lambda: len(seen.events) >= 2 * 58)
-            assert it.counters.units_lost == 2
-            assert 0.0 < it.health.network_round_trip_s < 1.0
-            assert 0.0 <= it.health.jitter_s < 1.0
-            assert it.health.answer_s is None
-            it.send(STOP)
+            assert arm_link.counters.units_lost == 2
+            assert 0.0 < arm_link.health.network_round_trip_s < 1.0
+            assert 0.0 <= arm_link.health.jitter_s < 1.0
+            assert arm_link.health.answer_s is None
+            arm_link.send(STOP)
             await reader.readexactly(len(STOP))
             await asyncio.sleep(0.1)
             writer.write(told(51.0, b"stopped"))
-            await until(lambda: it.health.answer_s is not None)
-            assert 0.1 <= it.health.answer_s < 2.0
+            await until(lambda: arm_link.health.answer_s is not None)
+            assert 0.1 <= arm_link.health.answer_s < 2.0
             await end(writer)
 
     run(main())

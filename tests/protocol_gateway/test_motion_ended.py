@@ -13,8 +13,8 @@ from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from robots.description import load
 from robots.joints import joints_of
 from tests.conftest import run
-from tests.protocol_gateway.hall import gateway, simulator, until
-from tests.protocol_gateway.place import place
+from tests.protocol_gateway.control_bench import control_bench
+from tests.protocol_gateway.gateway_site import gateway, simulator, until
 
 A = LeaseRequest.Action
 C = CommandRequest.Command
@@ -154,34 +154,34 @@ def test_control_given_back_stops_what_is_not_proven_to_be_at_rest(
     tmp_path, clock, activity, positions, age_s, latched
 ):
     async def main():
-        async with place(tmp_path) as it:
-            it.status = StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=False)
-            it.control.observe(moving=False)
-            await it.lease(A.ACQUIRE)
-            await it.commands((C.HOME, {}))
-            clock.goes_on(0.1)
-            it.control.observe(moving=True)
-            it.status, it.positions = replace(it.status, activity=activity, homed=True), positions
-            clock.goes_on(0.1)
-            it.control.observe(moving=False)
+        async with control_bench(tmp_path) as bench:
+            bench.status = StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=False)
+            bench.control.observe(moving=False)
+            await bench.lease(A.ACQUIRE)
+            await bench.commands((C.HOME, {}))
+            clock.advance(0.1)
+            bench.control.observe(moving=True)
+            bench.status, bench.positions = replace(bench.status, activity=activity, homed=True), positions
+            clock.advance(0.1)
+            bench.control.observe(moving=False)
             for _ in range(2):
-                clock.goes_on(0.01)
-                it.control.reported(activity, clock.now.monotonic_s - age_s)
-            await it.lease(A.RELEASE, lease=it.secret)
-            assert (it.control.authority.stop is not None) is latched
-            assert any(unit == b"1#COMMAND*stop@" for unit in it.socket) is latched
+                clock.advance(0.01)
+                bench.control.reported(activity, clock.now.monotonic_s - age_s)
+            await bench.lease(A.RELEASE, lease=bench.secret)
+            assert (bench.control.authority.stop is not None) is latched
+            assert any(unit == b"1#COMMAND*stop@" for unit in bench.socket) is latched
 
     run(main())
 
 
 def test_control_given_back_as_soon_as_the_arm_is_at_home_stops_nothing(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await plant.home()
-            await plant.lease(A.RELEASE)
-            await until(lambda: not plant.seen["lease"][-1].holder)
-            await plant.units(3)
-            assert [each.request for each in plant.seen["audit"] if each.operator == GATEWAY] == []
-            assert plant.controller.stop.id == 0
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.home()
+            await site.lease(A.RELEASE)
+            await until(lambda: not site.seen["lease"][-1].holder)
+            await site.units(3)
+            assert [each.request for each in site.seen["audit"] if each.operator == GATEWAY] == []
+            assert site.controller.stop.id == 0
 
     run(main())

@@ -8,24 +8,24 @@ import pytest
 
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
-from tests.protocol_gateway.bare import bare_controller, repeated, slow_starter
-from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, until
+from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
+from tests.protocol_gateway.scripted_controller import repeated, scripted_controller, slow_starter
 
 
 def test_motion_that_nobody_commanded_is_said_and_ends_the_lease(mesh, tmp_path):
     async def main():
         waist = 0.0
         async with contextlib.AsyncExitStack() as stack:
-            port, say, _ = await stack.enter_async_context(bare_controller())
+            port, say, _ = await stack.enter_async_context(scripted_controller())
             await stack.enter_async_context(repeated(say, lambda: f"1#ABSOLUTE.DEG*{waist};90;-90;0;0@"))
-            plant = await stack.enter_async_context(gateway(mesh, tmp_path, port))
-            await plant.lease(A.ACQUIRE, ttl_s=5)
+            site = await stack.enter_async_context(gateway(mesh, tmp_path, port))
+            await site.lease(A.ACQUIRE, ttl_s=5)
             await asyncio.sleep(0.3)
-            await until(lambda: plant.seen["lease"][-1].holder == "li")
+            await until(lambda: site.seen["lease"][-1].holder == "li")
             waist = 5.0
-            await until(lambda: plant.events("motion.foreign"))
-            await until(lambda: not plant.seen["lease"][-1].holder)
-            assert not plant.events("stop.latched")
+            await until(lambda: site.events("motion.foreign"))
+            await until(lambda: not site.seen["lease"][-1].holder)
+            assert not site.events("stop.latched")
 
     run(main())
 
@@ -33,12 +33,12 @@ def test_motion_that_nobody_commanded_is_said_and_ends_the_lease(mesh, tmp_path)
 @pytest.mark.parametrize("ttl_s", [0.5, 1.0])
 def test_the_dead_mans_stop_comes_with_the_leases_end_and_not_before(mesh, tmp_path, ttl_s):
     async def main():
-        async with bare_controller() as (port, say, heard):
+        async with scripted_controller() as (port, say, heard):
             status = "2#ABSOLUTE.DEG*1;90;-90;0;0&STATUS*moving;remote;homed@"
-            async with repeated(say, lambda: status), gateway(mesh, tmp_path, port) as plant:
-                await plant.lease(A.ACQUIRE, ttl_s=ttl_s)
-                await plant.command(C.MOVE_ABSOLUTE, joint_positions=[0, 1.5, -1.5, 0, 0])
-                renewed = await plant.lease(A.RENEW, ttl_s=ttl_s)
+            async with repeated(say, lambda: status), gateway(mesh, tmp_path, port) as site:
+                await site.lease(A.ACQUIRE, ttl_s=ttl_s)
+                await site.command(C.MOVE_ABSOLUTE, joint_positions=[0, 1.5, -1.5, 0, 0])
+                renewed = await site.lease(A.RENEW, ttl_s=ttl_s)
                 until_s = renewed.until.ToNanoseconds() * 1e-9
                 await until(lambda: b"stop" in heard)
                 assert time.time() > until_s - 0.005
@@ -48,17 +48,17 @@ def test_the_dead_mans_stop_comes_with_the_leases_end_and_not_before(mesh, tmp_p
 
 def test_a_robot_that_moves_on_is_a_critical_event_however_often_stop_is_pressed(mesh, tmp_path):
     async def main():
-        async with bare_controller() as (port, say, heard):
+        async with scripted_controller() as (port, say, heard):
             status = "2#ABSOLUTE.DEG*1;90;-90;0;0&STATUS*moving;remote;homed@"
-            async with repeated(say, lambda: status), gateway(mesh, tmp_path, port) as plant:
+            async with repeated(say, lambda: status), gateway(mesh, tmp_path, port) as site:
                 began_s = time.monotonic()
                 pressed = 0
-                while not plant.events("stop.disobeyed"):
+                while not site.events("stop.disobeyed"):
                     assert time.monotonic() - began_s < 20.0
-                    await plant.stop()
+                    await site.stop()
                     pressed += 1
                     await asyncio.sleep(0.3)
-                assert (await plant.event("stop.disobeyed", 0)).severity == schema.Event.CRITICAL
+                assert (await site.event("stop.disobeyed", 0)).severity == schema.Event.CRITICAL
                 await until(lambda: heard.count(b"stop") == pressed + 1)
 
     run(main())
@@ -66,13 +66,13 @@ def test_a_robot_that_moves_on_is_a_critical_event_however_often_stop_is_pressed
 
 def test_a_motion_that_begins_late_stays_under_its_lease_and_is_stopped_with_it(mesh, tmp_path):
     async def main():
-        async with slow_starter(2.6) as (port, heard), gateway(mesh, tmp_path, port) as plant:
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            await plant.command(C.MOVE_ABSOLUTE, joint_positions=[1.0, 0, 0, 0, 0])
-            await until(lambda: plant.controller.activity == STATE.MOVING)
-            await until(lambda: plant.seen["lease"][-1].motion)
-            assert not plant.events("motion.foreign")
-            await plant.lease(A.RELEASE)
+        async with slow_starter(2.6) as (port, heard), gateway(mesh, tmp_path, port) as site:
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            await site.command(C.MOVE_ABSOLUTE, joint_positions=[1.0, 0, 0, 0, 0])
+            await until(lambda: site.controller.activity == STATE.MOVING)
+            await until(lambda: site.seen["lease"][-1].motion)
+            assert not site.events("motion.foreign")
+            await site.lease(A.RELEASE)
             await until(lambda: b"stop" in heard)
 
     run(main())
@@ -80,11 +80,11 @@ def test_a_motion_that_begins_late_stays_under_its_lease_and_is_stopped_with_it(
 
 def test_a_lease_that_ends_before_its_motion_has_begun_stops_the_robot(mesh, tmp_path):
     async def main():
-        async with slow_starter(60.0) as (port, heard), gateway(mesh, tmp_path, port) as plant:
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            await plant.command(C.MOVE_ABSOLUTE, joint_positions=[1.0, 0, 0, 0, 0])
+        async with slow_starter(60.0) as (port, heard), gateway(mesh, tmp_path, port) as site:
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            await site.command(C.MOVE_ABSOLUTE, joint_positions=[1.0, 0, 0, 0, 0])
             await asyncio.sleep(2.2)
-            await plant.lease(A.RELEASE)
+            await site.lease(A.RELEASE)
             await until(lambda: b"stop" in heard)
 
     run(main())
@@ -93,17 +93,17 @@ def test_a_lease_that_ends_before_its_motion_has_begun_stops_the_robot(mesh, tmp
 def test_a_motion_that_the_controller_refuses_is_over_at_once(mesh, tmp_path):
     async def main():
         async with (
-            bare_controller() as (port, say, heard),
+            scripted_controller() as (port, say, heard),
             repeated(say, lambda: "2#ABSOLUTE.DEG*0;0;0;0;0&STATUS*idle;remote;homed@"),
-            gateway(mesh, tmp_path, port) as plant,
+            gateway(mesh, tmp_path, port) as site,
         ):
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            await plant.command(C.MOVE_ABSOLUTE, joint_positions=[1.0, 0, 0, 0, 0])
-            await until(lambda: plant.seen["lease"][-1].motion)
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            await site.command(C.MOVE_ABSOLUTE, joint_positions=[1.0, 0, 0, 0, 0])
+            await until(lambda: site.seen["lease"][-1].motion)
             say("1#ERROR*5;no@")
-            await until(lambda: not plant.seen["lease"][-1].motion)
-            await plant.lease(A.RELEASE)
-            await until(lambda: not plant.seen["lease"][-1].holder)
+            await until(lambda: not site.seen["lease"][-1].motion)
+            await site.lease(A.RELEASE)
+            await until(lambda: not site.seen["lease"][-1].holder)
             assert b"stop" not in heard
 
     run(main())
@@ -112,16 +112,16 @@ def test_a_motion_that_the_controller_refuses_is_over_at_once(mesh, tmp_path):
 def test_a_refusal_of_an_earlier_unit_leaves_the_dead_man_his_motion(mesh, tmp_path):
     async def main():
         async with (
-            bare_controller() as (port, say, heard),
+            scripted_controller() as (port, say, heard),
             repeated(say, lambda: "2#ABSOLUTE.DEG*0;0;0;0;0&STATUS*idle;remote;homed@"),
-            gateway(mesh, tmp_path, port) as plant,
+            gateway(mesh, tmp_path, port) as site,
         ):
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            await plant.command(C.SPEED, speed_percent=50)
-            await plant.command(C.MOVE_ABSOLUTE, joint_positions=[1.0, 0, 0, 0, 0])
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            await site.command(C.SPEED, speed_percent=50)
+            await site.command(C.MOVE_ABSOLUTE, joint_positions=[1.0, 0, 0, 0, 0])
             say("1#ERROR*5;speed@")
-            await until(lambda: plant.events("controller.refused"))
-            await plant.lease(A.RELEASE)
+            await until(lambda: site.events("controller.refused"))
+            await site.lease(A.RELEASE)
             await until(lambda: b"stop" in heard)
 
     run(main())
@@ -135,22 +135,22 @@ def test_a_stop_is_not_reset_while_the_robot_moves_on_and_its_dead_man_stays(mes
             return f"2#ABSOLUTE.DEG*0;0;0;0;0&STATUS*{activity};remote;homed@"
 
         async with (
-            bare_controller() as (port, say, _),
+            scripted_controller() as (port, say, _),
             repeated(say, state),
-            gateway(mesh, tmp_path, port) as plant,
+            gateway(mesh, tmp_path, port) as site,
         ):
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            await until(lambda: plant.controller.activity == STATE.MOVING)
-            stop_id = (await plant.stop()).stop_id
-            text = await refusal(plant.command(C.RESET, stop_id=stop_id))
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            await until(lambda: site.controller.activity == STATE.MOVING)
+            stop_id = (await site.stop()).stop_id
+            text = await refusal(site.command(C.RESET, stop_id=stop_id))
             assert text == (
                 f"Not sent: the robot still moves after stop {stop_id}: wait until it stands, then RESET."
             )
-            assert plant.controller.stop.id == stop_id
+            assert site.controller.stop.id == stop_id
             activity = "idle"
-            await until(lambda: plant.controller.activity == STATE.IDLE)
-            await plant.command(C.RESET, stop_id=stop_id)
-            await until(lambda: not plant.controller.HasField("stop"))
+            await until(lambda: site.controller.activity == STATE.IDLE)
+            await site.command(C.RESET, stop_id=stop_id)
+            await until(lambda: not site.controller.HasField("stop"))
 
     run(main())
 
@@ -163,16 +163,16 @@ def test_after_a_reset_the_old_stop_is_overlooked_for_a_moment_but_not_a_new_fau
             return f"2#ABSOLUTE.DEG*0;0;0;0;0&STATUS*{activity};remote;homed@"
 
         async with (
-            bare_controller() as (port, say, _),
+            scripted_controller() as (port, say, _),
             repeated(say, state),
-            gateway(mesh, tmp_path, port) as plant,
+            gateway(mesh, tmp_path, port) as site,
         ):
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            await plant.command(C.RESET)
-            await plant.command(C.HOME)
-            await plant.command(C.RESET)
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            await site.command(C.RESET)
+            await site.command(C.HOME)
+            await site.command(C.RESET)
             activity = "fault"
-            await until(lambda: plant.controller.activity == STATE.FAULT)
-            assert "has a fault" in await refusal(plant.command(C.HOME))
+            await until(lambda: site.controller.activity == STATE.FAULT)
+            assert "has a fault" in await refusal(site.command(C.HOME))
 
     run(main())

@@ -9,15 +9,15 @@ import pytest
 
 from protocol_gateway.audit.log import read_entries
 from tests.conftest import run
-from tests.protocol_gateway.hall import STATE, A, C, gateway, simulator, until
+from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, simulator, until
 
 FAR = [2.4, 1.0, 0.5, -1.0, 2.0]
 
 
 @contextlib.asynccontextmanager
-async def homing(plant, mesh):
+async def homing(site, mesh):
     """`robomesh send arm home` as a process of its own, and the arm homes."""
-    plant.session.declare_presence("hall", "arm", "gateway")  # as the service itself does when it is run
+    site.session.declare_presence("hall", "arm", "gateway")  # as the service itself does when it is run
     process = await asyncio.create_subprocess_exec(
         *[sys.executable, "-m", "services.command_line.main", "send", "arm", "home"],
         *["--connect", mesh.connect[0], "--operator", "wang"],
@@ -25,7 +25,7 @@ async def homing(plant, mesh):
         stderr=asyncio.subprocess.DEVNULL,
     )
     try:
-        await until(lambda: plant.controller.activity == STATE.HOMING)
+        await until(lambda: site.controller.activity == STATE.HOMING)
         yield process
     finally:
         with contextlib.suppress(ProcessLookupError):
@@ -35,15 +35,15 @@ async def homing(plant, mesh):
 
 def test_an_operators_program_that_is_killed_loses_control_with_its_session_and_the_arm_stops(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            async with homing(plant, mesh) as process:
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            async with homing(site, mesh) as process:
                 process.send_signal(signal.SIGKILL)
-                await until(lambda: plant.controller.HasField("stop"))
-            assert plant.controller.stop.reason == "dead-man: wang's page or program has gone"
-            await until(lambda: plant.controller.activity == STATE.STOPPED)
-            assert plant.controller.homed == STATE.NO
-            await until(lambda: plant.seen["lease"][-1].ended == "wang's page or program has gone")
-            entries = {entry.request: entry for entry in read_entries(plant.audit)}
+                await until(lambda: site.controller.HasField("stop"))
+            assert site.controller.stop.reason == "dead-man: wang's page or program has gone"
+            await until(lambda: site.controller.activity == STATE.STOPPED)
+            assert site.controller.homed == STATE.NO
+            await until(lambda: site.seen["lease"][-1].ended == "wang's page or program has gone")
+            entries = {entry.request: entry for entry in read_entries(site.audit)}
             # Its time was not over: the lease was ended, it did not expire.
             assert entries["REVOKE"].text == "wang's page or program has gone"
             assert "EXPIRE" not in entries
@@ -53,17 +53,17 @@ def test_an_operators_program_that_is_killed_loses_control_with_its_session_and_
 
 def test_an_operators_program_that_hangs_loses_control_with_its_leases_time(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await plant.home()
-            await plant.command(C.MOVE_ABSOLUTE, joint_positions=[0.3, 0, 0, 0, 0])
-            await until(lambda: plant.joints[0] == pytest.approx(0.3, abs=1e-3))
-            await until(lambda: not plant.seen["lease"][-1].motion)
-            await plant.command(C.SPEED, speed_percent=1)  # the way home takes longer than the lease lives
-            await plant.lease(A.RELEASE)
-            async with homing(plant, mesh) as process:
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.home()
+            await site.command(C.MOVE_ABSOLUTE, joint_positions=[0.3, 0, 0, 0, 0])
+            await until(lambda: site.joints[0] == pytest.approx(0.3, abs=1e-3))
+            await until(lambda: not site.seen["lease"][-1].motion)
+            await site.command(C.SPEED, speed_percent=1)  # the way home takes longer than the lease lives
+            await site.lease(A.RELEASE)
+            async with homing(site, mesh) as process:
                 process.send_signal(signal.SIGSTOP)
-                await until(lambda: plant.controller.HasField("stop"))
-            assert plant.controller.stop.reason == "dead-man: wang's lease was not renewed within 2 s"
+                await until(lambda: site.controller.HasField("stop"))
+            assert site.controller.stop.reason == "dead-man: wang's lease was not renewed within 2 s"
 
     run(main())
 
@@ -75,18 +75,18 @@ def test_a_link_that_breaks_while_the_arm_moves_is_a_stop_that_the_controller_ge
         async with contextlib.AsyncExitStack() as stack:
             first = await stack.enter_async_context(contextlib.AsyncExitStack())
             port = await first.enter_async_context(simulator())
-            plant = await stack.enter_async_context(gateway(mesh, tmp_path, port))
-            await plant.home()
-            await plant.command(C.MOVE_ABSOLUTE, joint_positions=FAR)
-            await until(lambda: plant.controller.activity == STATE.MOVING)
+            site = await stack.enter_async_context(gateway(mesh, tmp_path, port))
+            await site.home()
+            await site.command(C.MOVE_ABSOLUTE, joint_positions=FAR)
+            await until(lambda: site.controller.activity == STATE.MOVING)
             await first.aclose()  # the controller dies
-            await until(lambda: plant.controller.HasField("stop"))
-            stop = plant.controller.stop
+            await until(lambda: site.controller.HasField("stop"))
+            stop = site.controller.stop
             assert not stop.sent
             assert stop.reason.startswith("li's motion ran, and ")
             await stack.enter_async_context(simulator(listen=f"127.0.0.1:{port}"))
-            await until(lambda: plant.controller.activity == STATE.STOPPED)
-            assert plant.controller.stop.sent
+            await until(lambda: site.controller.activity == STATE.STOPPED)
+            assert site.controller.stop.sent
 
     run(main())
 
@@ -96,13 +96,13 @@ def test_a_link_that_breaks_while_the_arm_rests_takes_nobodys_control(mesh, tmp_
         async with contextlib.AsyncExitStack() as stack:
             first = await stack.enter_async_context(contextlib.AsyncExitStack())
             port = await first.enter_async_context(simulator())
-            plant = await stack.enter_async_context(gateway(mesh, tmp_path, port))
-            await plant.lease(A.ACQUIRE, ttl_s=5)
+            site = await stack.enter_async_context(gateway(mesh, tmp_path, port))
+            await site.lease(A.ACQUIRE, ttl_s=5)
             await first.aclose()
-            await until(lambda: plant.controller.link == STATE.DOWN)
+            await until(lambda: site.controller.link == STATE.DOWN)
             await stack.enter_async_context(simulator(listen=f"127.0.0.1:{port}"))
-            await until(lambda: plant.controller.link == STATE.UP)
-            assert not plant.controller.HasField("stop")
-            await plant.lease(A.RENEW)
+            await until(lambda: site.controller.link == STATE.UP)
+            assert not site.controller.HasField("stop")
+            await site.lease(A.RENEW)
 
     run(main())

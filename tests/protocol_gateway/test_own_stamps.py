@@ -10,7 +10,7 @@ import pytest
 
 from robomesh.session import open_session
 from tests.conftest import run
-from tests.protocol_gateway.hall import gateway, until
+from tests.protocol_gateway.gateway_site import gateway, until
 
 UNIT = b"1#ABSOLUTE.DEG*%.2f;90;-90;0;0@"
 TIMED = b"2#ABSOLUTE.DEG*%.2f;90;-90;0;0&TIME*%.6f@"

@@ -19,7 +19,7 @@ from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
 from tests.conftest import run
-from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
+from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, simulator, until
 from tests.protocol_gateway.test_checked_motion import POST, alone, checked, standing
 
 RUN, REFUSED = schema.ProgramState, schema.AuditEntry.REFUSED
@@ -37,40 +37,40 @@ LAST = [radians(-40), radians(90), radians(-90), 0, 0]
 LONG = "move_joints -140 90 -90 0 0\nmove_joints 0 90 -90 0 0\n"
 
 
-async def start(plant, text, **fields):
+async def start(site, text, **fields):
     """Run a program, again where a busy machine plans it too slowly; control is renewed meanwhile."""
     while True:
         try:
-            return await start_once(plant, text, **fields)
+            return await start_once(site, text, **fields)
         except RefusedError as error:
             if error.reason.code != "program.plan_too_slow":
                 raise
 
 
-async def start_once(plant, text, **fields):
-    await in_control(plant)
-    plant.id += 1
+async def start_once(site, text, **fields):
+    await in_control(site)
+    site.id += 1
     request = schema.CommandRequest(
-        command=C.RUN_PROGRAM, lease=plant.secret, id=plant.id, program=text, program_name="weld", **fields
+        command=C.RUN_PROGRAM, lease=site.secret, id=site.id, program=text, program_name="weld", **fields
     )
-    asked = asyncio.ensure_future(plant.session.ask(plant.key("command/li"), request, timeout_s=60))
+    asked = asyncio.ensure_future(site.session.ask(site.key("command/li"), request, timeout_s=60))
     while not asked.done():
         # What checks may still have to begin.
-        await in_control(plant)
+        await in_control(site)
         await asyncio.wait([asked], timeout=0.5)
     return asked.result()
 
 
-def states(plant):
-    return plant.seen["program"]
+def states(site):
+    return site.seen["program"]
 
 
-async def ended(plant, outcome, timeout_s=60):
+async def ended(site, outcome, timeout_s=60):
     async with asyncio.timeout(timeout_s):
-        while not states(plant) or states(plant)[-1].outcome != outcome:
-            await plant.lease(A.RENEW, ttl_s=5)
+        while not states(site) or states(site)[-1].outcome != outcome:
+            await site.lease(A.RENEW, ttl_s=5)
             await asyncio.sleep(0.1)
-    return states(plant)[-1]
+    return states(site)[-1]
 
 
 def test_a_step_whose_check_is_late_is_checked_again(mesh, tmp_path, monkeypatch):
@@ -84,13 +84,13 @@ def test_a_step_whose_check_is_late_is_checked_again(mesh, tmp_path, monkeypatch
     async def main():
         async with (
             simulator() as port,
-            gateway(mesh, tmp_path, port, check="require", cell=alone(POST)) as plant,
+            gateway(mesh, tmp_path, port, check="require", cell=alone(POST)) as site,
         ):
-            await until(lambda: not plant.controller.check_text, timeout_s=60)
+            await until(lambda: not site.controller.check_text, timeout_s=60)
             monkeypatch.setattr(Checker, "motion", slow)
-            await start(plant, "home\n")
-            await ended(plant, RUN.DONE)
-            steps = [each for each in plant.seen["audit"] if each.source == "program"]
+            await start(site, "home\n")
+            await ended(site, RUN.DONE)
+            steps = [each for each in site.seen["audit"] if each.source == "program"]
             refused = [each.reason for each in steps if each.outcome == REFUSED]
             assert {each.code for each in refused} == {"check.required"}
             assert [each.causes[0].code for each in refused][:2] == ["check.too_slow"] * 2
@@ -103,28 +103,28 @@ def test_a_program_runs_step_by_step_to_its_end_and_everybody_sees_where_it_is(m
     async def main():
         async with (
             simulator() as port,
-            gateway(mesh, tmp_path, port, check=check, cell=alone(POST)) as plant,
+            gateway(mesh, tmp_path, port, check=check, cell=alone(POST)) as site,
         ):
-            await until(lambda: not plant.controller.check_text, timeout_s=60)
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            answer = await start(plant, GOOD)
+            await until(lambda: not site.controller.check_text, timeout_s=60)
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            answer = await start(site, GOOD)
             assert answer.text == "RUN_PROGRAM: it runs"
-            done = await ended(plant, RUN.DONE)
+            done = await ended(site, RUN.DONE)
             assert (done.name, done.operator, done.text) == ("weld", "li", "")
             assert done.steps == done.step == 10
             assert done.duration_s > 1.0
-            await standing(plant, LAST)
-            seen = {(state.line, state.statement) for state in states(plant)}
+            await standing(site, LAST)
+            seen = {(state.line, state.statement) for state in states(site)}
             assert {(1, "home"), (3, "move_joints -40 90 -90 0 0")} <= seen
-            assert plant.controller.trace == STATE.YES
-            entries = [(each.request, each.source) for each in plant.seen["audit"]]
+            assert site.controller.trace == STATE.YES
+            entries = [(each.request, each.source) for each in site.seen["audit"]]
             run_at = entries.index(("RUN_PROGRAM", "mesh"))
             # The lease's renewals stand in no entry: what follows is the program's own.
             assert [request for request, _ in entries[run_at + 1 : run_at + 5]] == [
                 *("SPEED", "HOME", "SPEED", "MOVE_ABSOLUTE"),
             ]
-            await until(lambda: any(each.request == "PROGRAM_END" for each in plant.seen["audit"]))
-            assert await plant.event("program.done", 0)
+            await until(lambda: any(each.request == "PROGRAM_END" for each in site.seen["audit"]))
+            assert await site.event("program.done", 0)
 
     run(main(), timeout_s=240)
 
@@ -133,127 +133,127 @@ def test_required_a_program_that_collides_is_refused_with_its_line_and_the_arm_h
     async def main():
         async with (
             simulator() as port,
-            gateway(mesh, tmp_path, port, check="require", cell=alone(POST)) as plant,
+            gateway(mesh, tmp_path, port, check="require", cell=alone(POST)) as site,
         ):
-            await checked(plant)
-            units, before = plant.controller.counters.units_sent, list(plant.joints)
-            text = await refusal(start(plant, "move_joints -40 90 -90 0 0\nmove_joints 90 0 0 0 0\n"))
+            await checked(site)
+            units, before = site.controller.counters.units_sent, list(site.joints)
+            text = await refusal(start(site, "move_joints -40 90 -90 0 0\nmove_joints 90 0 0 0 0\n"))
             assert "post" in text
             assert "line 2" in text
-            text = await refusal(start(plant, "move_joints 0 0 0 0 0\nmove_joint 0 0 0 0 0\n"))
+            text = await refusal(start(site, "move_joints 0 0 0 0 0\nmove_joint 0 0 0 0 0\n"))
             assert "line 2" in text
             assert "move_joint" in text
-            text = await refusal(start(plant, "# nothing\n"))
+            text = await refusal(start(site, "# nothing\n"))
             assert "no statement that does anything" in text
             await asyncio.sleep(1.1)
-            assert plant.controller.counters.units_sent == units
-            assert list(plant.joints) == pytest.approx(before)
-            assert states(plant)[-1].outcome == RUN.OUTCOME_UNSPECIFIED
+            assert site.controller.counters.units_sent == units
+            assert list(site.joints) == pytest.approx(before)
+            assert states(site)[-1].outcome == RUN.OUTCOME_UNSPECIFIED
 
     run(main(), timeout_s=240)
 
 
 def test_a_stop_ends_a_program_and_no_step_of_it_comes_after_the_reset(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await plant.home()
-            await start(plant, LONG)
-            await until(lambda: plant.joints[0] < -0.2)
-            await plant.stop(by="wang", reason="somebody is in there")
-            state = await ended(plant, RUN.ENDED)
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.home()
+            await start(site, LONG)
+            await until(lambda: site.joints[0] < -0.2)
+            await site.stop(by="wang", reason="somebody is in there")
+            state = await ended(site, RUN.ENDED)
             assert state.text == "stopped by wang: somebody is in there"
             assert state.line == 1
-            await until(lambda: plant.controller.activity == STATE.STOPPED)
+            await until(lambda: site.controller.activity == STATE.STOPPED)
             await asyncio.sleep(0.5)
-            await plant.command(C.RESET, stop_id=plant.controller.stop.id)
-            await plant.lease(A.RENEW, ttl_s=5)
-            where = list(plant.joints)
+            await site.command(C.RESET, stop_id=site.controller.stop.id)
+            await site.lease(A.RENEW, ttl_s=5)
+            where = list(site.joints)
             await asyncio.sleep(1.0)
-            assert list(plant.joints) == pytest.approx(where, abs=1e-3)
+            assert list(site.joints) == pytest.approx(where, abs=1e-3)
 
     run(main(), timeout_s=240)
 
 
 def test_what_would_hold_up_a_program_is_told_before_it_begins(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            text = await refusal(start(plant, "speed 50\nmove_joints -40 90 -90 0 0\n"))
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            text = await refusal(start(site, "speed 50\nmove_joints -40 90 -90 0 0\n"))
             assert "not homed" in text
-            assert plant.controller.counters.units_sent == 0
+            assert site.controller.counters.units_sent == 0
 
     run(main(), timeout_s=240)
 
 
 def test_a_program_ends_with_its_holders_control_even_while_it_waits(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await plant.home()
-            await start(plant, "wait 600\nmove_joints -140 90 -90 0 0\n")
-            await until(lambda: states(plant)[-1].outcome == RUN.RUNNING)
-            text = await refusal(plant.command(C.MOVE_ABSOLUTE, joint_positions=LAST))
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.home()
+            await start(site, "wait 600\nmove_joints -140 90 -90 0 0\n")
+            await until(lambda: states(site)[-1].outcome == RUN.RUNNING)
+            text = await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=LAST))
             assert "the program weld runs: stop it, or wait until it has ended" in text
             # It was checked for its own speed.
-            assert "the program weld runs" in await refusal(plant.command(C.SPEED, speed_percent=100))
-            await plant.lease(A.RELEASE)
-            await until(lambda: states(plant)[-1].outcome == RUN.ENDED)
-            assert states(plant)[-1].text.startswith("control ended: ")
+            assert "the program weld runs" in await refusal(site.command(C.SPEED, speed_percent=100))
+            await site.lease(A.RELEASE)
+            await until(lambda: states(site)[-1].outcome == RUN.ENDED)
+            assert states(site)[-1].text.startswith("control ended: ")
 
     run(main(), timeout_s=240)
 
 
 def test_a_program_on_hold_waits_and_goes_on_with_resume(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await plant.home()
-            await start(plant, "move_joints -60 90 -90 0 0\nmove_joints -40 90 -90 0 0\n")
-            await until(lambda: plant.joints[0] < -0.1)
-            await plant.command(C.HOLD)
-            await until(lambda: plant.controller.activity == STATE.HOLDING)
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.home()
+            await start(site, "move_joints -60 90 -90 0 0\nmove_joints -40 90 -90 0 0\n")
+            await until(lambda: site.joints[0] < -0.1)
+            await site.command(C.HOLD)
+            await until(lambda: site.controller.activity == STATE.HOLDING)
             await asyncio.sleep(1.0)
-            assert states(plant)[-1].outcome == RUN.RUNNING
-            await plant.lease(A.RENEW, ttl_s=5)
-            await plant.command(C.RESUME)
-            await ended(plant, RUN.DONE)
-            await standing(plant, LAST)
+            assert states(site)[-1].outcome == RUN.RUNNING
+            await site.lease(A.RENEW, ttl_s=5)
+            await site.command(C.RESUME)
+            await ended(site, RUN.DONE)
+            await standing(site, LAST)
 
     run(main(), timeout_s=240)
 
 
 def test_a_program_on_hold_between_two_motions_waits_there(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await plant.home()
-            await start(plant, "wait 1\nmove_joints -40 90 -90 0 0\n")
-            await until(lambda: states(plant)[-1].outcome == RUN.RUNNING)
-            await plant.command(C.HOLD)
-            await until(lambda: plant.controller.activity == STATE.HOLDING)
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.home()
+            await start(site, "wait 1\nmove_joints -40 90 -90 0 0\n")
+            await until(lambda: states(site)[-1].outcome == RUN.RUNNING)
+            await site.command(C.HOLD)
+            await until(lambda: site.controller.activity == STATE.HOLDING)
             await asyncio.sleep(1.5)
-            await plant.lease(A.RENEW, ttl_s=5)
-            assert states(plant)[-1].outcome == RUN.RUNNING
-            await plant.command(C.RESUME)
-            await ended(plant, RUN.DONE)
-            await standing(plant, LAST)
+            await site.lease(A.RENEW, ttl_s=5)
+            assert states(site)[-1].outcome == RUN.RUNNING
+            await site.command(C.RESUME)
+            await ended(site, RUN.DONE)
+            await standing(site, LAST)
 
     run(main(), timeout_s=240)
 
 
 def test_a_program_that_is_given_up_on_hold_between_two_motions_goes_on_no_more(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await plant.home()
-            await start(plant, "wait 1\nmove_joints -40 90 -90 0 0\n")
-            await until(lambda: states(plant)[-1].outcome == RUN.RUNNING)
-            await plant.command(C.HOLD)
-            await until(lambda: plant.controller.activity == STATE.HOLDING)
-            where = list(plant.joints)
-            await plant.command(C.RESET)
-            state = await ended(plant, RUN.ENDED)
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.home()
+            await start(site, "wait 1\nmove_joints -40 90 -90 0 0\n")
+            await until(lambda: states(site)[-1].outcome == RUN.RUNNING)
+            await site.command(C.HOLD)
+            await until(lambda: site.controller.activity == STATE.HOLDING)
+            where = list(site.joints)
+            await site.command(C.RESET)
+            state = await ended(site, RUN.ENDED)
             assert state.text == "given up with RESET"
-            await until(lambda: plant.controller.activity == STATE.IDLE)
-            await plant.lease(A.RENEW, ttl_s=5)
+            await until(lambda: site.controller.activity == STATE.IDLE)
+            await site.lease(A.RENEW, ttl_s=5)
             await asyncio.sleep(1.5)
-            assert list(plant.joints) == pytest.approx(where, abs=1e-3)
+            assert list(site.joints) == pytest.approx(where, abs=1e-3)
 
     run(main(), timeout_s=240)
 
@@ -271,67 +271,67 @@ def slow_check():
             os.kill(each, signal.SIGCONT)
 
 
-async def planned(plant):
+async def planned(site):
     """The process that plans is there: it has planned something."""
-    assert "no statement that does anything" in await refusal(start(plant, "# nothing\n"))
+    assert "no statement that does anything" in await refusal(start(site, "# nothing\n"))
 
 
-async def in_control(plant):
+async def in_control(site):
     """Renew control, or take it again where this machine was too busy to renew it in time."""
     try:
-        return await plant.lease(A.RENEW, ttl_s=5)
+        return await site.lease(A.RENEW, ttl_s=5)
     except RefusedError:
-        return await plant.lease(A.ACQUIRE, ttl_s=5)
+        return await site.lease(A.ACQUIRE, ttl_s=5)
 
 
-def gave_up(plant):
+def gave_up(site):
     """Whether a program was not run because its asker gave up."""
-    return any(each.reason.code == "program.asker_gave_up" for each in not_run(plant))
+    return any(each.reason.code == "program.asker_gave_up" for each in not_run(site))
 
 
-def not_run(plant):
-    return [each for each in plant.seen["audit"] if each.request == "RUN_PROGRAM" and each.outcome == REFUSED]
+def not_run(site):
+    return [each for each in site.seen["audit"] if each.request == "RUN_PROGRAM" and each.outcome == REFUSED]
 
 
-async def plain_run(plant, timeout_s, **fields):
+async def plain_run(site, timeout_s, **fields):
     """A plain Zenoh client asks for a program, in JSON, and waits no longer than it says: its answers."""
-    plant.id += 1
+    site.id += 1
     payload = json.dumps(
-        {"lease": plant.secret, "id": plant.id, "command": "RUN_PROGRAM", "program": "home\n", **fields}
+        {"lease": site.secret, "id": site.id, "command": "RUN_PROGRAM", "program": "home\n", **fields}
     )
-    get, key = plant.session.zenoh_session.get, plant.key("command/li")
+    get, key = site.session.zenoh_session.get, site.key("command/li")
     return await asyncio.to_thread(lambda: list(get(key, payload=payload, timeout=timeout_s)))
 
 
 @pytest.mark.parametrize("told", [True, False])
 def test_a_program_whose_asker_gave_up_while_it_was_checked_never_runs(mesh, tmp_path, told):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            lease = await plant.lease(A.ACQUIRE, ttl_s=5)
-            await planned(plant)
-            lease = await in_control(plant)
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            lease = await site.lease(A.ACQUIRE, ttl_s=5)
+            await planned(site)
+            lease = await in_control(site)
             with slow_check():
                 if told:
                     until_ns = lease.now.ToNanoseconds() + 1_000_000_000
                     not_after = Timestamp(seconds=until_ns // 10**9, nanos=until_ns % 10**9)
-                    words = await refusal(start(plant, "home\n", not_after=not_after))
+                    words = await refusal(start(site, "home\n", not_after=not_after))
                     assert words.startswith(
                         "Not run: it was not checked before its asker gives up: wait longer"
                     )
                 else:
                     # Zenoh's own words for nobody's answer, if anything; the gateway's come later.
-                    replies = await plain_run(plant, 0.5)
+                    replies = await plain_run(site, 0.5)
                     assert not [each for each in replies if each.ok is not None]
-                    await until(lambda: gave_up(plant))
-            await in_control(plant)
+                    await until(lambda: gave_up(site))
+            await in_control(site)
             # What the process that plans had begun is over when this is planned.
-            await planned(plant)
-            assert gave_up(plant)
-            assert plant.controller.counters.units_sent == 0
-            assert states(plant)[-1].outcome == RUN.OUTCOME_UNSPECIFIED
+            await planned(site)
+            assert gave_up(site)
+            assert site.controller.counters.units_sent == 0
+            assert states(site)[-1].outcome == RUN.OUTCOME_UNSPECIFIED
             # Who waits is served.
-            await start(plant, "home\n")
-            await ended(plant, RUN.DONE)
+            await start(site, "home\n")
+            await ended(site, RUN.DONE)
 
     run(main(), timeout_s=240)
 
@@ -357,38 +357,38 @@ def test_a_question_says_until_when_its_asker_waits_and_not_after_wins_where_it_
 
 def test_a_hold_cancels_a_program_that_is_being_checked_and_leaves_nothing_on_hold(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            await planned(plant)
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            await planned(site)
             with slow_check():
-                asked = asyncio.create_task(refusal(start(plant, "home\n")))
-                await until(lambda: plant.id == 2)
-                await plant.lease(A.RENEW, ttl_s=5)
+                asked = asyncio.create_task(refusal(start(site, "home\n")))
+                await until(lambda: site.id == 2)
+                await site.lease(A.RENEW, ttl_s=5)
                 await asyncio.sleep(0.3)  # it is with the gateway by then, or HOLD finds nothing to cancel
-                answer = await plant.command(C.HOLD)
+                answer = await site.command(C.HOLD)
                 assert answer.text == "HOLD: the program was not started, and nothing is on hold"
                 assert await asked == "Not run: HOLD came while it was being checked: not started."
-            await in_control(plant)
-            await planned(plant)
-            assert plant.controller.counters.units_sent == 0
-            assert plant.controller.activity == STATE.IDLE
+            await in_control(site)
+            await planned(site)
+            assert site.controller.counters.units_sent == 0
+            assert site.controller.activity == STATE.IDLE
             # Nothing is in the way of what comes next, of a robot that is not homed.
-            await start(plant, "home\n")
-            await ended(plant, RUN.DONE)
+            await start(site, "home\n")
+            await ended(site, RUN.DONE)
 
     run(main(), timeout_s=240)
 
 
 def test_a_stop_ends_a_program_that_is_being_checked_at_once(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            await planned(plant)
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            await planned(site)
             with slow_check():
-                asked = asyncio.create_task(refusal(start(plant, "home\n")))
-                await until(lambda: plant.id == 2)
+                asked = asyncio.create_task(refusal(start(site, "home\n")))
+                await until(lambda: site.id == 2)
                 await asyncio.sleep(0.3)
-                await plant.stop(by="wang", reason="fire")
+                await site.stop(by="wang", reason="fire")
                 assert "wang" in await asked
 
     run(main(), timeout_s=240)
@@ -396,17 +396,17 @@ def test_a_stop_ends_a_program_that_is_being_checked_at_once(mesh, tmp_path):
 
 def test_a_homing_on_hold_goes_on_with_resume(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await plant.lease(A.ACQUIRE, ttl_s=5)
-            await plant.command(C.HOME)
-            await until(lambda: plant.controller.activity == STATE.HOMING)
-            await plant.command(C.HOLD)
-            await until(lambda: plant.controller.activity == STATE.HOLDING)
-            await plant.lease(A.RENEW, ttl_s=5)
-            await plant.command(C.RESUME)
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            await site.command(C.HOME)
+            await until(lambda: site.controller.activity == STATE.HOMING)
+            await site.command(C.HOLD)
+            await until(lambda: site.controller.activity == STATE.HOLDING)
+            await site.lease(A.RENEW, ttl_s=5)
+            await site.command(C.RESUME)
             async with asyncio.timeout(50):
-                while plant.controller.homed != STATE.YES:
-                    await plant.lease(A.RENEW, ttl_s=5)
+                while site.controller.homed != STATE.YES:
+                    await site.lease(A.RENEW, ttl_s=5)
                     await asyncio.sleep(0.2)
 
     run(main(), timeout_s=240)
@@ -414,14 +414,14 @@ def test_a_homing_on_hold_goes_on_with_resume(mesh, tmp_path):
 
 def test_a_program_is_not_run_twice_when_it_is_asked_for_twice(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            await plant.home()
-            await start(plant, "move_joints -20 90 -90 0 0\n")
-            plant.id -= 1
-            again = await start(plant, "move_joints -20 90 -90 0 0\n")
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.home()
+            await start(site, "move_joints -20 90 -90 0 0\n")
+            site.id -= 1
+            again = await start(site, "move_joints -20 90 -90 0 0\n")
             assert again.accepted
-            await ended(plant, RUN.DONE)
-            asked = [each for each in plant.seen["audit"] if each.request == "RUN_PROGRAM"]
+            await ended(site, RUN.DONE)
+            asked = [each for each in site.seen["audit"] if each.request == "RUN_PROGRAM"]
             # A busy machine may have planned it too slowly before.
             assert len([each for each in asked if each.outcome != REFUSED]) == 1
 
@@ -432,10 +432,10 @@ def test_what_is_warned_of_is_in_the_answer_to_who_runs_the_program(mesh, tmp_pa
     async def main():
         async with (
             simulator() as port,
-            gateway(mesh, tmp_path, port, check="warn", cell=alone(POST)) as plant,
+            gateway(mesh, tmp_path, port, check="warn", cell=alone(POST)) as site,
         ):
-            await checked(plant)
-            answer = await start(plant, "move_joints 90 45 -45 0 0\n")
+            await checked(site)
+            answer = await start(site, "move_joints 90 45 -45 0 0\n")
             assert answer.accepted
             assert answer.text.startswith("RUN_PROGRAM: it runs; mind: line 1: ")
             assert "post" in answer.text

@@ -7,7 +7,7 @@ from robomesh.client import ask_all
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
 from tests.conftest import run
-from tests.protocol_gateway.hall import STATE, A, C, gateway, simulator, until
+from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, simulator, until
 
 FAR = [2.4, 0.2, -0.2, 0.1, 0.5]
 ASKED = 1000  # gateway, controller and stranger are one process here
@@ -17,18 +17,18 @@ def test_in_a_flood_of_requests_a_stop_is_done_and_every_request_is_counted(mesh
     async def main():
         async with (
             simulator() as port,
-            gateway(mesh, tmp_path, port) as plant,
+            gateway(mesh, tmp_path, port) as site,
             open_session(mesh) as stranger,
         ):
-            await plant.home()
-            await plant.command(C.MOVE_ABSOLUTE, joint_positions=FAR)
-            await plant.lease(A.RENEW, ttl_s=5)
+            await site.home()
+            await site.command(C.MOVE_ABSOLUTE, joint_positions=FAR)
+            await site.lease(A.RENEW, ttl_s=5)
             guess = schema.CommandRequest(lease="guess", id=1, command=C.HOME)
             flood = [
                 asyncio.create_task(
                     ask_all(
                         stranger.zenoh_session,
-                        plant.key("command/eve"),
+                        site.key("command/eve"),
                         guess.SerializeToString(),
                         timeout_s=30.0,
                     )
@@ -36,15 +36,13 @@ def test_in_a_flood_of_requests_a_stop_is_done_and_every_request_is_counted(mesh
                 for _ in range(ASKED)
             ]
             await asyncio.wait(flood, return_when=asyncio.FIRST_COMPLETED)
-            assert (await plant.stop(by="wang")).sent
-            await until(lambda: plant.controller.activity == STATE.STOPPED)
+            assert (await site.stop(by="wang")).sent
+            await until(lambda: site.controller.activity == STATE.STOPPED)
             answers = await asyncio.gather(*flood)
             assert all(error is not None for [(_, _, error)] in answers)
 
             def told():
-                return [
-                    e for e in read_entries(plant.audit) if e.operator == "eve" or e.request == "REQUESTS"
-                ]
+                return [e for e in read_entries(site.audit) if e.operator == "eve" or e.request == "REQUESTS"]
 
             await until(lambda: sum(1 + entry.repeated for entry in told()) == ASKED)
             assert len(told()) < 100

@@ -28,7 +28,7 @@ from protocol_gateway.errors import CommandError
 from services.errors import SiteFileError
 from services.site_file.site import load
 from tests.conftest import run
-from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, until
+from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
 
 _WORDS = {Home: "home", Stop: "stop", Reset: "reset"}
 
@@ -122,30 +122,28 @@ def test_a_robot_of_another_protocol_is_shown_commanded_and_stopped_like_any_oth
         monkeypatch.setitem(DRIVERS, "json", JsonLines)
         async with (
             json_controller() as (port, heard, state),
-            gateway(mesh, tmp_path, port, protocol="json") as plant,
+            gateway(mesh, tmp_path, port, protocol="json") as site,
         ):
-            await until(lambda: plant.joints == [0.1] * 5)
+            await until(lambda: site.joints == [0.1] * 5)
             # Positions and state are two topics.
-            await until(lambda: plant.controller.mode == STATE.REMOTE)
-            assert plant.controller.homed == STATE.YES
-            await plant.lease(A.ACQUIRE, ttl_s=5)
+            await until(lambda: site.controller.mode == STATE.REMOTE)
+            assert site.controller.homed == STATE.YES
+            await site.lease(A.ACQUIRE, ttl_s=5)
             target = [0.2, 1.0, -0.5, 0.1, 0.3]
-            await plant.command(C.MOVE_ABSOLUTE, joint_positions=target)
-            await until(lambda: plant.joints == target)
-            await plant.lease(
-                A.ACQUIRE, lease=plant.secret, ttl_s=5
-            )  # a busy machine may have taken over 5 s
-            assert "knows no Trace" in await refusal(plant.command(C.TRACE_ON))
+            await site.command(C.MOVE_ABSOLUTE, joint_positions=target)
+            await until(lambda: site.joints == target)
+            await site.lease(A.ACQUIRE, lease=site.secret, ttl_s=5)  # a busy machine may have taken over 5 s
+            assert "knows no Trace" in await refusal(site.command(C.TRACE_ON))
             far = [math.radians(170.0), *target[1:]]
-            assert "waist" in await refusal(plant.command(C.MOVE_ABSOLUTE, joint_positions=far))
-            stop = await plant.stop(by="wang")
-            await until(lambda: plant.controller.activity == STATE.STOPPED)
-            await plant.lease(A.RENEW, ttl_s=5)
-            await plant.command(C.RESET, stop_id=stop.stop_id)
+            assert "waist" in await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=far))
+            stop = await site.stop(by="wang")
+            await until(lambda: site.controller.activity == STATE.STOPPED)
+            await site.lease(A.RENEW, ttl_s=5)
+            await site.command(C.RESET, stop_id=stop.stop_id)
             await until(lambda: heard[-1] == "reset")
             state["q"] = [0.0] * 3
-            await until(lambda: plant.events("unit.malformed"))
-            await until(lambda: plant.controller.link == STATE.SILENT)
+            await until(lambda: site.events("unit.malformed"))
+            await until(lambda: site.controller.link == STATE.SILENT)
 
     run(main())
 

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from tests.conftest import run
-from tests.protocol_gateway.hall import gateway, until
+from tests.protocol_gateway.gateway_site import gateway, until
 
 # What lies between a unit's writing and its reading on a busy machine.
 _SLACK_S = 0.35
@@ -103,10 +103,10 @@ def test_no_joints_message_is_dated_newer_than_its_unit(mesh, tmp_path, way):
         server = await asyncio.start_server(controller.serve, "127.0.0.1", 0)
         port = server.sockets[0].getsockname()[1]
         patient = {"stale_after_s": 5.0, "reconnect_after_s": 20.0}
-        async with server, gateway(mesh, tmp_path, port, up=False, **patient) as plant:
+        async with server, gateway(mesh, tmp_path, port, up=False, **patient) as site:
             await done.wait()
-            await until(lambda: number_of(plant.seen["joints"][-1]) == (len(controller.made_ns) - 1) % 9000)
-            seen = [(number_of(each), each.timestamp.ToNanoseconds()) for each in plant.seen["joints"]]
+            await until(lambda: number_of(site.seen["joints"][-1]) == (len(controller.made_ns) - 1) % 9000)
+            seen = [(number_of(each), each.timestamp.ToNanoseconds()) for each in site.seen["joints"]]
         assert len(seen) >= 50
         late_ns = [stamp_ns - controller.made_ns[number] for number, stamp_ns in seen]
         if way is split:

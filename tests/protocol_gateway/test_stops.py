@@ -11,138 +11,138 @@ from protocol_gateway.audit.persisted_state import authority_after
 from robomesh.errors import NoAnswerError, RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
-from tests.protocol_gateway.hall import gateway, simulator
-from tests.protocol_gateway.place import place
+from tests.protocol_gateway.control_bench import control_bench
+from tests.protocol_gateway.gateway_site import gateway, simulator
 
 C = schema.CommandRequest.Command
 A = schema.LeaseRequest.Action
 STOP = b"1#COMMAND*stop@"
 
 
-def press(it, by="wang"):
-    return it.control.stop(by=by, reason="fire", source="test")
+def press(bench, by="wang"):
+    return bench.control.stop(by=by, reason="fire", source="test")
 
 
-def codes(it):
-    return [event.code for event in it.events]
+def codes(bench):
+    return [event.code for event in bench.events]
 
 
 def test_a_flood_of_one_askers_stops_is_one_stop_and_each_is_counted(tmp_path, clock):
     async def main():
-        async with place(tmp_path) as it:
-            answers = [press(it) for _ in range(50)]
+        async with control_bench(tmp_path) as bench:
+            answers = [press(bench) for _ in range(50)]
             assert all(answer == answers[0] for answer in answers)
             assert (answers[0].stop_id, answers[0].sent) == (1, True)
-            assert it.socket == [STOP]
-            assert (codes(it), it.changes) == (["stop.latched"], 1)
-            clock.goes_on(0.11)
-            assert press(it).stop_id == 2
-            assert it.socket == [STOP, STOP]
-        assert sum(1 + entry.repeated for entry in read_entries(it.log.path)) == 51
+            assert bench.socket == [STOP]
+            assert (codes(bench), bench.changes) == (["stop.latched"], 1)
+            clock.advance(0.11)
+            assert press(bench).stop_id == 2
+            assert bench.socket == [STOP, STOP]
+        assert sum(1 + entry.repeated for entry in read_entries(bench.log.path)) == 51
 
     run(main())
 
 
 def test_others_stops_share_the_unit_under_numbers_of_their_own(tmp_path, clock):
     async def main():
-        async with place(tmp_path) as it:
-            press(it)
-            clock.goes_on(0.06)
-            assert press(it, by="zhao").stop_id == 2
-            assert it.control.stop(by="zhao", reason="fire", source="elsewhere").stop_id == 3
-            assert it.socket == [STOP]
+        async with control_bench(tmp_path) as bench:
+            press(bench)
+            clock.advance(0.06)
+            assert press(bench, by="zhao").stop_id == 2
+            assert bench.control.stop(by="zhao", reason="fire", source="elsewhere").stop_id == 3
+            assert bench.socket == [STOP]
             # The unit grows no younger by being shared.
-            clock.goes_on(0.06)
-            assert press(it).stop_id == 4
-            assert it.socket == [STOP, STOP]
+            clock.advance(0.06)
+            assert press(bench).stop_id == 4
+            assert bench.socket == [STOP, STOP]
 
     run(main())
 
 
 def test_a_stop_that_was_reset_or_not_sent_is_no_other_ones(tmp_path, clock):
     async def main():
-        async with place(tmp_path) as it:
-            press(it)
-            await it.lease(A.ACQUIRE)
-            await it.commands((C.RESET, {"stop_id": 1}))
-            assert press(it).stop_id == 2
-            assert it.socket == [STOP, b"1#COMMAND*reset@", STOP]
-            clock.goes_on(1.0)
-            it.broken = True
-            assert [press(it).sent, press(it).sent] == [False, False]
-            it.broken = False
-            it.control.send_latched_stop()
+        async with control_bench(tmp_path) as bench:
+            press(bench)
+            await bench.lease(A.ACQUIRE)
+            await bench.commands((C.RESET, {"stop_id": 1}))
+            assert press(bench).stop_id == 2
+            assert bench.socket == [STOP, b"1#COMMAND*reset@", STOP]
+            clock.advance(1.0)
+            bench.broken = True
+            assert [press(bench).sent, press(bench).sent] == [False, False]
+            bench.broken = False
+            bench.control.send_latched_stop()
             # It is on its way now, but was not when it was asked for.
-            assert (press(it).sent, it.control.authority.stop.id) == (True, 5)
+            assert (press(bench).sent, bench.control.authority.stop.id) == (True, 5)
 
     run(main())
 
 
 def test_whoever_presses_again_does_not_hide_that_the_robot_moves_on(tmp_path, clock):
     async def main():
-        async with place(tmp_path) as it:
+        async with control_bench(tmp_path) as bench:
             for _ in range(5):
-                press(it)
-                it.control.observe(moving=True)
-                clock.goes_on(0.5)
-            assert codes(it).count("stop.disobeyed") == 1
+                press(bench)
+                bench.control.observe(moving=True)
+                clock.advance(0.5)
+            assert codes(bench).count("stop.disobeyed") == 1
             for _ in range(4):
-                press(it)
-                it.control.observe(moving=True)
-                clock.goes_on(0.5)
-            assert codes(it).count("stop.disobeyed") == 2
-            assert it.socket.count(STOP) == 9 + 2
+                press(bench)
+                bench.control.observe(moving=True)
+                clock.advance(0.5)
+            assert codes(bench).count("stop.disobeyed") == 2
+            assert bench.socket.count(STOP) == 9 + 2
 
     run(main())
 
 
 def test_whoever_presses_again_does_not_hide_that_others_move_the_robot(tmp_path, clock):
     async def main():
-        async with place(tmp_path) as it:
-            it.control.observe(moving=False)
+        async with control_bench(tmp_path) as bench:
+            bench.control.observe(moving=False)
             for _ in range(5):
-                press(it)
-                clock.goes_on(0.5)
-            it.control.observe(moving=True)
-            assert codes(it).count("motion.foreign") == 1
+                press(bench)
+                clock.advance(0.5)
+            bench.control.observe(moving=True)
+            assert codes(bench).count("motion.foreign") == 1
 
     run(main())
 
 
 def test_a_stop_is_given_its_time_behind_a_reset_and_on_a_new_connection(tmp_path, clock):
     async def main():
-        async with place(tmp_path) as it:
-            await it.lease(A.ACQUIRE)
-            press(it)
-            await it.commands((C.RESET, {"stop_id": 1}))
-            clock.goes_on(3.0)
-            press(it)
-            it.control.observe(moving=True)
-            clock.goes_on(1.9)
-            it.control.send_latched_stop()
-            clock.goes_on(1.9)
-            it.control.observe(moving=True)
-            assert "stop.disobeyed" not in codes(it)
-            clock.goes_on(0.2)
-            it.control.observe(moving=True)
-            assert "stop.disobeyed" in codes(it)
+        async with control_bench(tmp_path) as bench:
+            await bench.lease(A.ACQUIRE)
+            press(bench)
+            await bench.commands((C.RESET, {"stop_id": 1}))
+            clock.advance(3.0)
+            press(bench)
+            bench.control.observe(moving=True)
+            clock.advance(1.9)
+            bench.control.send_latched_stop()
+            clock.advance(1.9)
+            bench.control.observe(moving=True)
+            assert "stop.disobeyed" not in codes(bench)
+            clock.advance(0.2)
+            bench.control.observe(moving=True)
+            assert "stop.disobeyed" in codes(bench)
 
     run(main())
 
 
 def test_a_stop_that_is_sent_again_is_in_the_audit_log_and_latches_nothing(tmp_path, clock):
     async def main():
-        async with place(tmp_path) as it:
-            it.broken = True
-            press(it)
-            it.broken = False
-            it.control.send_latched_stop()
-            clock.goes_on(2.1)
-            it.control.observe(moving=True)
-            clock.goes_on(2.1)
-            it.broken = True
-            it.control.observe(moving=True)
-        entries = list(read_entries(it.log.path))
+        async with control_bench(tmp_path) as bench:
+            bench.broken = True
+            press(bench)
+            bench.broken = False
+            bench.control.send_latched_stop()
+            clock.advance(2.1)
+            bench.control.observe(moving=True)
+            clock.advance(2.1)
+            bench.broken = True
+            bench.control.observe(moving=True)
+        entries = list(read_entries(bench.log.path))
         assert [(entry.request, entry.outcome) for entry in entries] == [
             ("STOP", Outcome.FAILED),
             ("STOP_AGAIN", Outcome.ACCEPTED),
@@ -160,19 +160,19 @@ def test_a_stop_that_is_sent_again_is_in_the_audit_log_and_latches_nothing(tmp_p
 
 def test_a_stop_is_not_reset_while_the_robot_moves_on(tmp_path):
     async def main():
-        async with place(tmp_path) as it:
-            await it.lease(A.ACQUIRE)
-            await it.commands((C.HOME, {}))
-            it.control.observe(moving=True)
-            press(it)
+        async with control_bench(tmp_path) as bench:
+            await bench.lease(A.ACQUIRE)
+            await bench.commands((C.HOME, {}))
+            bench.control.observe(moving=True)
+            press(bench)
             with pytest.raises(
                 RefusedError, match="still moves after stop 1: wait until it stands, then RESET"
             ):
-                await it.commands((C.RESET, {"stop_id": 1}), first_id=2)
-            assert it.control.authority.stop.id == 1
-            it.control.observe(moving=False)
-            await it.commands((C.RESET, {"stop_id": 1}), first_id=3)
-            assert it.control.authority.stop is None
+                await bench.commands((C.RESET, {"stop_id": 1}), first_id=2)
+            assert bench.control.authority.stop.id == 1
+            bench.control.observe(moving=False)
+            await bench.commands((C.RESET, {"stop_id": 1}), first_id=3)
+            assert bench.control.authority.stop is None
 
     run(main())
 
@@ -185,19 +185,19 @@ def test_a_stop_comes_over_a_connection_of_its_own(mesh, tmp_path):
             held.add(threading.get_ident())
             go_on.wait(20.0)
 
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             # On the threads that read the other connections, and with the priority of a request.
             handler = zenoh.handlers.Callback(block, indirect=False)
             others = ("", "requests")
-            subscribers = [plant.own.connection(each).declare_subscriber("block", handler) for each in others]
+            subscribers = [site.own.connection(each).declare_subscriber("block", handler) for each in others]
             try:
                 while len(held) < len(others):
-                    plant.session.zenoh_session.put("block", b"", priority=zenoh.Priority.REAL_TIME)
+                    site.session.zenoh_session.put("block", b"", priority=zenoh.Priority.REAL_TIME)
                     await asyncio.sleep(0.01)
                 ask = schema.LeaseRequest(action=A.ACQUIRE)
                 with pytest.raises(NoAnswerError):
-                    await plant.session.ask(plant.key("lease/request/li"), ask, timeout_s=0.5)
-                assert (await plant.stop()).sent
+                    await site.session.ask(site.key("lease/request/li"), ask, timeout_s=0.5)
+                assert (await site.stop()).sent
             finally:
                 go_on.set()
             for subscriber in subscribers:

@@ -9,7 +9,7 @@ from robomesh import pieces
 from robomesh.errors import BrokenAnswerError
 from robomesh.session import open_session
 from tests.conftest import run
-from tests.protocol_gateway.hall import until
+from tests.protocol_gateway.gateway_site import until
 
 KEY = "robomesh/hall/arm/mesh/{}"
 NAMED = "robomesh/hall/arm/kinematics/check/{}"

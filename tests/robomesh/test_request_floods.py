@@ -14,7 +14,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
 from robomesh.session import open_session
 from tests.conftest import run
-from tests.protocol_gateway.hall import until
+from tests.protocol_gateway.gateway_site import until
 
 HOME = schema.CommandRequest(command=schema.CommandRequest.HOME)
 

@@ -17,7 +17,7 @@ from services.ros2 import Settings as Ros2Settings
 from services.ros2 import serve as serve_ros2
 from services.router.router import read_access
 from tests.conftest import free_port, run
-from tests.protocol_gateway.hall import until
+from tests.protocol_gateway.gateway_site import until
 from tests.services.foxglove_client import attached
 from tests.services.test_foxglove import ARM, bridge, joints
 

@@ -9,7 +9,7 @@ from protocol_gateway.audit.log import read_entries
 from robomesh.session import open_session
 from services.recorder.recorder import Settings, serve
 from tests.conftest import run
-from tests.protocol_gateway.hall import A, C, gateway, simulator, until
+from tests.protocol_gateway.gateway_site import A, C, gateway, simulator, until
 from tests.site import robomesh
 
 

@@ -18,7 +18,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import SessionSettings, open_session
 from services.foxglove import Settings, serve
 from tests.conftest import free_port, run
-from tests.protocol_gateway.hall import STATE, gateway, simulator
+from tests.protocol_gateway.gateway_site import STATE, gateway, simulator
 from tests.services.foxglove_client import attached
 
 ARM = "robomesh/hall/arm"

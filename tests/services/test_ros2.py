@@ -19,7 +19,7 @@ from services.ros2 import Settings, serve
 from services.ros2.bridge import JOINT_STATES, ROBOT_DESCRIPTION, TF
 from services.ros2.wire import Topic
 from tests.conftest import run
-from tests.protocol_gateway.hall import until
+from tests.protocol_gateway.gateway_site import until
 
 GLB = b"glTF" + bytes(60)
 URDF = """<robot name="arm"><link name="base"/><link name="column"/>

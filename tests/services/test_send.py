@@ -12,7 +12,7 @@ from robomesh.session import open_session
 from services.command_line import discovery
 from services.command_line.live import send
 from tests.conftest import run
-from tests.protocol_gateway.hall import A, until
+from tests.protocol_gateway.gateway_site import A, until
 
 KEY = "robomesh/hall/arm/lease/request/li"
 

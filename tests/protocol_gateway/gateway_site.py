@@ -27,7 +27,7 @@ async def until(condition, timeout_s=30.0):
 
 
 @dataclass
-class Plant:
+class GatewaySite:
     """What a test sees of a site, from the monitor's and the operator's side."""
 
     session: object
@@ -95,13 +95,13 @@ class Plant:
 
 
 @contextlib.asynccontextmanager
-async def kept_control(*plants):
+async def kept_control(*sites):
     """Meanwhile each one's operator renews control: however long the machine takes, it is not lost."""
 
     async def renew():
         while True:
-            for plant in plants:
-                await plant.lease(A.RENEW, ttl_s=5)
+            for site in sites:
+                await site.lease(A.RENEW, ttl_s=5)
             await asyncio.sleep(0.5)
 
     renewing = asyncio.create_task(renew())
@@ -154,24 +154,26 @@ async def gateway(mesh, folder, *ports, up=True, each=(), **robot):
     )
     async with open_session(mesh) as own, open_session(mesh) as monitor:
         task = asyncio.create_task(serve(own, settings))
-        plant = Plant(monitor, folder / "hall" / "arm.jsonl", own=own)
-        plant.others = [Plant(monitor, folder / "hall" / f"{name}.jsonl", name) for name in names[1:] if each]
+        site = GatewaySite(monitor, folder / "hall" / "arm.jsonl", own=own)
+        site.others = [
+            GatewaySite(monitor, folder / "hall" / f"{name}.jsonl", name) for name in names[1:] if each
+        ]
         topics = ("joints", "joints/slow", "controller", "lease", "events", "audit", "raw", "program")
         watching = [
             asyncio.create_task(watch(monitor, one, topic))
-            for one in (plant, *plant.others)
+            for one in (site, *site.others)
             for topic in topics
         ]
         try:
-            await until(lambda: task.done() or plant.seen.get("controller"))
+            await until(lambda: task.done() or site.seen.get("controller"))
             if up:
-                await until(lambda: task.done() or plant.controller.link == STATE.UP)
-                for other in plant.others:
+                await until(lambda: task.done() or site.controller.link == STATE.UP)
+                for other in site.others:
                     await until(lambda other=other: other.seen.get("controller"))
                     await until(lambda other=other: other.controller.link == STATE.UP)
             if task.done():
                 await task
-            yield plant
+            yield site
         finally:
             task.cancel()
             await asyncio.gather(task, return_exceptions=True)
@@ -180,9 +182,9 @@ async def gateway(mesh, folder, *ports, up=True, each=(), **robot):
             await asyncio.gather(*watching, return_exceptions=True)
 
 
-async def watch(session, plant, topic):
-    seen = plant.seen.setdefault(topic, [])
-    async for sample in session.subscribe(plant.key(topic), newest=2000):
+async def watch(session, site, topic):
+    seen = site.seen.setdefault(topic, [])
+    async for sample in session.subscribe(site.key(topic), newest=2000):
         message = sample.message()
         if isinstance(message, schema.EventList):
             seen.extend(message.events)

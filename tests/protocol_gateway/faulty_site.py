@@ -4,18 +4,18 @@ import contextlib
 
 from robomesh.schemas import robomesh_pb2 as schema
 from services.simulator.fault_requests import Mesh
-from tests.protocol_gateway.hall import gateway, simulator
+from tests.protocol_gateway.gateway_site import gateway, simulator
 
 
 @contextlib.asynccontextmanager
-async def faulty(mesh, folder, *more_ports, demo=True, **robot):
-    """A plant, and `await fault(name)`, `await fault(name, off=True)`."""
+async def faulty_site(mesh, folder, *more_ports, demo=True, **robot):
+    """A site, and `await fault(name)`, `await fault(name, off=True)`."""
     own = Mesh(site="hall", robot="arm", session=mesh)
     simulated = simulator(demo=demo, mesh=own)
-    async with simulated as port, gateway(mesh, folder, port, *more_ports, **robot) as plant:
+    async with simulated as port, gateway(mesh, folder, port, *more_ports, **robot) as site:
 
         async def fault(name, *, off=False):
             request = schema.FaultRequest(fault=name, off=off)
-            return await plant.session.ask(plant.key("simulator/fault"), request)
+            return await site.session.ask(site.key("simulator/fault"), request)
 
-        yield plant, fault
+        yield site, fault

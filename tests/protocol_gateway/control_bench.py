@@ -19,8 +19,8 @@ from robots.description import load
 from robots.joints import joints_of
 
 
-class Place:
-    """A control and all around it."""
+class ControlBench:
+    """A control and all around bench."""
 
     def __init__(self, folder):
         self.socket = []
@@ -84,10 +84,10 @@ class Place:
 
 
 @asynccontextmanager
-async def place(folder):
-    it = Place(folder)
+async def control_bench(folder):
+    bench = ControlBench(folder)
     try:
-        yield it
+        yield bench
     finally:
-        await it.control.close()
-        await it.log.close()
+        await bench.control.close()
+        await bench.log.close()

@@ -6,7 +6,7 @@ import time
 
 
 @contextlib.asynccontextmanager
-async def bare_controller():
+async def scripted_controller():
     """A controller that says what a test tells it to: (port, say, heard)."""
     writers, heard = [], bytearray()
 
@@ -58,5 +58,5 @@ async def slow_starter(after_s):
         waist += 0.1 if moves else 0.0
         return f"2#ABSOLUTE.DEG*{waist:.2f};0;0;0;0&STATUS*{'moving' if moves else 'idle'};remote;homed@"
 
-    async with bare_controller() as (port, say, heard), repeated(say, state):
+    async with scripted_controller() as (port, say, heard), repeated(say, state):
         yield port, heard

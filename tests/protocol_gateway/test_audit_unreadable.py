@@ -8,14 +8,14 @@ from protocol_gateway.audit.log import read_entries, verify
 from robomesh.messages import JSON, PROTOBUF
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
-from tests.protocol_gateway.hall import C, gateway, simulator, until
+from tests.protocol_gateway.gateway_site import C, gateway, simulator, until
 
 MOVE = {"command": "MOVE_ABSOLUTE", "lease": "x", "id": "1"}
 
 
-def asked(plant, topic, payload, encoding=JSON):
+def asked(site, topic, payload, encoding=JSON):
     """The refusal of a request in bytes of anybody's own."""
-    replies = plant.session.zenoh_session.get(plant.key(topic), payload=payload, encoding=encoding)
+    replies = site.session.zenoh_session.get(site.key(topic), payload=payload, encoding=encoding)
     return [reply.err.payload.to_string() for reply in replies if reply.err is not None]
 
 
@@ -36,12 +36,12 @@ CASES = [
 
 def test_what_nobody_judged_is_refused_by_name_and_written_down(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             for topic, payload, words in CASES:
-                count = len(plant.seen["audit"])
-                (text,) = await asyncio.to_thread(asked, plant, topic, payload.encode())
+                count = len(site.seen["audit"])
+                (text,) = await asyncio.to_thread(asked, site, topic, payload.encode())
                 assert words in text
-                (entry,) = await until(lambda count=count: plant.seen["audit"][count:])
+                (entry,) = await until(lambda count=count: site.seen["audit"][count:])
                 assert entry.request == ("LEASE" if topic.startswith("lease") else "COMMAND")
                 assert entry.outcome == schema.AuditEntry.REFUSED
                 assert entry.text == text
@@ -54,12 +54,12 @@ def test_what_nobody_judged_is_refused_by_name_and_written_down(mesh, tmp_path):
                 schema.CommandRequest(command=77),
             ):
                 bytes_ = message.SerializeToString()
-                assert await asyncio.to_thread(asked, plant, "command/li", bytes_, PROTOBUF)
-            assert await asyncio.to_thread(asked, plant, "command/li", b"\xff\xff", PROTOBUF)
+                assert await asyncio.to_thread(asked, site, "command/li", bytes_, PROTOBUF)
+            assert await asyncio.to_thread(asked, site, "command/li", b"\xff\xff", PROTOBUF)
             every = len(CASES) + 3
-            await until(lambda: sum(1 + entry.repeated_count for entry in plant.seen["audit"]) == every)
-            assert plant.controller.counters.units_sent == 0
-        assert verify(plant.audit).ok
+            await until(lambda: sum(1 + entry.repeated_count for entry in site.seen["audit"]) == every)
+            assert site.controller.counters.units_sent == 0
+        assert verify(site.audit).ok
 
     run(main())
 
@@ -68,10 +68,10 @@ def test_a_flood_of_what_cannot_be_read_is_counted(mesh, tmp_path):
     flood = 200
 
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             for _ in range(flood):
-                await asyncio.to_thread(asked, plant, "command/li", b"{")
-        told = [entry for entry in read_entries(plant.audit) if entry.request == "COMMAND"]
+                await asyncio.to_thread(asked, site, "command/li", b"{")
+        told = [entry for entry in read_entries(site.audit) if entry.request == "COMMAND"]
         assert sum(1 + entry.repeated for entry in told) == flood
         assert len(told) < 40
 

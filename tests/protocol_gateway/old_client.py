@@ -8,7 +8,7 @@ from protocol_gateway.core.records import AbsolutePositions, Error, Status
 from protocol_gateway.core.stream import Malformed, UnitStream
 from protocol_gateway.legacy.settings import LegacySettings
 from tests.conftest import free_port
-from tests.protocol_gateway.hall import gateway, simulator, until
+from tests.protocol_gateway.gateway_site import gateway, simulator, until
 
 ME = "127.0.0.1"
 
@@ -94,10 +94,10 @@ async def program(settings):
 
 
 @contextlib.asynccontextmanager
-async def hall(mesh, folder, settings, **robot):
+async def legacy_site(mesh, folder, settings, **robot):
     """A gateway with a simulated controller, and old programs welcome."""
     async with (
         simulator(**robot.pop("simulated", {})) as port,
-        gateway(mesh, folder, port, legacy_clients=settings, **robot) as plant,
+        gateway(mesh, folder, port, legacy_clients=settings, **robot) as site,
     ):
-        yield plant
+        yield site
