@@ -1,4 +1,4 @@
-"""What the gateway's tests share."""
+"""Fixtures of the gateway's tests."""
 
 import time
 
@@ -9,7 +9,7 @@ from protocol_gateway.control import control, stop_handler
 
 
 class Clock:
-    """A clock of control's, set by hand."""
+    """Clock of Control, advanced by the test."""
 
     def __init__(self):
         self.now = Now(time.monotonic(), time.time_ns())
@@ -20,7 +20,7 @@ class Clock:
 
 @pytest.fixture
 def clock(monkeypatch):
-    """In place of both of control's clocks; the lease's alarm and the disk go by their own."""
+    """Replace both clocks of Control; the lease's timer and the disk use the real time."""
     clock = Clock()
     for module in (control, stop_handler):
         monkeypatch.setattr(module, "read_clocks", lambda: clock.now)

@@ -1,4 +1,4 @@
-"""Control of one robot: its driver, audit log and rules are real, the socket is a list."""
+"""Test bench for Control of one robot: driver, audit log and rules are real, the socket is a list."""
 
 from contextlib import asynccontextmanager
 
@@ -20,7 +20,7 @@ from robots.joints import joints_of
 
 
 class ControlBench:
-    """A control and all around bench."""
+    """Control with its collaborators."""
 
     def __init__(self, folder):
         self.socket = []
@@ -28,7 +28,7 @@ class ControlBench:
         self.changes = 0
         self.status = StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=False)
         self.positions = (0.0,) * 5
-        self.known = None  # the controller, if not as the above say
+        self.known = None  # overrides the controller's state
         self.broken = False
         self.secret = ""
         joints = joints_of(load("pt600"))

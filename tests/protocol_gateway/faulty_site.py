@@ -1,4 +1,4 @@
-"""A robot whose simulated controller misbehaves on request."""
+"""A robot with a simulated controller that misbehaves on request."""
 
 import contextlib
 
@@ -9,7 +9,7 @@ from tests.protocol_gateway.gateway_site import gateway, simulator
 
 @contextlib.asynccontextmanager
 async def faulty_site(mesh, folder, *more_ports, demo=True, **robot):
-    """A site, and `await fault(name)`, `await fault(name, off=True)`."""
+    """Run a gateway site; yield it and the coroutine function `fault(name, off=False)`."""
     own = Mesh(site="hall", robot="arm", session=mesh)
     simulated = simulator(demo=demo, mesh=own)
     async with simulated as port, gateway(mesh, folder, port, *more_ports, **robot) as site:

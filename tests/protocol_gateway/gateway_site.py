@@ -1,4 +1,4 @@
-"""A hall for the gateway's tests: controllers, a gateway, a monitor, an operator; nothing is a mock."""
+"""Site for the gateway's tests: controllers, a gateway, a monitor, an operator; nothing is a mock."""
 
 import asyncio
 import contextlib
@@ -28,7 +28,7 @@ async def until(condition, timeout_s=30.0):
 
 @dataclass
 class GatewaySite:
-    """What a test sees of a site, from the monitor's and the operator's side."""
+    """A site as a monitor and an operator see it."""
 
     session: object
     audit: object
@@ -48,7 +48,7 @@ class GatewaySite:
 
     @property
     def joints(self):
-        """The newest positions; none: nothing has come yet."""
+        """The newest positions; empty: none received yet."""
         states = self.seen.get("joints")
         return [joint.position for joint in states[-1].joints] if states else []
 
@@ -56,7 +56,7 @@ class GatewaySite:
         return [event for event in self.seen["events"] if event.code == code]
 
     async def event(self, code, number):
-        """One of that code, as soon as there is one: topics come each in their own time."""
+        """Wait for an event with this code and return it: topics arrive independently."""
         await until(lambda: self.events(code))
         return self.events(code)[number]
 
@@ -79,13 +79,13 @@ class GatewaySite:
         return await self.session.ask(self.key(f"command/{operator}"), request)
 
     async def units(self, number):
-        """Wait until the gateway has taken so many more units of the controller's."""
+        """Wait until the gateway has published this many more units of the controller."""
         seen = self.seen.setdefault("joints", [])
         more = len(seen) + number
         await until(lambda: len(seen) >= more)
 
     async def home(self):
-        """Take control for long enough, and home; until the motion has demonstrably ended."""
+        """Acquire control and home, and wait until the motion has demonstrably ended."""
         await self.lease(A.ACQUIRE, ttl_s=5)
         await self.command(C.HOME)
         await until(lambda: self.controller.homed == STATE.YES)
@@ -96,7 +96,7 @@ class GatewaySite:
 
 @contextlib.asynccontextmanager
 async def kept_control(*sites):
-    """Meanwhile each one's operator renews control: however long the machine takes, it is not lost."""
+    """Renew the lease of each site's operator while the block runs, also on a slow machine."""
 
     async def renew():
         while True:
@@ -114,7 +114,7 @@ async def kept_control(*sites):
 
 @contextlib.asynccontextmanager
 async def simulator(**settings):
-    """The port of a running simulated controller."""
+    """Run a simulated controller; yield its port."""
     said = asyncio.get_running_loop().create_future()
     task = asyncio.create_task(
         simulate(SimulatorSettings(**{"robot": "pt600", **settings}), ready=said.set_result)
@@ -129,7 +129,7 @@ async def simulator(**settings):
 
 @contextlib.asynccontextmanager
 async def gateway(mesh, folder, *ports, up=True, each=(), **robot):
-    """A gateway of one robot a port, and a monitor that has seen the first one's link up.
+    """Run a gateway with one robot for each port, and a monitor; wait until the links are up.
 
     `each`: settings of each robot alone; then every robot is watched.
     """
@@ -195,7 +195,7 @@ async def watch(session, site, topic):
 
 
 async def none_left_out(session, joints, robot):
-    """Whether all states that its controller sent have come over a subscription, however slow the machine."""
+    """Return whether a subscription received all states of the controller, without loss on a slow machine."""
     state = await last_value(session, f"robomesh/hall/{robot}/controller")
     return (joints.lost(f"robomesh/hall/{robot}/joints"), state.counters.units_skipped) == (0, 0)
 

@@ -1,4 +1,4 @@
-"""An old client program for the gateway's tests: a plain socket, as the paper's programs have it."""
+"""Old client program for the gateway's tests: a plain socket, like the paper's programs."""
 
 import asyncio
 import contextlib
@@ -14,7 +14,7 @@ ME = "127.0.0.1"
 
 
 def in_loop(test):
-    """A test as a coroutine, in a loop of its own."""
+    """Run a coroutine test in a new event loop."""
 
     @functools.wraps(test)
     def run(*args, **fixtures):
@@ -24,12 +24,12 @@ def in_loop(test):
 
 
 def legacy(**settings):
-    """Settings of a robot that old programs may attach to; one of this machine's commands as li."""
+    """Return settings for old client programs; programs of this machine command as li."""
     return LegacySettings(**{"host": ME, "port": free_port(), "commanders": {ME: "li"}, **settings})
 
 
 class Program:
-    """An old client program: what it reads is kept, bytes and units."""
+    """Old client program that keeps the bytes and units that it reads."""
 
     def __init__(self, reader, writer):
         self.reader, self.writer = reader, writer
@@ -64,7 +64,7 @@ class Program:
 
     @property
     def last_state(self):
-        """The bytes of the last unit with positions; a refusal may have come behind it."""
+        """Bytes of the last unit with positions; a refusal may have followed."""
         return [unit for unit in self.bytes.split(b"@")[:-1] if b"ABSOLUTE" in unit][-1] + b"@"
 
     def say(self, *units):
@@ -95,7 +95,7 @@ async def program(settings):
 
 @contextlib.asynccontextmanager
 async def legacy_site(mesh, folder, settings, **robot):
-    """A gateway with a simulated controller, and old programs welcome."""
+    """Run a gateway with a simulated controller that accepts old client programs."""
     async with (
         simulator(**robot.pop("simulated", {})) as port,
         gateway(mesh, folder, port, legacy_clients=settings, **robot) as site,

@@ -1,4 +1,4 @@
-"""Controllers that say what a test tells them to."""
+"""Controllers that send the bytes that a test gives them."""
 
 import asyncio
 import contextlib
@@ -7,7 +7,7 @@ import time
 
 @contextlib.asynccontextmanager
 async def scripted_controller():
-    """A controller that says what a test tells it to: (port, say, heard)."""
+    """Run a controller that sends a test's text: (port, say, heard)."""
     writers, heard = [], bytearray()
 
     async def serve(reader, writer):
@@ -30,7 +30,7 @@ async def scripted_controller():
 
 @contextlib.asynccontextmanager
 async def repeated(say, text):
-    """Something said 100 times a second; `text` is asked for each time."""
+    """Send the result of `text()` 100 times a second."""
 
     async def keep_saying():
         while True:
@@ -47,7 +47,7 @@ async def repeated(say, text):
 
 @contextlib.asynccontextmanager
 async def slow_starter(after_s):
-    """A controller that begins to move so long after it was sent a target: (port, heard)."""
+    """Run a controller that begins to move some seconds after a target: (port, heard)."""
     waist, begins = 0.0, None
 
     def state():

@@ -43,7 +43,7 @@ def test_entries_are_numbered_chained_and_read_back_as_they_were(tmp_path):
     assert verify(path, head=written[1].hash).ok
 
 
-def test_a_log_that_is_opened_again_goes_on_with_its_chain(tmp_path):
+def test_a_reopened_log_continues_its_chain(tmp_path):
     path = tmp_path / "arm.jsonl"
     write(path, entry())
     log, (second,) = write(path, entry())
@@ -51,7 +51,7 @@ def test_a_log_that_is_opened_again_goes_on_with_its_chain(tmp_path):
     assert verify(path).entries == 2
 
 
-def test_entries_asked_for_at_once_stand_in_the_order_of_the_asking(tmp_path):
+def test_concurrent_entries_keep_the_order_of_the_calls(tmp_path):
     async def main():
         seen = []
         log = AuditLog(tmp_path / "arm.jsonl", on_written=seen.append)
@@ -63,7 +63,7 @@ def test_entries_asked_for_at_once_stand_in_the_order_of_the_asking(tmp_path):
     run(main())
 
 
-def test_the_hash_is_of_the_line_without_it_so_that_anybody_can_check(tmp_path):
+def test_the_hash_covers_the_line_without_the_hash(tmp_path):
     path = tmp_path / "arm.jsonl"
     write(path, entry(id="1"))
     row = json.loads(path.read_text())
@@ -90,14 +90,14 @@ def three_lines(path):
         (lambda a, b, c: [a, b.replace(b":", b": ", 1), c], 2),
     ],
 )
-def test_a_log_that_was_changed_shows_where(tmp_path, change, first_break):
+def test_a_changed_log_reports_the_first_break(tmp_path, change, first_break):
     path = tmp_path / "arm.jsonl"
     path.write_bytes(b"".join(change(*three_lines(path))))
     found = verify(path)
     assert (found.ok, found.first_break, found.entries) == (False, first_break, first_break - 1)
 
 
-def test_a_cut_tail_shows_to_whoever_knows_the_head(tmp_path):
+def test_a_truncated_log_is_detected_with_the_head(tmp_path):
     path = tmp_path / "arm.jsonl"
     lines = three_lines(path)
     head = json.loads(lines[2])["hash"]
@@ -107,7 +107,7 @@ def test_a_cut_tail_shows_to_whoever_knows_the_head(tmp_path):
     assert (found.ok, found.first_break) == (False, 3)
 
 
-def test_a_torn_last_line_is_cut_off_and_told(tmp_path):
+def test_a_torn_last_line_is_cut_off_and_reported(tmp_path):
     path = tmp_path / "arm.jsonl"
     path.write_bytes(b"".join(three_lines(path))[:-20])
     log, _ = write(path, entry(id="new"))
@@ -116,7 +116,7 @@ def test_a_torn_last_line_is_cut_off_and_told(tmp_path):
     assert verify(path).ok
 
 
-def test_a_broken_chain_is_told_and_not_mended(tmp_path):
+def test_a_broken_chain_is_reported_and_not_repaired(tmp_path):
     path = tmp_path / "arm.jsonl"
     first, second, third = three_lines(path)
     path.write_bytes(first + second.replace(b"HOME", b"HOLD") + third)
@@ -135,13 +135,13 @@ def test_two_gateways_do_not_write_one_log(tmp_path):
     run(main())
 
 
-def test_a_folder_that_cannot_be_made_is_said_in_words(tmp_path):
+def test_a_folder_that_cannot_be_created_is_an_error(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(AuditError, match=r"arm\.jsonl cannot be written \(File exists\)"):
         AuditLog(tmp_path / "file" / "arm.jsonl")
 
 
-def test_what_a_full_disk_refused_is_not_in_the_log_and_what_is_owed_comes_later(tmp_path):
+def test_a_full_disk_rejects_commands_and_delays_past_events(tmp_path):
     async def main():
         log = AuditLog(tmp_path / "arm.jsonl")
         await log.append(entry(id="1"))
@@ -162,7 +162,7 @@ def test_what_a_full_disk_refused_is_not_in_the_log_and_what_is_owed_comes_later
     run(main())
 
 
-def test_whoever_waits_for_an_entry_is_told_whatever_fails(tmp_path, monkeypatch, caplog):
+def test_every_pending_entry_gets_its_error(tmp_path, monkeypatch, caplog):
     def broken(entry):
         raise ZeroDivisionError("nobody listens")
 
@@ -181,7 +181,7 @@ def test_whoever_waits_for_an_entry_is_told_whatever_fails(tmp_path, monkeypatch
     run(main())
 
 
-def test_a_text_that_is_no_text_is_written_all_the_same(tmp_path):
+def test_an_invalid_text_is_escaped_and_written(tmp_path):
     write(tmp_path / "arm.jsonl", entry(reason="\ud800"), entry(id="2"))
     assert verify(tmp_path / "arm.jsonl").entries == 2
 
@@ -202,7 +202,7 @@ asyncio.run(main())
 
 
 @pytest.mark.slow
-def test_what_was_said_to_be_written_is_there_after_kill_nine(tmp_path):
+def test_confirmed_entries_survive_kill_9(tmp_path):
     path = tmp_path / "arm.jsonl"
     writer = subprocess.Popen(
         [sys.executable, "-c", WRITER, str(path)],
@@ -258,6 +258,6 @@ def test_what_was_said_to_be_written_is_there_after_kill_nine(tmp_path):
         ),
     ],
 )
-def test_a_stop_that_nobody_reset_is_remembered_from_the_log(entries, latched):
+def test_a_stop_without_reset_is_restored_from_the_log(entries, latched):
     stop = authority_after(entries).stop
     assert (stop.id if stop else None) == latched

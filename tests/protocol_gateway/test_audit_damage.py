@@ -1,4 +1,4 @@
-"""Damaged audit logs: who may have forgotten a latched stop latches one, once, and says so."""
+"""Damaged audit logs: if a stop may be lost, the gateway latches one, once, and reports it."""
 
 import contextlib
 import json
@@ -25,7 +25,7 @@ def entry(request="HOME", outcome=Outcome.ACCEPTED, **values):
 
 
 def write(live, *entries, rotate_bytes=1 << 20):
-    """Write entries; what was found wrong at the start, and what is remembered at the end."""
+    """Open a log and write entries; return the damage found and the final state."""
 
     async def main():
         log = AuditLog(live, rotate_bytes=rotate_bytes)
@@ -75,7 +75,7 @@ def begun_anew(live):
 
 
 def put_back(live):
-    """An older copy of the live file, from before it was rotated."""
+    """Restore an older copy of the live file, from before its rotation."""
     live.write_bytes(older_parts(live)[-1].read_bytes())
 
 
@@ -86,7 +86,7 @@ STOPPED = [entry(), entry("STOP", stop_id="6", reason="dog"), entry("TRACE_ON")]
     "damage", [changed(0), changed(1), changed(0, 2), left_out(0), left_out(1), unreadable]
 )
 @pytest.mark.parametrize("more", [[], [entry("RESET", stop_id="6")]])
-def test_a_log_that_was_damaged_latches_a_stop_once(tmp_path, damage, more):
+def test_a_damaged_log_latches_a_stop_once(tmp_path, damage, more):
     live = tmp_path / "arm.jsonl"
     write(live, *STOPPED, *more)
     damage(live)
@@ -99,7 +99,7 @@ def test_a_log_that_was_damaged_latches_a_stop_once(tmp_path, damage, more):
     assert own.values == {"stop_id": str(memory.stop.id), "reason": UNKNOWN}
     assert own.number == last + 2
     assert not verify(live).ok
-    # It is latched at the next start, too, and reset for good.
+    # It is latched after the next start, too, and then reset.
     again, memory = write(live, entry("RESET", stop_id=str(memory.stop.id)))
     assert again == ""
     assert memory.stop is None
@@ -118,7 +118,7 @@ def test_a_log_that_was_damaged_latches_a_stop_once(tmp_path, damage, more):
         put_back,
     ],
 )
-def test_a_live_file_that_does_not_go_on_from_its_older_parts_latches_a_stop(tmp_path, damage):
+def test_a_live_file_that_does_not_continue_its_parts_latches_a_stop(tmp_path, damage):
     live = tmp_path / "arm.jsonl"
     write(live, *STOPPED, *(entry() for _ in range(9)), rotate_bytes=1200)
     write(live, entry("RESET", stop_id="6"), rotate_bytes=1200)
@@ -151,7 +151,7 @@ def test_a_torn_last_line_latches_a_stop_when_it_may_have_been_one(
     tmp_path, request_, shown, latched, before
 ):
     live = tmp_path / "arm.jsonl"
-    # What somebody is called is no request.
+    # An operator's name is no request.
     torn = replace(entry(request_), operator='\\","request":"HOME"')
     write(live, *(entry() for _ in range(before)), torn)
     *rows, last = lines(live)
@@ -168,7 +168,7 @@ def test_a_torn_last_line_latches_a_stop_when_it_may_have_been_one(
 
 @settings(deadline=None)
 @given(st.data())
-def test_whichever_bytes_are_changed_a_stop_that_was_latched_is_not_forgotten(tmp_path_factory, data):
+def test_changed_bytes_never_lose_a_latched_stop(tmp_path_factory, data):
     live = tmp_path_factory.mktemp("any") / "arm.jsonl"
     write(live, *STOPPED)
     whole = live.read_bytes()
@@ -176,12 +176,12 @@ def test_whichever_bytes_are_changed_a_stop_that_was_latched_is_not_forgotten(tm
     end = data.draw(st.integers(begin, len(whole)))
     live.write_bytes(whole[:begin] + data.draw(st.binary(max_size=40)) + whole[end:])
     left, first = live.read_bytes(), whole[: whole.index(b"\n") + 1]
-    # A cut tail shows to nobody but who knows the head: at a line's end, or in a line that was a HOME.
+    # Without the head, a truncation at a line's end or in a HOME line is not detected.
     if left not in (b"", first) and not (b"\n" not in left and b'"request":"HOME"' in left):
         assert write(live)[1].stop is not None
 
 
-def test_a_gateway_whose_log_was_damaged_is_stopped_until_its_operator_says_otherwise(mesh, tmp_path):
+def test_a_damaged_log_stops_the_robot_until_a_reset(mesh, tmp_path):
     async def main():
         async with simulator() as port:
             async with gateway(mesh, tmp_path, port) as site:
@@ -207,7 +207,7 @@ def test_a_gateway_whose_log_was_damaged_is_stopped_until_its_operator_says_othe
     run(main())
 
 
-def test_a_read_only_robot_shows_no_stop_that_nobody_could_reset_and_its_log_remembers_it(mesh, tmp_path):
+def test_a_read_only_robot_shows_no_stop_but_its_log_keeps_it(mesh, tmp_path):
     live = tmp_path / "hall" / "arm.jsonl"
     write(live, *STOPPED)
     changed(1)(live)
@@ -224,7 +224,7 @@ def test_a_read_only_robot_shows_no_stop_that_nobody_could_reset_and_its_log_rem
     run(main())
 
 
-# ----------------------------------------------------------------------- lines of anybody's
+# ----------------------------------------------------------------------- arbitrary lines
 
 NUMBERS = st.integers() | st.integers(0, 10**5000) | st.just("7" * 5000)
 
@@ -237,12 +237,12 @@ NUMBERS = st.integers() | st.integers(0, 10**5000) | st.just("7" * 5000)
 )
 @example({"number": 1, "time_ns": 1, "repeated": 0}, {}, "\ud800")
 @example({"number": "7" * 5000, "time_ns": 1, "repeated": 0}, {"stop": "[" * 100_000}, "ROTATE")
-def test_whatever_a_line_says_it_is_an_entry_or_an_audit_error(tmp_path_factory, numbers, values, request_):
+def test_any_line_is_an_entry_or_an_audit_error(tmp_path_factory, numbers, values, request_):
     live = tmp_path_factory.mktemp("line") / "arm.jsonl"
     write(live, entry())
     (line,) = lines(live)
     for name, number in numbers.items():
-        # The digits as they stand: Python reads no more than 4300 of them.
+        # As text, because Python parses 4300 digits at most.
         digits = number if isinstance(number, str) else str(number % 10**4000)
         line = _with(line, name, digits.encode())
     line = line.replace(b'"HOME"', b'"%s"' % request_.encode(errors="backslashreplace"))
@@ -264,7 +264,7 @@ def _with(line, name, digits):
 # ----------------------------------------------------------------------------- the disk
 
 
-def test_half_a_line_that_the_disk_took_is_not_left_behind_a_shorter_one(tmp_path, monkeypatch):
+def test_the_rest_of_an_incomplete_write_is_removed(tmp_path, monkeypatch):
     async def main():
         log = AuditLog(tmp_path / "arm.jsonl")
         await log.append(entry(id="1"))
@@ -286,7 +286,7 @@ def _half(pwrite, file, data, place):
     raise OSError(28, "No space left on device")
 
 
-def test_an_entry_is_on_disk_with_its_files_name_before_anybody_is_told(tmp_path, monkeypatch):
+def test_an_entry_and_its_file_name_are_synced_before_the_confirmation(tmp_path, monkeypatch):
     folder, live = tmp_path / "hall", tmp_path / "hall" / "arm.jsonl"
     synced, fsync = [], os.fsync
 
@@ -301,7 +301,7 @@ def test_an_entry_is_on_disk_with_its_files_name_before_anybody_is_told(tmp_path
         assert synced == [str(live), str(folder)]
         synced.clear()
         await log.append(entry())
-        # The new file has its beginning before it has the live file's name.
+        # The new file's first entry is synced before its rename.
         assert synced == [str(live.with_suffix(".new")), str(live), str(folder)]
         await log.close()
 

@@ -1,4 +1,4 @@
-"""FloodCounter in the audit log: what is written, what is counted, and that nothing is forgotten."""
+"""Floods in the audit log: entries that are written, entries that are counted, and no lost request."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ def test_the_first_five_of_a_second_are_written_the_rest_is_one_entry_a_second()
     assert [floods.admits(entry(), 0.01 * n) for n in range(50)] == [True] * IN_FULL + [False] * 45
     (counted,) = floods.counts(1.0)
     assert (counted.repeated, counted.text) == (44, "no")
-    # It goes on: nothing in full any more, until there is a second's peace.
+    # The flood continues: only counts, until it pauses for a second.
     assert not any(floods.admits(entry(), 1.0 + 0.1 * n) for n in range(10))
     (counted,) = floods.counts(2.0)
     assert counted.repeated == 9
@@ -36,7 +36,7 @@ def test_the_first_five_of_a_second_are_written_the_rest_is_one_entry_a_second()
     assert floods.admits(entry(), 3.6)
 
 
-def test_a_single_one_too_many_is_written_as_it_is():
+def test_a_single_excess_entry_is_written_unchanged():
     floods = FloodCounter()
     written = [floods.admits(entry(text=str(n)), 0.0) for n in range(IN_FULL + 1)]
     assert not written[-1]
@@ -45,7 +45,7 @@ def test_a_single_one_too_many_is_written_as_it_is():
 
 
 @pytest.mark.parametrize("outcome", [Outcome.ACCEPTED, Outcome.FAILED])
-def test_what_was_accepted_is_never_counted(outcome):
+def test_accepted_requests_are_never_counted(outcome):
     floods = FloodCounter()
     assert all(floods.admits(entry(outcome=outcome), 0.0) for _ in range(1000))
 
@@ -58,7 +58,7 @@ def test_kinds_do_not_hide_each_other():
     assert floods.admits(entry("wang", "HOME"), 0.5)
 
 
-def test_whoever_floods_under_ever_new_names_fills_neither_memory_nor_disk():
+def test_a_flood_under_new_names_fills_neither_memory_nor_disk():
     floods, written = FloodCounter(), 0
     flood = 20_000
     for number in range(flood):
@@ -71,7 +71,7 @@ def test_whoever_floods_under_ever_new_names_fills_neither_memory_nor_disk():
     assert written == flood
 
 
-def test_a_long_text_leaves_room_for_what_it_stands_for():
+def test_a_long_text_leaves_room_for_the_count():
     floods = FloodCounter()
     for number in range(MOST_KINDS + 20):
         floods.admits(entry(f"name-{number}", text="x" * 800), 0.0)
@@ -80,7 +80,7 @@ def test_a_long_text_leaves_room_for_what_it_stands_for():
     assert counted.text.endswith("… (the last of many askers)")
 
 
-def test_whoever_comes_back_over_a_new_connection_is_counted_with_the_one_before():
+def test_a_new_connection_of_a_host_is_counted_with_the_previous_one():
     floods = FloodCounter()
     asked = [
         replace(entry(), source=f"legacy {host}:{port}")
@@ -117,7 +117,7 @@ def test_every_request_is_counted_once_and_the_last_stop_is_remembered(asked):
         one = entry(operator, request, Outcome.ACCEPTED if accepted else Outcome.REFUSED, stop_id=stop)
         if floods.admits(one, now_s):
             written.append(one)
-    # What stands before a RESET in the log.
+    # Entries before a RESET in the log.
     written += floods.counts(now_s, request="STOP")
     latched = authority_after(written).stop
     assert (latched.id if latched else 0) == stop

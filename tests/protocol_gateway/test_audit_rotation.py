@@ -1,4 +1,4 @@
-"""The audit log over many files: rotated, archived, killed meanwhile, checked and searched as one."""
+"""Audit log of several files: rotation, archive, crashes during rotation, verification and search."""
 
 import asyncio
 import json
@@ -38,7 +38,7 @@ def entry(number=0, request="HOME", outcome=Outcome.ACCEPTED, operator="li", **v
 
 
 def write(path, *entries, rotate_bytes=SMALL):
-    """Write entries, an fsync each; (head, what a restart finds)."""
+    """Write entries, an fsync each; return the head and the state after a restart."""
 
     async def main():
         log = AuditLog(path, rotate_bytes=rotate_bytes)
@@ -55,11 +55,11 @@ def write(path, *entries, rotate_bytes=SMALL):
 
 
 def own(live):
-    """What was asked for; not how the log was kept."""
+    """Return the requests without ROTATE entries."""
     return [each.time_ns - 1_000 for each in read_entries(live) if each.request != "ROTATE"]
 
 
-def test_a_log_that_has_grown_goes_on_in_a_new_file_and_is_one_chain_all_the_same(tmp_path):
+def test_a_rotated_log_is_one_chain(tmp_path):
     live = tmp_path / "arm.jsonl"
     _, mended = write(live, *(entry(n) for n in range(40)))
     parts = older_parts(live)
@@ -75,7 +75,7 @@ def test_a_log_that_has_grown_goes_on_in_a_new_file_and_is_one_chain_all_the_sam
 
 
 @pytest.mark.parametrize("harm", ["change", "cut_old_tail", "take_middle_away", "take_live_away"])
-def test_what_is_changed_in_an_older_part_shows(tmp_path, harm):
+def test_a_change_in_an_older_part_is_detected(tmp_path, harm):
     live = tmp_path / "arm.jsonl"
     write(live, *(entry(n) for n in range(40)))
     first, second = older_parts(live)[:2]
@@ -96,7 +96,7 @@ def test_what_is_changed_in_an_older_part_shows(tmp_path, harm):
         assert "no entry has the hash" in verify(live, head=head).text
 
 
-def test_every_changed_byte_of_every_file_shows(tmp_path):
+def test_every_changed_byte_of_every_file_is_detected(tmp_path):
     live = tmp_path / "arm.jsonl"
     write(live, *(entry(n, reason="李") for n in range(3)), rotate_bytes=1)
     files = [*older_parts(live), live]
@@ -111,14 +111,14 @@ def test_every_changed_byte_of_every_file_shows(tmp_path):
 
 
 @given(st.lists(st.binary(max_size=300) | st.sampled_from([b"\n", b"{", b'{"hash":"']), max_size=8))
-def test_whatever_a_file_holds_is_verified_and_searched_without_a_fault(tmp_path_factory, pieces):
+def test_any_file_can_be_verified_and_searched(tmp_path_factory, pieces):
     live = tmp_path_factory.mktemp("any") / "arm.jsonl"
     live.write_bytes(b"".join(pieces))
     assert verify(live).entries == 0
     assert find(live, Query()) == []
 
 
-def test_parts_that_were_taken_to_an_archive_are_no_break_and_are_said(tmp_path):
+def test_archived_parts_are_no_break_and_are_reported(tmp_path):
     live = tmp_path / "arm.jsonl"
     write(live, *(entry(n) for n in range(40)))
     everything = list(read_entries(live))
@@ -129,12 +129,12 @@ def test_parts_that_were_taken_to_an_archive_are_no_break_and_are_said(tmp_path)
     assert found.ok
     assert (found.first, found.entries) == (gone + 1, len(everything) - gone)
     assert f"entries 1 to {gone} are not here" in found.text
-    # And the archived part is whole by itself, wherever it lies.
+    # The archived part can also be verified alone.
     alone = verify(tmp_path / "elsewhere.jsonl")
     assert (alone.ok, alone.entries, alone.last_hash) == (True, gone, everything[gone].previous)
 
 
-def test_a_file_that_begins_in_the_middle_without_saying_so_is_a_break(tmp_path):
+def test_a_file_that_begins_in_the_middle_without_rotate_is_a_break(tmp_path):
     live = tmp_path / "arm.jsonl"
     write(live, *(entry(n) for n in range(3)))
     live.write_bytes(b"".join(live.read_bytes().splitlines(keepends=True)[1:]))
@@ -148,9 +148,9 @@ NOT_SENT = [*RESET, entry(3, "RESET", Outcome.FAILED, stop_id=7)]
 
 @pytest.mark.parametrize(("asked", "latched"), [(STOPPED, 7), (RESET, None), (NOT_SENT, 7)])
 @pytest.mark.parametrize("after", range(3))
-def test_what_a_restart_must_remember_is_in_every_file_by_itself(tmp_path, asked, latched, after):
+def test_every_file_holds_the_state_for_a_restart(tmp_path, asked, latched, after):
     live = tmp_path / "arm.jsonl"
-    # Rotated after each entry, so that each step is remembered over a file's end.
+    # Rotated after each entry, so that the state crosses files at each step.
     write(live, *asked, *(entry(9) for _ in range(after)), rotate_bytes=1)
     expected = authority_after(read_entries(live))
     for part in older_parts(live):
@@ -163,7 +163,7 @@ def test_what_a_restart_must_remember_is_in_every_file_by_itself(tmp_path, asked
         assert memory.stop == Stop(id=7, by="li", reason="dog", since_ns=1_001)
 
 
-def test_a_late_count_of_older_stops_does_not_take_the_newest_ones_place():
+def test_a_late_count_of_older_stops_does_not_replace_the_newest():
     entries = [entry(1, "STOP", stop_id=9, operator="wang"), entry(2, "STOP", stop_id=8)]
     assert authority_after(entries).stop.id == 9
 
@@ -191,7 +191,7 @@ asyncio.run(main())
 @pytest.mark.parametrize("when", ["before", "after"])
 @pytest.mark.parametrize("call", ["fsync", "link", "rename"])
 @pytest.mark.slow
-def test_a_rotation_that_was_killed_leaves_a_whole_log_and_its_latched_stop(tmp_path, call, when):
+def test_a_killed_rotation_leaves_an_intact_log_and_its_stop(tmp_path, call, when):
     live = tmp_path / "arm.jsonl"
     write(live, *STOPPED, rotate_bytes=1 << 20)
     child = [sys.executable, "-c", KILLED, str(live), call, when]
@@ -206,7 +206,7 @@ def test_a_rotation_that_was_killed_leaves_a_whole_log_and_its_latched_stop(tmp_
     assert not live.with_suffix(".new").exists()
 
 
-def test_a_log_that_cannot_be_rotated_goes_on_where_it_is(tmp_path, caplog):
+def test_a_log_that_cannot_be_rotated_continues_in_its_file(tmp_path, caplog):
     live = tmp_path / "arm.jsonl"
 
     async def main():
@@ -225,7 +225,7 @@ def test_a_log_that_cannot_be_rotated_goes_on_where_it_is(tmp_path, caplog):
     assert verify(live).ok
 
 
-def test_only_one_gateway_writes_a_log_also_after_it_was_rotated(tmp_path):
+def test_the_lock_survives_a_rotation(tmp_path):
     async def main():
         log = AuditLog(tmp_path / "arm.jsonl", rotate_bytes=1)
         for number in range(3):
@@ -250,7 +250,7 @@ def test_a_line_that_the_gateway_is_still_writing_is_no_break(tmp_path):
     run(main())
 
 
-def test_a_line_that_is_far_too_long_takes_nothing_with_it_that_comes_after(tmp_path):
+def test_a_line_that_is_too_long_does_not_hide_later_ones(tmp_path):
     live = tmp_path / "arm.jsonl"
     write(live, entry(0), entry(1), rotate_bytes=1 << 20)
     first, second = live.read_bytes().splitlines(keepends=True)
@@ -279,7 +279,7 @@ def test_a_line_without_end_does_not_fill_the_memory(tmp_path):
 
 @pytest.fixture(scope="module")
 def searched(tmp_path_factory):
-    """A log of several files that nobody changes."""
+    """A log of several files that the tests do not change."""
     live = tmp_path_factory.mktemp("searched") / "arm.jsonl"
     write(
         live,
@@ -307,12 +307,12 @@ def searched(tmp_path_factory):
         Query(most=1),
     ],
 )
-def test_a_search_finds_what_a_look_at_every_entry_finds(searched, query):
+def test_a_search_finds_the_same_as_a_full_scan(searched, query):
     expected = [each for each in read_entries(searched) if matches(each, query)][-query.most :]
     assert find(searched, query) == expected
 
 
-def test_a_text_that_looks_like_a_field_deceives_no_search(tmp_path):
+def test_a_text_that_looks_like_a_field_does_not_match(tmp_path):
     live = tmp_path / "arm.jsonl"
     write(live, replace(entry(operator='x","operator":"li'), text='"request":"STOP"'), entry(operator="李"))
     assert find(live, Query(operator="li")) == []
@@ -322,7 +322,7 @@ def test_a_text_that_looks_like_a_field_deceives_no_search(tmp_path):
     assert verify(live).entries == 2
 
 
-def test_what_somebody_wrote_into_a_log_is_left_out_of_a_search(tmp_path):
+def test_invalid_lines_are_left_out_of_a_search(tmp_path):
     live = tmp_path / "arm.jsonl"
     write(live, entry(), rotate_bytes=1 << 20)
     row = json.loads(live.read_text())
@@ -338,12 +338,12 @@ def test_what_somebody_wrote_into_a_log_is_left_out_of_a_search(tmp_path):
     assert verify(live).first_break == 2
 
 
-def test_a_search_for_too_many_entries_is_refused_in_words():
+def test_a_search_for_too_many_entries_is_refused():
     with pytest.raises(RefusedError, match="most = 10001: at most 10000"):
         query_of(schema.AuditQuery(most=10_001))
 
 
-def test_entries_that_the_disk_did_not_take_are_kept_up_to_a_bound_and_the_rest_is_said(tmp_path):
+def test_failed_entries_are_kept_up_to_a_limit_and_the_rest_is_counted(tmp_path):
     async def main():
         log = AuditLog(tmp_path / "arm.jsonl")
         kept, full = os.dup(log._file), os.open("/dev/full", os.O_RDWR)

@@ -1,4 +1,4 @@
-"""The audit log as the mesh, the command line and a full disk see it: real gateways, real files."""
+"""Audit log over the mesh, on the command line, and on a full disk: real gateways, real files."""
 
 import asyncio
 import contextlib
@@ -40,14 +40,14 @@ JOINTS = schema.Description(joints=[_JOINT(type="ROTARY"), _JOINT(type="PRISMATI
 
 
 async def robomesh_to(router, *arguments):
-    """A command's output, asked of this test's router."""
+    """Run a command against this test's router; return its output."""
     done = await asyncio.to_thread(robomesh, *arguments, "--connect", router)
     assert done.stderr == ""
     assert done.returncode == 0
     return done.stdout.splitlines()
 
 
-def test_the_head_is_told_with_the_controllers_state_and_at_once_after_a_restart(mesh, tmp_path):
+def test_the_head_is_published_with_the_state_and_after_a_restart(mesh, tmp_path):
     async def main():
         async with simulator() as port:
             async with gateway(mesh, tmp_path, port) as site:
@@ -63,7 +63,7 @@ def test_the_head_is_told_with_the_controllers_state_and_at_once_after_a_restart
     run(main())
 
 
-def test_a_flood_of_refusals_is_written_as_a_count_and_none_is_forgotten(mesh, tmp_path):
+def test_a_flood_of_refusals_is_written_as_a_count(mesh, tmp_path):
     flood = 400
 
     async def main():
@@ -84,7 +84,7 @@ def test_a_flood_of_refusals_is_written_as_a_count_and_none_is_forgotten(mesh, t
     run(main())
 
 
-def test_of_a_flood_of_stops_of_many_the_last_is_the_one_that_a_restart_remembers(mesh, tmp_path):
+def test_after_a_flood_of_stops_a_restart_restores_the_last(mesh, tmp_path):
     flood = 100
 
     def by(number):
@@ -97,7 +97,7 @@ def test_of_a_flood_of_stops_of_many_the_last_is_the_one_that_a_restart_remember
             async with gateway(mesh, tmp_path, port) as site:
                 answers = await asyncio.gather(*[site.stop(by=by(number)) for number in range(flood)])
                 assert {answer.text for answer in answers if not answer.sent} == set()
-                # Those within a tenth of a second share a unit, so they break no link.
+                # Stops within 0.1 s share a unit, so they do not break the link.
                 await until(lambda: controller.stops)
                 assert controller.stops < flood
                 last = max(answer.stop_id for answer in answers)
@@ -111,13 +111,13 @@ def test_of_a_flood_of_stops_of_many_the_last_is_the_one_that_a_restart_remember
                 stops = [await site.stop(by=by(number)) for number in range(20)]
                 await site.command(C.RESET, stop_id=stops[-1].stop_id)
             async with gateway(mesh, tmp_path, port) as site:
-                # What was counted was written before the RESET that cleared it.
+                # The count was written before the RESET that cleared the stop.
                 assert not site.controller.HasField("stop")
 
     run(main())
 
 
-def test_entries_are_found_over_the_mesh_by_who_what_and_when(mesh, tmp_path):
+def test_entries_are_found_over_the_mesh_by_operator_request_and_time(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await refusal(site.command(C.HOME, operator="wang"))
@@ -145,16 +145,14 @@ def test_entries_are_found_over_the_mesh_by_who_what_and_when(mesh, tmp_path):
     run(main())
 
 
-def test_people_list_what_was_asked_of_one_robot_of_all_and_of_a_log_without_its_gateway(
-    mesh, router, tmp_path
-):
+def test_the_command_lists_entries_of_robots_and_of_log_files(mesh, router, tmp_path):
     async def main():
         async with simulator() as one, simulator() as two, gateway(mesh, tmp_path, one, two) as site:
             await refusal(site.command(C.HOME))
             await site.session.ask("robomesh/hall/arm-2/stop", schema.StopRequest(by="wang", reason="dog"))
             await site.lease(A.ACQUIRE, ttl_s=5)
             await until(lambda: len(site.seen["audit"]) >= 2)
-            # What attaches to the mesh finds robots by who is present for them.
+            # Clients find robots by the presence of their services.
             for robot in ("arm", "arm-2"):
                 site.session.declare_presence("hall", robot, "gateway")
             lines = await robomesh_to(router, "audit", "list", "arm", "--outcome", "refused")
@@ -167,7 +165,7 @@ def test_people_list_what_was_asked_of_one_robot_of_all_and_of_a_log_without_its
                 ("hall/arm", "ACQUIRE"),
             ]
             assert rows[1]["values"] == {"stop_id": "1", "reason": "dog"}
-            # A robot whose gateway is gone hides no other.
+            # A robot without a gateway does not hide others.
             site.session.declare_presence("hall", "arm-3", "kinematics")
             done = await asyncio.to_thread(robomesh, "audit", "list", "--connect", router)
             assert "hall/arm-3: no gateway answers" in done.stderr
@@ -178,7 +176,7 @@ def test_people_list_what_was_asked_of_one_robot_of_all_and_of_a_log_without_its
     run(main())
 
 
-def test_people_read_degrees_and_millimetres_and_how_often_and_programs_si(mesh, router, tmp_path):
+def test_the_command_prints_degrees_and_millimetres_and_json_has_si(mesh, router, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=POSITIONS))
@@ -212,7 +210,7 @@ def test_people_read_degrees_and_millimetres_and_how_often_and_programs_si(mesh,
     ],
 )
 @pytest.mark.slow
-def test_a_list_that_cannot_be_meant_is_refused_in_one_line(tmp_path, arguments, words):
+def test_an_invalid_query_is_refused_in_one_line(tmp_path, arguments, words):
     done = robomesh("audit", "list", str(tmp_path / "none.jsonl"), *arguments)
     assert (done.returncode, done.stdout) == (2, "")
     assert words in done.stderr
@@ -235,7 +233,7 @@ TMPFS = 'mount -t tmpfs -o size=64k tmpfs "$1" && shift && exec "$@"'
 
 @contextlib.asynccontextmanager
 async def gateway_process(mesh, folder, port, *, wrapped=()):
-    """A gateway as a process of its own, what a monitor sees of it, and its process id."""
+    """Run a gateway in a separate process; yield its site and its process id."""
     site = folder / "site.toml"
     site.write_text(SITE.format(port=port))
     command = ("-m", "services.command_line.main", "gateway", "--site", site, "--connect", *mesh.connect)
@@ -258,7 +256,7 @@ async def gateway_process(mesh, folder, port, *, wrapped=()):
 
 @contextlib.contextmanager
 def limited(pid, log):
-    """The gateway's files may not grow any more: its writes fail in the kernel, after half a line."""
+    """Limit the size of the gateway's files: its writes fail in the kernel, after half a line."""
     _, most = resource.prlimit(pid, resource.RLIMIT_FSIZE)
     resource.prlimit(pid, resource.RLIMIT_FSIZE, (log.stat().st_size + 30, most))
     yield
@@ -267,7 +265,7 @@ def limited(pid, log):
 
 @contextlib.contextmanager
 def filled(pid, log):
-    """The gateway's disk is full to its last byte."""
+    """Fill the gateway's disk to its last byte."""
     filler = log.with_name("filler")
     with filler.open("wb", buffering=0) as file, contextlib.suppress(OSError):
         while True:
@@ -279,7 +277,7 @@ def filled(pid, log):
 async def on_a_full_disk(site, log, full, words):
     await site.home()
     with full:
-        # What is left of the log's last page is still to be had.
+        # The rest of the log's last page can still be written.
         with contextlib.suppress(RefusedError):
             for _ in range(40):
                 await site.lease(A.RENEW, ttl_s=5)
@@ -298,7 +296,7 @@ async def on_a_full_disk(site, log, full, words):
     assert verify(log).ok
 
 
-def test_when_its_file_cannot_grow_stop_works_and_motion_is_refused_in_words(mesh, tmp_path):
+def test_when_its_file_cannot_grow_stop_works_and_motion_is_refused(mesh, tmp_path):
     async def main():
         async with (
             simulator() as port,
@@ -309,7 +307,7 @@ def test_when_its_file_cannot_grow_stop_works_and_motion_is_refused_in_words(mes
     run(main(), timeout_s=60.0)
 
 
-def test_on_a_disk_that_is_really_full_stop_works_and_motion_is_refused_in_words(mesh, tmp_path):
+def test_on_a_full_disk_stop_works_and_motion_is_refused(mesh, tmp_path):
     unshare = shutil.which("unshare")
     (tmp_path / "audit").mkdir()
     wrapped = (unshare, "-rm", "sh", "-c", TMPFS, "sh", str(tmp_path / "audit"))
@@ -327,7 +325,7 @@ def test_on_a_disk_that_is_really_full_stop_works_and_motion_is_refused_in_words
     run(main(), timeout_s=60.0)
 
 
-def test_a_disk_that_hangs_delays_no_stop_and_what_it_took_then_is_told(mesh, tmp_path, monkeypatch):
+def test_a_disk_that_hangs_delays_no_stop(mesh, tmp_path, monkeypatch):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.home()

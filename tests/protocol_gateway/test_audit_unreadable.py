@@ -1,4 +1,4 @@
-"""What is refused before anybody judges it is in the audit log all the same, and nothing is sent."""
+"""Requests that are rejected before evaluation are in the audit log, and nothing is sent."""
 
 import asyncio
 import json
@@ -14,7 +14,7 @@ MOVE = {"command": "MOVE_ABSOLUTE", "lease": "x", "id": "1"}
 
 
 def asked(site, topic, payload, encoding=JSON):
-    """The refusal of a request in bytes of anybody's own."""
+    """Send arbitrary bytes as a request; return the refusal."""
     replies = site.session.zenoh_session.get(site.key(topic), payload=payload, encoding=encoding)
     return [reply.err.payload.to_string() for reply in replies if reply.err is not None]
 
@@ -34,7 +34,7 @@ CASES = [
 ]
 
 
-def test_what_nobody_judged_is_refused_by_name_and_written_down(mesh, tmp_path):
+def test_a_request_rejected_before_evaluation_is_audited(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             for topic, payload, words in CASES:
@@ -64,7 +64,7 @@ def test_what_nobody_judged_is_refused_by_name_and_written_down(mesh, tmp_path):
     run(main())
 
 
-def test_a_flood_of_what_cannot_be_read_is_counted(mesh, tmp_path):
+def test_a_flood_of_unreadable_requests_is_counted(mesh, tmp_path):
     flood = 200
 
     async def main():

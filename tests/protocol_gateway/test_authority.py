@@ -1,4 +1,4 @@
-"""The authority's rules, by hand-set clocks."""
+"""Rules of authority, with clocks set by the tests."""
 
 from dataclasses import replace
 
@@ -56,7 +56,7 @@ def test_a_leases_time_is_kept_between_half_a_second_and_five(asked, kept):
     assert held(ttl_s=asked).lease.ttl_s == kept
 
 
-def test_a_lease_lives_until_its_time_is_over_and_not_longer():
+def test_a_lease_expires_at_its_time():
     authority = ask(held(), A.RENEW, time_s=1.5, lease="s").authority
     assert expire(authority, at(3.4)) == (authority, None)
     free, ended = expire(authority, at(3.5))
@@ -83,7 +83,7 @@ def test_the_holders_own_acquire_renews_and_keeps_the_secret():
         (A.TAKE, "wang", {"reason": "  "}, "needs a reason"),
     ],
 )
-def test_who_does_not_hold_the_lease_is_refused_with_the_reason(action, operator, fields, words):
+def test_without_the_lease_requests_are_refused_with_the_reason(action, operator, fields, words):
     outcome = ask(held(), action, operator, **fields)
     assert not outcome.answer.accepted
     assert words in outcome.answer.text
@@ -92,7 +92,7 @@ def test_who_does_not_hold_the_lease_is_refused_with_the_reason(action, operator
 
 
 @pytest.mark.parametrize("action", [A.RENEW, A.RELEASE, A.OFFER])
-def test_a_lease_that_has_ended_is_not_anybodys(action):
+def test_an_ended_lease_has_no_holder(action):
     free, _ = end_lease(held(), codes.ENDED_GATEWAY())
     outcome = ask(free, action, lease="s")
     assert "take control first" in outcome.answer.text
@@ -116,7 +116,7 @@ def test_an_offer_passes_the_lease_on_but_not_while_its_holders_motion_runs():
         lambda state: end_lease(state, codes.ENDED_SESSION(name="li"))[1],
     ],
 )
-def test_however_a_lease_ends_its_holders_motion_is_stopped(end):
+def test_every_end_of_a_lease_stops_its_holders_motion(end):
     assert end(moving()).stop
     assert end(command_sent(moving(), command(C.HOLD), at(0.1))).stop
     assert not end(held()).stop
@@ -133,21 +133,21 @@ def test_motion_is_over_when_the_robot_has_been_still_for_half_a_second():
 
 
 @pytest.mark.parametrize(("arrived", "patience_s"), [(True, 2.0), (False, 30.0)])
-def test_motion_that_has_not_begun_is_the_holders_until_it_is_there_or_long_after(arrived, patience_s):
+def test_motion_that_has_not_begun_is_the_holders_until_a_timeout(arrived, patience_s):
     state, _ = see(moving(), False, patience_s - 0.1, arrived=arrived)
     assert state.lease.motion is not None
     state, _ = see(state, False, patience_s, arrived=arrived)
     assert state.lease.motion is None
 
 
-def test_motion_that_begins_late_is_its_holders_and_is_stopped_with_his_lease():
+def test_late_motion_is_the_holders_and_is_stopped_with_the_lease():
     state, _ = see(moving(), False, 2.5)
     state, uncommanded = see(state, True, 2.6)
     assert not uncommanded
     assert expire(state, at(2.7))[1].stop
 
 
-def test_motion_that_begins_after_all_patience_is_stopped_because_it_may_be_the_holders():
+def test_very_late_motion_is_stopped_because_it_may_be_the_holders():
     state, _ = see(moving(), False, 31.0)
     state, uncommanded = see(state, True, 32.0)
     assert uncommanded
@@ -155,7 +155,7 @@ def test_motion_that_begins_after_all_patience_is_stopped_because_it_may_be_the_
     assert not end_lease(held(), codes.ENDED_FOREIGN_MOTION(), uncommanded=True)[1].stop
 
 
-def test_what_the_controller_refused_does_not_begin():
+def test_a_refused_motion_does_not_begin():
     assert refused(moving()).lease.motion is None
 
 
@@ -168,13 +168,13 @@ def test_a_refusal_of_something_else_does_not_end_the_holders_motion():
         assert refused(state) == state
 
 
-def test_what_is_resumed_goes_where_it_was_sent():
+def test_a_resumed_motion_keeps_its_target():
     state = command_sent(held(), command(C.MOVE_ABSOLUTE), at(0), waypoints=((1.0,),))
     state = command_sent(state, command(C.HOLD), at(1))
     assert command_sent(state, command(C.RESUME), at(2)).lease.motion.target == (1.0,)
 
 
-def test_a_held_motion_stays_the_holders_until_the_controller_says_that_there_is_none():
+def test_a_held_motion_stays_the_holders_until_the_controller_reports_none():
     state = command_sent(moving(), command(C.HOLD), at(0.1))
     state, _ = see(state, False, 100.0, pending=True)
     assert state.lease.motion is not None
@@ -182,7 +182,7 @@ def test_a_held_motion_stays_the_holders_until_the_controller_says_that_there_is
     assert state.lease.motion is None
 
 
-def test_motion_that_nobody_commanded_is_seen_when_it_begins():
+def test_uncommanded_motion_is_detected_when_it_begins():
     state, uncommanded = see(held(), False, 0.0)
     assert not uncommanded
     state, uncommanded = see(state, True, 1.0)
@@ -192,7 +192,7 @@ def test_motion_that_nobody_commanded_is_seen_when_it_begins():
     assert not state.lease.tolerates_motion
 
 
-def test_a_robot_that_was_moving_by_itself_may_go_on_until_it_is_commanded_to_move():
+def test_motion_before_the_lease_is_tolerated_until_the_first_command():
     state, _ = see(Authority(), True, 0.0)
     state, _ = see(state, False, 0.1)
     state = ask(state, A.ACQUIRE, secret="s", time_s=5.0).authority
@@ -203,7 +203,7 @@ def test_a_robot_that_was_moving_by_itself_may_go_on_until_it_is_commanded_to_mo
     assert not late.lease.tolerates_motion
 
 
-def test_a_robot_slowing_down_from_a_stop_is_not_moved_by_somebody_else():
+def test_slowing_down_from_a_stop_is_not_uncommanded_motion():
     state, _ = see(moving(), True, 0.1)
     state, _ = stop(state, by="wang", reason="", now=at(0.2))
     state, uncommanded = see(state, True, 0.25)
@@ -211,7 +211,7 @@ def test_a_robot_slowing_down_from_a_stop_is_not_moved_by_somebody_else():
     assert state.uncommanded_s is None
 
 
-def test_a_motion_that_is_seen_only_behind_its_stop_is_not_somebody_elses():
+def test_motion_seen_just_after_its_stop_is_not_uncommanded():
     state, latched = stop(moving(), by="li", reason="", now=at(0.1))
     state, uncommanded = see(stop_sent(state, latched.id, 1000.1), True, 0.2)
     assert not uncommanded
@@ -244,7 +244,7 @@ def test_a_latched_stop_forbids_motion(kind):
 
 
 @pytest.mark.parametrize("kind", [C.HOLD, C.TRACE_ON, C.TRACE_OFF, C.SPEED])
-def test_a_latched_stop_does_not_forbid_what_moves_nothing(kind):
+def test_a_latched_stop_allows_commands_without_motion(kind):
     state, _ = stop(held(), by="wang", reason="", now=at(0))
     assert admit(state, command(kind), operator="li", now=at(0)).answer.accepted
 
@@ -287,12 +287,12 @@ def test_an_id_names_one_command_and_its_values(kind, fields, words):
     assert admit(state, late, operator="li", now=at(9)).answer == Answer(True, "done")
 
 
-def test_an_answer_is_not_kept_under_somebody_elses_lease():
+def test_an_answer_is_not_kept_under_another_operators_lease():
     state = ask(held(), A.TAKE, "wang", reason="he left", secret="w").authority
     assert keep_answer(state, command(C.HOME, 9), Answer(True, "")) == state
 
 
-def test_what_was_delayed_on_the_way_is_refused():
+def test_a_command_after_its_deadline_is_refused():
     late = command(C.HOME)
     late.not_after.FromNanoseconds(at(1).wall_ns)
     assert admit(held(), late, operator="li", now=at(1)).answer.accepted
@@ -301,7 +301,7 @@ def test_what_was_delayed_on_the_way_is_refused():
     assert refused.id_used
 
 
-def test_what_waited_over_a_second_in_the_gateway_is_not_sent():
+def test_a_command_that_waited_over_a_second_is_not_sent():
     assert wait_refusal(at(0).monotonic_s, at(0.9)) is None
     assert wait_refusal(at(0).monotonic_s, at(6)).text.startswith("Not sent: it waited 6.0 s in the gateway")
 
@@ -321,7 +321,7 @@ requests = st.tuples(
 
 
 @given(st.lists(requests, max_size=30))
-def test_whatever_is_asked_only_the_newest_granted_secret_ever_holds(asked):
+def test_only_the_newest_granted_secret_holds(asked):
     authority, granted, time_s = Authority(), {}, 0.0
     for number, (action, operator, to, reason, knows, wait_s) in enumerate(asked):
         time_s += wait_s

@@ -1,4 +1,4 @@
-"""Whatever happens in whatever order: one holder, no motion past a stop, no lease ends under a moving arm."""
+"""Random sequences of events: one holder, no motion after a stop, a stop when a lease ends during motion."""
 
 from hypothesis import settings
 from hypothesis import strategies as st
@@ -31,7 +31,7 @@ commands = st.sampled_from(
 
 
 class Machine(RuleBasedStateMachine):
-    """Operators, a controller and a clock do what they please."""
+    """Random actions of operators, a controller and a clock."""
 
     def __init__(self):
         super().__init__()
@@ -51,7 +51,7 @@ class Machine(RuleBasedStateMachine):
         return self.authority.lease.motion is not None and self.rests < 2
 
     def ends(self, authority, ended):
-        """The lease was `self.authority.lease` and is over."""
+        """Handle the end of the lease `self.authority.lease`."""
         if ended is not None:
             assert ended.stop or not self.motion_may_run
             assert ended.why == authority.ended

@@ -1,4 +1,4 @@
-"""What a controller's state and the joints' limits forbid, and what a robot's positions tell of motion."""
+"""Preconditions of commands, and detection of motion in positions."""
 
 from dataclasses import replace
 from math import radians
@@ -93,7 +93,7 @@ AT_REST = [name for name in ALL if name != "RESUME"]
         ("not homed, unknown accepted", ["HOME", "HOLD", "RESET", "TRACE_ON", "TRACE_OFF", "SPEED"]),
     ],
 )
-def test_what_may_be_sent_in_each_state_of_the_controller(situation, allowed):
+def test_allowed_commands_in_each_state_of_the_controller(situation, allowed):
     found = [name for name in ALL if not obstacle(command(C.Value(name)), SITUATIONS[situation], JOINTS)]
     assert found == allowed
 
@@ -121,18 +121,18 @@ def test_what_may_be_sent_in_each_state_of_the_controller(situation, allowed):
         ),
     ],
 )
-def test_a_refused_value_is_named_with_what_would_be_allowed(asked, words):
+def test_a_refused_value_is_named_with_the_allowed_ones(asked, words):
     assert words in obstacle(asked, READY, JOINTS).text
 
 
-def test_a_robot_that_never_told_where_it_is_is_homed_but_not_moved():
+def test_a_robot_without_positions_is_homed_but_not_moved():
     untold = replace(READY, positions=None)
     for kind in (C.MOVE_RELATIVE, C.MOVE_ABSOLUTE, C.RESUME):
         assert "has not told where the joints are" in obstacle(command(kind), untold, JOINTS).text
     assert not obstacle(command(C.HOME), untold, JOINTS)
 
 
-def test_a_robot_that_tells_no_more_where_it_is_is_not_even_homed():
+def test_a_robot_with_stale_positions_is_not_even_homed():
     gone = replace(READY, positions=None, positions_stale=codes.POSITIONS_STALE(seconds=1.0))
     for kind in (C.MOVE_RELATIVE, C.MOVE_ABSOLUTE, C.RESUME, C.HOME):
         assert obstacle(command(kind), gone, JOINTS).text == (
@@ -163,11 +163,11 @@ def watched(positions_at):
         (lambda t: (0.5 + t if t < 1.0 else 1.5, 0.1), False),
     ],
 )
-def test_positions_tell_whether_a_robot_moves_when_its_controller_does_not(positions_at, moving):
+def test_positions_show_motion_that_the_controller_does_not_report(positions_at, moving):
     assert is_moving(None, watched(positions_at)) is moving
 
 
-def test_the_controllers_word_counts_where_it_gives_one():
+def test_the_reported_activity_counts_before_positions():
     still, moving = watched(lambda t: (0.0, 0.0)), watched(lambda t: (t, 0.0))
     assert is_moving(Activity.HOMING, still) is True
     assert is_moving(Activity.IDLE, moving) is False

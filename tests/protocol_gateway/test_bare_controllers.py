@@ -1,13 +1,11 @@
-"""Controllers that tell little, or nothing that is known, or have no proven stop."""
+"""Controllers that report little, or only unknown records, or have no proven stop."""
 
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, simulator, until
 from tests.protocol_gateway.scripted_controller import repeated, scripted_controller
 
 
-def test_a_controller_that_tells_only_positions_is_commanded_only_if_the_site_file_accepts_that(
-    mesh, tmp_path
-):
+def test_a_controller_with_positions_only_is_commanded_if_the_site_file_accepts_it(mesh, tmp_path):
     async def main():
         async with (
             scripted_controller() as (port, say, heard),
@@ -35,7 +33,7 @@ def test_a_controller_that_tells_only_positions_is_commanded_only_if_the_site_fi
     run(main())
 
 
-def test_records_of_unknown_types_come_out_raw(mesh, tmp_path):
+def test_records_of_unknown_types_are_published_raw(mesh, tmp_path):
     async def main():
         async with scripted_controller() as (port, say, _), gateway(mesh, tmp_path, port, up=False) as site:
             await until(lambda: site.controller.link == STATE.SILENT)
@@ -58,16 +56,14 @@ def test_a_controller_without_a_proven_stop_is_read_only(mesh, tmp_path):
             stop = await site.stop()
             assert not stop.sent
             assert "stop it at its own panel" in stop.text
-            # Nothing is latched that nobody could ever clear, and nobody reads "stopped".
+            # No stop is latched, because it could never be reset, and none is shown.
             assert not site.controller.HasField("stop")
             assert site.controller.counters.units_sent == 0
 
     run(main())
 
 
-def test_a_controller_of_codes_without_one_for_stop_is_read_only_whatever_is_said_to_be_proven(
-    mesh, tmp_path
-):
+def test_a_controller_without_a_code_for_stop_is_read_only(mesh, tmp_path):
     codes = {2: "ABSOLUTE.DEG", 101: "COMMAND:home"}
 
     async def main():
@@ -81,7 +77,7 @@ def test_a_controller_of_codes_without_one_for_stop_is_read_only_whatever_is_sai
     run(main())
 
 
-def test_positions_that_come_no_more_are_not_taken_for_where_the_robot_is(mesh, tmp_path):
+def test_stale_positions_are_not_used(mesh, tmp_path):
     async def main():
         positions = "ABSOLUTE.DEG*1;2;3;4;5&"
 

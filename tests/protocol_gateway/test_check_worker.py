@@ -1,4 +1,4 @@
-"""The gateway's worker processes: who waits for whom, what no check covers, and what goes wrong in one."""
+"""Worker processes of the gateway: queueing, uncovered parts of a cell, and errors in a worker."""
 
 import asyncio
 import contextlib
@@ -56,7 +56,7 @@ def alone(name, model, *fixtures):
     return CellDescription((CellRobot(name, model, placed(0.0)),), fixtures)
 
 
-def test_robots_of_a_cell_share_a_process_and_who_is_alone_needs_none_of_his_own():
+def test_robots_of_a_cell_share_a_process_and_single_robots_share_one():
     pairs = [
         CellDescription((CellRobot(f"l{n}", "pt600", placed(0.0)), CellRobot(f"r{n}", "pt600", placed(1.0))))
         for n in range(MOST_PROCESSES + 3)
@@ -73,7 +73,7 @@ def test_robots_of_a_cell_share_a_process_and_who_is_alone_needs_none_of_his_own
 
 
 @pytest.mark.slow
-def test_what_nobody_waits_for_any_more_is_not_begun(tmp_path, monkeypatch):
+def test_a_query_is_not_started_after_its_timeout(tmp_path, monkeypatch):
     async def main():
         checker = Checker({"arm": alone("arm", bar_arm(tmp_path))}, start_now=True)
         begun = []
@@ -96,14 +96,14 @@ def test_what_nobody_waits_for_any_more_is_not_begun(tmp_path, monkeypatch):
             os.kill(checker.pid, signal.SIGCONT)
             monkeypatch.setattr("protocol_gateway.checking.checker.MOTION_TIMEOUT_S", 30.0)
             assert isinstance(await checker.motion(motion("arm")), Checked)
-            # The one that hung, and the one that was waited for.
+            # The query that hung, and the one that waited.
             assert len(begun) == 2
 
     run(main(), timeout_s=90)
 
 
 @pytest.mark.slow
-def test_an_error_that_nobody_foresaw_is_said_in_words_and_ends_nothing(tmp_path):
+def test_an_unexpected_error_is_reported_and_the_worker_goes_on(tmp_path):
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, np.nan]])
     faces = np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3]])
     shape = Shape(Mesh(parts=(Part("", Material(), corners, np.zeros_like(corners), faces),)), np.eye(4))
@@ -120,7 +120,7 @@ def test_an_error_that_nobody_foresaw_is_said_in_words_and_ends_nothing(tmp_path
             assert "LinAlgError" in checker.problem("bad").text
             with pytest.raises(CheckError, match="LinAlgError"):
                 await checker.motion(motion("bad"))
-            # Of a mate that its cell has not: a bug, wherever it came from.
+            # A robot that is not in the cell: a bug of the caller.
             with pytest.raises(CheckError, match="the check failed: KeyError: 'nobody'"):
                 await checker.motion(motion("good", others={"nobody": (STANDING,)}))
             assert not task.done()
@@ -128,7 +128,7 @@ def test_an_error_that_nobody_foresaw_is_said_in_words_and_ends_nothing(tmp_path
     run(main(), timeout_s=90)
 
 
-def test_a_mate_without_shapes_or_with_missing_meshes_is_refused(tmp_path):
+def test_another_robot_without_shapes_or_meshes_is_refused(tmp_path):
     for name, text, words in (
         ("bare", BARE, "bare's description gives no link a shape"),
         ("half", HALF, "half cannot be checked whole: no such mesh file: nowhere.stl"),
@@ -143,7 +143,7 @@ def test_a_mate_without_shapes_or_with_missing_meshes_is_refused(tmp_path):
         assert uncovered.text.startswith(words)
 
 
-def test_a_moving_link_without_a_shape_is_not_covered_whichever_robot_of_the_cell_has_it(tmp_path):
+def test_a_moving_link_without_a_shape_is_uncovered(tmp_path):
     whole, half = bar_arm(tmp_path / "whole"), bar_arm(tmp_path / "half", bare=("elbow",))
     for arm, mate in ((half, whole), (whole, half)):
         cell = CellDescription((CellRobot("arm", arm, placed(0.0)), CellRobot("mate", mate, placed(5.0))))
@@ -153,14 +153,14 @@ def test_a_moving_link_without_a_shape_is_not_covered_whichever_robot_of_the_cel
         assert checked.refusals == checked.warnings == ()
 
 
-def test_what_has_no_shape_and_does_not_move_is_only_said(tmp_path):
+def test_a_fixed_link_without_a_shape_is_a_warning(tmp_path):
     arm = CellRobot("arm", bar_arm(tmp_path, bare=("base",)), placed(0.0))
     checked = begin({"arm": CellDescription((arm,))})(motion("arm"))
     assert checked.uncovered == checked.refusals == ()
     assert checked.warnings == (codes.FIXED_WITHOUT_SHAPE(name="arm", links="base"),)
 
 
-def test_a_mates_long_program_is_gone_through_only_where_it_is_near(tmp_path):
+def test_a_long_program_of_another_robot_is_checked_only_where_near(tmp_path):
     bars = bar_arm(tmp_path / "bars")
     fixture = block("post", (0.1, 0.1, 0.1), placed(0.0, 1.0))
 
@@ -177,7 +177,7 @@ def test_a_mates_long_program_is_gone_through_only_where_it_is_near(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_gateways_own_process_holds_neither_coal_nor_pinocchio():
+def test_the_gateway_process_imports_neither_coal_nor_pinocchio():
     code = "import sys, protocol_gateway.gateway; print({'coal', 'pinocchio'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"

@@ -1,4 +1,4 @@
-"""Motions that are checked before they are made: real gateway, real worker process, simulated controllers."""
+"""Checks of motions before they start: real gateway, real worker process, simulated controllers."""
 
 import asyncio
 import contextlib
@@ -21,7 +21,7 @@ from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, kept_control, refusal, simulator, until
 from tests.robots.boxes import bar_arm
 
-# Beside the arm, which at home reaches out along x: waist at +90 degrees is in it.
+# The arm reaches out along x at home, and into this post at waist +90 degrees.
 POST = fixtures.Fixture(cell="a", name="post", box=(200.0, 200.0, 800.0), pose={"xyz": (0.0, 500.0, 400.0)})
 AWAY, INTO_POST = [radians(-60), 0, 0, 0, 0], [radians(90), 0, 0, 0, 0]
 
@@ -40,21 +40,21 @@ def alone(*fixtures):
 
 
 OUT = [0, 0, 0, 0, 0]
-# The second stands a metre ahead of the first, and at home reaches out across its way.
+# The second is a metre in front of the first, and crosses its path at home.
 TWO = CellDescription(
     (CellRobot("arm", "pt600", np.eye(4)), CellRobot("arm-2", "pt600", place_of(1000.0, 90.0)))
 )
 
 
 async def checked(site):
-    """Wait until motions can be checked, and be homed."""
+    """Wait until motions can be checked, then home."""
     await until(lambda: not site.controller.check_text, timeout_s=60)
     await site.home()
 
 
 @contextlib.asynccontextmanager
 async def all_checked(arm):
-    """The arm and the others of its hall, homed one after the other, and each under control to the end."""
+    """Home the robots of a site one after the other, and keep control of all until the end."""
     async with contextlib.AsyncExitStack() as stack:
         for site in (arm, *arm.others):
             await checked(site)
@@ -63,7 +63,7 @@ async def all_checked(arm):
 
 
 async def move(site, target):
-    """Asked again while this machine is too busy to check it in time, as anybody would."""
+    """Repeat a command while this machine is too busy to check it in time."""
     async with asyncio.timeout(60):
         while True:
             try:
@@ -79,7 +79,7 @@ async def standing(site, target):
     await until(lambda: site.controller.activity == STATE.IDLE)
 
 
-def test_required_what_collides_is_refused_and_the_arm_has_not_moved(mesh, tmp_path):
+def test_required_a_collision_is_refused_without_motion(mesh, tmp_path):
     async def main():
         async with (
             simulator() as port,
@@ -115,7 +115,7 @@ def test_required_a_motion_below_the_floor_is_refused(mesh, tmp_path):
     run(main(), timeout_s=120)
 
 
-def test_warned_what_collides_is_made_and_said(mesh, tmp_path):
+def test_warned_a_collision_is_sent_with_a_warning(mesh, tmp_path):
     async def main():
         async with (
             simulator() as port,
@@ -134,7 +134,7 @@ def test_warned_what_collides_is_made_and_said(mesh, tmp_path):
     run(main(), timeout_s=90)
 
 
-def test_required_while_nothing_can_check_nothing_moves_and_a_killed_worker_comes_back(mesh, tmp_path):
+def test_required_motion_waits_for_a_killed_worker(mesh, tmp_path):
     async def main():
         async with (
             simulator() as port,
@@ -156,7 +156,7 @@ def test_required_while_nothing_can_check_nothing_moves_and_a_killed_worker_come
 
 
 def worker_of(parent):
-    """The process that checks, of those that a process has started."""
+    """Return the worker process among the children of a process."""
     for process in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
             ours = f") S {parent} " in (process / "stat").read_text()
@@ -182,7 +182,7 @@ def test_required_a_robot_without_shapes_is_not_moved(mesh, tmp_path):
     run(main(), timeout_s=90)
 
 
-def test_required_a_moving_link_without_a_shape_keeps_the_arm_where_it_is(mesh, tmp_path):
+def test_required_a_moving_link_without_a_shape_is_refused(mesh, tmp_path):
     model = bar_arm(tmp_path / "half", bare=("elbow",))
 
     async def main():
@@ -200,7 +200,7 @@ def test_required_a_moving_link_without_a_shape_keeps_the_arm_where_it_is(mesh, 
     run(main(), timeout_s=90)
 
 
-def test_a_motion_that_was_not_checked_is_not_said_to_pass_near_something(mesh, tmp_path):
+def test_an_unchecked_motion_has_no_warning_about_clearance(mesh, tmp_path):
     urdf = tmp_path / "bare.urdf"
     urdf.write_text(BARE)
 
@@ -210,7 +210,7 @@ def test_a_motion_that_was_not_checked_is_not_said_to_pass_near_something(mesh, 
             simulator(robot=str(urdf)) as port,
             gateway(mesh, tmp_path, port, check="warn", cell=bare, description=str(urdf)) as site,
         ):
-            # Also at once, while the check is getting ready.
+            # Also while the check is starting.
             await site.lease(A.ACQUIRE, ttl_s=5)
             await site.command(C.HOME)
             event = (await until(lambda: site.events("check.skipped")))[0]
@@ -226,7 +226,7 @@ BARE = """<robot name="bare"><link name="base"/><link name="tip"/>
 <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
 
 
-def test_robots_of_a_cell_are_checked_where_they_are_and_where_they_have_been_told_to_go(mesh, tmp_path):
+def test_robots_are_checked_along_the_paths_of_the_others(mesh, tmp_path):
     async def main():
         async with (
             simulator() as port,
@@ -235,7 +235,7 @@ def test_robots_of_a_cell_are_checked_where_they_are_and_where_they_have_been_to
             all_checked(cell_site) as (arm, other),
         ):
             await move(arm, OUT)
-            # While it goes there, and when it is there, the other may not swing through it.
+            # During the motion, and after it, the other robot must not swing through it.
             text = await refusal(move(other, [radians(90), 0, 0, 0, 0]))
             assert "arm/" in text
             await standing(arm, OUT)
@@ -244,7 +244,7 @@ def test_robots_of_a_cell_are_checked_where_they_are_and_where_they_have_been_to
             assert "arm-2/" in text
             await move(arm, [radians(-90), 0, 0, 0, 0])
             await standing(arm, [radians(-90), 0, 0, 0, 0])
-            # Asked for at once, each good alone: whichever comes second is told of the first's way.
+            # Sent concurrently, each allowed alone: the second is refused because of the first's path.
             answers = await asyncio.gather(
                 move(arm, OUT),
                 move(other, [radians(90), 0, 0, 0, 0]),
@@ -257,7 +257,7 @@ def test_robots_of_a_cell_are_checked_where_they_are_and_where_they_have_been_to
     run(main(), timeout_s=120)
 
 
-def test_required_a_cell_mate_that_nobody_hears_of_keeps_an_arm_where_it_is(mesh, tmp_path):
+def test_required_an_unserved_robot_of_the_cell_is_refused(mesh, tmp_path):
     async def main():
         async with (
             simulator() as port,
@@ -271,7 +271,7 @@ def test_required_a_cell_mate_that_nobody_hears_of_keeps_an_arm_where_it_is(mesh
     run(main(), timeout_s=90)
 
 
-def test_a_policy_that_there_is_not_is_named(mesh, tmp_path):
+def test_an_unknown_policy_is_refused(mesh, tmp_path):
     async def main():
         async with gateway(mesh, tmp_path, 9, up=False, check="sometimes"):
             pass

@@ -1,4 +1,4 @@
-"""What the robots of a cell are checked against: everywhere that each has been told to go."""
+"""Checks against the commanded paths of a cell's other robots."""
 
 import asyncio
 import contextlib
@@ -27,7 +27,7 @@ HERE, FAR, NEAR = (0.0,) * 5, (1.0, 0.0, 0.0, 0.0, 0.0), (0.1, 0.0, 0.0, 0.0, 0.
 
 
 def occupied_path(bench):
-    """As the cell's other robots get bench."""
+    """Return the path that the cell's other robots are checked against."""
     context = bench.control._context
     cell_occupancy = CellOccupancy()
     Checks(
@@ -50,7 +50,7 @@ def occupied_path(bench):
         ((C.MOVE_RELATIVE, {"joint_positions": NEAR}), (HERE, FAR, (1.1, 0.0, 0.0, 0.0, 0.0))),
     ],
 )
-def test_of_a_unit_of_two_motions_the_others_are_kept_out_of_both(tmp_path, second, path):
+def test_a_unit_of_two_motions_occupies_both_paths(tmp_path, second, path):
     async def main():
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE)
@@ -76,7 +76,7 @@ def test_resume_and_another_motion_are_two_units(tmp_path):
     run(main())
 
 
-def test_who_is_not_checked_himself_still_meets_nobody_who_is(mesh, tmp_path):
+def test_an_unchecked_robot_is_an_obstacle_for_the_others(mesh, tmp_path):
     async def main():
         policies = [{"cell": TWO, "check": "require"}, {"cell": TWO, "check": "off"}]
         async with (
@@ -95,13 +95,13 @@ def test_who_is_not_checked_himself_still_meets_nobody_who_is(mesh, tmp_path):
                     accepted.append(robot)
 
             await asyncio.gather(asked(other, [radians(90), 0, 0, 0, 0]), asked(arm, OUT))
-            # Of two that are accepted, the checked one was there first: then its way was free.
+            # If both are accepted, the checked one was first, and its path was free.
             assert accepted in ([other], [arm], [arm, other])
 
     run(main(), timeout_s=120)
 
 
-def test_a_stop_that_is_reset_at_once_ends_a_program_that_waits(mesh, tmp_path):
+def test_a_stop_ends_a_waiting_program_even_if_reset_immediately(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.home()
@@ -113,7 +113,7 @@ def test_a_stop_that_is_reset_at_once_ends_a_program_that_waits(mesh, tmp_path):
                 request = schema.CommandRequest(
                     command=C.RESET, lease=site.secret, id=site.id, stop_id=stop.stop_id
                 )
-                # No sooner than the answer to the stop: within one look of the program's.
+                # After the answer to the stop, within one poll of the program.
                 await site.session.ask(site.key("command/li"), request)
             state = await ended(site, RUN.ENDED)
             assert state.text.startswith("stopped")
@@ -121,7 +121,7 @@ def test_a_stop_that_is_reset_at_once_ends_a_program_that_waits(mesh, tmp_path):
     run(main(), timeout_s=60)
 
 
-def test_a_program_is_planned_from_where_the_robot_stands_whatever_the_policy(mesh, tmp_path):
+def test_a_program_is_planned_from_the_robots_positions(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.home()

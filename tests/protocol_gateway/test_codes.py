@@ -10,7 +10,7 @@ BOTH_WAYS = [
     (AbsolutePositions((1.0,)), b"1#2*1.00@"),
     (Command(("home",)), b"1#101@"),
     (Command(("speed=50",)), b"1#107*50@"),
-    # No code in this table: the name.
+    # Without a code in this table, the name is used.
     (Command(("stop",)), b"1#COMMAND*stop@"),
 ]
 
@@ -26,12 +26,12 @@ def test_names_are_read_where_the_table_has_codes_too():
     assert read_records(b"1#ABSOLUTE.DEG*1.00", code_table(TABLE)) == (AbsolutePositions((1.0,)),)
 
 
-def test_a_site_files_table_takes_the_place_of_the_default_one():
+def test_a_site_files_table_replaces_the_default():
     assert read_records(b"1#1*home") == (Command(("home",)),)
     assert read_records(b"1#1*home", code_table(TABLE)) == (Unknown("1", ("home",)),)
 
 
-def test_a_type_of_the_controllers_own_is_told_under_the_name_that_the_site_file_gives_it():
+def test_a_controllers_own_type_gets_its_name_from_the_site_file():
     assert read_records(b"1#-9*1.5", code_table(TABLE)) == (Unknown("FORCE", ("1.5",)),)
 
 

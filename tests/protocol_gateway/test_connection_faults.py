@@ -1,4 +1,4 @@
-"""Connections that freeze, drop, are refused, or end in a host that has vanished: state, event, recovery."""
+"""Connections that freeze, drop, are refused, or lose their host: state, event, recovery."""
 
 import asyncio
 import contextlib
@@ -20,15 +20,13 @@ from tests.protocol_gateway.gateway_site import STATE, gateway, refusal, simulat
 HOUSE = Path(__file__).resolve().parents[2]
 
 
-def test_of_a_frozen_controller_old_states_are_silent_within_a_second_then_it_is_connected_anew(
-    mesh, tmp_path
-):
+def test_a_frozen_controller_is_silent_within_a_second_and_reconnected(mesh, tmp_path):
     async def main():
         async with faulty_site(mesh, tmp_path) as (site, fault):
             await fault("freeze")
             begin_s = time.monotonic()
             await until(lambda: site.controller.link == STATE.SILENT)
-            # 1 s after the last unit, and what a busy machine adds.
+            # 1 s after the last unit, and a margin for a busy machine.
             assert time.monotonic() - begin_s < 1.0 + 1.5
             assert "sends nothing" in (await site.event("link.silent", -1)).text
             joints = len(site.seen["joints"])
@@ -41,7 +39,7 @@ def test_of_a_frozen_controller_old_states_are_silent_within_a_second_then_it_is
     run(main())
 
 
-def test_a_controller_that_drops_its_connections_is_connected_to_again_and_again(mesh, tmp_path):
+def test_a_controller_that_drops_connections_is_reconnected(mesh, tmp_path):
     async def main():
         async with faulty_site(mesh, tmp_path) as (site, fault):
             await fault("drop")
@@ -67,7 +65,7 @@ def test_a_controller_that_restarts_comes_back_and_is_not_taken_for_homed(mesh, 
     run(main())
 
 
-def test_a_controller_that_lets_nobody_in_is_told_in_its_own_words(mesh, tmp_path):
+def test_a_controller_that_refuses_connections_is_reported_with_its_text(mesh, tmp_path):
     async def main():
         async with faulty_site(mesh, tmp_path) as (site, fault):
             await fault("refuse")
@@ -80,7 +78,7 @@ def test_a_controller_that_lets_nobody_in_is_told_in_its_own_words(mesh, tmp_pat
     run(main())
 
 
-def test_a_fault_that_there_is_not_is_refused_in_words_and_what_there_is_is_told(mesh, tmp_path):
+def test_an_unknown_fault_is_refused_with_the_known_ones(mesh, tmp_path):
     async def main():
         async with faulty_site(mesh, tmp_path) as (site, fault):
             assert "'melt' is unknown; there are freeze, " in await refusal(fault("melt"))
@@ -94,7 +92,7 @@ def test_a_fault_that_there_is_not_is_refused_in_words_and_what_there_is_is_told
     run(main())
 
 
-def test_without_a_router_a_simulator_serves_all_the_same(mesh, tmp_path):
+def test_a_simulator_serves_without_a_router(mesh, tmp_path):
     async def main():
         nowhere = SessionSettings(connect=("tcp/127.0.0.1:9",))
         own = Mesh(site="hall", robot="arm", session=nowhere)
@@ -122,7 +120,7 @@ def ip(*words):
 
 @contextlib.contextmanager
 def another_host():
-    """A network namespace with a cable to it: its name, and its end of the cable."""
+    """Create a network namespace with a virtual cable; yield its name and its end of the cable."""
     name = f"mesh-{os.getpid()}"
     here, there = f"mh{os.getpid() % 10**6}", f"mt{os.getpid() % 10**6}"
     try:
@@ -157,9 +155,7 @@ async def simulator_there(name):
         await process.wait()
 
 
-def test_of_a_host_that_vanished_without_a_word_the_link_is_down_in_seconds_and_comes_back_by_itself(
-    mesh, tmp_path
-):
+def test_a_vanished_host_is_detected_in_seconds_and_reconnected(mesh, tmp_path):
     async def main():
         with another_host() as (name, cable):
             async with (

@@ -1,4 +1,4 @@
-"""Control of one robot: units of several commands, leases, what happens while the disk is waited for."""
+"""Control of one robot: units of several commands, leases, and events during a write to disk."""
 
 import asyncio
 from math import radians
@@ -24,7 +24,7 @@ def move(*degrees):
     return C.MOVE_ABSOLUTE, {"joint_positions": [radians(value) for value in degrees]}
 
 
-def test_commands_of_one_unit_are_judged_as_those_before_them_leave_the_robot(tmp_path):
+def test_commands_of_one_unit_are_evaluated_after_the_previous_ones(tmp_path):
     async def main():
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE)
@@ -55,14 +55,14 @@ def test_commands_of_one_unit_are_judged_as_those_before_them_leave_the_robot(tm
         ),
     ],
 )
-def test_commands_of_one_unit_are_done_all_or_none(tmp_path, commands, words):
+def test_commands_of_one_unit_are_all_or_none(tmp_path, commands, words):
     async def main():
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE)
             with pytest.raises(RefusedError, match=words):
                 await bench.commands(*commands)
             assert bench.socket == []
-            # Its ids are used up.
+            # Its ids are used.
             with pytest.raises(RefusedError, match="id 1 is not higher"):
                 await bench.commands((C.HOME, {}))
         asked = [outcome.value for name, outcome in bench.entries() if name not in ("ACQUIRE", "REVOKE")]
@@ -88,12 +88,12 @@ def test_a_reset_in_a_unit_allows_the_motion_behind_it(tmp_path):
     run(main())
 
 
-def test_a_stop_while_a_unit_is_being_written_down_forbids_all_of_it(tmp_path):
+def test_a_stop_during_the_audit_write_forbids_the_unit(tmp_path):
     async def main():
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE)
             commands = asyncio.create_task(bench.commands((C.TRACE_ON, {}), (C.HOME, {})))
-            await asyncio.sleep(0)  # it waits for the disk now
+            await asyncio.sleep(0)  # the command waits for the disk now
             bench.control.stop(by="wang", reason="fire", source="test")
             with pytest.raises(RefusedError, match="stop 1 is latched"):
                 await commands
@@ -104,12 +104,12 @@ def test_a_stop_while_a_unit_is_being_written_down_forbids_all_of_it(tmp_path):
     run(main())
 
 
-def test_a_motion_that_hold_has_overtaken_is_not_sent(tmp_path):
+def test_a_motion_overtaken_by_hold_is_not_sent(tmp_path):
     async def main():
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE)
             motion = asyncio.create_task(bench.commands((C.HOME, {})))
-            await asyncio.sleep(0)  # it waits for the disk now
+            await asyncio.sleep(0)  # the command waits for the disk now
             hold = asyncio.create_task(bench.commands((C.HOLD, {}), first_id=2))
             with pytest.raises(RefusedError, match="HOLD came before it could be sent"):
                 await motion
@@ -120,7 +120,7 @@ def test_a_motion_that_hold_has_overtaken_is_not_sent(tmp_path):
     run(main())
 
 
-def test_a_session_that_is_gone_takes_its_own_lease_with_it_and_stops_its_motion(tmp_path):
+def test_an_ended_session_ends_its_lease_and_stops_its_motion(tmp_path):
     async def main():
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE, session="s1")
@@ -137,7 +137,7 @@ def test_a_session_that_is_gone_takes_its_own_lease_with_it_and_stops_its_motion
     run(main())
 
 
-def test_a_link_that_is_lost_while_the_holders_motion_runs_is_a_stop_that_waits_for_it(tmp_path):
+def test_a_lost_link_during_motion_is_a_stop(tmp_path):
     async def main():
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE)
@@ -156,7 +156,7 @@ def test_a_link_that_is_lost_while_the_holders_motion_runs_is_a_stop_that_waits_
     run(main())
 
 
-def test_who_asks_for_control_is_shown_to_its_holder_until_he_gets_it(tmp_path):
+def test_a_request_for_control_is_shown_until_it_is_granted(tmp_path):
     async def main():
         async with control_bench(tmp_path) as bench:
             with pytest.raises(RefusedError, match="nobody is in control: take it"):
@@ -176,18 +176,18 @@ def test_who_asks_for_control_is_shown_to_its_holder_until_he_gets_it(tmp_path):
             await bench.lease(A.ACCEPT, "wang")
             assert bench.control.authority.ended.code == "lease.ended.handed_over"
             assert [each.operator for each in bench.control.authority.asked_by] == ["zhao"]
-        # Asking again within half a minute is no new entry.
+        # A repeated ASK within half a minute has no entry.
         assert [name for name, outcome in bench.entries() if outcome.value == "ACCEPTED"].count("ASK") == 2
 
     run(main())
 
 
-def test_a_lease_that_ends_while_its_command_is_being_written_down_takes_the_command_with_it(tmp_path):
+def test_a_lease_that_ends_during_the_audit_write_cancels_the_command(tmp_path):
     async def main():
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE)
             command = asyncio.create_task(bench.commands((C.HOME, {})))
-            await asyncio.sleep(0)  # it waits for the disk now
+            await asyncio.sleep(0)  # the command waits for the disk now
             bench.control.leases.end(codes.ENDED_GATEWAY())
             with pytest.raises(RefusedError, match="control ended while"):
                 await command
@@ -196,7 +196,7 @@ def test_a_lease_that_ends_while_its_command_is_being_written_down_takes_the_com
     run(main())
 
 
-def test_a_stop_that_is_told_long_after_the_reset_is_a_new_one(tmp_path, clock):
+def test_a_stop_reported_long_after_a_reset_is_new(tmp_path, clock):
     async def main():
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE)
@@ -219,7 +219,7 @@ def test_a_stop_that_is_told_long_after_the_reset_is_a_new_one(tmp_path, clock):
         ((), 0.0, (C.SPEED, {"speed_percent": 50}), False),
     ],
 )
-def test_a_refusal_ends_a_motion_only_where_it_can_be_an_answer_to_nothing_else(
+def test_a_refusal_ends_a_motion_only_if_it_cannot_answer_another_unit(
     tmp_path, clock, before, wait_s, behind, over
 ):
     async def main():
@@ -248,7 +248,7 @@ def test_a_refusal_of_a_unit_is_of_all_its_commands(tmp_path):
     run(main())
 
 
-def test_what_a_killed_gateways_holder_set_in_motion_is_stopped_by_the_next_one(tmp_path):
+def test_motion_from_before_a_kill_is_stopped(tmp_path):
     async def main():
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE)
@@ -264,7 +264,7 @@ def test_what_a_killed_gateways_holder_set_in_motion_is_stopped_by_the_next_one(
     run(main())
 
 
-def test_a_robot_that_stands_when_the_gateway_is_back_is_not_stopped(tmp_path):
+def test_a_robot_at_rest_after_a_kill_is_not_stopped(tmp_path):
     async def main():
         async with control_bench(tmp_path) as bench:
             bench.control._context.orphan = "li"

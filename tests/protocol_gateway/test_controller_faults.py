@@ -8,7 +8,7 @@ from tests.protocol_gateway.gateway_site import STATE, A, C, refusal, until
 FAR = [2.4, 0.2, -0.2, 0.1, 0.5]
 
 
-def test_joints_that_leap_although_their_controller_says_that_it_rests_are_foreign_motion(mesh, tmp_path):
+def test_jumping_joints_of_an_idle_controller_are_uncommanded_motion(mesh, tmp_path):
     async def main():
         async with faulty_site(mesh, tmp_path, demo=False) as (site, fault):
             await site.home()
@@ -41,7 +41,7 @@ def test_in_local_mode_motion_is_refused_until_it_is_remote_again(mesh, tmp_path
     run(main())
 
 
-def test_a_controller_with_a_fault_tells_it_and_moves_again_after_its_reset(mesh, tmp_path):
+def test_a_fault_is_reported_and_cleared_by_reset(mesh, tmp_path):
     async def main():
         async with faulty_site(mesh, tmp_path, demo=False) as (site, fault):
             await site.home()
@@ -60,7 +60,7 @@ def test_a_controller_with_a_fault_tells_it_and_moves_again_after_its_reset(mesh
     run(main())
 
 
-def test_a_controller_that_ignores_a_stop_is_a_critical_event_and_heeds_it_when_it_can_again(mesh, tmp_path):
+def test_an_ignored_stop_is_a_critical_event_and_is_repeated(mesh, tmp_path):
     async def main():
         async with faulty_site(mesh, tmp_path) as (site, fault):
             await until(lambda: site.controller.activity == STATE.MOVING)
@@ -70,7 +70,7 @@ def test_a_controller_that_ignores_a_stop_is_a_critical_event_and_heeds_it_when_
             assert (await site.event("stop.disobeyed", 0)).severity == schema.Event.CRITICAL
             assert site.controller.activity == STATE.MOVING
             await fault("deaf", off=True)
-            # The gateway has gone on sending it.
+            # The gateway repeated the stop.
             await until(lambda: site.controller.activity == STATE.STOPPED)
 
     run(main())

@@ -1,4 +1,4 @@
-"""More than is taken: floods thinned, deluges thrown away, the newest of a burst; over real sockets too."""
+"""Flood protection: thinned floods, discarded deluges, the newest of a burst; also over real sockets."""
 
 import asyncio
 import contextlib
@@ -46,7 +46,7 @@ def test_more_than_a_mebibyte_in_half_a_second_is_a_deluge_until_half_a_second_i
 
     assert not deluge(1 << 20, 10.0)
     assert deluge(1, 10.4)
-    assert deluge(1 << 18, 10.6)  # the half second before was none of calm
+    assert deluge(1 << 18, 10.6)  # the previous half second was not calm
     assert deluge(1, 11.0)
     assert deluge(1, 11.2, more_waits=True)  # few bytes, but more of them wait
     assert deluge(1, 11.7)
@@ -55,7 +55,7 @@ def test_more_than_a_mebibyte_in_half_a_second_is_a_deluge_until_half_a_second_i
     assert not detector.active
 
 
-def test_units_so_many_that_others_would_wait_for_their_reading_are_a_deluge_too():
+def test_too_many_units_to_parse_are_a_deluge():
     detector = FloodDetector()
     detector.add_bytes(10_000, 10.0, more_waits=False)
     detector.add_units(10_000)
@@ -65,7 +65,7 @@ def test_units_so_many_that_others_would_wait_for_their_reading_are_a_deluge_too
 
 
 class Timers:
-    """What is to be called later, called by hand."""
+    """Scheduled calls, executed by the test."""
 
     def __init__(self):
         self.calls = []
@@ -79,7 +79,7 @@ class Timers:
 
 
 def handed_over(*reads, burst):
-    """What is handed over of the events of reads, before and after a time without more."""
+    """Return the events dispatched immediately, and those dispatched later."""
     seen, timers, now = [], Timers(), Received(1.0, 10**9)
     dispatcher = EventDispatcher(lambda event, date: seen.append(event), timers.later)
     for events in reads:
@@ -94,23 +94,23 @@ def joints(number):
     return JointsReceived((number,))
 
 
-def test_of_a_burst_in_pieces_the_newest_alone_is_handed_over_and_only_when_no_more_comes():
+def test_of_a_split_burst_only_the_newest_is_dispatched_at_its_end():
     reads = [joints(1), joints(2)], [], [joints(3)]
     assert handed_over(*reads, burst=True) == ([], [joints(3)], 2)
     assert handed_over(*reads, burst=False) == ([joints(1), joints(2), joints(3)], [], 0)
 
 
-def test_of_a_burst_what_its_controller_dates_and_what_it_refuses_is_handed_over_at_once():
+def test_of_a_burst_dated_events_and_refusals_are_dispatched_immediately():
     dated = [JointsReceived((1.0,), None, 5.0), JointsReceived((2.0,), None, 5.1), Refused(5, "limit")]
     assert handed_over(dated, burst=True) == (dated, [], 0)
 
 
-def test_no_position_that_was_held_back_follows_a_newer_one_with_a_time():
+def test_no_deferred_position_follows_a_newer_dated_one():
     undated, dated = joints(1), JointsReceived((2.0,), None, 5.0)
     assert handed_over([undated], [dated], burst=True) == ([dated], [], 1)
 
 
-def test_of_statuses_held_back_none_that_says_something_else_is_left_out_and_the_newest_is_the_last():
+def test_deferred_statuses_keep_every_change_and_end_with_the_newest():
     idle, local = StatusReceived(activity=Activity.IDLE), StatusReceived(mode=Mode.LOCAL)
     assert handed_over([idle, local, idle], [local], burst=True) == ([], [idle, local], 0)
 
@@ -122,7 +122,7 @@ UNIT = "1#ABSOLUTE.DEG*%.2f;0;0;0;0@"
 
 @contextlib.asynccontextmanager
 async def flooding(say):
-    """Positions, 8,000 a second, however seldom the machine comes to it."""
+    """Send 8,000 positions a second, also on a slow machine."""
 
     async def keep_saying():
         said_s = time.monotonic()
@@ -140,7 +140,7 @@ async def flooding(say):
         await asyncio.gather(task, return_exceptions=True)
 
 
-def test_a_status_told_once_in_the_midst_of_a_flood_is_heeded_and_reaches_old_client_programs(mesh, tmp_path):
+def test_a_single_status_in_a_flood_is_used_and_relayed(mesh, tmp_path):
     async def main():
         settings = legacy(commanders={})
         async with (
@@ -158,7 +158,7 @@ def test_a_status_told_once_in_the_midst_of_a_flood_is_heeded_and_reaches_old_cl
                     await until(lambda known=known: site.controller.mode == known)
                     await until(lambda mode=mode: mode in old.words)
                 say("1#STATUS*idle;local;homed@1#STATUS*idle;remote;homed@" + UNIT % 1.0)
-                await until(lambda: len(site.events("controller.local")) == 4)  # not even one of a moment
+                await until(lambda: len(site.events("controller.local")) == 4)  # even a single one
                 say("1#STATUS*idle;local;homed@" + UNIT % 1.0)
                 await until(lambda: len(site.events("controller.local")) == 5)
                 move = site.command(C.MOVE_ABSOLUTE, joint_positions=[0.1, 0, 0, 0, 0])
@@ -168,7 +168,7 @@ def test_a_status_told_once_in_the_midst_of_a_flood_is_heeded_and_reaches_old_cl
     run(main())
 
 
-def test_of_a_flood_the_newest_is_published_some_two_hundred_times_a_second(mesh, tmp_path):
+def test_of_a_flood_the_newest_is_published_200_times_a_second(mesh, tmp_path):
     async def main():
         settings = legacy(commanders={})
         async with (
@@ -185,12 +185,12 @@ def test_of_a_flood_the_newest_is_published_some_two_hundred_times_a_second(mesh
                     elapsed_s = time.monotonic() - begin_s
                     rates[0].append((len(site.seen["joints"]) - before) / elapsed_s)
                     rates[1].append((len(old.units) - told) / elapsed_s)
-                # On a busy machine what was sent in one half second may be read in the next.
+                # A busy machine may read data in the half second after their sending.
                 for each in rates:
                     assert max(each) > 0
                     assert min(each) < 250
             assert site.controller.counters.units_skipped > 1000
-            # Not even the last of a flood is left out.
+            # The last state of a flood is published, too.
             say(UNIT % 2.0)
             await until(lambda: site.joints[0] == pytest.approx(math.radians(2.0)))
 
@@ -199,7 +199,7 @@ def test_of_a_flood_the_newest_is_published_some_two_hundred_times_a_second(mesh
 
 @contextlib.asynccontextmanager
 async def deluging():
-    """A controller that sends as fast as it is read, while `on` is set: (port, on, heard)."""
+    """Run a controller that sends as fast as it is read, while `on` is set: (port, on, heard)."""
     on, heard, tasks = asyncio.Event(), bytearray(), []
     on.set()
     state = b"2#STATUS*idle;remote;homed&ABSOLUTE.DEG*1;0;0;0;0@"
@@ -228,9 +228,7 @@ async def deluging():
         await asyncio.gather(*tasks, return_exceptions=True)
 
 
-def test_in_a_deluge_a_stop_is_sent_at_once_another_robot_keeps_its_rate_and_all_is_well_after_it(
-    mesh, tmp_path
-):
+def test_in_a_deluge_stops_and_other_robots_work(mesh, tmp_path):
     async def main():
         async with (
             deluging() as (port, on, heard),
@@ -244,7 +242,7 @@ def test_in_a_deluge_a_stop_is_sent_at_once_another_robot_keeps_its_rate_and_all
                 await until(lambda number=number: heard.count(b"1#COMMAND*stop@") == number + 1)
                 assert site.controller.link == STATE.SILENT
                 await asyncio.sleep(0.15)
-            # By now the last state from before the deluge is here: it goes another way than the link's state.
+            # By now the last state from before the deluge has arrived, on another topic than the link's state.
             joints = len(site.seen["joints"])
             calm = site.session.subscribe(robot_key("hall", "arm-2", "joints"), newest=1000)
             await anext(calm)
@@ -253,12 +251,12 @@ def test_in_a_deluge_a_stop_is_sent_at_once_another_robot_keeps_its_rate_and_all
                 await anext(calm)
             elapsed_s = time.monotonic() - begin_s
             assert await none_left_out(site.session, calm, "arm-2")
-            # The state is told each second.
+            # The state is published each second.
             await until(lambda: site.controller.counters.bytes_received > taken)
             taken = site.controller.counters.bytes_received - taken
             assert taken < 5e6 * (elapsed_s + 2.0)
             assert len(site.seen["joints"]) == joints
-            # Longer than the link waits for a controller that sends nothing.
+            # Longer than the reconnect timeout of a silent controller.
             await asyncio.sleep(max(0.0, 4.5 - elapsed_s))
             assert site.controller.counters.connections == 1
             await until(lambda: len(site.events("link.deluge")) == 1)
@@ -271,7 +269,7 @@ def test_in_a_deluge_a_stop_is_sent_at_once_another_robot_keeps_its_rate_and_all
     run(main(), timeout_s=180.0)
 
 
-def test_of_what_was_held_back_without_a_clock_the_newest_alone_is_published(mesh, tmp_path):
+def test_of_undated_delayed_units_only_the_newest_is_published(mesh, tmp_path):
     async def main():
         async with scripted_controller() as (port, say, _), gateway(mesh, tmp_path, port, up=False) as site:
             await until(lambda: site.controller.link == STATE.SILENT)
@@ -306,7 +304,7 @@ def test_live_positions_after_a_gap_are_all_published(mesh, tmp_path):
             await asyncio.sleep(0.5)
             async with repeated(say, state):
                 await until(lambda: len(site.seen["joints"]) > 60)
-            # What two of which came at once is a burst, on a busy machine.
+            # Two units in one read are a burst, on a busy machine.
             assert len(site.seen["joints"]) > 0.7 * waist
 
     run(main())

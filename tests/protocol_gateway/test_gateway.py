@@ -17,7 +17,7 @@ TARGET = [0.3, 0.2, -0.2, 0.1, 0.5]
 FAR = [2.4, 0.2, -0.2, 0.1, 0.5]
 
 
-def test_a_controllers_units_come_out_as_joint_states(mesh, tmp_path):
+def test_a_controllers_units_are_published_as_joint_states(mesh, tmp_path):
     async def main():
         async with simulator(demo=True) as port, gateway(mesh, tmp_path, port) as site:
             await until(lambda: len(site.seen["joints"]) > 150)
@@ -25,7 +25,7 @@ def test_a_controllers_units_come_out_as_joint_states(mesh, tmp_path):
             assert [joint.name for joint in last.joints] == ["waist", "shoulder", "elbow", "wrist", "roll"]
             assert all(joint.HasField("velocity") for joint in last.joints)
             assert first != last
-            # Ten a second, however few the simulated controller got to send.
+            # Ten a second, even if the simulated controller sent fewer.
             took_s = (last.timestamp.ToNanoseconds() - first.timestamp.ToNanoseconds()) * 1e-9
             assert 0.5 * 10.0 * took_s < len(site.seen["joints/slow"]) < 1.2 * 10.0 * took_s + 3
             assert site.controller.mode == STATE.REMOTE
@@ -34,7 +34,7 @@ def test_a_controllers_units_come_out_as_joint_states(mesh, tmp_path):
     run(main())
 
 
-def test_home_and_move_arrive_where_they_were_sent(mesh, tmp_path):
+def test_home_and_move_reach_their_targets(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.lease(A.ACQUIRE)
@@ -58,7 +58,7 @@ def test_home_and_move_arrive_where_they_were_sent(mesh, tmp_path):
     run(main())
 
 
-def test_an_operator_takes_over_an_arm_that_moves_by_itself_and_keeps_control(mesh, tmp_path):
+def test_an_operator_keeps_control_of_an_arm_in_a_demonstration(mesh, tmp_path):
     async def main():
         async with simulator(demo=True) as port, gateway(mesh, tmp_path, port) as site:
             await until(lambda: site.controller.activity == STATE.MOVING)
@@ -91,7 +91,7 @@ def test_stop_needs_no_lease_and_latches_until_the_holder_resets_that_stop(mesh,
             text = await refusal(site.command(C.RESET, stop_id=stop.stop_id))
             assert "RESET names stop 1, but stop 2 is latched" in text
             await site.command(C.RESET, stop_id=again.stop_id)
-            # At once: the controller's status may still tell of the stop.
+            # Immediately: the controller may still report the stop.
             await site.command(C.MOVE_ABSOLUTE, joint_positions=TARGET)
             await until(lambda: site.joints == pytest.approx(TARGET, abs=1e-6))
             assert not site.controller.HasField("stop")
@@ -99,7 +99,7 @@ def test_stop_needs_no_lease_and_latches_until_the_holder_resets_that_stop(mesh,
     run(main())
 
 
-def test_operators_texts_are_cut_and_on_one_line_wherever_they_are_shown(mesh, tmp_path, caplog):
+def test_operators_texts_are_shortened_to_one_line(mesh, tmp_path, caplog):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.stop(by="wang\nERROR arm: forged", reason="\x1b[2J" + "r" * 150_000)
@@ -146,7 +146,7 @@ def test_a_lease_that_is_not_renewed_stops_its_holders_motion(mesh, tmp_path):
     run(main())
 
 
-def test_giving_control_back_while_the_motion_runs_stops_it(mesh, tmp_path):
+def test_releasing_control_during_motion_stops_it(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.home()
@@ -173,7 +173,7 @@ def test_one_operator_at_a_time_and_a_secret_alone_is_not_enough(mesh, tmp_path)
     run(main())
 
 
-def test_a_command_is_done_once_and_its_repeat_gets_the_first_answer(mesh, tmp_path):
+def test_a_command_is_executed_once_and_its_repeat_gets_the_first_answer(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.lease(A.ACQUIRE, ttl_s=5)
@@ -191,14 +191,14 @@ def test_a_command_is_done_once_and_its_repeat_gets_the_first_answer(mesh, tmp_p
     run(main())
 
 
-def test_a_command_id_that_was_used_for_other_content_is_refused_and_written_down(mesh, tmp_path):
+def test_a_command_id_with_other_content_is_refused_and_audited(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.home()
             key = site.key("command/li")
 
             async def as_json(**fields):
-                """What a plain Zenoh client of another language sends, and what it gets."""
+                """Send a request like a plain Zenoh client; return the answer."""
                 payload = json.dumps({"lease": site.secret, "id": 9, **fields})
                 get = site.session.zenoh_session.get
                 replies = await asyncio.to_thread(lambda: list(get(key, payload=payload, timeout=5.0)))
@@ -215,7 +215,7 @@ def test_a_command_id_that_was_used_for_other_content_is_refused_and_written_dow
             ):
                 refused = await as_json(**other)
                 assert refused == "Not sent: id 9 was used for SPEED 50 %: count up with each command."
-            # Another encoding, another date: the same command.
+            # Another encoding and time: the same command.
             soon = schema.CommandRequest().not_after
             soon.FromNanoseconds(time.time_ns() + 10**9)
             again = await site.command(C.SPEED, speed_percent=50, id=9, not_after=soon)
@@ -235,7 +235,7 @@ def test_a_command_id_that_was_used_for_other_content_is_refused_and_written_dow
     run(main())
 
 
-def test_what_is_refused_says_why_and_sends_nothing(mesh, tmp_path):
+def test_a_refusal_gives_a_reason_and_sends_nothing(mesh, tmp_path):
     async def main():
         async with simulator(demo=True) as port, gateway(mesh, tmp_path, port) as site:
             assert "take control first" in await refusal(site.command(C.HOME))
@@ -254,7 +254,7 @@ def test_what_is_refused_says_why_and_sends_nothing(mesh, tmp_path):
     run(main())
 
 
-def test_every_request_is_in_an_audit_log_whose_chain_holds(mesh, tmp_path):
+def test_every_request_is_in_an_intact_audit_log(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.home()
@@ -272,7 +272,7 @@ def test_every_request_is_in_an_audit_log_whose_chain_holds(mesh, tmp_path):
     run(main())
 
 
-def test_a_gateway_that_ends_stops_the_motion_and_one_that_begins_remembers_the_stop(mesh, tmp_path):
+def test_a_shutdown_stops_motion_and_a_start_restores_the_stop(mesh, tmp_path):
     async def main():
         async with simulator() as port:
             async with gateway(mesh, tmp_path, port) as site:
@@ -335,12 +335,12 @@ def settings_with(*robots):
         ([{"stale_after_s": 9.0}], "stale_after_s = 9,"),
     ],
 )
-def test_settings_that_cannot_be_meant_are_refused_in_words(robots, words):
+def test_invalid_settings_are_refused(robots, words):
     with pytest.raises(GatewaySettingsError, match=words):
         check(settings_with(*robots))
 
 
-def test_two_operators_racing_for_control_are_never_both_given_it(mesh, tmp_path):
+def test_two_operators_never_both_get_control(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             for _ in range(10):
@@ -352,7 +352,7 @@ def test_two_operators_racing_for_control_are_never_both_given_it(mesh, tmp_path
     run(main())
 
 
-def test_everybody_sees_the_speed_that_was_set_until_a_controller_may_have_forgotten_it(mesh, tmp_path):
+def test_the_speed_is_published_until_the_controller_may_have_lost_it(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             assert not site.controller.HasField("speed_percent")

@@ -1,4 +1,4 @@
-"""A gateway with frozen and dead controllers, without its router, with a failure of its own."""
+"""Gateway with frozen and dead controllers, without its router, and with an internal failure."""
 
 import asyncio
 import contextlib
@@ -28,7 +28,7 @@ asyncio.run(serve(Settings(robot="pt600", demo=True), ready=lambda line: print(l
 
 @contextlib.asynccontextmanager
 async def simulator_process():
-    """A simulated controller as a process of its own, with its port."""
+    """Run a simulated controller in a separate process; yield its port."""
     process = await asyncio.create_subprocess_exec(
         sys.executable,
         "-c",
@@ -46,7 +46,7 @@ async def simulator_process():
         await process.wait()
 
 
-def test_a_frozen_controller_falls_silent_and_old_states_are_not_dated_anew(mesh, tmp_path):
+def test_a_frozen_controller_is_silent_and_old_states_keep_their_stamps(mesh, tmp_path):
     async def main():
         async with simulator_process() as (process, port), gateway(mesh, tmp_path, port) as site:
             process.send_signal(signal.SIGSTOP)
@@ -84,7 +84,7 @@ def test_a_stop_while_the_link_is_down_is_latched_and_sent_when_it_is_back(mesh,
 
 
 @pytest.mark.slow
-def test_without_its_router_the_gateway_still_stops_a_motion_whose_operator_is_gone(tmp_path):
+def test_without_its_router_the_gateway_stops_motion_of_a_lost_operator(tmp_path):
     async def main():
         endpoint = f"tcp/127.0.0.1:{free_port()}"
         mesh = SessionSettings(connect=(endpoint,), wait_s=5.0)
@@ -102,7 +102,7 @@ def test_without_its_router_the_gateway_still_stops_a_motion_whose_operator_is_g
     run(main())
 
 
-def test_one_robots_dead_controller_does_not_hurt_another(mesh, tmp_path):
+def test_a_dead_controller_does_not_affect_another_robot(mesh, tmp_path):
     async def main():
         async with simulator(demo=True) as alive, gateway(mesh, tmp_path, alive, free_port()) as site:
             other = await last_value(site.session, "robomesh/hall/arm-2/controller")
@@ -113,7 +113,7 @@ def test_one_robots_dead_controller_does_not_hurt_another(mesh, tmp_path):
     run(main())
 
 
-def test_a_failure_at_one_robot_is_said_and_neither_ends_it_nor_another(mesh, tmp_path, monkeypatch):
+def test_a_failure_at_one_robot_is_reported_and_its_task_restarts(mesh, tmp_path, monkeypatch):
     async def main():
         failing = True
         observe = Robot._observe

@@ -9,7 +9,7 @@ from protocol_gateway.errors import UnitError, UnitFormatError
 
 PAPER = b"2# COMMAND* trace; home&ABSOLUTE.DEG* 100.00; 30.45; 92.66; - 67.10; - 25.85@"
 
-# What is written is read as itself, and the other way round.
+# Cases in both directions.
 BOTH_WAYS = [
     ([("COMMAND", "home")], b"1#COMMAND*home@"),
     ([("COMMAND", "trace", "home")], b"1#COMMAND*trace;home@"),
@@ -61,12 +61,12 @@ def records(*rows):
 
 
 @pytest.mark.parametrize(("rows", "data"), BOTH_WAYS)
-def test_units_are_written_and_read_as_themselves(rows, data):
+def test_units_are_formatted_and_parsed(rows, data):
     assert format_unit(records(*rows)) == data
     assert parse_unit(data[:-1]) == records(*rows)
 
 
-def test_the_papers_example_reads_as_two_records_in_spite_of_its_blanks():
+def test_the_papers_example_with_blanks_is_two_records():
     assert parse_unit(PAPER[:-1]) == records(
         ("COMMAND", "trace", "home"), ("ABSOLUTE.DEG", "100.00", "30.45", "92.66", "- 67.10", "- 25.85")
     )
@@ -76,7 +76,7 @@ def test_blanks_of_every_kind_around_items_types_and_counts_mean_nothing():
     assert parse_unit(b"\r\n 1 \t#\n COMMAND \r* home \t; stop\n") == records(("COMMAND", "home", "stop"))
 
 
-def test_a_star_with_nothing_behind_it_is_a_record_without_items():
+def test_a_star_without_data_is_a_record_without_items():
     assert parse_unit(b"1#STATUS* ") == records(("STATUS",))
 
 
@@ -100,7 +100,7 @@ def test_a_malformed_unit_is_refused_with_its_reason(data, reason):
         records(("2147483648",)),
     ],
 )
-def test_what_would_not_be_read_as_itself_is_not_written(unit):
+def test_an_ambiguous_value_is_not_formatted(unit):
     with pytest.raises(UnitFormatError):
         format_unit(unit)
 
@@ -113,7 +113,7 @@ def test_a_type_is_a_name_or_an_int32_code(text, code):
 
 
 @given(st.lists(raw_records, min_size=1, max_size=6).map(tuple))
-def test_any_unit_written_and_read_is_itself(unit):
+def test_any_unit_survives_a_round_trip(unit):
     assert parse_unit(format_unit(unit)[:-1]) == unit
 
 
@@ -124,6 +124,6 @@ def test_any_bytes_are_a_unit_or_are_refused(data):
 
 
 @given(st.text(max_size=60))
-def test_any_text_can_be_told_in_plain_words(text):
+def test_any_text_can_be_made_plain(text):
     plain = plain_text(text)
     assert not plain or parse_unit(format_unit(records(("ERROR", "2", plain)))[:-1])[0].items[1] == plain

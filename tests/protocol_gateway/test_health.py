@@ -27,7 +27,7 @@ def test_jitter_is_the_99th_percentile_less_the_median():
     assert times.jitter_s(now_s) == pytest.approx(0.02)
 
 
-def test_what_few_units_or_old_ones_tell_of_jitter_and_rate_is_nothing():
+def test_few_or_old_units_give_no_jitter_and_rate():
     times, now_s = arrivals(*[0.01] * 15)
     assert times.jitter_s(now_s) is None
     times, now_s = arrivals(*[0.01] * 200)
@@ -51,14 +51,14 @@ REGULAR = [number * 0.01 for number in range(100)]
         (REGULAR, 0),
         ([time_s for number, time_s in enumerate(REGULAR) if number not in (30, 31, 55)], 3),
         ([each for time_s in REGULAR for each in (time_s, time_s)], 0),  # joints and status of one unit
-        ([time_s + 0.004 * (number % 7 == 0) for number, time_s in enumerate(REGULAR)], 0),  # told late
+        ([time_s + 0.004 * (number % 7 == 0) for number, time_s in enumerate(REGULAR)], 0),  # delayed
         ([*REGULAR, *[5000.0 + time_s for time_s in REGULAR]], 0),  # the clock was set
         ([*REGULAR, *REGULAR], 0),  # it was restarted
         ([0.014 * number - 0.014 * number % 0.01 for number in range(100)], 0),  # a coarse clock
         ([number**1.5 for number in range(60)], 0),  # no rate at all
     ],
 )
-def test_units_that_never_came_are_gaps_in_a_clock_that_beats_regularly(times_s, lost):
+def test_lost_units_are_gaps_in_a_regular_clock(times_s, lost):
     assert losses(*times_s) == lost
 
 
@@ -66,7 +66,7 @@ def test_an_answer_is_a_refusal_or_a_status_that_changes_after_a_command():
     timer = ResponseTimer()
     timer.event_received(IDLE, 1.0)
     timer.event_received(MOVING, 1.1)
-    assert timer.answer_s is None  # nothing was asked
+    assert timer.answer_s is None  # no command was sent
     timer.command_sent(2.0)
     timer.event_received(JointsReceived((0.0,)), 2.01)
     timer.event_received(MOVING, 2.02)
@@ -80,7 +80,7 @@ def test_an_answer_is_a_refusal_or_a_status_that_changes_after_a_command():
     assert timer.answer_s == pytest.approx(0.2)
 
 
-def test_what_comes_more_than_two_seconds_after_a_command_is_no_answer_to_it():
+def test_a_response_after_two_seconds_is_no_answer():
     timer = ResponseTimer()
     timer.event_received(IDLE, 0.0)
     timer.command_sent(1.0)

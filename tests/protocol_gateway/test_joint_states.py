@@ -11,7 +11,7 @@ _NUMBERS = st.tuples(*[st.floats(allow_nan=False, allow_infinity=False)] * len(N
 
 
 @given(st.lists(st.tuples(_NUMBERS, st.none() | _NUMBERS, st.integers(0, 2**62)), min_size=1, max_size=4))
-def test_message_that_is_filled_in_again_is_the_one_that_would_be_made_anew(units):
+def test_a_reused_message_equals_a_new_one(units):
     message = JointStatesMessage(NAMES)
     for positions, velocities, wall_ns in units:
         anew = JointStates(

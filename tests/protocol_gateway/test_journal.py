@@ -1,4 +1,4 @@
-"""Events of a kind that comes again and again."""
+"""Rate limit of repeated events."""
 
 from protocol_gateway.journal import Journal
 from robomesh.schemas.robomesh_pb2 import Event
@@ -12,7 +12,7 @@ class Heard:
         self.events.append(event)
 
 
-def test_of_many_of_a_kind_five_are_said_then_one_each_five_seconds_and_all_are_counted():
+def test_a_flood_of_events_is_five_then_one_each_five_seconds():
     heard, now_s = Heard(), 100.0
     journal = Journal(heard, "arm", monotonic_s=lambda: now_s)
     for _ in range(1000):  # 100 s of ten a second
@@ -25,7 +25,7 @@ def test_of_many_of_a_kind_five_are_said_then_one_each_five_seconds_and_all_are_
     assert heard.events[6].text == f"a unit is malformed (and {more} more like it before)"
 
 
-def test_a_flood_of_one_kind_leaves_out_no_other():
+def test_a_flood_of_one_kind_suppresses_no_other():
     heard, now_s = Heard(), 100.0
     journal = Journal(heard, "arm", monotonic_s=lambda: now_s)
     for _ in range(100):
@@ -34,7 +34,7 @@ def test_a_flood_of_one_kind_leaves_out_no_other():
     assert [event.code for event in heard.events] == ["unit.malformed"] * 5 + ["stop.latched"]
 
 
-def test_after_a_rest_as_many_are_said_at_once_as_at_first():
+def test_after_a_pause_the_burst_is_allowed_again():
     heard, now_s = Heard(), 100.0
     journal = Journal(heard, "arm", monotonic_s=lambda: now_s)
     for _ in range(10):

@@ -1,4 +1,4 @@
-"""The latch file: what a gateway that was killed on a full disk remembers of its stops."""
+"""Latch file: stops that survive a kill of the gateway, also on a full disk."""
 
 import asyncio
 import json
@@ -35,7 +35,7 @@ def path(tmp_path):
 
 
 def killed(path, *states, begin=(None, 0)):
-    """A latch file as a gateway leaves it that was killed."""
+    """Write a latch file as a killed gateway leaves it."""
     latch = LatchFile(path)
     latch.begin(*begin, given_out=begin[1])
     for state in states:
@@ -60,19 +60,19 @@ def test_the_newest_of_two_slots_counts_and_the_file_never_grows(path):
         path.unlink()
 
 
-def test_what_is_reset_is_not_latched_any_more(path):
+def test_a_reset_stop_is_no_longer_latched(path):
     killed(path, (stop(1), 1), (None, 1))
     assert LatchFile(path).found.stop is None
 
 
-def test_a_number_is_never_given_out_twice_whether_the_gateway_was_killed_or_not(path):
+def test_a_stop_number_is_never_given_out_twice(path):
     killed(path, (stop(1), 1))
     given = RESERVED + 1  # what a killed gateway may have given out, and not written
     latch = LatchFile(path)
     latch.begin(latch.found.stop, latch.found.last_stop_id, given_out=latch.found.reserved)
     assert latch.next_number(given, NOW_NS) == given + 1
     latch.close()
-    assert LatchFile(path).found.reserved == given  # this one ended by itself, and gave out none
+    assert LatchFile(path).found.reserved == given  # this one shut down normally, and gave out none
 
 
 def test_a_number_that_no_disk_reserves_is_the_time(path, monkeypatch):
@@ -98,14 +98,14 @@ EMPTY = b"\0" * SLOT_BYTES
 
 
 @pytest.mark.parametrize("data", [b"", 2 * EMPTY])
-def test_a_file_that_a_first_start_did_not_write_says_nothing_and_a_later_one_is_damaged(path, data):
+def test_an_unwritten_file_is_damage_except_at_the_first_start(path, data):
     path.write_bytes(data)
     latch = LatchFile(path, first=True)
     assert (latch.found, latch.damage) == (None, "")
     assert LatchFile(path).damage == "its latch file arm.latch is damaged"
 
 
-def test_an_empty_slot_is_damage_but_where_a_first_start_was_killed_between_both(path):
+def test_an_empty_slot_is_damage_except_after_the_very_first_write(path):
     data = killed(path, (stop(1), 1), (stop(2), 2))  # in slot 0, in slot 1
     for left in (data[:SLOT_BYTES], data[:SLOT_BYTES] + EMPTY, EMPTY + data[SLOT_BYTES:]):
         path.write_bytes(left)
@@ -124,7 +124,7 @@ def test_a_file_of_another_robot_is_damage(path):
     assert (latch.found, latch.damage) == (None, "its latch file other.latch belongs to another robot")
 
 
-def test_a_stop_that_comes_while_the_file_is_closed_is_said_to_be_forgotten(path, monkeypatch):
+def test_a_stop_after_closing_the_file_is_reported_as_lost(path, monkeypatch):
     latch = LatchFile(path)
     latch.begin(None, 0, given_out=0)
     goes_on, begun, pwrite = threading.Event(), threading.Event(), os.pwrite
@@ -153,7 +153,7 @@ def test_a_stop_that_comes_while_the_file_is_closed_is_said_to_be_forgotten(path
 
 
 @pytest.mark.parametrize("data", [b"x", b"{}\n", b"[" * 9000, b"\xff" * 8192, b'{"sha256":1}' + b" " * 4084])
-def test_whatever_the_file_holds_it_is_read_or_called_damaged(path, data):
+def test_any_file_is_read_or_reported_as_damaged(path, data):
     path.write_bytes(data)
     assert LatchFile(path).damage
 
@@ -163,7 +163,7 @@ def test_the_longest_texts_fit_into_a_slot(path):
     assert LatchFile(path).found.stop.id == 2**62
 
 
-def test_a_disk_that_hangs_holds_up_no_stop_and_is_said(path, monkeypatch):
+def test_a_disk_that_hangs_delays_no_stop_and_is_reported(path, monkeypatch):
     latch = LatchFile(path)
     latch.begin(None, 0, given_out=0)
     goes_on, pwrite = threading.Event(), os.pwrite
@@ -175,7 +175,7 @@ def test_a_disk_that_hangs_holds_up_no_stop_and_is_said(path, monkeypatch):
     monkeypatch.setattr(os, "pwrite", hang)
     try:
         latch.keep(stop(1), 1)
-        latch.keep(stop(2), 2)  # returns, although the first is still being written
+        latch.keep(stop(2), 2)  # returns while the first is still being written
         monkeypatch.setattr("protocol_gateway.audit.latch.LONGEST_WRITE_S", -1.0)
         assert latch.problem == codes.LATCH_SLOW(name="arm.latch", seconds=-1.0)
     finally:
@@ -186,7 +186,7 @@ def test_a_disk_that_hangs_holds_up_no_stop_and_is_said(path, monkeypatch):
     latch.close()
 
 
-def test_a_sync_that_hangs_keeps_no_newer_stop_from_the_file(path, monkeypatch):
+def test_a_sync_that_hangs_does_not_block_newer_stops(path, monkeypatch):
     latch = LatchFile(path)
     latch.begin(None, 0, given_out=0)
     goes_on = threading.Event()
@@ -201,7 +201,7 @@ def test_a_sync_that_hangs_keeps_no_newer_stop_from_the_file(path, monkeypatch):
     latch.close()
 
 
-def test_a_stop_that_only_the_latch_file_knows_is_remembered_and_written_down(tmp_path):
+def test_a_stop_only_in_the_latch_file_is_restored_and_audited(tmp_path):
     log = tmp_path / "arm.jsonl"
 
     async def life(*, latched=None, kill=False):
@@ -231,7 +231,7 @@ def test_a_stop_that_only_the_latch_file_knows_is_remembered_and_written_down(tm
     run(main())
 
 
-def test_a_stop_whose_reset_was_written_down_and_not_sent_stays_latched(tmp_path):
+def test_a_stop_with_an_unsent_reset_stays_latched(tmp_path):
     log = tmp_path / "arm.jsonl"
 
     async def life(*requests, latched=None):
@@ -267,7 +267,7 @@ def test_a_stop_whose_reset_was_written_down_and_not_sent_stays_latched(tmp_path
     run(main())
 
 
-def test_the_number_of_a_stop_for_a_damaged_file_was_never_given_out(tmp_path):
+def test_a_damaged_file_gets_a_new_stop_number(tmp_path):
     async def life():
         audit = AuditLog(tmp_path / "arm.jsonl")
         found = audit.state
@@ -306,11 +306,11 @@ def test_a_damaged_latch_file_latches_a_stop_once(tmp_path):
     run(main())
 
 
-def test_where_it_cannot_be_allocated_motion_is_refused_with_the_reason_and_stop_works(mesh, tmp_path):
+def test_without_an_allocated_file_motion_is_refused_and_stop_works(mesh, tmp_path):
     async def main():
         latch = tmp_path / "hall" / "arm.latch"
         latch.parent.mkdir(parents=True)
-        latch.symlink_to(tmp_path / "gone" / "arm.latch")  # its disk is not there
+        latch.symlink_to(tmp_path / "gone" / "arm.latch")  # its disk is missing
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.lease(A.ACQUIRE, ttl_s=5)
             assert await refusal(site.command(C.HOME)) == (
@@ -330,13 +330,13 @@ def test_where_it_cannot_be_allocated_motion_is_refused_with_the_reason_and_stop
             await site.command(C.RESET, stop_id=second.stop_id)
             await until(lambda: site.controller.activity == STATE.IDLE)
             await site.command(C.HOME)
-        # The way home ran when the gateway was ended: that stop is in the file that is there now.
+        # The homing ran during the shutdown: its stop is in the new file.
         assert LatchFile(latch).found.stop.reason == "dead-man: the gateway is being ended"
 
     run(main())
 
 
-def test_a_log_that_is_open_elsewhere_leaves_the_latch_file_alone(tmp_path):
+def test_a_locked_log_leaves_the_latch_file_unchanged(tmp_path):
     async def main():
         audit = AuditLog(tmp_path / "arm.jsonl")
         audit.latch.keep(stop(3), 3)

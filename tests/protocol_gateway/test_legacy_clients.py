@@ -1,4 +1,4 @@
-"""Old client programs on the gateway: what they read, who of them commands. Nothing is a mock."""
+"""Old client programs on the gateway: the states that they read, and their commands. Nothing is a mock."""
 
 import asyncio
 import contextlib
@@ -61,7 +61,7 @@ async def test_the_papers_unit_homes_and_moves_the_robot_in_its_operators_name(m
 
 
 async def homed_by_li(site, one):
-    """A robot that an old program of li's has homed, and still controls."""
+    """Home a robot with an old program of li, which keeps control."""
     one.say(b"1#COMMAND*home@")
 
     def there():
@@ -129,7 +129,7 @@ async def test_operators_of_the_mesh_and_of_old_programs_refuse_each_other(mesh,
         async with program(settings) as other:
             number, text = await other.asks(b"1#COMMAND*hold@")
             assert (number, "another lease" in text) == (7, True)
-        # Taken away with a reason, it is told so with its next command.
+        # After a TAKE, its next command is refused with the reason.
         await site.lease(A.TAKE, operator="wang", ttl_s=5, reason="the shift is over")
         number, text = await one.asks(b"1#COMMAND*home@")
         assert (number, "wang is in control" in text) == (7, True)
@@ -154,7 +154,7 @@ async def test_who_is_no_commander_reads_and_stops_and_moves_nothing(mesh, tmp_p
         assert len(one.errors) == 4
         await until(lambda: len([e for e in site.seen["audit"] if e.outcome == e.REFUSED]) >= 1)
         assert site.controller.counters.units_sent == 0
-        # Its stop is done, whatever stands beside it.
+        # A stop is executed together with any other records.
         one.say(b"2#THERMAL*1&COMMAND*sing;stop@")
         await until(lambda: "stopped" in one.words)
         stop = await site.event("stop.latched", 0)
@@ -179,12 +179,12 @@ async def test_a_commanders_refusals_have_the_protocols_numbers(mesh, tmp_path):
         for unit, (number, words) in answers.items():
             answer, text = await one.asks(unit)
             assert (answer, words in text) == (number, True), (unit, answer, text)
-        # All of a unit or nothing: neither the homing nor the trace was done.
+        # All or nothing: neither the homing nor the trace was executed.
         assert site.controller.counters.units_sent == 0
-        # Its own state, echoed, moves nothing either.
+        # An echoed state moves nothing, either.
         assert (await one.asks(one.last_state))[0] == 7
         assert site.controller.counters.units_sent == 0
-        # The controller's own refusals: ours are found first, so there is none left here to pass on.
+        # The gateway refuses before the controller would, so no refusal of the controller is relayed here.
         assert site.controller.counters.refusals == 0
 
 

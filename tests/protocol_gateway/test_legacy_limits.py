@@ -1,4 +1,4 @@
-"""Old client programs that are slow, deaf, half-open, too many or too loud: they harm nobody."""
+"""Limits of old client programs: slow, deaf, half-open, too many or too fast ones affect no other."""
 
 import asyncio
 import ctypes
@@ -124,7 +124,7 @@ async def test_who_asks_and_goes_before_the_answers_leaves_no_line_for_each(mesh
             before = clients().units_refused
             with socket.create_connection((ME, settings.port)) as hasty:
                 hasty.sendall(b"1#COMMAND*home@" * 60)
-            # What was not read yet when its answers found nobody is not read any more.
+            # Bytes that were unread when the client vanished are not parsed.
             await until(lambda before=before: clients().units_refused > before and not clients().attached)
     assert "socket.send()" not in caplog.text
 
@@ -139,7 +139,7 @@ def networks(*lines):
 
 @pytest.fixture
 def cable():
-    """A cable to another network: (this end's address, connect there, pull it out)."""
+    """Create a virtual cable to another network: (this end's address, connect there, pull it out)."""
     name, address = f"rm{os.getpid()}", f"169.254.{os.getpid() % 250 + 1}"
     if os.geteuid() != 0 or shutil.which("ip") is None:
         pytest.skip("a cable of one's own to pull out takes root and `ip`")
@@ -149,7 +149,7 @@ def cable():
         pytest.skip(f"no network of one's own to be had here: {error.stderr.decode().strip()}")
 
     def connect(port):
-        """A socket that belongs to the other network; it is only made there."""
+        """Create a socket in the other network."""
         libc = ctypes.CDLL(None, use_errno=True)
         own, other = Path("/proc/thread-self/ns/net"), Path("/run/netns", name)
         with own.open() as here, other.open() as there:
@@ -169,7 +169,7 @@ def cable():
         )
         yield f"{address}.1", f"{address}.2", connect, lambda: networks(f"-n {name} link set far down")
     finally:
-        # The cable by itself: the network lives on as long as a socket of it does.
+        # Only the cable: the network exists as long as one of its sockets.
         subprocess.run(["ip", "link", "del", name], check=False, capture_output=True, timeout=10)
         networks(f"netns del {name}")
 
@@ -201,7 +201,7 @@ async def test_a_pulled_cable_ends_control_and_is_noticed_in_seconds(mesh, tmp_p
 # -------------------------------------------------------------------------- budget
 
 
-def test_a_budget_gives_a_burst_then_its_rate_and_knows_a_flood():
+def test_a_budget_allows_a_burst_then_its_rate_and_detects_a_flood():
     limits = Limits(units_per_s=10.0, bytes_per_s=1000.0, burst_s=2.0, patience_s=5.0)
     budget = Budget(limits, 0.0)
     assert budget.spend(units=20, length=100, now_s=0.0) == 0.0
@@ -214,14 +214,14 @@ def test_a_budget_gives_a_burst_then_its_rate_and_knows_a_flood():
     assert now_s >= 5.0
 
 
-def test_bytes_count_as_units_do_and_who_keeps_to_the_rate_is_never_paused():
+def test_bytes_count_like_units_and_an_allowed_rate_is_never_paused():
     budget = Budget(Limits(units_per_s=10.0, bytes_per_s=1000.0), 0.0)
     assert budget.spend(units=1, length=5000, now_s=0.0) == pytest.approx(4.0)
     budget = Budget(Limits(units_per_s=10.0, bytes_per_s=1000.0), 0.0)
     assert not any(budget.spend(units=1, length=99, now_s=0.1 * number) for number in range(10_000))
 
 
-def test_who_was_over_the_limits_once_and_long_ago_begins_anew():
+def test_an_old_excess_is_forgotten():
     budget = Budget(Limits(units_per_s=10.0), 0.0)
     assert budget.spend(units=50, length=1, now_s=0.0)
     assert budget.spend(units=50, length=1, now_s=100.0)

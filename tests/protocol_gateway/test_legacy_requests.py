@@ -1,4 +1,4 @@
-"""What an old program's unit asks for, and the ERROR number of a refusal."""
+"""Requests of old client programs' units, and the ERROR numbers of refusals."""
 
 import asyncio
 import math
@@ -44,7 +44,7 @@ def requests(text):
 
 
 async def refused(bench, unit, *, first_id=1, **fields):
-    """The number of the refusal that control gives a unit's requests."""
+    """Return the ERROR number of Control's refusal of a unit's requests."""
     asked = requests(unit)
     for number, request in enumerate(asked):
         request.MergeFrom(CommandRequest(lease=bench.secret, id=first_id + number, **fields))
@@ -65,7 +65,7 @@ def test_the_papers_unit_is_three_requests_in_its_order():
     assert list(move.joint_positions) == pytest.approx(expected, abs=1e-12)
 
 
-def test_every_word_has_its_request_and_stop_is_done_elsewhere():
+def test_every_word_but_stop_has_a_request():
     words = "1#COMMAND*trace;untrace;home;hold;resume;stop;reset;speed=25"
     assert [C.Name(each.command) for each in requests(words)] == [
         "TRACE_ON", "TRACE_OFF", "HOME", "HOLD", "RESUME", "RESET", "SPEED",
@@ -87,7 +87,7 @@ def test_every_word_has_its_request_and_stop_is_done_elsewhere():
         ("1#STATUS*stop", False, False),
     ],
 )
-def test_what_a_unit_asks_for_is_told_apart_from_what_it_tells(unit, stops, more):
+def test_requests_are_distinguished_from_states(unit, stops, more):
     records = read_records(unit.encode())
     assert (asks_to_stop(records), asks_for_more(records)) == (stops, more)
 
@@ -105,7 +105,7 @@ def test_what_a_unit_asks_for_is_told_apart_from_what_it_tells(unit, stops, more
         ("2#ABSOLUTE.DEG*1;2;3;4;5&TIME*7", 7),
     ],
 )
-def test_a_unit_is_refused_whole_with_its_number(unit, number):
+def test_a_refused_unit_has_one_error_number(unit, number):
     refusal = requests(unit)
     assert isinstance(refusal, Error)
     assert refusal.number == number
@@ -126,7 +126,7 @@ def test_a_unit_is_refused_whole_with_its_number(unit, number):
         ("1#ABSOLUTE.DEG*999;0;0;0;0", told(homed=False), 9),
         ("1#ABSOLUTE.DEG*999;0;0;0;0", READY, 5),
         ("1#COMMAND*speed=0", READY, 5),
-        # Judged as those before it leave things.
+        # Evaluated after the previous ones.
         ("2#COMMAND*home&ABSOLUTE.DEG*999;0;0;0;0", told(homed=False), 5),
         ("2#COMMAND*reset&ABSOLUTE.DEG*999;0;0;0;0", told(activity=Activity.STOPPED), 5),
         ("1#COMMAND*hold;home", READY, 8),
@@ -143,13 +143,13 @@ def test_a_refusal_has_the_number_of_its_reason(tmp_path, unit, controller, numb
     run(main())
 
 
-def test_who_is_not_in_control_is_told_to_read_only(tmp_path):
+def test_without_control_the_refusal_is_read_only(tmp_path):
     async def main():
         async with control_bench(tmp_path) as bench:
             assert await refused(bench, "1#COMMAND*home") == 7
             await bench.lease(A.ACQUIRE)
             asked = asyncio.create_task(refused(bench, "1#COMMAND*home"))
-            await asyncio.sleep(0)  # it is being written down now
+            await asyncio.sleep(0)  # the audit entry is being written now
             bench.control.leases.end(codes.ENDED_GATEWAY())
             assert await asked == 7
 
@@ -168,7 +168,7 @@ def test_motion_under_a_latched_stop_and_a_reset_while_the_robot_moves_are_refus
     run(main())
 
 
-def test_reset_means_the_stop_that_can_have_been_seen():
+def test_reset_means_a_stop_that_its_sender_can_have_seen():
     assert stop_to_reset(Authority(), 100.0) == 0
     stop = Stop(id=3, by="wang", reason="smoke", since_ns=0, sent_s=10.0)
     assert stop_to_reset(Authority(stop=stop), 11.5) == 3
@@ -179,7 +179,7 @@ def test_reset_means_the_stop_that_can_have_been_seen():
     assert isinstance(unsent, Error)
 
 
-def test_an_address_has_one_way_of_writing():
+def test_an_address_is_normalized():
     assert plain_address("::ffff:10.0.0.9") == plain_address("10.0.0.9") == "10.0.0.9"
     assert plain_address("FE80:0:0::1") == "fe80::1"
     with pytest.raises(ValueError, match=r"ten\.0\.0\.9"):
@@ -196,7 +196,7 @@ RECORDS = st.lists(
 
 
 @given(RECORDS)
-def test_whatever_a_unit_holds_it_is_requests_or_a_refusal_that_can_be_written(records):
+def test_any_unit_is_requests_or_a_refusal(records):
     text = "&".join(f"{kind}*{';'.join(items)}" for kind, items in records)
     for event in UnitStream().receive(f"{len(records)}#{text}@".encode()):
         if not isinstance(event, Unit):

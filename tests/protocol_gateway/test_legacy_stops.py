@@ -1,4 +1,4 @@
-"""A stop of an old client program is done, whatever else is wrong with the program."""
+"""Stops of old client programs are executed even if the program is rejected or throttled."""
 
 import asyncio
 import contextlib
@@ -17,7 +17,7 @@ async def test_a_program_over_its_limits_is_heard_for_a_stop_at_once_and_for_not
         number, text = await one.asks(TIME * 250)
         assert number == 9
         assert "10 units/s" in text
-        # For 10 s or more it is over them.
+        # It exceeds its limits for 10 s or more.
         one.say(b"1#COMMAND*trace@", TIME * 250, STOP)
         await until(lambda: site.events("stop.latched"), timeout_s=30)
         await until(lambda: site.controller.stop.by == "li")

@@ -1,4 +1,4 @@
-"""The link over real sockets; a bare TCP server stands for controllers that misbehave."""
+"""Link over real sockets; a plain TCP server simulates controllers that misbehave."""
 
 import asyncio
 import contextlib
@@ -18,7 +18,7 @@ STOP = b"1#COMMAND*stop@"
 
 
 class Controller:
-    """A TCP server whose every byte the test decides."""
+    """TCP server that sends only the test's bytes."""
 
     def __init__(self):
         self.connections = asyncio.Queue()
@@ -103,7 +103,7 @@ async def end(writer):
         await writer.wait_closed()
 
 
-def test_the_link_is_up_when_units_come_and_events_are_dated_when_they_came():
+def test_the_link_is_up_with_units_and_events_have_their_receive_time():
     async def main():
         async with controller() as arm, link(arm.port) as (arm_link, seen):
             _, writer = await arm.next()
@@ -120,7 +120,7 @@ def test_the_link_is_up_when_units_come_and_events_are_dated_when_they_came():
     run(main())
 
 
-def test_a_unit_in_pieces_is_dated_when_its_last_byte_came():
+def test_a_split_unit_is_stamped_at_its_last_byte():
     async def main():
         async with controller() as arm, link(arm.port) as (_, seen):
             _, writer = await arm.next()
@@ -135,7 +135,7 @@ def test_a_unit_in_pieces_is_dated_when_its_last_byte_came():
     run(main())
 
 
-def test_what_goes_wrong_is_counted():
+def test_errors_are_counted():
     async def main():
         async with controller() as arm, link(arm.port) as (arm_link, seen):
             reader, writer = await arm.next()
@@ -159,7 +159,7 @@ def test_what_goes_wrong_is_counted():
     run(main())
 
 
-def test_a_controller_that_falls_silent_is_told_and_then_connected_to_anew():
+def test_a_silent_controller_is_reported_and_reconnected():
     async def main():
         patience = {"stale_after_s": 0.2, "reconnect_after_s": 0.5}
         async with controller() as arm, link(arm.port, **patience) as (arm_link, seen):
@@ -167,7 +167,7 @@ def test_a_controller_that_falls_silent_is_told_and_then_connected_to_anew():
             writer.write(STATE)
             await until(lambda: arm_link.status.state is LinkState.SILENT and LinkState.UP in seen.states)
             assert "sends nothing" in arm_link.status.text
-            # The socket is still open: a stop is worth trying.
+            # The socket is still open, so a stop can be sent.
             arm_link.send(STOP)
             _, again = await arm.next()
             again.write(STATE)
@@ -193,7 +193,7 @@ def test_garbage_alone_does_not_make_a_link_look_alive():
     run(main())
 
 
-def test_a_lost_connection_is_made_again_and_half_a_unit_of_it_is_forgotten():
+def test_a_reconnection_discards_half_a_unit():
     async def main():
         async with controller() as arm, link(arm.port) as (arm_link, seen):
             _, writer = await arm.next()
@@ -210,7 +210,7 @@ def test_a_lost_connection_is_made_again_and_half_a_unit_of_it_is_forgotten():
     run(main())
 
 
-def test_a_controller_that_is_not_there_is_told_in_words_and_found_when_it_comes():
+def test_a_missing_controller_is_reported_and_connected_later():
     async def main():
         port = free_port()
         async with link(port) as (arm_link, seen):
@@ -228,7 +228,7 @@ def test_a_controller_that_is_not_there_is_told_in_words_and_found_when_it_comes
     run(main())
 
 
-def test_a_refused_connection_is_told_with_the_controllers_own_words():
+def test_a_refused_connection_is_reported_with_the_controllers_text():
     async def main():
         async with controller() as arm, link(arm.port) as (arm_link, seen):
             _, writer = await arm.next()
@@ -256,7 +256,7 @@ def test_an_answer_alone_does_not_bring_a_silent_link_up_but_the_state_after_it_
     run(main())
 
 
-def test_while_something_could_not_be_sent_a_connection_is_tried_without_long_pauses():
+def test_after_a_failed_send_the_link_reconnects_without_long_pauses():
     async def main():
         tries = 0
 
@@ -276,7 +276,7 @@ def test_while_something_could_not_be_sent_a_connection_is_tried_without_long_pa
                 arm_link.send(STOP)
             before, begin_s = tries, time.monotonic()
             await until(lambda: tries >= before + 5, timeout_s=10.0)
-            assert time.monotonic() - begin_s > 0.5  # no hammer either
+            assert time.monotonic() - begin_s > 0.5  # but not continuously
             refusing.cancel()
             reader, writer = await arm.next()
             arm_link.send(STOP)
@@ -308,7 +308,7 @@ def test_a_unit_that_does_not_fit_is_an_error_and_is_never_completed_later():
     run(main())
 
 
-def test_what_was_sent_last_arrives_although_the_controller_goes_on_sending():
+def test_the_last_unit_arrives_while_the_controller_sends():
     async def main():
         async with controller() as arm:
             async with link(arm.port) as (arm_link, _):
@@ -332,14 +332,14 @@ def test_nothing_is_sent_over_a_connection_that_has_just_broken():
             writer.write(STATE)
             await until(lambda: arm_link.status.state is LinkState.UP)
             await end(writer)
-            # A first unit may still go to a socket whose end is not known yet; the link finds out.
+            # The first unit may still be written before the end of the socket is detected.
             with pytest.raises(LinkDownError):
                 await send_on(arm_link)
 
     run(main())
 
 
-def test_bad_code_behind_the_link_ends_it_with_its_own_exception():
+def test_an_exception_in_a_callback_ends_the_link():
     async def main():
         def broken(event, received):
             raise ZeroDivisionError
@@ -357,7 +357,7 @@ def test_bad_code_behind_the_link_ends_it_with_its_own_exception():
     run(main())
 
 
-def test_the_rate_is_told_after_a_second_and_is_none_when_nothing_comes():
+def test_the_rate_is_known_after_a_second_and_0_without_units():
     async def main():
         async with controller() as arm, link(arm.port) as (arm_link, _):
             _, writer = await arm.next()
@@ -372,7 +372,7 @@ def test_the_rate_is_told_after_a_second_and_is_none_when_nothing_comes():
     run(main())
 
 
-def test_what_the_network_held_back_is_not_dated_as_new_and_does_not_look_live():
+def test_delayed_units_are_not_stamped_as_new():
     def told(clock_s):
         return b"2#ABSOLUTE.DEG*10.00;20.00&TIME*%.2f@" % clock_s
 
@@ -396,7 +396,7 @@ def test_what_the_network_held_back_is_not_dated_as_new_and_does_not_look_live()
     run(main())
 
 
-def test_the_link_tells_its_round_trip_its_answers_and_what_never_came():
+def test_the_link_reports_round_trip_answers_and_losses():
     def told(clock_s, activity):
         return b"3#ABSOLUTE.DEG*10.00;20.00&STATUS*%b;remote&TIME*%.2f@" % (activity, clock_s)
 

@@ -1,4 +1,4 @@
-"""When a motion has demonstrably ended: control that ends then stops nothing, and any sooner it does."""
+"""Proof that a motion has ended: the end of a lease stops the robot before it, and not after it."""
 
 from dataclasses import replace
 
@@ -45,13 +45,13 @@ def report(state, time_s, *, resting=True):
 
 @pytest.fixture
 def controlled():
-    """Li has control of a robot that is seen to rest."""
+    """Return a state in which li controls a robot at rest."""
     return ask(see(Authority(), False, -1.0), A.ACQUIRE).authority
 
 
 @pytest.fixture
 def at_rest(controlled):
-    """Li's motion was seen, and the robot has just come to rest."""
+    """Return a state after li's motion, with the robot just at rest."""
     return see(see(command(controlled, C.MOVE_ABSOLUTE, 0.0), True, 0.9), False, 1.0)
 
 
@@ -81,7 +81,7 @@ def test_the_two_units_are_consecutive(at_rest):
     assert not stops(report(state, 1.03))
 
 
-def test_what_was_received_before_the_motion_was_last_seen_proves_nothing(at_rest):
+def test_units_from_before_the_last_motion_prove_nothing(at_rest):
     assert stops(report(report(at_rest, 0.8), 0.9))
 
 
@@ -90,7 +90,7 @@ def test_a_motion_that_was_never_seen_has_not_ended(controlled):
     assert stops(report(report(state, 0.2), 0.3))
 
 
-def test_a_robot_that_moves_once_more_is_the_holders_until_it_rests_once_more(at_rest):
+def test_a_robot_that_moves_again_is_the_holders_until_it_rests(at_rest):
     state = see(report(report(at_rest, 1.0), 1.01), True, 1.1)
     assert stops(state)
     state = see(state, False, 1.2)
@@ -105,14 +105,14 @@ def test_a_new_motion_begins_the_proof_again(at_rest):
     assert not stops(report(report(state, 2.1), 2.2))
 
 
-def test_home_of_a_robot_that_was_on_its_way_home_is_not_over_with_the_first_of_both(controlled):
+def test_a_second_home_is_not_ended_by_the_first(controlled):
     state = see(command(controlled, C.MOVE_ABSOLUTE, 0.0, waypoints=(HERE,)), True, 0.1)
     state = see(see(command(state, C.HOME, 0.9, waypoints=(HERE,)), True, 1.0), False, 1.1)
     assert stops(report(report(state, 1.2), 1.3))
     assert see(state, False, 1.5).lease.motion is None  # 0.5 s later, as ever
 
 
-def test_a_place_that_is_passed_twice_proves_nothing_when_it_is_reached_first(controlled):
+def test_a_target_passed_twice_proves_nothing_at_first(controlled):
     state = command(controlled, C.MOVE_ABSOLUTE, 0.0, waypoints=(THERE,))
     state = command(
         command(state, C.MOVE_ABSOLUTE, 0.1, waypoints=(ELSEWHERE,)), C.MOVE_ABSOLUTE, 0.2, waypoints=(THERE,)
@@ -121,20 +121,20 @@ def test_a_place_that_is_passed_twice_proves_nothing_when_it_is_reached_first(co
     assert stops(report(report(state, 1.1), 1.2))
 
 
-def test_a_motion_behind_another_has_ended_at_its_own_target(controlled):
+def test_a_queued_motion_has_ended_at_its_own_target(controlled):
     state = see(command(controlled, C.MOVE_ABSOLUTE, 0.0, waypoints=(THERE,)), True, 0.1)
     state = see(see(command(state, C.MOVE_ABSOLUTE, 0.2, waypoints=(ELSEWHERE,)), True, 1.9), False, 2.0)
     assert not stops(report(report(state, 2.1), 2.2))
 
 
-def test_a_motion_on_hold_has_not_ended_and_what_is_resumed_has_at_its_target(at_rest):
+def test_a_held_motion_has_not_ended_until_it_is_resumed_to_its_target(at_rest):
     held = command(report(report(at_rest, 1.0), 1.01), C.HOLD, 1.1)
     assert stops(report(report(held, 1.2), 1.3))
     resumed = see(see(command(held, C.RESUME, 2.0), True, 2.4), False, 2.5)
     assert not stops(report(report(resumed, 2.6), 2.7))
 
 
-def test_a_robot_that_others_moved_when_it_was_commanded_proves_nothing_by_resting():
+def test_rest_proves_nothing_if_the_robot_moved_before_the_command():
     moved = ask(see(Authority(), True, -1.0), A.ACQUIRE).authority
     state = see(see(command(moved, C.HOME, 0.0), True, 0.1), False, 0.2)
     assert stops(report(report(state, 0.3), 0.4))
@@ -150,7 +150,7 @@ def test_a_robot_that_others_moved_when_it_was_commanded_proves_nothing_by_resti
         (Activity.IDLE, HOME, 9.0, True),
     ],
 )
-def test_control_given_back_stops_what_is_not_proven_to_be_at_rest(
+def test_releasing_control_stops_motion_without_proof_of_its_end(
     tmp_path, clock, activity, positions, age_s, latched
 ):
     async def main():
@@ -174,7 +174,7 @@ def test_control_given_back_stops_what_is_not_proven_to_be_at_rest(
     run(main())
 
 
-def test_control_given_back_as_soon_as_the_arm_is_at_home_stops_nothing(mesh, tmp_path):
+def test_releasing_control_at_home_stops_nothing(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.home()

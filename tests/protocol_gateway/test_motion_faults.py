@@ -1,4 +1,4 @@
-"""Motion that nobody commanded, that begins late, that is refused, that goes on after a stop."""
+"""Motion that is uncommanded, begins late, is refused, or continues after a stop."""
 
 import asyncio
 import contextlib
@@ -12,7 +12,7 @@ from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, u
 from tests.protocol_gateway.scripted_controller import repeated, scripted_controller, slow_starter
 
 
-def test_motion_that_nobody_commanded_is_said_and_ends_the_lease(mesh, tmp_path):
+def test_uncommanded_motion_is_reported_and_ends_the_lease(mesh, tmp_path):
     async def main():
         waist = 0.0
         async with contextlib.AsyncExitStack() as stack:
@@ -31,7 +31,7 @@ def test_motion_that_nobody_commanded_is_said_and_ends_the_lease(mesh, tmp_path)
 
 
 @pytest.mark.parametrize("ttl_s", [0.5, 1.0])
-def test_the_dead_mans_stop_comes_with_the_leases_end_and_not_before(mesh, tmp_path, ttl_s):
+def test_the_dead_man_stop_is_sent_at_the_end_of_the_lease(mesh, tmp_path, ttl_s):
     async def main():
         async with scripted_controller() as (port, say, heard):
             status = "2#ABSOLUTE.DEG*1;90;-90;0;0&STATUS*moving;remote;homed@"
@@ -46,7 +46,7 @@ def test_the_dead_mans_stop_comes_with_the_leases_end_and_not_before(mesh, tmp_p
     run(main())
 
 
-def test_a_robot_that_moves_on_is_a_critical_event_however_often_stop_is_pressed(mesh, tmp_path):
+def test_a_robot_that_ignores_repeated_stops_is_a_critical_event(mesh, tmp_path):
     async def main():
         async with scripted_controller() as (port, say, heard):
             status = "2#ABSOLUTE.DEG*1;90;-90;0;0&STATUS*moving;remote;homed@"
@@ -109,7 +109,7 @@ def test_a_motion_that_the_controller_refuses_is_over_at_once(mesh, tmp_path):
     run(main())
 
 
-def test_a_refusal_of_an_earlier_unit_leaves_the_dead_man_his_motion(mesh, tmp_path):
+def test_a_refusal_of_an_earlier_unit_does_not_end_the_motion(mesh, tmp_path):
     async def main():
         async with (
             scripted_controller() as (port, say, heard),
@@ -127,7 +127,7 @@ def test_a_refusal_of_an_earlier_unit_leaves_the_dead_man_his_motion(mesh, tmp_p
     run(main())
 
 
-def test_a_stop_is_not_reset_while_the_robot_moves_on_and_its_dead_man_stays(mesh, tmp_path):
+def test_a_stop_is_not_reset_during_motion_and_the_dead_man_stays(mesh, tmp_path):
     async def main():
         activity = "moving"
 
@@ -155,7 +155,7 @@ def test_a_stop_is_not_reset_while_the_robot_moves_on_and_its_dead_man_stays(mes
     run(main())
 
 
-def test_after_a_reset_the_old_stop_is_overlooked_for_a_moment_but_not_a_new_fault(mesh, tmp_path):
+def test_after_a_reset_the_old_stop_is_ignored_briefly_but_not_a_new_fault(mesh, tmp_path):
     async def main():
         activity = "stopped"
 

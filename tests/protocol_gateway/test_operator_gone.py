@@ -1,4 +1,4 @@
-"""Operators that vanish, links that break: the arm does not move on unseen or unowned."""
+"""Operators that vanish and links that break: the arm stops."""
 
 import asyncio
 import contextlib
@@ -16,7 +16,7 @@ FAR = [2.4, 1.0, 0.5, -1.0, 2.0]
 
 @contextlib.asynccontextmanager
 async def homing(site, mesh):
-    """`robomesh send arm home` as a process of its own, and the arm homes."""
+    """Run `robomesh send arm home` in a separate process, and wait until the arm homes."""
     site.session.declare_presence("hall", "arm", "gateway")  # as the service itself does when it is run
     process = await asyncio.create_subprocess_exec(
         *[sys.executable, "-m", "services.command_line.main", "send", "arm", "home"],
@@ -33,7 +33,7 @@ async def homing(site, mesh):
         await process.wait()
 
 
-def test_an_operators_program_that_is_killed_loses_control_with_its_session_and_the_arm_stops(mesh, tmp_path):
+def test_a_killed_program_loses_control_with_its_session(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             async with homing(site, mesh) as process:
@@ -44,14 +44,14 @@ def test_an_operators_program_that_is_killed_loses_control_with_its_session_and_
             assert site.controller.homed == STATE.NO
             await until(lambda: site.seen["lease"][-1].ended == "wang's page or program has gone")
             entries = {entry.request: entry for entry in read_entries(site.audit)}
-            # Its time was not over: the lease was ended, it did not expire.
+            # The lease did not expire: it was ended.
             assert entries["REVOKE"].text == "wang's page or program has gone"
             assert "EXPIRE" not in entries
 
     run(main())
 
 
-def test_an_operators_program_that_hangs_loses_control_with_its_leases_time(mesh, tmp_path):
+def test_a_hanging_program_loses_control_when_its_lease_expires(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.home()
@@ -68,9 +68,7 @@ def test_an_operators_program_that_hangs_loses_control_with_its_leases_time(mesh
     run(main())
 
 
-def test_a_link_that_breaks_while_the_arm_moves_is_a_stop_that_the_controller_gets_when_it_is_back(
-    mesh, tmp_path
-):
+def test_a_link_lost_during_motion_is_a_stop_sent_after_reconnection(mesh, tmp_path):
     async def main():
         async with contextlib.AsyncExitStack() as stack:
             first = await stack.enter_async_context(contextlib.AsyncExitStack())
@@ -91,7 +89,7 @@ def test_a_link_that_breaks_while_the_arm_moves_is_a_stop_that_the_controller_ge
     run(main())
 
 
-def test_a_link_that_breaks_while_the_arm_rests_takes_nobodys_control(mesh, tmp_path):
+def test_a_link_lost_at_rest_keeps_the_lease(mesh, tmp_path):
     async def main():
         async with contextlib.AsyncExitStack() as stack:
             first = await stack.enter_async_context(contextlib.AsyncExitStack())

@@ -1,4 +1,4 @@
-"""Every controller unit has a stamp of its own, and what is computed from it carries that stamp."""
+"""Every controller unit has a different stamp, and data computed from it carry the same stamp."""
 
 import asyncio
 import contextlib
@@ -19,7 +19,7 @@ SEVERAL, ROUNDS = 4, 40
 
 
 class Samples:
-    """What came of a robot's joints: of each publisher identity the stamps and first joints, in order."""
+    """Received stamps and first joints of a robot, in order, by publisher identity."""
 
     def __init__(self):
         self.by_identity = defaultdict(list)
@@ -33,7 +33,7 @@ class Samples:
 
     @property
     def spans_ns(self):
-        """Between the stamps of one identity."""
+        """Return the intervals between the stamps of one identity."""
         return [
             later - earlier
             for samples in self.by_identity.values()
@@ -42,7 +42,7 @@ class Samples:
 
 
 async def seen_of(mesh, folder, say):
-    """What a monitor sees of a controller that says so; `say(writer)` returns how many units it sent."""
+    """Return what a monitor receives from a controller; `say(writer)` returns the number of units sent."""
     sent = asyncio.get_running_loop().create_future()
 
     async def serve(reader, writer):
@@ -70,7 +70,7 @@ async def seen_of(mesh, folder, say):
     return samples
 
 
-def test_units_that_come_together_are_stamped_as_their_controllers_time_goes(mesh, tmp_path):
+def test_units_of_one_read_are_spaced_like_time(mesh, tmp_path):
     async def say(writer):
         begin_s = time.monotonic()
         number = 0
@@ -86,11 +86,11 @@ def test_units_that_come_together_are_stamped_as_their_controllers_time_goes(mes
     samples = run(seen_of(mesh, tmp_path, say))
     assert samples.count == SEVERAL * ROUNDS
     assert all(abs(span - 10 * MS) <= MS for span in samples.spans_ns), sorted(samples.spans_ns)
-    # An identity ends only where a read came sooner than all before it: at the beginning.
+    # A new identity begins only at an early read: at the beginning.
     assert len(samples.spans_ns) >= SEVERAL * ROUNDS * 0.7
 
 
-def test_units_that_come_together_without_time_are_stamped_at_the_measured_rate(mesh, tmp_path):
+def test_units_of_one_read_without_time_have_the_measured_rate(mesh, tmp_path):
     came = []
 
     async def say(writer):
@@ -126,7 +126,7 @@ def test_two_positions_in_one_unit_have_two_stamps_within_a_millisecond(mesh, tm
 
 
 @pytest.mark.parametrize("jump_s", [-20.0, -0.5, 3.0])
-def test_a_controllers_clock_that_is_set_begins_a_new_identity(mesh, tmp_path, jump_s):
+def test_setting_a_controllers_clock_begins_a_new_identity(mesh, tmp_path, jump_s):
     async def say(writer):
         for number in range(60):
             writer.write(TIMED % (number * 0.1, 50.0 + number * 0.01 + (jump_s if number >= 30 else 0.0)))

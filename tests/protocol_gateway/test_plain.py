@@ -17,7 +17,7 @@ PLAIN = (
     b"4#ABSOLUTE.DEG*1.00;2.00&VELOCITY.DEG*0.00;0.00&STATUS*idle;remote;homed&TIME*12.340000",
 )
 
-# Pieces of units: what is put together of them is often well formed, and often nearly.
+# Pieces of units: their combinations are often well formed, or nearly.
 _TEXTS = (
     "1 2 3 # * & ; . - + -  e5 0 00 9 7.25 -0.0 ABSOLUTE.DEG TIME STATUS VELOCITY.DEG RELATIVE.DEG "
     "COMMAND ERROR OVEN 101 -9 12 idle homed Idle home stop speed=5 nan inf 1_0 1e999 \t \n \v \f \xff "
@@ -30,7 +30,7 @@ _NUMBERS = st.text("0123456789.-; \t\n\v_e", max_size=30).map(lambda text: b"1#A
 
 
 @pytest.mark.parametrize("unit", PLAIN)
-def test_units_that_controllers_send_all_day_are_plain(unit):
+def test_common_units_are_plain(unit):
     assert read_plain(unit, plain_readers(NAMES)) == read_records(unit)
 
 
@@ -48,7 +48,7 @@ def test_units_that_controllers_send_all_day_are_plain(unit):
 @example(data=b"2#TIME*1")
 @example(data=b"1#2")
 @example(data=b"1#101*1")
-def test_what_is_plain_reads_as_the_grammar_reads_it(table, data):
+def test_plain_units_parse_like_the_grammar(table, data):
     plain = read_plain(data, plain_readers(table))
     if plain is None:
         return

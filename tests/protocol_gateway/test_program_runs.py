@@ -1,4 +1,4 @@
-"""Programs that the gateway runs step by step: real gateway, real worker process, simulated controller."""
+"""Programs run by the gateway: real gateway, real worker process, simulated controller."""
 
 import asyncio
 import contextlib
@@ -38,7 +38,7 @@ LONG = "move_joints -140 90 -90 0 0\nmove_joints 0 90 -90 0 0\n"
 
 
 async def start(site, text, **fields):
-    """Run a program, again where a busy machine plans it too slowly; control is renewed meanwhile."""
+    """Run a program, and repeat it if a busy machine plans it too slowly; renews the lease."""
     while True:
         try:
             return await start_once(site, text, **fields)
@@ -55,7 +55,7 @@ async def start_once(site, text, **fields):
     )
     asked = asyncio.ensure_future(site.session.ask(site.key("command/li"), request, timeout_s=60))
     while not asked.done():
-        # What checks may still have to begin.
+        # The checking process may still have to start.
         await in_control(site)
         await asyncio.wait([asked], timeout=0.5)
     return asked.result()
@@ -73,7 +73,7 @@ async def ended(site, outcome, timeout_s=60):
     return states(site)[-1]
 
 
-def test_a_step_whose_check_is_late_is_checked_again(mesh, tmp_path, monkeypatch):
+def test_a_step_with_a_late_check_is_checked_again(mesh, tmp_path, monkeypatch):
     late, motion = iter([True, True]), Checker.motion
 
     async def slow(self, question):
@@ -99,7 +99,7 @@ def test_a_step_whose_check_is_late_is_checked_again(mesh, tmp_path, monkeypatch
 
 
 @pytest.mark.parametrize("check", ["off", "require"])
-def test_a_program_runs_step_by_step_to_its_end_and_everybody_sees_where_it_is(mesh, tmp_path, check):
+def test_a_program_runs_to_its_end_and_publishes_its_steps(mesh, tmp_path, check):
     async def main():
         async with (
             simulator() as port,
@@ -119,7 +119,7 @@ def test_a_program_runs_step_by_step_to_its_end_and_everybody_sees_where_it_is(m
             assert site.controller.trace == STATE.YES
             entries = [(each.request, each.source) for each in site.seen["audit"]]
             run_at = entries.index(("RUN_PROGRAM", "mesh"))
-            # The lease's renewals stand in no entry: what follows is the program's own.
+            # Renewals have no entry: the next ones are the program's.
             assert [request for request, _ in entries[run_at + 1 : run_at + 5]] == [
                 *("SPEED", "HOME", "SPEED", "MOVE_ABSOLUTE"),
             ]
@@ -129,7 +129,7 @@ def test_a_program_runs_step_by_step_to_its_end_and_everybody_sees_where_it_is(m
     run(main(), timeout_s=240)
 
 
-def test_required_a_program_that_collides_is_refused_with_its_line_and_the_arm_has_not_moved(mesh, tmp_path):
+def test_required_a_colliding_program_is_refused_with_its_line(mesh, tmp_path):
     async def main():
         async with (
             simulator() as port,
@@ -153,7 +153,7 @@ def test_required_a_program_that_collides_is_refused_with_its_line_and_the_arm_h
     run(main(), timeout_s=240)
 
 
-def test_a_stop_ends_a_program_and_no_step_of_it_comes_after_the_reset(mesh, tmp_path):
+def test_a_stop_ends_a_program_for_good(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.home()
@@ -174,7 +174,7 @@ def test_a_stop_ends_a_program_and_no_step_of_it_comes_after_the_reset(mesh, tmp
     run(main(), timeout_s=240)
 
 
-def test_what_would_hold_up_a_program_is_told_before_it_begins(mesh, tmp_path):
+def test_a_program_that_could_not_start_is_refused(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.lease(A.ACQUIRE, ttl_s=5)
@@ -185,7 +185,7 @@ def test_what_would_hold_up_a_program_is_told_before_it_begins(mesh, tmp_path):
     run(main(), timeout_s=240)
 
 
-def test_a_program_ends_with_its_holders_control_even_while_it_waits(mesh, tmp_path):
+def test_a_program_ends_with_the_lease_even_while_it_waits(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.home()
@@ -193,7 +193,7 @@ def test_a_program_ends_with_its_holders_control_even_while_it_waits(mesh, tmp_p
             await until(lambda: states(site)[-1].outcome == RUN.RUNNING)
             text = await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=LAST))
             assert "the program weld runs: stop it, or wait until it has ended" in text
-            # It was checked for its own speed.
+            # The check holds only at its speed.
             assert "the program weld runs" in await refusal(site.command(C.SPEED, speed_percent=100))
             await site.lease(A.RELEASE)
             await until(lambda: states(site)[-1].outcome == RUN.ENDED)
@@ -202,7 +202,7 @@ def test_a_program_ends_with_its_holders_control_even_while_it_waits(mesh, tmp_p
     run(main(), timeout_s=240)
 
 
-def test_a_program_on_hold_waits_and_goes_on_with_resume(mesh, tmp_path):
+def test_a_held_program_continues_with_resume(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.home()
@@ -220,7 +220,7 @@ def test_a_program_on_hold_waits_and_goes_on_with_resume(mesh, tmp_path):
     run(main(), timeout_s=240)
 
 
-def test_a_program_on_hold_between_two_motions_waits_there(mesh, tmp_path):
+def test_a_program_held_between_two_motions_waits(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.home()
@@ -238,7 +238,7 @@ def test_a_program_on_hold_between_two_motions_waits_there(mesh, tmp_path):
     run(main(), timeout_s=240)
 
 
-def test_a_program_that_is_given_up_on_hold_between_two_motions_goes_on_no_more(mesh, tmp_path):
+def test_a_held_program_ends_with_reset(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.home()
@@ -260,7 +260,7 @@ def test_a_program_that_is_given_up_on_hold_between_two_motions_goes_on_no_more(
 
 @contextlib.contextmanager
 def slow_check():
-    """The processes that plan are stopped, so that a check takes as long as the test likes."""
+    """Suspend the planning processes, so that the test decides how long a check takes."""
     workers = [each.pid for each in psutil.Process().children()]
     for each in workers:
         os.kill(each, signal.SIGSTOP)
@@ -272,12 +272,12 @@ def slow_check():
 
 
 async def planned(site):
-    """The process that plans is there: it has planned something."""
+    """Wait until the planning process runs and has planned something."""
     assert "no statement that does anything" in await refusal(start(site, "# nothing\n"))
 
 
 async def in_control(site):
-    """Renew control, or take it again where this machine was too busy to renew it in time."""
+    """Renew the lease, or acquire it again if it expired on a busy machine."""
     try:
         return await site.lease(A.RENEW, ttl_s=5)
     except RefusedError:
@@ -285,7 +285,7 @@ async def in_control(site):
 
 
 def gave_up(site):
-    """Whether a program was not run because its asker gave up."""
+    """Return whether a program was not run because of its sender's timeout."""
     return any(each.reason.code == "program.asker_gave_up" for each in not_run(site))
 
 
@@ -294,7 +294,7 @@ def not_run(site):
 
 
 async def plain_run(site, timeout_s, **fields):
-    """A plain Zenoh client asks for a program, in JSON, and waits no longer than it says: its answers."""
+    """Request a program as a plain Zenoh client, in JSON, with a timeout; return the answers."""
     site.id += 1
     payload = json.dumps(
         {"lease": site.secret, "id": site.id, "command": "RUN_PROGRAM", "program": "home\n", **fields}
@@ -304,7 +304,7 @@ async def plain_run(site, timeout_s, **fields):
 
 
 @pytest.mark.parametrize("told", [True, False])
-def test_a_program_whose_asker_gave_up_while_it_was_checked_never_runs(mesh, tmp_path, told):
+def test_a_program_is_not_run_after_its_senders_timeout(mesh, tmp_path, told):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             lease = await site.lease(A.ACQUIRE, ttl_s=5)
@@ -319,24 +319,24 @@ def test_a_program_whose_asker_gave_up_while_it_was_checked_never_runs(mesh, tmp
                         "Not run: it was not checked before its asker gives up: wait longer"
                     )
                 else:
-                    # Zenoh's own words for nobody's answer, if anything; the gateway's come later.
+                    # Without an answer, Zenoh may return an error; the gateway's answer comes later.
                     replies = await plain_run(site, 0.5)
                     assert not [each for each in replies if each.ok is not None]
                     await until(lambda: gave_up(site))
             await in_control(site)
-            # What the process that plans had begun is over when this is planned.
+            # The planning process is idle when this is planned.
             await planned(site)
             assert gave_up(site)
             assert site.controller.counters.units_sent == 0
             assert states(site)[-1].outcome == RUN.OUTCOME_UNSPECIFIED
-            # Who waits is served.
+            # A sender that waits gets an answer.
             await start(site, "home\n")
             await ended(site, RUN.DONE)
 
     run(main(), timeout_s=240)
 
 
-def test_a_question_says_until_when_its_asker_waits_and_not_after_wins_where_it_is_earlier():
+def test_the_earlier_deadline_counts():
     second = 10**9
 
     def dated(not_after_s=None, within_s=None, kind=C.RUN_PROGRAM):
@@ -355,7 +355,7 @@ def test_a_question_says_until_when_its_asker_waits_and_not_after_wins_where_it_
     assert dated(within_s=1e300) > 1e6
 
 
-def test_a_hold_cancels_a_program_that_is_being_checked_and_leaves_nothing_on_hold(mesh, tmp_path):
+def test_a_hold_cancels_a_program_during_its_check(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.lease(A.ACQUIRE, ttl_s=5)
@@ -364,7 +364,7 @@ def test_a_hold_cancels_a_program_that_is_being_checked_and_leaves_nothing_on_ho
                 asked = asyncio.create_task(refusal(start(site, "home\n")))
                 await until(lambda: site.id == 2)
                 await site.lease(A.RENEW, ttl_s=5)
-                await asyncio.sleep(0.3)  # it is with the gateway by then, or HOLD finds nothing to cancel
+                await asyncio.sleep(0.3)  # the gateway has it by then; otherwise HOLD finds nothing to cancel
                 answer = await site.command(C.HOLD)
                 assert answer.text == "HOLD: the program was not started, and nothing is on hold"
                 assert await asked == "Not run: HOLD came while it was being checked: not started."
@@ -372,14 +372,14 @@ def test_a_hold_cancels_a_program_that_is_being_checked_and_leaves_nothing_on_ho
             await planned(site)
             assert site.controller.counters.units_sent == 0
             assert site.controller.activity == STATE.IDLE
-            # Nothing is in the way of what comes next, of a robot that is not homed.
+            # The next motion is not blocked; the robot is not homed.
             await start(site, "home\n")
             await ended(site, RUN.DONE)
 
     run(main(), timeout_s=240)
 
 
-def test_a_stop_ends_a_program_that_is_being_checked_at_once(mesh, tmp_path):
+def test_a_stop_cancels_a_program_during_its_check(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.lease(A.ACQUIRE, ttl_s=5)
@@ -394,7 +394,7 @@ def test_a_stop_ends_a_program_that_is_being_checked_at_once(mesh, tmp_path):
     run(main(), timeout_s=240)
 
 
-def test_a_homing_on_hold_goes_on_with_resume(mesh, tmp_path):
+def test_a_held_homing_continues_with_resume(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.lease(A.ACQUIRE, ttl_s=5)
@@ -412,7 +412,7 @@ def test_a_homing_on_hold_goes_on_with_resume(mesh, tmp_path):
     run(main(), timeout_s=240)
 
 
-def test_a_program_is_not_run_twice_when_it_is_asked_for_twice(mesh, tmp_path):
+def test_a_repeated_request_does_not_run_a_program_twice(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             await site.home()
@@ -428,7 +428,7 @@ def test_a_program_is_not_run_twice_when_it_is_asked_for_twice(mesh, tmp_path):
     run(main(), timeout_s=240)
 
 
-def test_what_is_warned_of_is_in_the_answer_to_who_runs_the_program(mesh, tmp_path):
+def test_a_programs_warning_is_in_the_answer(mesh, tmp_path):
     async def main():
         async with (
             simulator() as port,

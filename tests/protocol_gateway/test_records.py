@@ -62,7 +62,7 @@ MALFORMED = [
     b"1#ERROR*x;y",
     b"1#TIME",
     b"1#TIME*1;2",
-    # All or nothing: what is good in it does not help.
+    # All or nothing: valid records do not help.
     b"2#COMMAND*home&ABSOLUTE.DEG*1;x",
 ]
 
@@ -84,7 +84,7 @@ CODES = code_table({1: "COMMAND", 12: "ABSOLUTE.DEG", 101: "COMMAND:home", 5: "S
 
 
 @pytest.mark.parametrize(("record", "data"), BOTH_WAYS)
-def test_records_are_written_and_read_as_themselves(record, data):
+def test_records_are_formatted_and_parsed(record, data):
     assert write_unit((record,)) == data
     assert read_records(data[:-1]) == (record,)
 
@@ -98,7 +98,7 @@ def test_the_papers_example_has_its_numbers_with_blanks_between_sign_and_digits(
 
 
 @pytest.mark.parametrize("data", MALFORMED)
-def test_a_record_that_is_not_what_its_type_says_refuses_the_unit(data):
+def test_an_invalid_record_rejects_the_unit(data):
     with pytest.raises(UnitError):
         read_records(data)
 
@@ -107,7 +107,7 @@ def test_a_record_that_is_not_what_its_type_says_refuses_the_unit(data):
     ("text", "value"),
     [("+5", 5.0), ("- 5", -5.0), (".5", 0.5), ("5.", 5.0), ("1e3", 1000.0), ("-\t2E-1", -0.2)],
 )
-def test_numbers_are_read_in_every_form_that_controllers_print(text, value):
+def test_numbers_are_parsed_in_every_form_of_controllers(text, value):
     assert read_number(text) == value
 
 
@@ -118,7 +118,7 @@ def test_a_number_that_is_not_finite_is_not_written(value):
 
 
 @given(_finite)
-def test_any_number_written_and_read_is_itself_and_has_two_decimals_or_more(value):
+def test_any_number_survives_a_round_trip_with_two_decimals_or_more(value):
     text = write_number(value)
     assert read_number(text) == value
     assert len(text.partition(".")[2]) >= 2
@@ -137,10 +137,10 @@ def test_a_speed_without_a_finite_number_is_malformed(word):
 
 
 @given(st.lists(typed_records, min_size=1, max_size=5).map(tuple))
-def test_any_typed_unit_written_and_read_is_itself(unit):
+def test_any_typed_unit_survives_a_round_trip(unit):
     assert read_records(write_unit(unit, NAMES)[:-1], NAMES) == unit
 
 
 @given(st.lists(typed_records.filter(lambda r: not isinstance(r, Command | Unknown)), min_size=1).map(tuple))
-def test_any_typed_unit_written_in_codes_and_read_is_itself(unit):
+def test_any_typed_unit_in_codes_survives_a_round_trip(unit):
     assert read_records(write_unit(unit, CODES)[:-1], CODES) == unit

@@ -1,4 +1,4 @@
-"""What a gateway refuses has the same code in the reply, the audit log, the events and the state."""
+"""A refusal has the same code in the reply, the audit log, the events and the state."""
 
 import json
 
@@ -11,13 +11,13 @@ from tests.protocol_gateway.gateway_site import A, C, gateway, simulator, until
 
 
 async def held_code(site, command, **values):
-    """The reason of a refusal to the holder, whose control a busy machine may not have renewed."""
+    """Return the reason of a refusal; acquire the lease again if it expired on a busy machine."""
     await site.lease(A.ACQUIRE, lease=site.secret, ttl_s=5)
     return await code(site.command(command, **values))
 
 
 async def code(awaitable):
-    """The reason of a refusal."""
+    """Return the reason of a refusal."""
     with pytest.raises(RefusedError) as refused:
         await awaitable
     return refused.value.reason
@@ -68,7 +68,7 @@ def test_reply_audit_entry_event_and_state_have_the_same_code(mesh, tmp_path):
     run(main(), timeout_s=120)
 
 
-def test_a_reason_within_a_reason_comes_with_the_state(mesh, tmp_path):
+def test_the_state_has_nested_reasons(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port, stop_proven=False) as site:
             await until(lambda: site.controller.read_only)

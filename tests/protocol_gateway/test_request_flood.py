@@ -1,4 +1,4 @@
-"""A stranger sends requests as fast as the mesh takes them."""
+"""Requests without a lease, sent as fast as the mesh takes them."""
 
 import asyncio
 
@@ -13,7 +13,7 @@ FAR = [2.4, 0.2, -0.2, 0.1, 0.5]
 ASKED = 1000  # gateway, controller and stranger are one process here
 
 
-def test_in_a_flood_of_requests_a_stop_is_done_and_every_request_is_counted(mesh, tmp_path):
+def test_in_a_flood_of_requests_a_stop_works_and_all_are_counted(mesh, tmp_path):
     async def main():
         async with (
             simulator() as port,

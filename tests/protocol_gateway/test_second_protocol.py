@@ -1,4 +1,4 @@
-"""A controller of another protocol: one driver, one line in the table, and nothing else is touched.
+"""A controller with another protocol needs one driver and one line in the registry.
 
 The protocol is a line of JSON each way: {"q": [..], "state": "idle", "remote": true, "homed": true} in
 radians from the controller, {"do": ["stop"]} or {"do": [{"to": [..]}]} to it.
@@ -34,7 +34,7 @@ _WORDS = {Home: "home", Stop: "stop", Reset: "reset"}
 
 
 class JsonLines:
-    """A `protocol_gateway.drivers.driver.Driver`."""
+    """Driver of JSON lines (`protocol_gateway.drivers.driver.Driver`)."""
 
     can_stop = True
 
@@ -86,7 +86,7 @@ class JsonLines:
 
 @contextlib.asynccontextmanager
 async def json_controller():
-    """A controller that speaks JSON, and does at once what it is told: (port, what it was told)."""
+    """Run a controller that speaks JSON and executes commands immediately: (port, received commands)."""
     heard, state = [], {"q": [0.1] * 5, "state": "idle", "remote": True, "homed": True}
 
     async def listen(reader):
@@ -148,7 +148,7 @@ def test_a_robot_of_another_protocol_is_shown_commanded_and_stopped_like_any_oth
     run(main())
 
 
-def test_a_site_file_names_a_protocol_that_there_is_or_is_told_which_there_are(tmp_path, monkeypatch):
+def test_an_unknown_protocol_is_refused_with_the_known_ones(tmp_path, monkeypatch):
     path = tmp_path / "site.toml"
     path.write_text('site = "hall"\n[[robot]]\nname = "arm"\nmodel = "pt600"\nprotocol = "json"\n')
     with pytest.raises(SiteFileError, match="'unit'") as caught:

@@ -1,4 +1,4 @@
-"""No joints message carries a newer time than its unit, whatever happens on the way."""
+"""No joints message carries a newer time than its unit, with any delay on the way."""
 
 import asyncio
 import contextlib
@@ -10,14 +10,14 @@ import pytest
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import gateway, until
 
-# What lies between a unit's writing and its reading on a busy machine.
+# Delay between a unit's writing and its reading on a busy machine.
 _SLACK_S = 0.35
 # A unit's number travels in its first joint, in steps that the protocol's text carries exactly.
 _STEP_DEG = 0.01
 
 
 class Clocked:
-    """A controller that tells its TIME, and knows when each unit was made and when it was written."""
+    """Controller that sends its TIME, and records when each unit was created and written."""
 
     def __init__(self, way):
         self._way = way
@@ -89,7 +89,7 @@ async def flood(controller, writer):
 
 
 @pytest.mark.parametrize("way", [split, burst, freeze, flood])
-def test_no_joints_message_is_dated_newer_than_its_unit(mesh, tmp_path, way):
+def test_no_joints_message_is_stamped_newer_than_its_unit(mesh, tmp_path, way):
     async def main():
         done = asyncio.Event()
 
@@ -110,10 +110,10 @@ def test_no_joints_message_is_dated_newer_than_its_unit(mesh, tmp_path, way):
         assert len(seen) >= 50
         late_ns = [stamp_ns - controller.made_ns[number] for number, stamp_ns in seen]
         if way is split:
-            # A unit is there with its last byte: made and written are 30 ms apart.
+            # A unit is received with its last byte: creation and end of writing are 30 ms apart.
             late_ns = [stamp_ns - controller.written_ns[number] for number, stamp_ns in seen]
         assert max(late_ns) < _SLACK_S * 1e9
-        # What was held back is dated by the controller's own clock.
+        # Delayed units are stamped by the controller's clock.
         assert all(stamp_ns >= controller.made_ns[number] - 1e6 for number, stamp_ns in seen)
 
     run(main())

@@ -1,4 +1,4 @@
-"""Stops of one robot: sent, shared, sent again, and not hidden by those who press again."""
+"""Stops of one robot: sent, shared, sent again, and not hidden by repeated stops."""
 
 import asyncio
 import threading
@@ -27,7 +27,7 @@ def codes(bench):
     return [event.code for event in bench.events]
 
 
-def test_a_flood_of_one_askers_stops_is_one_stop_and_each_is_counted(tmp_path, clock):
+def test_a_flood_of_one_operators_stops_is_one_counted_stop(tmp_path, clock):
     async def main():
         async with control_bench(tmp_path) as bench:
             answers = [press(bench) for _ in range(50)]
@@ -43,7 +43,7 @@ def test_a_flood_of_one_askers_stops_is_one_stop_and_each_is_counted(tmp_path, c
     run(main())
 
 
-def test_others_stops_share_the_unit_under_numbers_of_their_own(tmp_path, clock):
+def test_other_operators_stops_share_the_unit_under_new_numbers(tmp_path, clock):
     async def main():
         async with control_bench(tmp_path) as bench:
             press(bench)
@@ -51,7 +51,7 @@ def test_others_stops_share_the_unit_under_numbers_of_their_own(tmp_path, clock)
             assert press(bench, by="zhao").stop_id == 2
             assert bench.control.stop(by="zhao", reason="fire", source="elsewhere").stop_id == 3
             assert bench.socket == [STOP]
-            # The unit grows no younger by being shared.
+            # Sharing does not change the unit's time.
             clock.advance(0.06)
             assert press(bench).stop_id == 4
             assert bench.socket == [STOP, STOP]
@@ -59,7 +59,7 @@ def test_others_stops_share_the_unit_under_numbers_of_their_own(tmp_path, clock)
     run(main())
 
 
-def test_a_stop_that_was_reset_or_not_sent_is_no_other_ones(tmp_path, clock):
+def test_a_stop_that_was_reset_or_not_sent_is_not_shared(tmp_path, clock):
     async def main():
         async with control_bench(tmp_path) as bench:
             press(bench)
@@ -72,13 +72,13 @@ def test_a_stop_that_was_reset_or_not_sent_is_no_other_ones(tmp_path, clock):
             assert [press(bench).sent, press(bench).sent] == [False, False]
             bench.broken = False
             bench.control.send_latched_stop()
-            # It is on its way now, but was not when it was asked for.
+            # It is in transit now, but was not at the request.
             assert (press(bench).sent, bench.control.authority.stop.id) == (True, 5)
 
     run(main())
 
 
-def test_whoever_presses_again_does_not_hide_that_the_robot_moves_on(tmp_path, clock):
+def test_a_repeated_stop_does_not_hide_that_the_robot_moves(tmp_path, clock):
     async def main():
         async with control_bench(tmp_path) as bench:
             for _ in range(5):
@@ -96,7 +96,7 @@ def test_whoever_presses_again_does_not_hide_that_the_robot_moves_on(tmp_path, c
     run(main())
 
 
-def test_whoever_presses_again_does_not_hide_that_others_move_the_robot(tmp_path, clock):
+def test_a_repeated_stop_does_not_hide_uncommanded_motion(tmp_path, clock):
     async def main():
         async with control_bench(tmp_path) as bench:
             bench.control.observe(moving=False)
@@ -109,7 +109,7 @@ def test_whoever_presses_again_does_not_hide_that_others_move_the_robot(tmp_path
     run(main())
 
 
-def test_a_stop_is_given_its_time_behind_a_reset_and_on_a_new_connection(tmp_path, clock):
+def test_a_stop_has_its_full_time_after_a_reset_or_reconnection(tmp_path, clock):
     async def main():
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE)
@@ -130,7 +130,7 @@ def test_a_stop_is_given_its_time_behind_a_reset_and_on_a_new_connection(tmp_pat
     run(main())
 
 
-def test_a_stop_that_is_sent_again_is_in_the_audit_log_and_latches_nothing(tmp_path, clock):
+def test_a_repeated_stop_unit_is_audited_and_latches_nothing(tmp_path, clock):
     async def main():
         async with control_bench(tmp_path) as bench:
             bench.broken = True
@@ -158,7 +158,7 @@ def test_a_stop_that_is_sent_again_is_in_the_audit_log_and_latches_nothing(tmp_p
     run(main())
 
 
-def test_a_stop_is_not_reset_while_the_robot_moves_on(tmp_path):
+def test_a_stop_is_not_reset_while_the_robot_moves(tmp_path):
     async def main():
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE)
@@ -177,7 +177,7 @@ def test_a_stop_is_not_reset_while_the_robot_moves_on(tmp_path):
     run(main())
 
 
-def test_a_stop_comes_over_a_connection_of_its_own(mesh, tmp_path):
+def test_stops_have_a_separate_connection(mesh, tmp_path):
     async def main():
         held, go_on = set(), threading.Event()
 
@@ -186,7 +186,7 @@ def test_a_stop_comes_over_a_connection_of_its_own(mesh, tmp_path):
             go_on.wait(20.0)
 
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
-            # On the threads that read the other connections, and with the priority of a request.
+            # In the threads that read other connections, with the priority of a request.
             handler = zenoh.handlers.Callback(block, indirect=False)
             others = ("", "requests")
             subscribers = [site.own.connection(each).declare_subscriber("block", handler) for each in others]

@@ -19,7 +19,7 @@ def read(*pieces):
     return [event for piece in pieces for event in stream.receive(piece)]
 
 
-def test_the_papers_unit_comes_out_of_the_stream():
+def test_the_stream_parses_the_papers_unit():
     (unit,) = read(PAPER)
     assert unit == Unit(
         (Command(("trace", "home")), AbsolutePositions((100.0, 30.45, 92.66, -67.1, -25.85))), PAPER[:-1], 0
@@ -36,7 +36,7 @@ def test_pieces_of_any_size_parse_the_same(size):
     assert read(*[MIXED[i : i + size] for i in range(0, len(MIXED), size)]) == read(MIXED)
 
 
-def test_good_units_around_a_bad_one_survive_and_the_bad_one_tells_where_it_was():
+def test_good_units_around_a_bad_one_survive():
     first, bad, last = read(HOME + BAD + HOME)
     assert isinstance(first, Unit)
     assert isinstance(last, Unit)
@@ -44,7 +44,7 @@ def test_good_units_around_a_bad_one_survive_and_the_bad_one_tells_where_it_was(
     assert last.offset == len(HOME + BAD)
 
 
-def test_bytes_that_cannot_be_printed_are_told_in_hexadecimal():
+def test_unprintable_bytes_are_shown_in_hexadecimal():
     (bad,) = read(b"\x1b[2J\xff@")
     assert bad.text == r"\x1b[2J\xff"
 
@@ -58,7 +58,7 @@ def test_the_longest_unit_has_64_kib_with_its_terminator():
 
 
 @pytest.mark.parametrize("size", [1 << 20, 65_536, 4096, 997])
-def test_64_kib_without_a_terminator_are_one_event_and_reading_goes_on_behind_the_next_one(size):
+def test_64_kib_without_a_terminator_are_one_event(size):
     data = HOME + b"x" * 200_000 + b"@" + HOME
     first, bad, last = read(*[data[i : i + size] for i in range(0, len(data), size)])
     assert isinstance(first, Unit)
@@ -67,7 +67,7 @@ def test_64_kib_without_a_terminator_are_one_event_and_reading_goes_on_behind_th
     assert last.offset == len(data) - len(HOME)
 
 
-def test_an_endless_unit_is_refused_before_it_ends_and_is_not_kept():
+def test_an_endless_unit_is_rejected_and_not_kept():
     stream = UnitStream()
     (bad,) = stream.receive(b"x" * LONGEST_UNIT_BYTES)
     assert isinstance(bad, Malformed)
@@ -80,7 +80,7 @@ def test_an_unfinished_unit_is_nothing():
 
 
 @given(st.binary(max_size=400), st.lists(st.integers(0, 400), max_size=6))
-def test_any_bytes_in_any_pieces_are_events_and_no_exception(data, cuts):
+def test_any_bytes_are_events_and_no_exception(data, cuts):
     places = [0, *sorted(cuts), len(data)]
     events = read(*[data[a:b] for a, b in itertools.pairwise(places)])
     assert events == read(data)
@@ -114,4 +114,4 @@ SLOW_TO_READ = {
 def test_no_unit_of_64_kib_takes_long_to_read(data):
     begin_s = time.process_time()
     assert read(data + HOME)[-1].data == HOME[:-1]
-    assert time.process_time() - begin_s < 3.0  # what is not linear takes far longer
+    assert time.process_time() - begin_s < 3.0  # a non-linear parser takes far longer

@@ -1,4 +1,4 @@
-"""What a controller tells, and what is said when it tells something no more."""
+"""Publication of a controller's data, and events when the data stop."""
 
 from types import SimpleNamespace
 
@@ -11,7 +11,7 @@ from robots.joints import joints_of
 
 
 class Desk:
-    """Hears events; everything else that is published is of no interest."""
+    """Publisher that keeps events and ignores everything else."""
 
     def __init__(self):
         self.now_s = 100.0
@@ -40,7 +40,7 @@ class Desk:
             self.telemetry.check_timeouts(self.now_s)
 
 
-def test_positions_that_come_and_go_are_one_event_until_they_have_come_for_a_while():
+def test_flapping_positions_are_one_event():
     desk = Desk()
     for _ in range(30):
         desk.goes_on(0.5, positions=True)
@@ -52,7 +52,7 @@ def test_positions_that_come_and_go_are_one_event_until_they_have_come_for_a_whi
     assert desk.codes[2:] == ["joints.gone"]
 
 
-def test_the_last_word_of_what_comes_and_goes_is_never_left_out():
+def test_the_last_event_of_flapping_data_is_never_suppressed():
     desk = Desk()
     for _ in range(30):
         desk.goes_on(6.2, positions=True)

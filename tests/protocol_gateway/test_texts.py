@@ -1,4 +1,4 @@
-"""Texts of others on one line."""
+"""Untrusted texts on one line."""
 
 import pytest
 from hypothesis import given
@@ -19,11 +19,11 @@ from robomesh.texts import one_line
         ("r" * 201, "r" * 199 + "…"),
     ],
 )
-def test_what_moves_a_cursor_or_hides_becomes_a_blank_and_what_is_long_is_cut(text, shown):
+def test_control_characters_become_blanks_and_long_texts_are_shortened(text, shown):
     assert one_line(text) == shown
 
 
 @given(st.text())
-def test_whatever_is_sent_comes_out_printable_and_short(text):
+def test_any_text_becomes_printable_and_short(text):
     assert one_line(text, 20).isprintable()
     assert len(one_line(text, 20)) <= 20

@@ -33,21 +33,21 @@ def near(seconds):
 
 
 def fresh(timestamper, begin_s=100.0, clock_s=0.0):
-    """A second of units at 100 Hz; when it ends."""
+    """Receive units at 100 Hz for a second; return its end."""
     for number in range(101):
         now = at(begin_s + number * 0.01)
         assert date(timestamper, clock_s + number * 0.01, now).monotonic_s == near(now.monotonic_s)
     return begin_s + 1.0
 
 
-def test_units_that_come_as_they_are_sent_are_dated_when_they_come():
+def test_units_without_delay_are_stamped_at_receipt():
     fresh(Timestamper())
 
 
-def test_a_burst_after_a_gap_is_dated_when_it_should_have_come():
+def test_a_burst_after_a_gap_is_stamped_by_time():
     timestamper = Timestamper()
     end_s = fresh(timestamper)
-    # Three seconds held back, then everything within a few milliseconds.
+    # Delayed by three seconds, then received within a few milliseconds.
     for number in range(1, 280):
         received = date(timestamper, 1.0 + number * 0.01, at(end_s + 3.0 + number * 1e-5))
         assert received.monotonic_s == near(end_s + number * 0.01)
@@ -57,27 +57,27 @@ def test_a_burst_after_a_gap_is_dated_when_it_should_have_come():
     assert date(timestamper, 1.0 + 3.01, now).monotonic_s == near(now.monotonic_s)
 
 
-def test_a_controller_that_was_silent_itself_is_fresh_when_it_speaks_again():
+def test_a_controller_after_a_pause_is_fresh():
     timestamper = Timestamper()
     end_s = fresh(timestamper)
     assert date(timestamper, 1.0 + 3.0, at(end_s + 3.0)).monotonic_s == near(end_s + 3.0)
 
 
 @pytest.mark.parametrize("clock_s", [0.2, 1.0, 5000.0])
-def test_a_clock_that_was_set_or_is_stuck_makes_nothing_look_old_without_a_gap(clock_s):
+def test_a_set_or_stuck_clock_makes_nothing_look_old(clock_s):
     timestamper = Timestamper()
     end_s = fresh(timestamper)
     clocks = set()
     for number in range(1, 300):
         now = at(end_s + number * 0.01)
         received = date(timestamper, clock_s, now)
-        # Of units with one TIME the second may have come with the first.
+        # Of units with one TIME, the second may be stamped like the first.
         assert number <= 2 or received.monotonic_s == near(now.monotonic_s)
         clocks.add(received.clock)
     assert clocks == ({0} if clock_s == 1.0 else {1}), "a stuck clock is no new one for each unit"
 
 
-def test_after_a_gap_a_slow_clock_is_believed_for_a_second_only():
+def test_after_a_gap_a_slow_clock_is_trusted_for_a_second_only():
     timestamper = Timestamper()
     end_s = fresh(timestamper)
     assert date(timestamper, 1.01, at(end_s + 2.0)).monotonic_s == near(end_s + 0.01)
@@ -87,25 +87,25 @@ def test_after_a_gap_a_slow_clock_is_believed_for_a_second_only():
     assert date(timestamper, 3.01, at(end_s + 4.0)).monotonic_s == near(end_s + 4.0)
 
 
-def test_without_a_clock_everything_is_dated_when_it_comes():
+def test_without_a_clock_units_are_stamped_at_receipt():
     timestamper = Timestamper()
     for now in (at(1.0), at(1.01), at(5.0), at(5.02)):
         assert date(timestamper, None, now) == now
 
 
-def test_units_of_one_read_without_time_come_at_the_measured_rate_and_none_after_its_receipt():
+def test_units_of_one_read_without_time_are_spaced_at_the_measured_rate():
     timestamper = Timestamper()
     for number in range(150):
         date(timestamper, None, at(10.0 + number * 0.01))
     read = timestamper.timestamps([joints() for _ in range(5)], at(11.54))
     stamps = [received.monotonic_s for received in read]
     assert stamps == [near(11.50), near(11.51), near(11.52), near(11.53), near(11.54)]
-    # Sooner than the rate has room for: between the newest stamp and the receipt.
+    # Faster than the rate allows: between the newest stamp and the receipt.
     read = timestamper.timestamps([joints() for _ in range(4)], at(11.56))
     assert [received.monotonic_s for received in read] == [near(11.545 + 0.005 * n) for n in range(4)]
 
 
-def test_what_a_unit_says_of_one_time_has_one_stamp_and_what_it_says_twice_has_two():
+def test_a_repeated_event_of_a_unit_gets_another_stamp():
     unit = [
         joints(1.0),
         StatusReceived(activity=Activity.IDLE, controller_time_s=1.0),
@@ -121,7 +121,7 @@ def test_what_a_unit_says_of_one_time_has_one_stamp_and_what_it_says_twice_has_t
     assert following == at(5.0)
 
 
-def test_the_gateways_own_clock_that_is_set_begins_another_and_keeps_the_spacing():
+def test_setting_the_gateways_clock_begins_a_new_number():
     timestamper = Timestamper()
     end_s = fresh(timestamper)
     timestamper.wall_clock_was_set()
@@ -129,7 +129,7 @@ def test_the_gateways_own_clock_that_is_set_begins_another_and_keeps_the_spacing
     assert (received.monotonic_s, received.clock) == (near(end_s + 0.01), 1)
 
 
-def test_a_new_connection_believes_no_clock_of_the_one_before():
+def test_a_new_connection_discards_the_previous_clock():
     timestamper = Timestamper()
     end_s = fresh(timestamper)
     timestamper.connected()
@@ -139,7 +139,7 @@ def test_a_new_connection_believes_no_clock_of_the_one_before():
 
 
 @pytest.mark.parametrize("nonsense_s", [1e305, -1e305, 1e11, 5e-324])
-def test_a_time_that_no_clock_says_ends_nothing(nonsense_s):
+def test_an_absurd_time_is_ignored(nonsense_s):
     timestamper = Timestamper()
     end_s = fresh(timestamper)
     for number in range(1, 50):
@@ -149,7 +149,7 @@ def test_a_time_that_no_clock_says_ends_nothing(nonsense_s):
 
 
 @pytest.mark.parametrize("ppm", [-5000, -200, 0, 200, 5000])
-def test_a_clock_that_drifts_is_followed_in_one_identity(ppm):
+def test_a_drifting_clock_is_followed_in_one_identity(ppm):
     timestamper = Timestamper()
     dates = []
     for number in range(6000):
@@ -163,7 +163,7 @@ def test_a_clock_that_drifts_is_followed_in_one_identity(ppm):
 
 
 @pytest.mark.parametrize("seed", range(25))
-def test_whatever_comes_however_late_stamps_increase_follow_time_and_precede_their_receipt(seed):
+def test_stamps_increase_follow_time_and_precede_their_receipt(seed):
     chance = random.Random(seed)
     timestamper = Timestamper()
     period_s = chance.choice([0.001, 0.004, 0.01, 0.1])
@@ -183,7 +183,7 @@ def test_whatever_comes_however_late_stamps_increase_follow_time_and_precede_the
         times, waiting = waiting, []
         if read_s > quiet_until_s and chance.random() < 0.02:
             quiet_until_s = read_s + 1.0
-            times.insert(chance.randrange(len(times) + 1), None)  # a unit that tells no TIME
+            times.insert(chance.randrange(len(times) + 1), None)  # a unit without TIME
         for time_s, received in zip(
             times, timestamper.timestamps([joints(t) for t in times], at(read_s)), strict=True
         ):

@@ -48,7 +48,7 @@ def driver(**settings) -> Driver:
 
 
 @pytest.mark.parametrize(("command", "data"), COMMANDS)
-def test_commands_are_told_in_the_papers_words_and_units(command, data):
+def test_commands_are_encoded_in_the_papers_words_and_units(command, data):
     assert driver().encode(command) == data
 
 
@@ -61,11 +61,11 @@ def test_commands_are_told_in_the_papers_words_and_units(command, data):
         ({2: "ABSOLUTE.DEG", 101: "COMMAND:home"}, False),
     ],
 )
-def test_a_controller_of_codes_can_be_stopped_only_by_a_code(codes, can_stop):
+def test_a_controller_of_codes_needs_a_code_for_stop(codes, can_stop):
     assert driver(codes=codes).can_stop is can_stop
 
 
-def test_commands_are_told_in_codes_where_the_site_file_has_them():
+def test_commands_are_encoded_in_the_site_files_codes():
     coded = driver(codes={2: "ABSOLUTE.DEG", 102: "COMMAND:stop"})
     assert coded.encode(Stop()) == b"1#102@"
     assert coded.encode(MoveAbsolute((0.0, 0.0))) == b"1#2*0.00;0.00@"
@@ -75,12 +75,12 @@ def test_commands_are_told_in_codes_where_the_site_file_has_them():
     "command",
     [MoveAbsolute((1.0,)), MoveRelative((1.0, 2.0, 3.0)), MoveAbsolute((math.nan, 0.0)), Speed(math.inf)],
 )
-def test_what_the_protocol_cannot_say_is_refused(command):
+def test_an_inexpressible_command_is_refused(command):
     with pytest.raises(CommandError):
         driver().encode(command)
 
 
-def test_positions_come_in_radians_and_metres_with_their_velocities_and_time():
+def test_positions_are_si_with_velocities_and_time():
     (joints, status) = driver().receive(
         b"4#ABSOLUTE.DEG*180.00;1000.00&VELOCITY.DEG*90.00;10.00&STATUS*moving;remote;homed&TIME*1.50@"
     )
@@ -88,11 +88,11 @@ def test_positions_come_in_radians_and_metres_with_their_velocities_and_time():
     assert status == StatusReceived(Activity.MOVING, Mode.REMOTE, True, False, 1.5)
 
 
-def test_a_bare_controller_of_the_papers_kind_tells_positions_only():
+def test_the_papers_controllers_send_positions_only():
     assert driver().receive(b"1#ABSOLUTE.DEG*180;0@") == [JointsReceived((math.pi, 0.0), None, None)]
 
 
-def test_a_status_without_a_word_of_activity_or_mode_leaves_them_unknown():
+def test_a_status_without_activity_or_mode_leaves_them_unknown():
     assert driver().receive(b"1#STATUS*trace@") == [StatusReceived(None, None, False, True, None)]
 
 
@@ -108,12 +108,12 @@ def test_a_status_without_a_word_of_activity_or_mode_leaves_them_unknown():
         ("fault;stopped;moving", Activity.FAULT, None),
     ],
 )
-def test_of_words_that_contradict_each_other_the_one_that_forbids_motion_holds(words, activity, mode):
+def test_of_contradictory_words_the_one_that_forbids_motion_counts(words, activity, mode):
     (status,) = driver().receive(f"1#STATUS*{words}@".encode())
     assert (status.activity, status.mode) == (activity, mode)
 
 
-def test_unknown_words_types_and_a_clients_records_are_handed_over_raw_and_not_acted_on():
+def test_unknown_words_and_types_are_passed_on_raw():
     unit = b"4#STATUS*idle;sleepy&FORCE*1;2&COMMAND*home&RELATIVE.DEG*1.00;2.00"
     events = driver().receive(unit + b"@")
     assert [event.type for event in events if isinstance(event, UnknownReceived)] == [
@@ -126,7 +126,7 @@ def test_unknown_words_types_and_a_clients_records_are_handed_over_raw_and_not_a
     assert not any(isinstance(event, JointsReceived) for event in events)
 
 
-def test_units_of_refusals_alone_are_counted_apart():
+def test_units_of_refusals_are_counted_separately():
     fresh = driver()
     fresh.receive(b"2#ERROR*5;a&ERROR*5;b@" + b"2#STATUS*idle&ERROR*5@" + b"1#TIME*1@" + b"x@")
     assert (fresh.units_received, fresh.refusals_received) == (3, 1)
@@ -140,7 +140,7 @@ def test_a_refusal_comes_with_its_number_and_text():
     "unit",
     [b"1#ABSOLUTE.DEG*1;2;3@", b"2#ABSOLUTE.DEG*1;2&VELOCITY.DEG*1@", b"2#STATUS*idle&ABSOLUTE.DEG*1@"],
 )
-def test_a_unit_of_another_joint_count_is_refused_whole(unit):
+def test_a_unit_of_another_joint_count_is_rejected(unit):
     fresh = driver()
     (event,) = fresh.receive(b"1#TIME*1.00@" + unit)[1:]
     assert isinstance(event, MalformedReceived)
@@ -150,7 +150,7 @@ def test_a_unit_of_another_joint_count_is_refused_whole(unit):
     assert fresh.units_received == 1
 
 
-def test_a_new_connection_forgets_the_unfinished_unit_of_the_one_before():
+def test_a_new_connection_discards_an_unfinished_unit():
     fresh = driver()
     fresh.receive(b"1#ABSOLUTE.DEG*1;")
     fresh.connected()
@@ -158,13 +158,13 @@ def test_a_new_connection_forgets_the_unfinished_unit_of_the_one_before():
 
 
 @given(st.binary(max_size=300))
-def test_any_bytes_give_events_and_never_joints_that_nobody_sent(data):
+def test_any_bytes_give_events_but_no_invented_joints(data):
     for event in driver().receive(data):
         assert not isinstance(event, JointsReceived) or b"ABSOLUTE.DEG" in data or b"2" in data
 
 
 @given(st.lists(st.floats(-360, 360), min_size=2, max_size=2).map(tuple))
-def test_positions_sent_come_back_as_themselves(positions):
+def test_positions_survive_a_round_trip(positions):
     fresh = driver()
     (joints,) = fresh.receive(fresh.encode(MoveAbsolute(positions)))
     assert joints.positions == pytest.approx(positions, abs=1e-10)

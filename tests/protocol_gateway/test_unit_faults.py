@@ -1,4 +1,4 @@
-"""Controllers that send too much, too little, in pieces or something else: state, event, recovery."""
+"""Controllers that send too much, too little, in pieces, or garbage: state, event, recovery."""
 
 import asyncio
 import time
@@ -11,7 +11,7 @@ from tests.protocol_gateway.old_client import legacy, program
 from tests.protocol_gateway.scripted_controller import repeated, scripted_controller
 
 
-def test_a_controller_with_another_joint_count_is_silent_says_why_once_and_comes_back(mesh, tmp_path):
+def test_a_controller_with_another_joint_count_is_silent_and_recovers(mesh, tmp_path):
     async def main():
         async with faulty_site(mesh, tmp_path) as (site, fault):
             await fault("joints")
@@ -21,7 +21,7 @@ def test_a_controller_with_another_joint_count_is_silent_says_why_once_and_comes
             malformed = len(site.events("unit.malformed"))
             await site.lease(A.ACQUIRE)
             assert "the description has 5" in await refusal(site.command(C.HOME))
-            # Longer than the link waits for a controller that sends nothing.
+            # Longer than the reconnect timeout of a silent controller.
             await asyncio.sleep(4.5)
             await until(lambda: len(site.events("controller.joint_count")) == 1)
             assert len(site.events("unit.malformed")) == malformed
@@ -33,7 +33,7 @@ def test_a_controller_with_another_joint_count_is_silent_says_why_once_and_comes
     run(main())
 
 
-def test_a_controller_that_restarts_with_another_joint_count_is_never_taken_for_the_old_one(mesh, tmp_path):
+def test_a_restart_with_another_joint_count_is_detected(mesh, tmp_path):
     async def main():
         async with faulty_site(mesh, tmp_path) as (site, fault):
             await fault("restart")
@@ -56,9 +56,7 @@ STATE_5 = "2#ABSOLUTE.DEG*{:.2f};0;0;0;0&STATUS*{};remote;homed@"
 STATE_6 = "2#ABSOLUTE.DEG*0;0;0;0;0;0&STATUS*idle;remote;homed@"
 
 
-def test_one_unit_of_another_joint_count_invalidates_the_positions_and_a_motion_behind_it_is_refused(
-    mesh, tmp_path
-):
+def test_one_unit_of_another_joint_count_invalidates_the_positions(mesh, tmp_path):
     async def main():
         async with (
             scripted_controller() as (port, say, heard),
@@ -67,14 +65,14 @@ def test_one_unit_of_another_joint_count_invalidates_the_positions_and_a_motion_
         ):
             await until(lambda: site.controller.link == STATE.UP)
             await site.lease(A.ACQUIRE, ttl_s=5)
-            # One among all the others, as a controller's second program may send it.
+            # A single one, as a second program of the controller may send.
             say(STATE_6)
             await until(lambda: site.controller.link == STATE.SILENT)
             text = await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=[0.3, 0, 0, 0, 0]))
             assert "sends 6 joint values, the description has 5" in text
             assert "the description has 5" in await refusal(site.command(C.HOME))
             assert heard == b""
-            # No motion ran, so nothing is stopped; and what comes again for a while counts again.
+            # No motion ran, so nothing is stopped; positions that return for a while are used again.
             await until(lambda: site.controller.link == STATE.UP)
             assert not site.controller.HasField("stop")
             await site.lease(A.RENEW, ttl_s=5)
@@ -84,7 +82,7 @@ def test_one_unit_of_another_joint_count_invalidates_the_positions_and_a_motion_
     run(main())
 
 
-def test_a_motion_that_runs_when_the_joint_count_changes_is_stopped_as_at_a_lost_link(mesh, tmp_path):
+def test_a_changed_joint_count_stops_a_motion(mesh, tmp_path):
     async def main():
         async with (
             scripted_controller() as (port, say, heard),
@@ -112,7 +110,7 @@ def test_a_motion_that_runs_when_the_joint_count_changes_is_stopped_as_at_a_lost
     run(main())
 
 
-def test_of_a_flood_the_newest_is_published_the_rest_counted_and_another_robot_keeps_its_rate(mesh, tmp_path):
+def test_of_a_flood_the_newest_is_published_and_other_robots_keep_their_rate(mesh, tmp_path):
     async def main():
         async with simulator(demo=True) as other, faulty_site(mesh, tmp_path, other) as (site, fault):
             await fault("flood")
@@ -151,9 +149,7 @@ def test_a_flood_does_not_reach_old_client_programs(mesh, tmp_path):
     run(main())
 
 
-def test_of_a_controller_that_sends_more_than_can_be_read_nothing_is_taken_until_it_sends_less(
-    mesh, tmp_path
-):
+def test_a_deluge_is_discarded_until_it_ends(mesh, tmp_path):
     async def main():
         async with faulty_site(mesh, tmp_path) as (site, fault):
             await fault("deluge")
@@ -182,7 +178,7 @@ def test_units_in_pieces_are_units(mesh, tmp_path):
     run(main())
 
 
-def test_garbage_between_units_is_said_a_few_times_and_counted_always(mesh, tmp_path):
+def test_garbage_between_units_is_reported_at_a_limited_rate_and_counted(mesh, tmp_path):
     async def main():
         async with faulty_site(mesh, tmp_path) as (site, fault):
             await fault("garbage")
@@ -198,11 +194,11 @@ def test_garbage_between_units_is_said_a_few_times_and_counted_always(mesh, tmp_
     run(main())
 
 
-def test_a_status_that_comes_no_more_is_not_known_any_more_and_is_again_when_it_comes(mesh, tmp_path):
+def test_a_missing_status_is_unknown_until_it_returns(mesh, tmp_path):
     async def main():
         async with faulty_site(mesh, tmp_path, demo=False) as (site, fault):
             await until(lambda: site.controller.mode == STATE.REMOTE)
-            await asyncio.sleep(0.1)  # its status is seen to come again and again
+            await asyncio.sleep(0.1)  # its status is seen to repeat
             await fault("mute")
             await until(lambda: site.events("status.gone"))
             await until(lambda: site.controller.mode == STATE.MODE_UNKNOWN)
@@ -216,10 +212,10 @@ def test_a_status_that_comes_no_more_is_not_known_any_more_and_is_again_when_it_
     run(main())
 
 
-def test_a_controller_that_tells_only_positions_is_shown_and_the_rest_is_unknown(mesh, tmp_path):
+def test_a_controller_with_positions_only_has_an_unknown_status(mesh, tmp_path):
     async def main():
         async with faulty_site(mesh, tmp_path) as (site, fault):
-            await asyncio.sleep(0.1)  # its status is seen to come again and again
+            await asyncio.sleep(0.1)  # its status is seen to repeat
             await fault("bare")
             await until(lambda: site.controller.mode == STATE.MODE_UNKNOWN)
             assert site.controller.activity == STATE.ACTIVITY_UNKNOWN

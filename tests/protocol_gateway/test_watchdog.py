@@ -1,4 +1,4 @@
-"""What watchdog and has ceased to."""
+"""Watchdog of repeating values."""
 
 import pytest
 
@@ -24,11 +24,11 @@ def seen(*told_at):
         ([*(("idle", t) for t in range(4)), ("moving", 5), ("fault", 6)], True),
     ],
 )
-def test_only_what_was_seen_to_repeat_itself_can_cease(told_at, ceased):
+def test_only_a_repeating_value_can_expire(told_at, ceased):
     assert seen(*told_at).expired(1000.0) is ceased
 
 
-def test_it_has_ceased_after_three_seconds_and_beats_again_at_once():
+def test_it_expires_after_three_seconds_and_recovers_immediately():
     watchdog = seen(*(("idle", t) for t in range(4)))
     assert not watchdog.expired(5.9)
     assert watchdog.expired(6.0)
