@@ -242,7 +242,7 @@ def test_in_a_deluge_stops_and_other_robots_work(mesh, tmp_path):
                 await until(lambda number=number: heard.count(b"1#COMMAND*stop@") == number + 1)
                 assert site.controller.link == STATE.SILENT
                 await asyncio.sleep(0.15)
-            # By now the last state from before the deluge has arrived, on another topic than the link's state.
+            # By now the last state from before the deluge has arrived: another topic than the link state.
             joints = len(site.seen["joints"])
             calm = site.session.subscribe(robot_key("hall", "arm-2", "joints"), newest=1000)
             await anext(calm)
