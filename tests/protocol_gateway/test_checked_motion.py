@@ -175,9 +175,9 @@ def test_required_a_robot_without_shapes_is_not_moved(mesh, tmp_path):
             simulator(robot=str(urdf)) as port,
             gateway(mesh, tmp_path, port, check="require", cell=bare, description=str(urdf)) as site,
         ):
-            await until(lambda: "no link a shape" in site.controller.check_text, timeout_s=60)
+            await until(lambda: "no link with a shape" in site.controller.check_text, timeout_s=60)
             await site.lease(A.ACQUIRE, ttl_s=5)
-            assert "no link a shape" in await refusal(site.command(C.HOME))
+            assert "no link with a shape" in await refusal(site.command(C.HOME))
 
     run(main(), timeout_s=90)
 
