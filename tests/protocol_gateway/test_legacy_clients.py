@@ -15,7 +15,7 @@ def degrees(site):
 
 
 @in_loop
-async def test_old_programs_read_what_the_mesh_reads_in_step(mesh, tmp_path):
+async def test_old_programs_read_the_same_states_as_the_mesh(mesh, tmp_path):
     settings = legacy(commanders={})
     async with (
         legacy_site(mesh, tmp_path, settings, simulated={"demo": True}) as site,
@@ -36,7 +36,7 @@ async def test_old_programs_read_what_the_mesh_reads_in_step(mesh, tmp_path):
 
 
 @in_loop
-async def test_the_papers_unit_homes_and_moves_the_robot_in_its_operators_name(mesh, tmp_path):
+async def test_the_papers_unit_homes_and_moves_the_robot(mesh, tmp_path):
     settings = legacy()
     async with legacy_site(mesh, tmp_path, settings) as site, program(settings) as one:
         one.say(PAPER)
@@ -72,7 +72,7 @@ async def homed_by_li(site, one):
 
 
 @in_loop
-async def test_two_seconds_of_silence_in_a_motion_stop_the_robot(mesh, tmp_path):
+async def test_two_seconds_of_silence_during_motion_stop_the_robot(mesh, tmp_path):
     async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         await homed_by_li(site, one)
         one.say(b"2#COMMAND*speed=5&ABSOLUTE.DEG*140;0;0;0;0@")
@@ -87,7 +87,7 @@ async def test_two_seconds_of_silence_in_a_motion_stop_the_robot(mesh, tmp_path)
 
 
 @in_loop
-async def test_traffic_that_asks_for_nothing_keeps_the_lease(mesh, tmp_path):
+async def test_units_without_requests_renew_the_lease(mesh, tmp_path):
     async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         one.say(b"1#COMMAND*trace@")
         await until(lambda: site.seen["lease"][-1].holder == "li")
@@ -103,7 +103,7 @@ async def test_traffic_that_asks_for_nothing_keeps_the_lease(mesh, tmp_path):
 
 
 @in_loop
-async def test_a_killed_connection_stops_the_motion_at_once(mesh, tmp_path):
+async def test_a_killed_connection_stops_the_motion(mesh, tmp_path):
     async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as watcher:
         async with program(settings) as one:
             await homed_by_li(site, one)
@@ -138,7 +138,7 @@ async def test_operators_of_the_mesh_and_of_old_programs_refuse_each_other(mesh,
 
 
 @in_loop
-async def test_who_is_no_commander_reads_and_stops_and_moves_nothing(mesh, tmp_path):
+async def test_a_client_that_may_not_command_can_read_and_stop(mesh, tmp_path):
     settings = legacy(commanders={"10.0.0.9": "li"})
     simulated = {"demo": True}
     async with legacy_site(mesh, tmp_path, settings, simulated=simulated) as site, program(settings) as one:
@@ -163,7 +163,7 @@ async def test_who_is_no_commander_reads_and_stops_and_moves_nothing(mesh, tmp_p
 
 
 @in_loop
-async def test_a_commanders_refusals_have_the_protocols_numbers(mesh, tmp_path):
+async def test_refusals_have_the_protocols_error_numbers(mesh, tmp_path):
     async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         await until(lambda: one.positions)
         answers = {
@@ -189,7 +189,7 @@ async def test_a_commanders_refusals_have_the_protocols_numbers(mesh, tmp_path):
 
 
 @in_loop
-async def test_reset_clears_a_stop_that_can_have_been_seen_and_no_fresh_one(mesh, tmp_path):
+async def test_reset_does_not_clear_a_stop_that_was_just_sent(mesh, tmp_path):
     async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         await until(lambda: one.positions)
         number, text = await one.asks(b"1#COMMAND*stop@1#COMMAND*reset@")
@@ -207,7 +207,7 @@ async def test_reset_clears_a_stop_that_can_have_been_seen_and_no_fresh_one(mesh
 
 
 @in_loop
-async def test_a_stop_is_done_before_what_was_sent_ahead_of_it(mesh, tmp_path):
+async def test_a_stop_overtakes_queued_units(mesh, tmp_path):
     async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         await until(lambda: one.positions)
         one.say(b"1#COMMAND*home@" * 20 + b"1#COMMAND*stop@")
@@ -218,7 +218,7 @@ async def test_a_stop_is_done_before_what_was_sent_ahead_of_it(mesh, tmp_path):
 
 
 @in_loop
-async def test_a_read_only_robot_is_read_and_nothing_else(mesh, tmp_path):
+async def test_a_read_only_robot_refuses_commands_of_clients(mesh, tmp_path):
     settings = legacy()
     async with legacy_site(mesh, tmp_path, settings, stop_proven=False) as site, program(settings) as one:
         await until(lambda: one.positions)
@@ -252,7 +252,7 @@ async def test_clients_speak_the_controllers_codes(mesh, tmp_path):
 
 
 @in_loop
-async def test_a_link_that_goes_down_closes_who_was_told_states_and_lets_others_wait(mesh, tmp_path):
+async def test_a_lost_link_closes_only_clients_that_got_states(mesh, tmp_path):
     settings = legacy()
     async with contextlib.AsyncExitStack() as stack:
         first = contextlib.AsyncExitStack()
@@ -273,7 +273,7 @@ async def test_a_link_that_goes_down_closes_who_was_told_states_and_lets_others_
 
 
 @in_loop
-async def test_what_the_controller_refuses_is_told_to_who_is_in_control_alone(mesh, tmp_path):
+async def test_a_controllers_refusal_is_relayed_only_to_the_client_in_control(mesh, tmp_path):
     settings = legacy()
 
     async def controller(reader, writer):

@@ -19,7 +19,7 @@ from tests.protocol_gateway.old_client import ME, Program, in_loop, legacy, lega
 
 
 @in_loop
-async def test_one_too_many_is_told_so_and_a_hundred_harm_nobody(mesh, tmp_path):
+async def test_excess_clients_are_rejected_and_affect_no_other(mesh, tmp_path):
     settings = legacy(most=2)
     simulated = {"demo": True}
     async with legacy_site(mesh, tmp_path, settings, simulated=simulated) as site, program(settings) as one:
@@ -41,7 +41,7 @@ async def test_one_too_many_is_told_so_and_a_hundred_harm_nobody(mesh, tmp_path)
 
 
 @in_loop
-async def test_who_does_not_read_delays_nobody_and_is_closed(mesh, tmp_path):
+async def test_a_client_that_does_not_read_is_closed_and_delays_no_other(mesh, tmp_path):
     settings = legacy()
     simulated = {"demo": True, "rate_hz": 1000.0}
     async with legacy_site(mesh, tmp_path, settings, simulated=simulated) as site, program(settings) as one:
@@ -60,7 +60,7 @@ async def test_who_does_not_read_delays_nobody_and_is_closed(mesh, tmp_path):
 
 
 @in_loop
-async def test_who_reads_slowly_gets_the_newest_state_when_he_has_read(mesh, tmp_path):
+async def test_a_slow_reader_gets_the_newest_state(mesh, tmp_path):
     settings = legacy()
     simulated = {"demo": True, "rate_hz": 1000.0}
     async with legacy_site(mesh, tmp_path, settings, simulated=simulated) as site:
@@ -79,7 +79,7 @@ async def test_who_reads_slowly_gets_the_newest_state_when_he_has_read(mesh, tmp
 
 
 @in_loop
-async def test_a_flood_is_not_read_on_and_ends_and_its_stop_is_done(mesh, tmp_path):
+async def test_a_flooding_client_is_closed_but_its_stop_is_executed(mesh, tmp_path):
     settings = legacy(commanders={})
     simulated = {"demo": True}
     async with legacy_site(mesh, tmp_path, settings, simulated=simulated) as site, program(settings) as one:
@@ -96,7 +96,7 @@ async def test_a_flood_is_not_read_on_and_ends_and_its_stop_is_done(mesh, tmp_pa
 
 
 @in_loop
-async def test_rubbish_is_counted_and_answered_and_the_next_unit_is_heard(mesh, tmp_path):
+async def test_garbage_is_counted_and_answered(mesh, tmp_path):
     async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         one.say(b"\xff\x00#@", b"hello\r\n@", b"1#COMMAND*trace@")
         await until(lambda: site.controller.trace == STATE.YES)
@@ -116,7 +116,7 @@ async def test_rubbish_is_counted_and_answered_and_the_next_unit_is_heard(mesh, 
 
 
 @in_loop
-async def test_who_asks_and_goes_before_the_answers_leaves_no_line_for_each(mesh, tmp_path, caplog):
+async def test_answers_to_a_vanished_client_are_not_logged(mesh, tmp_path, caplog):
     settings = legacy(commanders={})
     async with legacy_site(mesh, tmp_path, settings) as site:
         clients = lambda: site.controller.legacy_clients  # noqa: E731
@@ -175,7 +175,7 @@ def cable():
 
 
 @in_loop
-async def test_a_pulled_cable_ends_control_and_is_noticed_in_seconds(mesh, tmp_path, cable):
+async def test_a_pulled_cable_ends_control_in_seconds(mesh, tmp_path, cable):
     here, far, connect, pull_out = cable
     settings = legacy(host=here, commanders={far: "li"})
     async with legacy_site(mesh, tmp_path, settings) as site:

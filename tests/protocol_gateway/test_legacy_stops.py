@@ -11,7 +11,7 @@ TIME, STOP = b"1#TIME*1@", b"1#COMMAND*stop@"
 
 
 @in_loop
-async def test_a_program_over_its_limits_is_heard_for_a_stop_at_once_and_for_nothing_else(mesh, tmp_path):
+async def test_from_a_throttled_client_only_stops_are_executed(mesh, tmp_path):
     settings = legacy(limits=Limits(units_per_s=10.0, burst_s=20.0))
     async with legacy_site(mesh, tmp_path, settings) as site, program(settings) as one:
         number, text = await one.asks(TIME * 250)
@@ -26,7 +26,7 @@ async def test_a_program_over_its_limits_is_heard_for_a_stop_at_once_and_for_not
 
 
 @in_loop
-async def test_a_program_that_was_over_its_limits_is_heard_again(mesh, tmp_path):
+async def test_a_throttled_client_recovers(mesh, tmp_path):
     settings = legacy(limits=Limits(units_per_s=200.0, burst_s=0.5))
     async with legacy_site(mesh, tmp_path, settings) as site, program(settings) as one:
         assert (await one.asks(TIME * 110))[0] == 9
@@ -39,7 +39,7 @@ async def test_a_program_that_was_over_its_limits_is_heard_again(mesh, tmp_path)
 
 
 @in_loop
-async def test_a_stop_behind_the_flood_for_which_a_program_is_closed_is_done(mesh, tmp_path):
+async def test_a_stop_after_a_flood_is_executed(mesh, tmp_path):
     settings = legacy(commanders={}, limits=Limits(burst_s=0.1, patience_s=0.0))
     async with legacy_site(mesh, tmp_path, settings) as site, program(settings) as one:
         one.say(TIME * 1500, STOP)
@@ -50,7 +50,7 @@ async def test_a_stop_behind_the_flood_for_which_a_program_is_closed_is_done(mes
 
 
 @in_loop
-async def test_a_stop_of_one_too_many_is_done(mesh, tmp_path):
+async def test_a_stop_of_a_rejected_client_is_executed(mesh, tmp_path):
     settings = legacy(commanders={}, most=1)
     async with legacy_site(mesh, tmp_path, settings) as site, program(settings):
         await until(lambda: site.controller.legacy_clients.attached == 1)
@@ -62,7 +62,7 @@ async def test_a_stop_of_one_too_many_is_done(mesh, tmp_path):
 
 
 @in_loop
-async def test_a_stop_by_its_code_is_done_as_well_of_one_too_many(mesh, tmp_path):
+async def test_a_stop_code_of_a_rejected_client_is_executed(mesh, tmp_path):
     codes = {2: "ABSOLUTE.DEG", 5: "STATUS", 102: "COMMAND:stop"}
     simulated, settings = {"codes": codes}, legacy(commanders={}, most=1)
     async with (
@@ -85,7 +85,7 @@ async def program_from(address, settings):
 
 
 @in_loop
-async def test_readers_leave_a_place_to_the_first_that_may_command(mesh, tmp_path):
+async def test_readers_leave_a_place_for_the_first_commander(mesh, tmp_path):
     settings = legacy(commanders={"127.0.0.2": "li"}, most=2)
     async with legacy_site(mesh, tmp_path, settings) as site, program(settings) as reader:
         await until(lambda: reader.positions)
