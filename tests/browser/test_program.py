@@ -146,7 +146,7 @@ def test_a_program_runs_or_is_stopped_and_everybody_sees_how_far_it_is_and_what_
     page.evaluate("location.hash = '#/test/arm'")
     for key in ("PageUp", *["ArrowUp"] * 3, "Enter"):
         page.get_by_role("slider", name="Target of waist").press(key)
-    expect(page.locator(".joints .mind")).to_contain_text("post", timeout=CHECKED_MS)
+    expect(page.locator(".joints .notice-warning")).to_contain_text("post", timeout=CHECKED_MS)
     page.evaluate(f"location.hash = '{PAGE}'")
     page.get_by_role("textbox", name="Program text").fill(WAITS)
     page.get_by_label("Program name").fill("waits")

@@ -91,8 +91,8 @@ export function eventText(event: Event): string {
   const reason = values.reason;
   switch (code) {
     case "stop.latched": {
-      const said = t(values.sent === "True" ? "event_stop" : "event_stop_unsent", { by });
-      return reason && reason !== "console" ? `${said} ${reason}` : said;
+      const text = t(values.sent === "True" ? "event_stop" : "event_stop_unsent", { by });
+      return reason && reason !== "console" ? `${text} ${reason}` : text;
     }
     case "stop.sent":
       return t("event_stop_sent");

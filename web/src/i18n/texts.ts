@@ -330,7 +330,7 @@ const TEXTS = {
   no_motion_unhomed: ["Not homed: press Home first.", "未回零：请先回零。"],
   reset_take: ["Whoever is in control can reset it: take control first.", "仅控制者可复位：请先取得控制权。"],
   sent: ["Sent: {what}", "已发送：{what}"],
-  mind: ["Mind: {text}", "注意：{text}"],
+  warning_of_check: ["Warning: {text}", "注意：{text}"],
   motion_done: ["Done: {what}", "已完成：{what}"],
   motion_ended: ["Ended before its target: {what}", "未到目标即结束：{what}"],
   sending: ["Sending {what}…", "正在发送 {what}…"],

@@ -49,11 +49,11 @@ export async function whoAmI(): Promise<Me | null> {
   try {
     const answer = await fetch("/account/me", { cache: "no-store", signal: AbortSignal.timeout(ANSWERED_WITHIN_MS) });
     if (!answer.ok) return null;
-    const told = (await answer.json()) as Me;
+    const identity = (await answer.json()) as Me;
     // A restarted console knows no sessions.
-    if (me.value?.account && !told.account) endedBy.value ||= "restart";
-    me.value = told;
-    return told;
+    if (me.value?.account && !identity.account) endedBy.value ||= "restart";
+    me.value = identity;
+    return identity;
   } catch {
     return null;
   }
@@ -80,9 +80,9 @@ export async function post<Answer>(path: string, body: object = {}): Promise<Ans
   } catch {
     throw new AccountError("unreachable", "");
   }
-  const told = (await answer.json().catch(() => ({}))) as { error?: string; text?: string; seconds?: number };
-  if (!answer.ok) throw new AccountError(told.error ?? "unreachable", told.text ?? "", told.seconds ?? 0);
-  return told as Answer;
+  const reply = (await answer.json().catch(() => ({}))) as { error?: string; text?: string; seconds?: number };
+  if (!answer.ok) throw new AccountError(reply.error ?? "unreachable", reply.text ?? "", reply.seconds ?? 0);
+  return reply as Answer;
 }
 
 export async function signIn(name: string, password: string): Promise<void> {
@@ -103,11 +103,11 @@ export async function signOut(everywhere: boolean): Promise<void> {
 /** Report activity to the console, at most once a minute: without it the right to command is suspended. */
 export function followPerson(connect: () => void): void {
   connects = connect;
-  let told = 0;
+  let reportedAt = 0;
   const touched = () => {
     const at = performance.now();
-    if (!me.value?.account || onlyWatches.value || at - told < ACTIVE_EACH_MS) return;
-    told = at;
+    if (!me.value?.account || onlyWatches.value || at - reportedAt < ACTIVE_EACH_MS) return;
+    reportedAt = at;
     void post("active").catch(() => undefined);
   };
   for (const kind of ["pointerdown", "keydown"] as const)

@@ -60,9 +60,9 @@ export async function command(
     const target = positions && { what, positions, id: request.id };
     if (answer.accepted && MOTIONS.includes(name)) newestMotion.value = request.id;
     // Older gateways put the warning only into their sentence.
-    const mind = reasonText(answer.warning, answer.text.split("; mind: ")[1]);
+    const warning = reasonText(answer.warning, answer.text.split("; mind: ")[1]);
     if (answer.accepted)
-      tell({ kind: "done", text: t("sent", { what }), ...(mind && { mind }), ...(target && { target }) });
+      tell({ kind: "done", text: t("sent", { what }), ...(warning && { warning }), ...(target && { target }) });
     else tell({ kind: "refused", text: t("not_sent", { text: answer.text }) });
     return answer.accepted;
   } catch (error) {

@@ -59,12 +59,12 @@ const listeners = new Map<string, Set<Listener>>();
 const newest = new Map<string, Sample>();
 /** Presence changes that subscribers have not received yet. */
 const changes = new Map<string, boolean>();
-const asked = new Map<bigint, { resolve: (payload: Uint8Array) => void; reject: (error: AskError) => void }>();
+const pending = new Map<bigint, { resolve: (payload: Uint8Array) => void; reject: (error: AskError) => void }>();
 let socket: WebSocket | null = null;
 let lastAsk = 0n;
 let retryMs = 250;
 /** When the last message arrived [ms], and a function that closes an idle connection. */
-let heardAt = 0;
+let receivedAt = 0;
 let giveUp: () => void = () => undefined;
 
 /** Connect, and reconnect for ever.
@@ -72,46 +72,46 @@ let giveUp: () => void = () => undefined;
  * @param ready Whether the page may connect now; null: the console does not answer.
  * @param ended Called with the reason when the session has ended. */
 export function keepConnected(ready: () => Promise<boolean | null>, ended: (why: string) => void): () => void {
-  const again = () => {
+  const reconnect = () => {
     setTimeout(begin, retryMs);
     retryMs = Math.min(retryMs * 2, 2000);
   };
   const begin = () =>
     void ready().then((may) => {
-      if (may) connect(again, ended);
-      else if (may === null) again();
+      if (may) connect(reconnect, ended);
+      else if (may === null) reconnect();
     });
   begin();
   return begin;
 }
 
-function connect(again: () => void, ended: (why: string) => void): void {
+function connect(reconnect: () => void, ended: (why: string) => void): void {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
   const opened = new WebSocket(`${scheme}://${location.host}/mesh`);
   opened.binaryType = "arraybuffer";
-  let askedAt = performance.now(); // opening counts as an answer
-  heardAt = 0;
-  const heard = () => (heardAt = performance.now());
+  let queriedAt = performance.now(); // opening counts as an answer
+  receivedAt = 0;
+  const received = () => (receivedAt = performance.now());
   const end = (code: number, reason: string) => {
     clearInterval(looking);
     giveUp = () => undefined;
     opened.onopen = opened.onmessage = opened.onclose = null;
     socket = null;
     if (lostAt.value === null) lostAt.value = Date.now();
-    for (const { reject } of asked.values()) reject(new AskError(t("not_connected"), true));
-    asked.clear();
+    for (const { reject } of pending.values()) reject(new AskError(t("not_connected"), true));
+    pending.clear();
     if (code === SIGNED_OUT) {
       hello.value = null;
       ended(reason);
-    } else again();
+    } else reconnect();
   };
   const look = () => {
     const at = performance.now();
-    if (askedAt > heardAt) {
-      if (at - askedAt < ANSWERED_WITHIN_MS) return;
+    if (queriedAt > receivedAt) {
+      if (at - queriedAt < ANSWERED_WITHIN_MS) return;
       giveUp();
-    } else if (at - heardAt > QUIET_MS) {
-      askedAt = at;
+    } else if (at - receivedAt > QUIET_MS) {
+      queriedAt = at;
       send({ case: "ask", value: { id: ++lastAsk, key: "" } }); // an invalid request is answered immediately
     }
   };
@@ -121,7 +121,7 @@ function connect(again: () => void, ended: (why: string) => void): void {
     end(0, "");
   };
   opened.onopen = () => {
-    heard();
+    received();
     socket = opened;
     retryMs = 250;
     changes.clear();
@@ -129,7 +129,7 @@ function connect(again: () => void, ended: (why: string) => void): void {
     for (const expression of listeners.keys()) send({ case: "watch", value: { key: expression } });
   };
   opened.onmessage = (event: MessageEvent<ArrayBuffer>) => {
-    heard();
+    received();
     receive(new Uint8Array(event.data));
   };
   opened.onclose = ({ code, reason }) => end(code, reason);
@@ -137,7 +137,7 @@ function connect(again: () => void, ended: (why: string) => void): void {
 
 /** Reconnect if nothing was received since a time of `performance.now`. */
 export function reopenIfSilent(since: number): void {
-  if (socket && heardAt < since) giveUp();
+  if (socket && receivedAt < since) giveUp();
 }
 
 /** Receive every publication on a key expression until the returned function is called. */
@@ -188,7 +188,7 @@ export async function ask<Q extends DescMessage, A extends DescMessage>(
       timeoutS * 1000 + 1000,
     );
     const done = () => clearTimeout(timer);
-    asked.set(id, {
+    pending.set(id, {
       resolve: (bytes) => (done(), resolve(bytes)),
       reject: (error) => (done(), reject(error)),
     });
@@ -197,8 +197,8 @@ export async function ask<Q extends DescMessage, A extends DescMessage>(
 }
 
 function settle(id: bigint) {
-  const waiting = asked.get(id);
-  asked.delete(id);
+  const waiting = pending.get(id);
+  pending.delete(id);
   return waiting;
 }
 

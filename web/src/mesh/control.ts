@@ -19,7 +19,7 @@ export interface Notice {
   kind: "busy" | "done" | "refused" | "lost";
   text: string;
   /** A warning of the gateway's check about an action that it carried out. */
-  mind?: string;
+  warning?: string;
   /** Target joints of the motion; the message disappears when they are reached. */
   target?: { what: string; positions: readonly number[]; id: bigint };
 }
@@ -34,7 +34,7 @@ export interface Held {
   /** When the lease ends unless renewed, on this page's clock [ms]. */
   endsAt: number;
   /** When this tab requested it, on this page's clock [ms]. */
-  askedAt: number;
+  requestedAt: number;
   /** When it began, and when the gateway reported that, on the gateway's clock [ms]. */
   since: number;
   saidAt: number;
@@ -127,10 +127,10 @@ async function begin(robotKey: string, action: Action, reason = ""): Promise<voi
   ended = null;
   offeredTo = "";
   controlNotice.value = { kind: "busy", text: t("taking") };
-  const askedAt = performance.now();
+  const requestedAt = performance.now();
   try {
     const answer = await askLease(robotKey, who, action, { reason });
-    hold(robotKey, who, answer, askedAt);
+    hold(robotKey, who, answer, requestedAt);
     controlNotice.value = null;
     if (document.hidden) await putAway();
   } catch (error) {
@@ -171,15 +171,15 @@ async function say(
   }
 }
 
-function hold(robotKey: string, who: string, answer: LeaseAnswer, askedAt: number): void {
+function hold(robotKey: string, who: string, answer: LeaseAnswer, requestedAt: number): void {
   const ttlMs = ms(answer.until) - ms(answer.now) || ttlS() * 1000;
   held.value = {
     robotKey,
     operator: who,
     lease: answer.lease,
     clockMs: ms(answer.now) - performance.now(),
-    endsAt: askedAt + ttlMs,
-    askedAt,
+    endsAt: requestedAt + ttlMs,
+    requestedAt,
     since: ms(answer.since),
     saidAt: ms(answer.now),
   };
@@ -194,18 +194,18 @@ function renewIn(delayMs: number): void {
 async function renew(): Promise<void> {
   const mine = held.value;
   if (!mine) return;
-  const askedAt = performance.now();
+  const requestedAt = performance.now();
   try {
     const answer = await askLease(mine.robotKey, mine.operator, Action.RENEW, { lease: mine.lease });
     if (held.value?.lease !== mine.lease) return;
-    hold(mine.robotKey, mine.operator, { ...answer, lease: answer.lease || mine.lease }, askedAt);
+    hold(mine.robotKey, mine.operator, { ...answer, lease: answer.lease || mine.lease }, requestedAt);
   } catch (error) {
     if (held.value?.lease !== mine.lease) return;
-    const slow = askedAt > mine.endsAt || stoodStill(mine.endsAt - mine.askedAt);
+    const slow = requestedAt > mine.endsAt || stoodStill(mine.endsAt - mine.requestedAt);
     const silent = error instanceof AskError && error.noAnswer;
     if (silent && performance.now() < mine.endsAt) renewIn(100);
     else if (slow) lose(t("lost_slow"), true);
-    else if (silent) lose(t("lost_no_answer", { seconds: Math.round((mine.endsAt - mine.askedAt) / 1000) }));
+    else if (silent) lose(t("lost_no_answer", { seconds: Math.round((mine.endsAt - mine.requestedAt) / 1000) }));
     else lose(reasonOf(error));
   }
 }
@@ -248,7 +248,7 @@ function seeLoss(robotKey: string, lease: Lease): void {
   if (mine?.robotKey !== robotKey || ms(lease.timestamp) <= mine.saidAt) return;
   if (isOf(mine, lease)) return;
   if (held.value) {
-    const slow = stoodStill(mine.endsAt - mine.askedAt);
+    const slow = stoodStill(mine.endsAt - mine.requestedAt);
     lose(slow ? t("lost_slow") : "", slow);
     if (slow) return;
   }

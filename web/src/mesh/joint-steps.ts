@@ -24,7 +24,7 @@ interface Going extends Step {
   what: string;
   accepted: boolean;
   /** The warning of the gateway's check. */
-  mind?: string;
+  warning?: string;
 }
 
 export interface Steps {
@@ -73,7 +73,7 @@ export function useSteps(props: {
     const jointPositions = joints.map((_, i) => (i === step.index ? step.offset : 0));
     let warned = {};
     const refuse = (notice: Notice) => {
-      if (notice.mind) warned = { mind: notice.mind };
+      if (notice.warning) warned = { warning: notice.warning };
       if (notice.kind !== "refused") return tell(notice);
       setRefused(step);
       drop(notice.text);
@@ -96,7 +96,11 @@ export function useSteps(props: {
     const joint = joints[going.index]?.name ?? "";
     const done = () => {
       setGoing(null);
-      tell({ kind: "done", text: t("motion_done", { what: going.what }), ...(going.mind && { mind: going.mind }) });
+      tell({
+        kind: "done",
+        text: t("motion_done", { what: going.what }),
+        ...(going.warning && { warning: going.warning }),
+      });
     };
     const timer = arrived
       ? setTimeout(done, STILL_MS)

@@ -27,10 +27,10 @@ export function useNoticeEnd(notice: Notice | null, tell: (notice: Notice | null
   const overtaken = !!notice?.target && notice.target.id < newestMotion.value;
   useEffect(() => {
     if (!notice || notice.kind === "busy" || notice.kind === "lost") return;
-    const { target, mind } = notice;
-    const warned = mind ? { mind } : {};
+    const { target, warning } = notice;
+    const warned = warning ? { warning } : {};
     if (!target) {
-      const timer = setTimeout(() => tell(null), TOLD_MS[mind ? "refused" : notice.kind]);
+      const timer = setTimeout(() => tell(null), TOLD_MS[warning ? "refused" : notice.kind]);
       return () => clearTimeout(timer);
     }
     if (stopped) return tell(null);

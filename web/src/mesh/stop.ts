@@ -8,7 +8,7 @@ import { AskError, ask, reopenIfSilent } from "./connection";
 import type { Notice } from "./control";
 import { operator, reasonOf } from "./control";
 
-const TOLD_MS = 15_000; // how long the notice of a successful stop is shown
+const NOTICE_MS = 15_000; // how long the notice of a successful stop is shown
 
 export const stopNotice = signal<Notice | null>(null);
 
@@ -17,7 +17,7 @@ export async function stop(robotKeys: readonly string[]): Promise<void> {
   const name = (key: string) => key.split("/").slice(1).join("/");
   stopNotice.value = { kind: "busy", text: t("stop_sending", { robot: robotKeys.map(name).join(", ") }) };
   const by = operator.value.trim();
-  const askedAt = performance.now();
+  const requestedAt = performance.now();
   const outcomes = await Promise.all(
     robotKeys.map(async (key): Promise<Notice> => {
       const robot = name(key);
@@ -28,16 +28,16 @@ export async function stop(robotKeys: readonly string[]): Promise<void> {
           : { kind: "refused", text: t("stop_latched", { robot, text: reasonText(answer.reason, answer.text) }) };
       } catch (error) {
         // The next request must not use the same dead connection.
-        if (error instanceof AskError && error.noAnswer) reopenIfSilent(askedAt);
+        if (error instanceof AskError && error.noAnswer) reopenIfSilent(requestedAt);
         return { kind: "refused", text: t("stop_failed", { robot, text: reasonOf(error) }) };
       }
     }),
   );
   const failed = outcomes.filter((outcome) => outcome.kind === "refused");
-  const told: Notice = {
+  const notice: Notice = {
     kind: failed.length ? "refused" : "done",
     text: (failed.length ? failed : outcomes).map((outcome) => outcome.text).join(" "),
   };
-  stopNotice.value = told;
-  if (told.kind === "done") setTimeout(() => stopNotice.value === told && (stopNotice.value = null), TOLD_MS);
+  stopNotice.value = notice;
+  if (notice.kind === "done") setTimeout(() => stopNotice.value === notice && (stopNotice.value = null), NOTICE_MS);
 }

@@ -119,17 +119,17 @@ function useList<M extends Dated>(
     const take = (sample: Sample) => {
       const before = lists.get(sample.key);
       const entries = decode(sample);
-      const told = (before && goesOn(before.last, sample, entries.length) && before) || {
+      const history = (before && goesOn(before.last, sample, entries.length) && before) || {
         entries: [],
         seen: new Set(),
         last: sample,
       };
       const id = `${sample.publisher}:${sample.sequence}`;
-      if (told.seen.has(id)) return; // repeated after a reconnect
-      if (sample.live) told.seen.add(id);
-      told.last = sample;
-      told.entries = [...[...entries].reverse(), ...told.entries].slice(0, LIST_LENGTH);
-      lists.set(sample.key, told);
+      if (history.seen.has(id)) return; // repeated after a reconnect
+      if (sample.live) history.seen.add(id);
+      history.last = sample;
+      history.entries = [...[...entries].reverse(), ...history.entries].slice(0, LIST_LENGTH);
+      lists.set(sample.key, history);
       // The sort is stable: entries of one publisher keep their order.
       const merged = [...lists.values()].flatMap(({ entries }) => entries);
       if (lists.size > 1) merged.sort((first, second) => timeOf(second) - timeOf(first));

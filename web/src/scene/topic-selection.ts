@@ -13,20 +13,20 @@ import type { Forward } from "./forward-kinematics";
 export const REACHES = ["slow", "all"] as const;
 export type Reach = (typeof REACHES)[number];
 
-const asked = signal<ReadonlyMap<string, Reach>>(new Map());
+const requested = signal<ReadonlyMap<string, Reach>>(new Map());
 
 /** Return whether the robot is at another site than this console. */
-export function isFar(robotKey: string): boolean {
+export function isRemote(robotKey: string): boolean {
   const [, site, robot = ""] = robotKey.split("/");
   return hello.value !== null && hello.value.site !== site && !isReplay(robot);
 }
 
 export function reachOf(robotKey: string): Reach {
-  return asked.value.get(robotKey) ?? (isFar(robotKey) ? "slow" : "all");
+  return requested.value.get(robotKey) ?? (isRemote(robotKey) ? "slow" : "all");
 }
 
 export function askReach(robotKey: string, reach: Reach): void {
-  asked.value = new Map(asked.value).set(robotKey, reach);
+  requested.value = new Map(requested.value).set(robotKey, reach);
 }
 
 /** Return the topic of the robot's joint states, whole or thinned. */
@@ -48,8 +48,10 @@ export function framesOf(
   const base = matrixOf(description.baseToSite);
   const { joints, frames } = description;
   return (payload) => {
-    const told = new Map(fromBinary(JointStatesSchema, payload).joints.map(({ name, position }) => [name, position]));
-    const placements = forward(joints.map(({ name, home }) => told.get(name) ?? home));
+    const positionsByName = new Map(
+      fromBinary(JointStatesSchema, payload).joints.map(({ name, position }) => [name, position]),
+    );
+    const placements = forward(joints.map(({ name, home }) => positionsByName.get(name) ?? home));
     const named = frames.flatMap(({ name, link, frameToLink }): [string, THREE.Matrix4][] => {
       const placement = placements.get(link);
       return placement ? [[name, placement.clone().multiply(matrixOf(frameToLink))]] : [];

@@ -26,10 +26,10 @@ export function NoticeLine({ notice, idle }: { notice: Notice | null; idle?: str
     <p class={`notice ${notice?.kind ?? "idle"}`} role={bad ? "alert" : "status"}>
       {bad && <span class="shape warning" aria-hidden="true" />}
       {notice?.text ?? idle ?? "\u00a0"}
-      {notice?.mind && (
-        <span class="mind">
+      {notice?.warning && (
+        <span class="notice-warning">
           <span class="shape warning" aria-hidden="true" />
-          {t("mind", { text: notice.mind })}
+          {t("warning_of_check", { text: notice.warning })}
         </span>
       )}
     </p>

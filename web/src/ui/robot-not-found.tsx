@@ -10,7 +10,7 @@ import { robotLink } from "./route";
 const SHOWS_WITHIN_MS = 4000;
 
 /** Return whether a live connection received nothing of a robot for some seconds; `known`: something was received. */
-export function useMissing(robotKey: string, known: boolean): boolean {
+export function useRobotNotFound(robotKey: string, known: boolean): boolean {
   const [waited, setWaited] = useState(false);
   const there = known || fleetRobots.value.includes(robotKey);
   const connected = lostAt.value === null && hello.value?.connected === true;
@@ -23,7 +23,7 @@ export function useMissing(robotKey: string, known: boolean): boolean {
   return waited && !there;
 }
 
-export function Missing({ site, robot }: RobotName) {
+export function RobotNotFound({ site, robot }: RobotName) {
   const robots = fleetRobots.value.map((key) => key.split("/").slice(1) as [string, string]);
   return (
     <div class="missing" role="status">

@@ -5,7 +5,7 @@ import { fixed, rollPitchYaw, toDegrees } from "../i18n/format";
 import { t } from "../i18n/texts";
 import type { Latest } from "../mesh/topics";
 import { ageOf, isStale } from "../mesh/topics";
-import { Margins } from "./joint-limits-panel";
+import { JointLimits } from "./joint-limits-panel";
 import { Age, Panel, Unit } from "./parts";
 
 export function ToolPanel(props: {
@@ -37,7 +37,7 @@ export function ToolPanel(props: {
         <NumberRow label={t("tool_speed")} text={fixed(speed, 1)} unit="mm/s" />
         <NumberRow label={t("manipulability")} text={fixed(state?.manipulability, 4)} unit="" />
       </dl>
-      <Margins robotKey={props.robotKey} state={state} description={props.description} stale={stale} />
+      <JointLimits robotKey={props.robotKey} state={state} description={props.description} stale={stale} />
     </Panel>
   );
 }

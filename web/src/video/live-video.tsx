@@ -51,7 +51,7 @@ export function useLive(robotKey: string, wanted: Wanted | null, label: string):
     setStep(0);
     if (!wanted) return;
     drawn.at = performance.now();
-    const saw = (newAt: number | null, reduced: number) => {
+    const showPicture = (newAt: number | null, reduced: number) => {
       drawn.newAt = newAt;
       drawn.at = performance.now();
       setAny(true);
@@ -59,14 +59,14 @@ export function useLive(robotKey: string, wanted: Wanted | null, label: string):
       setStep(reduced);
     };
     // Stills need many times the bytes of video: limit their size and rate.
-    const asked = video || !isStanding(wanted) ? wanted : { ...wanted, ...REDUCED_STILL, fps: STILL_FPS };
+    const request = video || !isStanding(wanted) ? wanted : { ...wanted, ...REDUCED_STILL, fps: STILL_FPS };
     return withView(
       robotKey,
-      asked,
+      request,
       (keys) => {
         if (video && canvas.current) {
           return playVideo(keys.video, canvas.current, {
-            drawn: saw,
+            drawn: showPicture,
             failed: (text) => {
               setProblem(t("camera_failed", { text }));
               setVideo(false);
@@ -77,7 +77,7 @@ export function useLive(robotKey: string, wanted: Wanted | null, label: string):
           const { data, format } = fromBinary(CompressedImageSchema, sample.payload);
           const blob = new Blob([data as Uint8Array<ArrayBuffer>], { type: `image/${format || "jpeg"}` });
           setStill((old) => (old && URL.revokeObjectURL(old), URL.createObjectURL(blob)));
-          saw(sample.newAt, 0);
+          showPicture(sample.newAt, 0);
         });
       },
       () => performance.now() - drawn.at > QUIET_MS,

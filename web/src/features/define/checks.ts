@@ -51,9 +51,9 @@ export const problems = computed<readonly Problem[]>(() => {
     path: placeOf(path),
     text: d("wrong_number", { text: text.trim() || " " }),
   }));
-  const told = [...typed, ...(checked.value?.problems ?? [])];
-  const places = new Set(told.map(({ path }) => path.join("/")));
-  return [...told, ...oddShapes().filter(({ path }) => !places.has(path.join("/")))];
+  const problems = [...typed, ...(checked.value?.problems ?? [])];
+  const places = new Set(problems.map(({ path }) => path.join("/")));
+  return [...problems, ...oddShapes().filter(({ path }) => !places.has(path.join("/")))];
 });
 
 function oddShapes(): Problem[] {
@@ -67,10 +67,10 @@ function oddShapes(): Problem[] {
     const { min, max, triangles } = shape.info;
     const size = Math.max(...max.map((value, axis) => value - (min[axis] ?? 0))) * scale;
     if (triangles === 0 || (size >= SMALLEST_M && size <= LARGEST_M)) return [];
-    const told = size >= 1 ? `${Number(size.toPrecision(3))} m` : `${Number((size * 1000).toPrecision(2))} mm`;
+    const sizeText = size >= 1 ? `${Number(size.toPrecision(3))} m` : `${Number((size * 1000).toPrecision(2))} mm`;
     return {
       path: [...place, "mesh_scale"],
-      text: d("odd_size", { file: mesh.split("/").at(-1) ?? mesh, size: told }),
+      text: d("odd_size", { file: mesh.split("/").at(-1) ?? mesh, size: sizeText }),
     };
   });
 }

@@ -120,7 +120,9 @@ function Row({ row, place }: { row: PairRow; place: number }) {
   const { links, kind, values, isIgnored, isAutomatic } = row;
   const [first, second] = links;
   const reason = REASONS[kind];
-  const said = Object.fromEntries(Object.entries(values).map(([name, value]) => [name, value.toLocaleString("en")]));
+  const formatted = Object.fromEntries(
+    Object.entries(values).map(([name, value]) => [name, value.toLocaleString("en")]),
+  );
   return (
     <tr class={isTouching(row) ? "touching" : isIgnored ? "ignored" : ""} data-kind={kind}>
       <td>
@@ -138,7 +140,7 @@ function Row({ row, place }: { row: PairRow; place: number }) {
       </td>
       <td>
         <span class="way">{d(isIgnored ? "way_ignored" : (WAYS[kind] ?? "way_hulls"))}</span>
-        {reason && <span class="dim"> {d(reason, said)}</span>}
+        {reason && <span class="dim"> {d(reason, formatted)}</span>}
       </td>
     </tr>
   );

@@ -72,7 +72,7 @@ export function ScenePanel() {
   useEffect(() => {
     if (!canvas.current) return;
     let made: DefineScene;
-    const again = new Set<string>();
+    const retried = new Set<string>();
     try {
       made = new DefineScene(canvas.current, {
         pick: (link) => choose(link === 0 ? "base" : link - 1),
@@ -80,8 +80,8 @@ export function ScenePanel() {
         dragged: seal,
         failed: (glb, text) => {
           setProblem(text);
-          if (!text || again.has(glb)) return;
-          again.add(glb);
+          if (!text || retried.has(glb)) return;
+          retried.add(glb);
           made.forget(glb);
           void convertAgain(glb);
         },

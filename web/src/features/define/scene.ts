@@ -52,7 +52,7 @@ export interface Picture {
   chosen: number | "tool" | null;
 }
 
-export interface Heard {
+export interface SceneEvents {
   pick: (link: number) => void;
   /** The gizmo's object was dragged to this pose in its link's frame. */
   drag: (pose: THREE.Matrix4) => void;
@@ -88,7 +88,7 @@ export class DefineScene {
   /** @throws Error if the browser has no WebGL. */
   constructor(
     private readonly canvas: HTMLCanvasElement,
-    private readonly heard: Heard,
+    private readonly events: SceneEvents,
   ) {
     this.renderer = makeRenderer(drawsInSoftware(), canvas);
     toneMap(this.renderer);
@@ -193,10 +193,10 @@ export class DefineScene {
           });
           link.model = model;
           link.holder.add(model);
-          this.heard.failed(wanted, "");
+          this.events.failed(wanted, "");
         } catch (error) {
           if (link.glb === wanted) link.glb = ""; // retried when shown again
-          this.heard.failed(wanted, error instanceof Error ? error.message : String(error));
+          this.events.failed(wanted, error instanceof Error ? error.message : String(error));
         }
         const now = this.picture?.shapes[this.links.indexOf(link)];
         if (now && link.model) link.model.scale.setScalar(now.scale);
@@ -270,7 +270,7 @@ export class DefineScene {
     this.gizmo.addEventListener("dragging-changed", (event) => {
       this.inDrag = event.value === true;
       this.view.controls.enabled = !this.inDrag;
-      if (!this.inDrag) this.heard.dragged();
+      if (!this.inDrag) this.events.dragged();
     });
     this.gizmo.addEventListener("objectChange", () => {
       const object = this.gizmo.object;
@@ -279,7 +279,7 @@ export class DefineScene {
       const pose = object.matrix.clone();
       const last = this.picture?.placements.at(-1);
       if (object === this.tool && last) pose.premultiply(last.clone().invert());
-      this.heard.drag(pose);
+      this.events.drag(pose);
     });
   }
 
@@ -299,7 +299,7 @@ export class DefineScene {
           ray.intersectObject(holder, true).map(({ distance }) => ({ index, distance })),
         );
         const nearest = hits.sort((one, other) => one.distance - other.distance)[0];
-        if (nearest) this.heard.pick(nearest.index);
+        if (nearest) this.events.pick(nearest.index);
       },
       { signal },
     );

@@ -108,10 +108,10 @@ async function send(path: string, init?: RequestInit): Promise<Response> {
   let words = text;
   let changed = false;
   try {
-    const said = JSON.parse(text) as { problems?: Problem[]; text?: string; changed?: boolean };
-    problems = said.problems ?? [];
-    changed = said.changed ?? false;
-    words = said.text ?? problems.map((problem) => problem.text).join("; ");
+    const reply = JSON.parse(text) as { problems?: Problem[]; text?: string; changed?: boolean };
+    problems = reply.problems ?? [];
+    changed = reply.changed ?? false;
+    words = reply.text ?? problems.map((problem) => problem.text).join("; ");
   } catch {
     // it is already text
   }

@@ -49,7 +49,7 @@ export function keepReading(): () => void {
   });
 }
 
-export interface Missing {
+export interface MissingFile {
   /** The mesh file that refers to it. */
   of: string;
   /** The name in that file. */
@@ -59,10 +59,10 @@ export interface Missing {
 }
 
 /** Missing files that the draft's mesh files refer to. */
-export function missingFiles(): Missing[] {
+export function missingFiles(): MissingFile[] {
   const now = draft.value;
   if (!now) return [];
-  const found = new Map<string, Missing>();
+  const found = new Map<string, MissingFile>();
   for (const { mesh: of } of bodies(now.description)) {
     const shape = shapeOf(of, now.files);
     if (typeof shape !== "object" || !("info" in shape)) continue;

@@ -13,26 +13,26 @@ export function AlarmBadge() {
       for (const end of ends) end();
     };
   }, []);
-  const told = counts.value;
+  const counted = counts.value;
   const silent = silentSites();
   const words = silent.length
     ? e("badge_silent", { sites: silent.join(", ") })
     : !anyWatch.value
       ? e("badge_unknown")
-      : told.length
-        ? e("badge", { counts: told.map(({ priority, count }) => `${count} ${priorityWord(priority)}`).join(", ") })
+      : counted.length
+        ? e("badge", { counts: counted.map(({ priority, count }) => `${count} ${priorityWord(priority)}`).join(", ") })
         : e("badge_none");
   return (
-    <a class={`alarm-badge ${told.length ? "" : "calm"}`} href="#/events" title={words}>
+    <a class={`alarm-badge ${counted.length ? "" : "calm"}`} href="#/events" title={words}>
       <span class="unseen">{words}</span>
       {silent.length > 0 && <span class="shape warning" aria-hidden="true" />}
       <span class="badge-counts" aria-hidden="true">
-        {told.map(({ priority, count }) => (
+        {counted.map(({ priority, count }) => (
           <PriorityMark key={priority} of={priority}>
             {count}
           </PriorityMark>
         ))}
-        {told.length === 0 && e(anyWatch.value ? "badge_calm" : "badge_dash")}
+        {counted.length === 0 && e(anyWatch.value ? "badge_calm" : "badge_dash")}
       </span>
     </a>
   );

@@ -71,12 +71,12 @@ export function useEntries(): void {
 }
 
 function takeEvents(sample: Sample): void {
-  const told = sample.live
+  const received = sample.live
     ? [fromBinary(EventSchema, sample.payload)]
     : fromBinary(EventListSchema, sample.payload).events;
   const [, site = "", robot = ""] = sample.key.split("/");
   events.take(
-    told.map((event) => {
+    received.map((event) => {
       const ms = event.timestamp ? timestampMs(event.timestamp) : 0;
       const nanos = event.timestamp?.nanos ?? 0;
       return { id: `${sample.key} ${ms} ${nanos} ${event.code} ${event.text}`, ms, site, robot, event };
@@ -85,11 +85,11 @@ function takeEvents(sample: Sample): void {
 }
 
 function takeAudit(sample: Sample): void {
-  const told = sample.live
+  const received = sample.live
     ? [fromBinary(AuditEntrySchema, sample.payload)]
     : fromBinary(AuditListSchema, sample.payload).entries;
   const [, site = "", robot = ""] = sample.key.split("/");
-  audits.take(auditLines(site, robot, told));
+  audits.take(auditLines(site, robot, received));
 }
 
 /** Return the entries of one robot's log. */

@@ -199,7 +199,7 @@ function AuditWords({ entry: { audit } }: { entry: AuditLine }) {
 function Details({ entry, close }: { entry: Entry; close: () => void }) {
   const event = "event" in entry ? entry.event : null;
   const audit = "audit" in entry ? entry.audit : null;
-  const told = event?.text ?? audit?.text ?? "";
+  const original = event?.text ?? audit?.text ?? "";
   const facts: [string, string][] = [
     [e("time"), stampFull(event?.timestamp ?? audit?.timestamp)],
     [e("entry_source"), event?.source ?? audit?.source ?? ""],
@@ -209,9 +209,9 @@ function Details({ entry, close }: { entry: Entry; close: () => void }) {
   return (
     <div class="entry-details" role="region" aria-label={wordsOf(entry)}>
       <p>{"event" in entry ? <EventWords entry={entry} /> : <AuditWords entry={entry} />}</p>
-      {!told.includes(event ? eventText(event) : audit ? entryText(audit) : "") && (
+      {!original.includes(event ? eventText(event) : audit ? entryText(audit) : "") && (
         <p class="dim">
-          {e("in_its_words")} <span lang="en">{told}</span>
+          {e("in_its_words")} <span lang="en">{original}</span>
         </p>
       )}
       <dl>

@@ -49,8 +49,8 @@ function Unseen({ robot }: { robot: string }) {
 function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robot: string }) {
   const known = robotNow(robotKey);
   const [controller, lease] = [known.controller.value, known.lease.value];
-  const told = useTopic(DescriptionSchema, `${robotKey}/description`)?.message;
-  if (told) known.description = told;
+  const newest = useTopic(DescriptionSchema, `${robotKey}/description`)?.message;
+  if (newest) known.description = newest;
   const description = known.description;
   const state = stateWord(controller);
   const age = ageOf(controller);
@@ -62,7 +62,7 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
   const problem = state.word === "state_stale" ? f("nothing_comes") : problemOf(controller?.message);
   const alarms = alarmsOf.value.get(robotKey) ?? [];
   const worst = alarms.reduce((most, { priority }) => Math.max(most, priority), 0);
-  const far = hello.value !== null && hello.value.site !== site;
+  const isRemote = hello.value !== null && hello.value.site !== site;
   return (
     <>
       <Picture robotKey={robotKey} description={description} stale={stale} />
@@ -74,7 +74,7 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
         <div class="tile-line dim">
           <span class="tile-title">
             {description?.title || "\u00a0"}
-            {far && <span title={f("far_hint")}> · {f("far")}</span>}
+            {isRemote && <span title={f("far_hint")}> · {f("far")}</span>}
           </span>
           {stale ? (
             <span class="age">{staleText(unitAge)}</span>

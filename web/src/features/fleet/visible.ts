@@ -7,10 +7,10 @@ import { useEffect, useState } from "preact/hooks";
 const COMES_AFTER_MS = 120;
 const GOES_AFTER_MS = 400;
 
-const hears = new WeakMap<Element, (visible: boolean) => void>();
+const listeners = new WeakMap<Element, (visible: boolean) => void>();
 const observer = new IntersectionObserver(
   (entries) => {
-    for (const entry of entries) hears.get(entry.target)?.(entry.isIntersecting);
+    for (const entry of entries) listeners.get(entry.target)?.(entry.isIntersecting);
   },
   { rootMargin: "160px 0px" },
 );
@@ -21,7 +21,7 @@ export function useVisible(place: RefObject<Element | null>): boolean {
     const element = place.current;
     if (!element) return;
     let timer: ReturnType<typeof setTimeout> | undefined;
-    hears.set(element, (shown) => {
+    listeners.set(element, (shown) => {
       clearTimeout(timer);
       timer = setTimeout(() => setVisible(shown), shown ? COMES_AFTER_MS : GOES_AFTER_MS);
     });

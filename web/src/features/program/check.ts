@@ -56,23 +56,23 @@ export function checkNow(): void {
 async function askNext(): Promise<void> {
   checking.value = true;
   while (wanted) {
-    const asked: { robotKey: string; text: string } = wanted;
+    const latest: { robotKey: string; text: string } = wanted;
     const at = Date.now();
     try {
-      const key = inOwnName(`${asked.robotKey}/kinematics/check`);
-      const request = { program: asked.text, path: true };
+      const key = inOwnName(`${latest.robotKey}/kinematics/check`);
+      const request = { program: latest.text, path: true };
       const answer = await ask(key, CheckRequestSchema, request, CheckAnswerSchema, WITHIN_S);
-      if (wanted === asked) {
-        checked.value = { text: asked.text, answer, at };
+      if (wanted === latest) {
+        checked.value = { text: latest.text, answer, at };
         checkFailed.value = "";
       }
     } catch (error) {
-      if (wanted === asked) {
+      if (wanted === latest) {
         checked.value = null;
         checkFailed.value = reasonOf(error);
       }
     }
-    if (wanted === asked) wanted = null;
+    if (wanted === latest) wanted = null;
   }
   checking.value = false;
 }

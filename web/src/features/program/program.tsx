@@ -16,7 +16,7 @@ import { SceneView } from "../../scene/scene-view";
 import { ControlPanel } from "../../ui/control/control-panel";
 import { State, Tag } from "../../ui/parts";
 import { Alarm } from "../../ui/robot-alarm";
-import { Missing, useMissing } from "../../ui/robot-not-found";
+import { RobotNotFound, useRobotNotFound } from "../../ui/robot-not-found";
 import { programLink, robotLink } from "../../ui/route";
 import { keepChecking } from "./check";
 import { CheckPanel } from "./check-panel";
@@ -71,7 +71,7 @@ function Workbench({ site, robot }: RobotName) {
   const joints = useTopic(JointStatesSchema, `${key}/joints`);
   const running = useTopic(ProgramStateSchema, `${key}/program`);
   const events = useEvents(key);
-  const [told, tell] = useTold();
+  const [told, tell] = useOutcome();
   const [stage, setStage] = useState<Stage | null>(null);
   useEffect(() => (stage ? addGizmo(stage) : undefined), [stage]);
   const age = jointsAge(joints, controller);
@@ -116,7 +116,7 @@ function Workbench({ site, robot }: RobotName) {
     if (lease) seeLease(key, lease.message);
   }, [key, lease]);
 
-  if (useMissing(key, there)) return <Missing site={site} robot={robot} />;
+  if (useRobotNotFound(key, there)) return <RobotNotFound site={site} robot={robot} />;
   const motion = {
     running: lease?.message.motion === true,
     stopped: state?.stop !== undefined || stoppedByItself(state),
@@ -177,7 +177,7 @@ function hasMoved(positions: readonly (number | undefined)[]): boolean {
   return start !== undefined && positions.some((each, i) => Math.abs((each ?? NaN) - (start[i] ?? NaN)) > MOVED);
 }
 
-function useTold(): [Words, (words: Words) => void] {
+function useOutcome(): [Words, (words: Words) => void] {
   const [told, setTold] = useState<{ words: Words }>({ words: noWords });
   useEffect(() => {
     const timer = setTimeout(() => setTold({ words: noWords }), TOLD_MS);

@@ -33,7 +33,7 @@ export function RunPanel(props: { robotKey: string; controller: ControllerState 
     const values = { program: of?.text ?? "", programName: name };
     void command(robotKey, Command.RUN_PROGRAM, name, values, (notice) => {
       // Once it runs, its progress is shown instead.
-      if (notice.kind === "done" && !notice.mind) setTold(null);
+      if (notice.kind === "done" && !notice.warning) setTold(null);
       else setTold({ notice: notice.kind === "busy" ? { ...notice, text: p("asking_run") } : notice, of });
     });
   };

@@ -94,7 +94,7 @@ export function useHappened(
               const audited = topicOf(channels[i] ?? "") === "audit";
               return messages.map(({ received, data }) => ({
                 at: received ? (timestampMs(received) - start) / 1000 : 0,
-                event: audited ? askedFor(fromBinary(AuditEntrySchema, data)) : fromBinary(EventSchema, data),
+                event: audited ? auditAsEvent(fromBinary(AuditEntrySchema, data)) : fromBinary(EventSchema, data),
               }));
             })
             .sort((first, second) => first.at - second.at);
@@ -106,16 +106,16 @@ export function useHappened(
 }
 
 /** Convert an audited request to an event. */
-function askedFor(entry: AuditEntry): Event {
+function auditAsEvent(entry: AuditEntry): Event {
   const { timestamp, operator, source, request, outcome, text } = entry;
   const words = outcome === Outcome.REFUSED ? "asked_refused" : outcome === Outcome.FAILED ? "asked_failed" : "asked";
-  const said = r(words, { who: operator || source, what: request.toLowerCase().replaceAll("_", " ") });
+  const summary = r(words, { who: operator || source, what: request.toLowerCase().replaceAll("_", " ") });
   const severity = words === "asked" ? Severity.INFO : Severity.WARNING;
   const event = create(EventSchema, {
     severity,
     source,
     code: request,
-    text: text ? `${said}: ${entryText(entry)}` : said,
+    text: text ? `${summary}: ${entryText(entry)}` : summary,
   });
   if (timestamp) event.timestamp = timestamp;
   return event;

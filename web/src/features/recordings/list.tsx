@@ -10,7 +10,7 @@ import { Action, askRecorder } from "../../mesh/recorder";
 import { NoticeLine } from "../../ui/parts";
 import type { RecordingName } from "../../ui/route";
 import { Card } from "./card";
-import type { Row, Told } from "./listed";
+import type { Row, SiteAnswer } from "./listed";
 import { useListed } from "./listed";
 import "./list.css";
 
@@ -68,8 +68,8 @@ export function List() {
           </select>
         </div>
       </div>
-      {[...sites].map(([site, told]) => (
-        <SiteLine key={site} site={site} told={told} named={sites.size > 1} />
+      {[...sites].map(([site, answer]) => (
+        <SiteLine key={site} site={site} answer={answer} named={sites.size > 1} />
       ))}
       {first.value && (
         <p class="compare-line" role="status">
@@ -109,7 +109,7 @@ function countText(shown: number, count: number): string {
 }
 
 /** State of a site's recorder: free space, flight recorder, problems. */
-function SiteLine({ site, told: { list, problem }, named }: { site: string; told: Told; named: boolean }) {
+function SiteLine({ site, answer: { list, problem }, named }: { site: string; answer: SiteAnswer; named: boolean }) {
   const [notice, setNotice] = useState<Notice | null>(null);
   const [of, setOf] = useState("");
   const robots = fleetRobots.value

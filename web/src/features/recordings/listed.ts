@@ -14,11 +14,11 @@ const AGAIN_MS = 5000;
 const LIST_S = 10;
 
 /** The last answer of a site's recorder. */
-export interface Told {
+export interface SiteAnswer {
   list: RecordingList | null;
   problem: string;
 }
-const told = signal<ReadonlyMap<string, Told>>(new Map());
+const answers = signal<ReadonlyMap<string, SiteAnswer>>(new Map());
 
 /** Sites with a recorder, and the console's own site. */
 function sitesOf(keys: ReadonlySet<string>, own: string): readonly string[] {
@@ -31,7 +31,7 @@ function sitesOf(keys: ReadonlySet<string>, own: string): readonly string[] {
 }
 
 async function look(site: string): Promise<void> {
-  let now: Told;
+  let now: SiteAnswer;
   try {
     const key = `robomesh/${site}/-/recordings/list`;
     now = { list: await ask(key, EmptySchema, {}, RecordingListSchema, LIST_S), problem: "" };
@@ -39,9 +39,9 @@ async function look(site: string): Promise<void> {
     const silent = error instanceof AskError && error.noAnswer;
     const text = error instanceof Error ? error.message : String(error);
     const problem = silent ? r("no_recorder", { site }) : r("list_refused", { site, text });
-    now = { list: told.value.get(site)?.list ?? null, problem };
+    now = { list: answers.value.get(site)?.list ?? null, problem };
   }
-  told.value = new Map(told.value).set(site, now);
+  answers.value = new Map(answers.value).set(site, now);
 }
 
 /** A recording in the list with its site: file names are unique only within a site. */
@@ -51,7 +51,7 @@ export interface Row {
 }
 
 export interface Listed {
-  sites: ReadonlyMap<string, Told>;
+  sites: ReadonlyMap<string, SiteAnswer>;
   /** Newest first. */
   rows: readonly Row[];
   /** No answer yet. */
@@ -74,7 +74,7 @@ export function useListed(): Listed {
   }, [sites.join(" "), changes, connected]);
   const rows = new Map<string, Row>();
   for (const site of sites) {
-    for (const recording of told.value.get(site)?.list?.recordings ?? [])
+    for (const recording of answers.value.get(site)?.list?.recordings ?? [])
       rows.set(`${site}/${recording.file}`, { site, recording });
   }
   for (const latest of live.values()) {
@@ -84,8 +84,8 @@ export function useListed(): Listed {
     }
   }
   return {
-    sites: new Map(sites.map((site) => [site, told.value.get(site) ?? { list: null, problem: "" }])),
+    sites: new Map(sites.map((site) => [site, answers.value.get(site) ?? { list: null, problem: "" }])),
     rows: [...rows.values()].sort((first, second) => startMs(second.recording) - startMs(first.recording)),
-    waiting: sites.some((site) => !told.value.has(site)) || sites.length === 0,
+    waiting: sites.some((site) => !answers.value.has(site)) || sites.length === 0,
   };
 }

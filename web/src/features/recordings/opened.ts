@@ -68,11 +68,11 @@ export function useMoment(replay: Replay | null): Signal<number> {
   const moment = useSignal(0);
   useEffect(() => {
     if (!replay) return;
-    let told = 0;
+    let updatedAt = 0;
     let request = requestAnimationFrame(function step(at) {
       request = requestAnimationFrame(step);
-      if (at - told < MOMENT_EACH_MS) return;
-      told = at;
+      if (at - updatedAt < MOMENT_EACH_MS) return;
+      updatedAt = at;
       moment.value = replay.position();
     });
     return () => cancelAnimationFrame(request);

@@ -26,7 +26,7 @@ import "./player.css";
 
 const NOBODY = "robomesh/-/-"; // until the replay has its name
 const NONE: readonly never[] = [];
-const nowhere = () => undefined;
+const noSeek = () => undefined;
 const FRAMES_HOLD_S = 1; // as for live frames
 
 export function Player({ first, second }: { first: RecordingName; second: RecordingName | null }) {
@@ -105,7 +105,7 @@ export function Player({ first, second }: { first: RecordingName; second: Record
         {other.replay && <SecondVideo replay={other.replay} arm={otherArm} info={secondInfo.value} />}
       </div>
       <div class="player-side">
-        <EventList asked={happened} moment={moment} seek={replay?.seek ?? nowhere} />
+        <EventList asked={happened} moment={moment} seek={replay?.seek ?? noSeek} />
         <Contents
           name={first}
           info={info.value}
@@ -119,7 +119,7 @@ export function Player({ first, second }: { first: RecordingName; second: Record
         duration={state?.durationS ?? (info.value ? durationS(info.value) : 0)}
         beside={beside}
         moment={moment}
-        seek={replay?.seek ?? nowhere}
+        seek={replay?.seek ?? noSeek}
       />
       {replay ? (
         <Transport replay={replay} moment={moment} events={events} />

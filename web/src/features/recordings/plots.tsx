@@ -46,20 +46,20 @@ export function Plots(props: {
     return (first.length ? first : (known.value ?? [])).slice(0, 7);
   }, [known.value, chosen]);
   const shown = useMemo(() => zoomed ?? { from: 0, to: duration || 1 }, [zoomed, duration]);
-  const asked = useSeries(name, info, values, shown, POINTS);
+  const series = useSeries(name, info, values, shown, POINTS);
   const shift = beside?.shift ?? 0;
   const later = useMemo(() => ({ from: shown.from + shift, to: shown.to + shift }), [shown, shift]);
   const second = useSeries(beside?.name ?? null, beside?.info ?? null, values, later, POINTS);
   const units = useMemo(
-    () => byUnit(values, asked.value ?? [], second.value ?? [], shift),
-    [asked.value, second.value, shift, values],
+    () => byUnit(values, series.value ?? [], second.value ?? [], shift),
+    [series.value, second.value, shift, values],
   );
   const zoom = ({ from, to }: Window) => {
     const middle = (from + to) / 2;
     const half = Math.max(NARROWEST_S, to - from) / 2;
     setZoomed({ from: Math.max(0, middle - half), to: Math.min(duration, middle + half) });
   };
-  const problem = known.problem || asked.problem || second.problem;
+  const problem = known.problem || series.problem || second.problem;
   useEffect(() => setZoomed(null), [name.file]);
   return (
     <Panel
@@ -104,7 +104,7 @@ export function Plots(props: {
             <span class="shape warning" aria-hidden="true" />
             {r("plots_refused", { text: problem })}
           </p>
-        ) : !known.value || (values.length > 0 && !asked.value) ? (
+        ) : !known.value || (values.length > 0 && !series.value) ? (
           <p class="charts-word dim">{r("plots_waiting")}</p>
         ) : known.value.length === 0 ? (
           <p class="charts-word dim">{r("values_none")}</p>

@@ -13,7 +13,7 @@ import { ageOf, isStale, useTopic } from "../../mesh/topics";
 import { SceneView } from "../../scene/scene-view";
 import { Panel } from "../../ui/parts";
 import { ReplayTag } from "../../ui/replay-tag";
-import { Missing, useMissing } from "../../ui/robot-not-found";
+import { RobotNotFound, useRobotNotFound } from "../../ui/robot-not-found";
 import { recordingsLink } from "../../ui/route";
 import { ToolPanel } from "../../ui/tool-panel";
 import { useMoment } from "./opened";
@@ -35,7 +35,7 @@ export function ReplayRobot({ site, robot }: RobotName) {
   const moment = useMoment(replay);
   const arm = useOfMoment(replay, "frames", 1);
   const gone = latest !== undefined && isStale("replay", ageOf(latest));
-  if (useMissing(key, Boolean(latest ?? description))) return <Missing site={site} robot={robot} />;
+  if (useRobotNotFound(key, Boolean(latest ?? description))) return <RobotNotFound site={site} robot={robot} />;
   const state = latest?.message;
   return (
     <div class="player of-robot" data-replay={robot}>

@@ -5,7 +5,7 @@ import type { Description, View } from "../../gen/robomesh_pb";
 import { clock } from "../../i18n/format";
 import { t, viewText } from "../../i18n/texts";
 import { viewsOf } from "../../scene/scene-view";
-import { isFar, reachOf } from "../../scene/topic-selection";
+import { isRemote, reachOf } from "../../scene/topic-selection";
 import { Age, Panel } from "../../ui/parts";
 import { useLive } from "../../video/live-video";
 import type { Wanted } from "../../video/own-view";
@@ -33,11 +33,11 @@ export function Camera(props: {
   sceneView: () => View | null;
 }) {
   const { robotKey, description } = props;
-  const far = reachOf(robotKey) === "slow";
+  const isSlow = reachOf(robotKey) === "slow";
   const [chosen, setView] = useState("");
-  const view = chosen || (far ? FAR : "front");
+  const view = chosen || (isSlow ? FAR : "front");
   const names = [
-    ...new Set([...viewsOf(description).map((each) => each.name), CLOSE, ...(isFar(robotKey) ? [FAR] : []), OWN]),
+    ...new Set([...viewsOf(description).map((each) => each.name), CLOSE, ...(isRemote(robotKey) ? [FAR] : []), OWN]),
   ];
   const shown = names.includes(view) ? view : (names[0] ?? "free");
   const own = useOwnView(shown === OWN, props.sceneView);

@@ -2,11 +2,11 @@
 
 import { t } from "../../i18n/texts";
 import { isClockOff, useMesh } from "../../mesh/site-health";
-import { askReach, isFar, REACHES, reachOf } from "../../scene/topic-selection";
+import { askReach, isRemote, REACHES, reachOf } from "../../scene/topic-selection";
 import { Choice } from "../../ui/parts";
 
 export function FarChoice({ robotKey }: { robotKey: string }) {
-  if (!isFar(robotKey)) return null;
+  if (!isRemote(robotKey)) return null;
   return (
     <span class="far-choice" title={t("far_hint")}>
       <span class="dim">{t("far_link")}</span>

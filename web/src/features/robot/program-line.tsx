@@ -14,7 +14,7 @@ const SHOWN_MS = 60_000; // after its end
 const ENDS = new Set(["program.done", "program.ended"]);
 
 /** Return whether a run is in progress, or ended within the last minute. */
-export function isTold(
+export function isShown(
   latest: Latest<ProgramState> | undefined,
   events: readonly Event[],
 ): latest is Latest<ProgramState> {
@@ -52,8 +52,8 @@ function programText({ message, sample }: Latest<ProgramState>): string {
     case Outcome.ENDED:
       return t("program_ended", { name, operator, at, text: reasonText(message.reason, text) });
     default: {
-      const told = between(message.since, message.timestamp) / 1000;
-      const gone = clock(told + (performance.now() - sample.arrived) / 1000);
+      const reported = between(message.since, message.timestamp) / 1000;
+      const gone = clock(reported + (performance.now() - sample.arrived) / 1000);
       const time = durationS > 0 ? t("program_of", { gone, all: clock(durationS) }) : gone;
       return t("program_runs", { name, operator, at, time, step, steps });
     }

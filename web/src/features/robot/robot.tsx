@@ -28,7 +28,7 @@ import { jointsTopic } from "../../scene/topic-selection";
 import { ControlPanel } from "../../ui/control/control-panel";
 import { State, Tag } from "../../ui/parts";
 import { Alarm } from "../../ui/robot-alarm";
-import { Missing, useMissing } from "../../ui/robot-not-found";
+import { RobotNotFound, useRobotNotFound } from "../../ui/robot-not-found";
 import { programLink } from "../../ui/route";
 import { ToolPanel } from "../../ui/tool-panel";
 import type { VideoPlace } from "./camera";
@@ -37,7 +37,7 @@ import { EventsPanel } from "./events-panel";
 import { History } from "./history";
 import { JointsPanel } from "./joints-panel";
 import { ClockHint, FarChoice } from "./low-bandwidth";
-import { isTold, ProgramLine } from "./program-line";
+import { isShown, ProgramLine } from "./program-line";
 import { RecordButton, RecordPanel } from "./record-panel";
 
 /** The page of a live robot; a replay has its own page, without commands. */
@@ -66,7 +66,8 @@ export function Robot({ site, robot }: RobotName) {
     stopped: state?.stop !== undefined || stoppedByItself(state),
     positions: (description?.message.joints ?? []).map((joint) => positions.get(joint.name)),
   };
-  if (useMissing(key, Boolean(controller ?? description ?? lease))) return <Missing site={site} robot={robot} />;
+  if (useRobotNotFound(key, Boolean(controller ?? description ?? lease)))
+    return <RobotNotFound site={site} robot={robot} />;
   return (
     <>
       <Alarm state={state} events={events} />
@@ -160,7 +161,7 @@ function Headline(props: {
   }
   const flooding = message?.health?.flooding === true;
   const down = message?.link === Link.UP ? undefined : message;
-  const told = message?.fault || down?.linkText;
+  const problem = message?.fault || down?.linkText;
   const trouble = message?.fault || reasonsText(down?.linkReasons, down?.linkText);
   return (
     <div class="headline">
@@ -175,7 +176,7 @@ function Headline(props: {
       <FarChoice robotKey={`robomesh/${props.site}/${props.name}`} />
       <ClockHint site={props.site} />
       {trouble && (
-        <span class={`trouble ${state.level}`} lang={trouble === told ? "en" : undefined}>
+        <span class={`trouble ${state.level}`} lang={trouble === problem ? "en" : undefined}>
           {trouble}
         </span>
       )}
@@ -195,7 +196,7 @@ function Headline(props: {
         </span>
       )}
       {/* Instead of less important facts, so that nothing below moves. */}
-      {isTold(program, events) ? (
+      {isShown(program, events) ? (
         <ProgramLine latest={program} />
       ) : (
         description?.provenance && (

@@ -12,19 +12,19 @@ const SOON_S = 10 * 86_400;
 const DAY_S = 86_400;
 
 export function Certificates() {
-  const told = [...useMesh()].flatMap(([site, { message }]) =>
+  const certificates = [...useMesh()].flatMap(([site, { message }]) =>
     message.services.flatMap((seen) => {
       const left = seen.values[SECONDS];
       // Every watch reports the certificates of its own site: show each once.
       return left === undefined || seen.site !== site ? [] : [{ key: `${site} ${seen.id}`, site, seen, left }];
     }),
   );
-  if (told.length === 0) return null;
+  if (certificates.length === 0) return null;
   return (
     <Panel name="certificates" title={s("certificates")}>
       <p class="footnote dim">{s("certificates_words")}</p>
       <ul class="presence-list">
-        {told
+        {certificates
           .sort((a, b) => a.left - b.left)
           .map(({ key, site, seen, left }) => (
             <li key={key}>

@@ -26,12 +26,12 @@ const known = new Map<string, Map<string, Known>>();
 const nameOf = ({ site, service, id }: Seen): string => `${site} ${service} ${id}`;
 
 function remember(site: string, { services }: MeshState): readonly Known[] {
-  const told = known.get(site) ?? new Map<string, Known>();
-  known.set(site, told);
+  const reported = known.get(site) ?? new Map<string, Known>();
+  known.set(site, reported);
   const now = Date.now();
-  for (const seen of services) told.set(nameOf(seen), { seen, at: now });
-  for (const [name, { at }] of told) if (now - at > GONE_TOLD_MS) told.delete(name);
-  return [...told].sort(([a], [b]) => a.localeCompare(b)).map(([, each]) => each);
+  for (const seen of services) reported.set(nameOf(seen), { seen, at: now });
+  for (const [name, { at }] of reported) if (now - at > GONE_TOLD_MS) reported.delete(name);
+  return [...reported].sort(([a], [b]) => a.localeCompare(b)).map(([, each]) => each);
 }
 
 export function MeshPanel() {
@@ -61,7 +61,7 @@ function PresentSite({ site }: { site: string }) {
 
 function SiteTable({ site, latest }: { site: string; latest: Latest<MeshState> }) {
   const { services, hops } = latest.message;
-  const told = new Set(services.map(nameOf));
+  const reported = new Set(services.map(nameOf));
   const stale = isMeshStale(latest);
   return (
     <div class={`site-seen ${stale ? "stale" : ""}`}>
@@ -88,7 +88,7 @@ function SiteTable({ site, latest }: { site: string; latest: Latest<MeshState> }
                 of={site}
                 seen={seen}
                 latest={latest}
-                goneAt={told.has(nameOf(seen)) ? null : at}
+                goneAt={reported.has(nameOf(seen)) ? null : at}
               />
             ))}
           </tbody>

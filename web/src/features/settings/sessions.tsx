@@ -28,9 +28,9 @@ export function Sessions() {
     if (answer.ok) setSessions(((await answer.json()) as { sessions: Session[] }).sessions);
   };
   useEffect(() => {
-    const again = () => void look().catch(() => undefined); // the page shows separately that the console is gone
-    again();
-    const timer = setInterval(again, LOOK_EACH_MS);
+    const refresh = () => void look().catch(() => undefined); // the page shows separately that the console is gone
+    refresh();
+    const timer = setInterval(refresh, LOOK_EACH_MS);
     return () => clearInterval(timer);
   }, []);
   const end = async ({ id }: Session) => {
