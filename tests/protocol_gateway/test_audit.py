@@ -150,7 +150,7 @@ def test_a_full_disk_rejects_commands_and_delays_past_events(tmp_path):
         with pytest.raises(AuditError, match="No space left on device"):
             await log.append(entry(id="refused"))
         with pytest.raises(AuditError):
-            await log.note(entry("STOP", id="owed"))
+            await log.append_later(entry("STOP", id="owed"))
         os.dup2(kept, log._file)
         await log.append(entry(id="2"))
         await log.close()

@@ -348,12 +348,12 @@ def test_failed_entries_are_kept_up_to_a_limit_and_the_rest_is_counted(tmp_path)
         log = AuditLog(tmp_path / "arm.jsonl")
         kept, full = os.dup(log._file), os.open("/dev/full", os.O_RDWR)
         os.dup2(full, log._file)
-        refused = [log.note(entry(n, outcome=Outcome.REFUSED)) for n in range(3000)]
-        stops = [log.note(entry(n, "STOP")) for n in range(20)]
+        refused = [log.append_later(entry(n, outcome=Outcome.REFUSED)) for n in range(3000)]
+        stops = [log.append_later(entry(n, "STOP")) for n in range(20)]
         done = await asyncio.gather(*refused, *stops, return_exceptions=True)
         assert {type(each).__name__ for each in done} == {"AuditError"}
         os.dup2(kept, log._file)
-        log.pay()
+        log.retry()
         await log.close()
         os.close(kept)
         os.close(full)

@@ -39,9 +39,9 @@ MALFORMED = [
     (b"2#COMMAND*home&", "without a type"),
     (b"1#COMMAND*home*stop", "second '*'"),
     (b"1#COMMAND*ho1#COMMAND*home", "second '#'"),
-    (b"1#2147483648*1", "beyond int32"),
-    (b"1#-2147483649*1", "beyond int32"),
-    (b"1#" + b"7" * 60_000, "beyond int32"),
+    (b"1#2147483648*1", "outside int32"),
+    (b"1#-2147483649*1", "outside int32"),
+    (b"1#" + b"7" * 60_000, "outside int32"),
     (b"1#COMMAND*h\xc3\xb6me", "outside ASCII"),
 ]
 

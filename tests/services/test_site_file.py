@@ -85,7 +85,7 @@ def test_codes_are_numbers(tmp_path):
         (f'site = "hall"\n{ROBOT}controller = "10.0.0.7"', "robot.arm.controller = '10.0.0.7': should be"),
         (f'site = "hall"\n{ROBOT}controller = "tcp://10.0.0.7:0"', "should be 'simulated' or tcp://"),
         (f'site = "hall"\n{ROBOT}codes = {{ x = "TIME" }}', "a code is a number"),
-        (f'site = "hall"\n{ROBOT}codes = {{ 1 = "COMMAND:dance" }}', "stands for nothing"),
+        (f'site = "hall"\n{ROBOT}codes = {{ 1 = "COMMAND:dance" }}', "is neither a type"),
         ('site = "hall"\n[router]\nlisten = []', "router.listen = []"),
         (f'site = "hall"\n{ROBOT}stale_after_s = 0', "robot.arm.stale_after_s = 0"),
         (f'site = "hall"\n{ROBOT}stop_proven = "yes"', "robot.arm.stop_proven = 'yes'"),
