@@ -1,1 +1,1 @@
-"""Recordings as MCAP files that explain themselves: written, finished, recovered, read."""
+"""Recordings as self-describing MCAP files: write, index, recover and read them."""

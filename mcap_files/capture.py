@@ -1,7 +1,7 @@
-"""An open recording: one robot's recorded topics into one MCAP file, whole to the last write.
+"""An open recording: the recorded topics of one robot in one MCAP file, complete up to the last write.
 
-While it is open the file is unchunked, so that a reader of the stream gets every whole message of
-a file whose writer was killed. `finish.index` makes what has been closed quick to read.
+The open file is unchunked, so that a reader gets every complete message even if the writer was killed.
+`reindex.index` adds chunks and an index to a closed file.
 """
 
 import contextlib
@@ -29,7 +29,7 @@ __all__ = ["ABOUT", "INDEXING", "LOST", "Capture", "is_being_written"]
 
 
 def is_being_written(path: Path) -> bool:
-    """Whether a capture has the file open, in this process or another; a killed one has it no more.
+    """Return whether a capture in any running process has the file open.
 
     Raises:
         OSError: If it cannot be opened.
@@ -49,8 +49,8 @@ def is_being_written(path: Path) -> bool:
 class Capture:
     """An open file.
 
-    `add`, `add_text` and `hand_over` are one thread's; `attach` is anybody's, and so are those that wait for
-    the disk. The file is locked (flock) while it is open: `is_being_written`.
+    Call `add`, `add_text` and `hand_over` from one thread; call `attach` and the functions that wait for the
+    disk from any thread. The file is locked (flock) while it is open: `is_being_written`.
 
     Args:
         about: Metadata `robomesh`: site, robot, name, started_by, cause, part.
@@ -66,9 +66,9 @@ class Capture:
         # Messages by topic.
         self.counts: Counter[str] = Counter()
         self.attached: list[str] = []
-        # Handed over, on its way to the file.
+        # Bytes handed over and not yet written.
         self.waiting_bytes = 0
-        # Why it was given up.
+        # Error after which writing was abandoned.
         self.failure: OSError | None = None
         self._contents = records.Contents()
         self._topics: dict[str, int] = {}
@@ -78,8 +78,8 @@ class Capture:
         self._ready: deque[bytes] = deque()
         self._end = self._written = 0
         self._finished = False
-        # Held by whoever writes or closes; the descriptor is None once closed, since its number is soon
-        # another file's.
+        # Protects writing and closing. The descriptor is None after closing, because the system reuses its
+        # number.
         self._writing = threading.Lock()
         self._file: int | None = None
         try:
@@ -94,14 +94,14 @@ class Capture:
 
     @property
     def size(self) -> int:
-        """Size of the file when all is written that it was given."""
+        """Size of the file when all waiting bytes are written."""
         return self._end
 
     def add(self, key: str, topic: Topic, header: Header, payload: bytes, *, received_ns: int) -> None:
-        """A publication of a topic, as it came.
+        """Add a received publication.
 
         Args:
-            received_ns: When, ns since the Unix epoch.
+            received_ns: Time of arrival, ns since the Unix epoch.
         """
         channel = self._topics.get(key)
         if channel is None:
@@ -115,7 +115,7 @@ class Capture:
         self.counts[key] += 1
 
     def add_text(self, topic: str, text: str, header: Header, *, received_ns: int) -> None:
-        """A text as ROS 2 has it (std_msgs/msg/String): what viewers take a robot's description from."""
+        """Add a ROS 2 text (std_msgs/msg/String), from which viewers read a robot's description."""
         channel = self._topics.get(topic)
         if channel is None:
             channel = self._register(topic, "cdr", "std_msgs/msg/String", "ros2msg", b"string data\n")
@@ -128,7 +128,7 @@ class Capture:
         self._contents.note_message(channel, received_ns)
 
     def attach(self, name: str, media_type: str, data: bytes, *, time_ns: int) -> None:
-        """Something that explains the recording; once a name."""
+        """Attach a file that explains the recording; ignores a second one with the same name."""
         attachment = Attachment(
             create_time=time_ns, log_time=time_ns, name=name, media_type=media_type, data=data
         )
@@ -138,37 +138,37 @@ class Capture:
                 self._put_record(records.record_bytes(attachment))
 
     def hand_over(self) -> None:
-        """What was added may be written now."""
+        """Release the added messages for writing."""
         if self._batch:
             batch, self._batch = self._batch, []
             with self._lock:
                 self._put(b"".join(batch))
 
     def write_out(self) -> None:
-        """Give the system what was handed over.
+        """Write the released messages to the file.
 
         Raises:
-            OSError: If the disk refuses, what was written before is whole after `give_up`; or it is closed.
+            OSError: If the disk refuses, or the file is closed. `give_up` keeps the messages written so far.
         """
         with self._writing:
             self._write_out()
 
     def sync(self) -> None:
-        """Give the disk what was written.
+        """Flush the written data to the disk.
 
         Raises:
-            OSError: If it refuses, or the file is closed.
+            OSError: If the disk refuses, or the file is closed.
         """
         os.fsync(self._open_file())
 
     def finish(self, missed: Mapping[str, int]) -> None:
-        """Close the file; afterwards it is whole.
+        """Write the end of the file and close it.
 
         Args:
-            missed: Publications that are not in it, by topic.
+            missed: Number of publications that are not in the file, by topic.
 
         Raises:
-            OSError: If the disk refuses, or the file is closed already.
+            OSError: If the disk refuses, or the file is already closed.
         """
         self._open_file()
         self.hand_over()
@@ -183,7 +183,7 @@ class Capture:
             self._close()
 
     def give_up(self, error: OSError | None = None) -> None:
-        """Close the file after the last whole write, if it is open: the disk takes no more."""
+        """Close an open file after the last complete write, because the disk accepts no more."""
         self.failure = self.failure or error
         with self._writing:
             if self._file is not None:
@@ -228,7 +228,7 @@ class Capture:
         return channel_id
 
     def _put_record(self, data: bytes) -> None:
-        """Metadata or an attachment, which the end of the file tells the place of."""
+        """Write metadata or an attachment; the summary of the file contains its position."""
         opcode = Opcode(data[0])
         self._contents.note(opcode, data[records.RECORD.size :], self._end)
         self._put(data)
@@ -243,7 +243,7 @@ _DESCRIPTORS: dict[str, bytes] = {}
 
 
 def _protobuf(schema: type[Message]) -> tuple[str, str, bytes]:
-    """Name, encoding and data of a message's schema."""
+    """Return name, encoding and data of a message's schema."""
     name: str = schema.DESCRIPTOR.full_name
     if name not in _DESCRIPTORS:
         described: Any = build_file_descriptor_set(schema)

@@ -1,8 +1,8 @@
-"""Names of ours in and of recordings."""
+"""Names in recordings, and endings of their files."""
 
-# Metadata records: what a recording is; publications that are not in it, by topic.
+# Metadata records: description of the recording; numbers of missing publications by topic.
 ABOUT = "robomesh"
 LOST = "robomesh.lost"
-# Endings: of a recording, and of one that is being written again.
+# Endings: of a recording, and of one that is being rewritten.
 SUFFIX = ".mcap"
 INDEXING = ".indexing"

@@ -2,12 +2,12 @@
 
 RecordingsError
 ├── CaptureError            a capture that cannot be written
-└── RecordingError          a file that is no recording, or a part of it that is not there
+└── RecordingError          a file that is not a recording, or lacks a requested part
 """
 
 
 class RecordingsError(Exception):
-    """Base of the errors of recordings; its text is one line for people."""
+    """Base of the errors of recordings; the text is one line for people."""
 
 
 class CaptureError(RecordingsError):
@@ -15,4 +15,4 @@ class CaptureError(RecordingsError):
 
 
 class RecordingError(RecordingsError):
-    """A file that is no recording, or a part of it that is not there."""
+    """A file that is not a recording, or lacks a requested part."""

@@ -1,4 +1,4 @@
-"""What is in a recording, told from the file itself."""
+"""Description of a recording from its file."""
 
 import contextlib
 from datetime import UTC, datetime
@@ -20,10 +20,10 @@ _CONTROLLER = "/controller"
 
 
 def describe_file(path: Path) -> schema.Recording:
-    """What a recording holds; a file whose writer was killed is read as far as it goes.
+    """Describe a recording; if its writer was killed, the part that can be read.
 
     Raises:
-        RecordingError: If it cannot be read at all.
+        RecordingError: If no part can be read.
     """
     try:
         found = path.stat()
@@ -35,22 +35,22 @@ def describe_file(path: Path) -> schema.Recording:
 
 
 def describe_unreadable(path: Path, *, robot: str, problem: str) -> schema.Recording:
-    """What a file's name tells, of one that cannot be read."""
+    """Describe a file that cannot be read, by its name."""
     name = path.stem.partition("Z_")[2] or path.stem
     return schema.Recording(
         robot=robot, name=name, file=path.name, start=_timestamp(_begun_ns(path)), problem=problem
     )
 
 
-# One that has been described costs a look at its folder's entry only, however many there are.
+# Listing many described recordings costs only a `stat` each.
 @lru_cache(maxsize=4096)
 def _described(path: Path, inode: int, size: int, mtime_ns: int) -> schema.Recording:
     if not size:
-        raise RecordingError(f"{path.name}: nothing was written: its disk was full, or its recorder killed")
+        raise RecordingError(f"{path.name} is empty: the disk was full, or the recorder was killed")
     layout = layout_of(path)
     about, lost = layout.metadata.get(ABOUT, {}), _lost(layout.metadata.get(LOST, {}))
     if not layout.whole and not about and not layout.counts:
-        raise RecordingError(f"{path}: no recording that can be read: it ends before its first message")
+        raise RecordingError(f"{path}: not a readable recording: it ends before its first message")
     recording = schema.Recording(
         site=about.get("site", ""),
         robot=about.get("robot", ""),
@@ -63,7 +63,7 @@ def _described(path: Path, inode: int, size: int, mtime_ns: int) -> schema.Recor
         start=_timestamp(layout.start_ns or _begun_ns(path)),
         duration=_duration(layout.end_ns - layout.start_ns),
         bytes=size,
-        problem="" if layout.whole else "its writer was killed: it reads up to there",
+        problem="" if layout.whole else "its recorder was killed: readable up to that point",
         attachments=sorted(layout.attachments),
     )
     state = _newest_state(path)
@@ -84,7 +84,7 @@ def _counts(layout: Layout) -> dict[str, int]:
 
 
 def _newest_state(path: Path) -> schema.ControllerState:
-    """The newest state of the controller, which tells the audit log's head."""
+    """Return the newest state of the controller, which contains the head of the audit log."""
     with RecordingFile(path) as file:
         topics = [topic for topic in file.topics if topic.endswith(_CONTROLLER)]
         try:
@@ -100,7 +100,7 @@ def _lost(record: dict[str, str]) -> dict[str, int]:
 
 
 def _begun_ns(path: Path) -> int:
-    """When a file was begun, which holds no message: its name tells it, or its time."""
+    """Return the start of a file without messages, from its name or its modification time."""
     with contextlib.suppress(ValueError):
         begun = datetime.strptime(path.name.partition("_")[0], "%Y-%m-%dT%H-%M-%S.%fZ").replace(tzinfo=UTC)
         return round(begun.timestamp() * 1e6) * 1000

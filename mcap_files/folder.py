@@ -1,4 +1,4 @@
-"""The recorder's folder: files by their names, and nothing outside it."""
+"""Access to files in the recorder's folder by name, and to no file outside it."""
 
 import re
 from pathlib import Path
@@ -10,14 +10,14 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.:+-]*")
 
 
 def find_file(folder: Path, name: str) -> Path:
-    """The file of that name, in the folder or in a robot's folder below it.
+    """Return the file with a name, in the folder or in a robot's folder below it.
 
     Raises:
-        RecordingError: If there is none, or the name could lead elsewhere.
+        RecordingError: If there is none, or the name could lead outside the folder.
     """
     if not _NAME.fullmatch(name) or not name.endswith(SUFFIX):
-        raise RecordingError(f"no recording {name!r}: a file's name is right, as recordings/list tells it")
+        raise RecordingError(f"no recording {name!r}: use a file name from recordings/list")
     for path in (folder / name, *sorted(folder.glob(f"*/{name}"))):
         if path.is_file() and path.resolve().is_relative_to(folder.resolve()):
             return path
-    raise RecordingError(f"no recording {name!r} here: recordings/list tells which there are")
+    raise RecordingError(f"no recording {name!r} here: use a file name from recordings/list")

@@ -1,4 +1,4 @@
-"""The indexed file that a recording becomes: 1 MiB zstd chunks, a message index, attachments, metadata."""
+"""Writer of an indexed recording: 1 MiB zstd chunks, a message index, attachments, metadata."""
 
 import zlib
 from collections import Counter
@@ -18,11 +18,11 @@ _CHUNK_BYTES = 1 << 20
 
 @dataclass
 class Copied:
-    """What was read, to be found again in what was written.
+    """Counts and checksums of the copied data, to verify the new file.
 
     Attributes:
-        cut: Sources that end in the middle of a record.
-        damaged: Chunks that could not be unpacked, and are left out.
+        cut: Number of sources that end in the middle of a record.
+        damaged: Number of omitted chunks, which could not be unpacked.
     """
 
     messages: Counter[int] = field(default_factory=Counter)
@@ -33,7 +33,7 @@ class Copied:
 
 
 class IndexedWriter:
-    """The new file: chunks, and what its end tells of them."""
+    """The new file: its chunks and its summary."""
 
     def __init__(self, stream: IO[bytes], about: Mapping[str, str]) -> None:
         self.copied = Copied()
@@ -54,15 +54,15 @@ class IndexedWriter:
         self._put(records.start())
 
     def topic(self, channel: int) -> str:
-        """The topic of a channel."""
+        """Return the topic of a channel."""
         return self._contents.channels[channel].topic
 
     def schema(self, found: Schema) -> int:
-        """The number of a schema here."""
+        """Return a schema's id in this file."""
         return self._schemas.setdefault((found.name, found.encoding, found.data), len(self._schemas) + 1)
 
     def channel(self, found: Channel, schema_id: int, schema: Schema | None) -> int:
-        """The number of a channel here."""
+        """Return a channel's id in this file."""
         key = (found.topic, found.message_encoding, schema_id)
         number = self._channels.get(key)
         if number is None:
@@ -81,9 +81,9 @@ class IndexedWriter:
         return number
 
     def message(self, channel: int, log_time: int, body: bytes) -> None:
-        """A message, its body with this file's channel in it."""
+        """Add a message with this file's channel id in its body."""
         if channel not in self._begun:
-            # Who reads it as a stream meets channel and schema before their first message.
+            # A stream reader needs the channel and its schema before their first message.
             self._begun.add(channel)
             found = self._contents.channels[channel]
             if found.schema_id:
@@ -99,14 +99,14 @@ class IndexedWriter:
             self._end_chunk()
 
     def attachment(self, found: Attachment) -> None:
-        """Something attached; of one name the first."""
+        """Add an attachment; ignores a second one with the same name."""
         if found.name not in self.copied.attachments:
             self.copied.attachments[found.name] = zlib.crc32(found.data)
             self._end_chunk()
             self._record(records.record_bytes(found))
 
     def metadata(self, found: Metadata) -> None:
-        """A metadata record; ours come at the end, put together."""
+        """Add a metadata record; our own records are merged and written at the end."""
         if found.name == ABOUT:
             self.about = self.about or dict(found.metadata)
         elif found.name == LOST:
@@ -116,7 +116,7 @@ class IndexedWriter:
             self._record(records.record_bytes(found))
 
     def finish(self) -> None:
-        """End the file."""
+        """Write the end of the file."""
         self._end_chunk()
         if self.about or self._more:
             self._record(records.record_bytes(Metadata(ABOUT, {**self.about, **self._more})))

@@ -1,7 +1,7 @@
-"""Where in a file its messages lie, learnt without reading them.
+"""Positions of the messages in a file, without decoding them.
 
-A finished file tells it in its summary. One that is still written, or whose writer was killed, is looked
-through once: its unchunked records count as blocks of about 1 MiB.
+A closed file has them in its summary. A file that is still being written, or whose writer was killed, is
+scanned once; its unchunked records are grouped into blocks of about 1 MiB.
 """
 
 import contextlib
@@ -33,20 +33,20 @@ from mcap_files.records import (
 _BLOCK_BYTES = 1 << 20
 _ATTACHMENT = struct.Struct("<QQ")
 _LENGTH = struct.Struct("<I")
-# What a chunk begins with: its times, then its unpacked size and checksum.
+# Head of a chunk: start and end time, unpacked size, checksum.
 _CHUNK = struct.Struct("<QQQI")
-# Files that may still grow, whose look through goes on from where it was.
+# Scans of growing files that are kept, to continue at their last position.
 _MOST_SCANS = 64
-# Before that place, compared: a file that was written anew is looked through anew.
+# Bytes before that position, compared to detect a file that was rewritten.
 _COMPARED_BYTES = 4096
 
 
 class Block(NamedTuple):
-    """Messages that lie together: a chunk, or a stretch of unchunked records.
+    """Consecutive messages: a chunk, or a range of unchunked records.
 
     Attributes:
-        channels: That it has messages of; None: nobody knows.
-        chunk: It is a chunk's record, to be unpacked.
+        channels: Channels with messages in the block; None: unknown.
+        chunk: The block is a chunk, which must be unpacked.
     """
 
     start_ns: int
@@ -58,7 +58,7 @@ class Block(NamedTuple):
 
 
 class Attached(NamedTuple):
-    """Something attached to a file, and where its bytes lie in it."""
+    """An attachment's type and the position of its bytes in the file."""
 
     media_type: str
     offset: int
@@ -67,11 +67,11 @@ class Attached(NamedTuple):
 
 @dataclass(frozen=True)
 class Layout:
-    """Where a file's messages lie, in order of time.
+    """Blocks and other contents of a file, blocks in order of time.
 
     Attributes:
-        counts: Messages of each channel.
-        whole: It was closed: it has a summary.
+        counts: Number of messages of each channel.
+        whole: The file was closed and has a summary.
     """
 
     channels: dict[int, Channel]
@@ -86,7 +86,7 @@ class Layout:
 
 
 def layout_of(path: Path) -> Layout:
-    """A file's layout, learnt once for each state that it was in.
+    """Return a file's layout; cached until the file changes.
 
     Raises:
         RecordingError: If it cannot be read.
@@ -102,7 +102,7 @@ def layout_of(path: Path) -> Layout:
 def _layout_of(path: Path, inode: int, size: int, mtime_ns: int) -> Layout:
     with path.open("rb") as stream:
         if stream.read(len(MAGIC)) != MAGIC:
-            raise RecordingError(f"{path.name}: no MCAP file: it does not begin as one")
+            raise RecordingError(f"{path.name}: not an MCAP file: its first bytes are wrong")
         try:
             stream.seek(0)
             reader = make_reader(stream)
@@ -111,18 +111,18 @@ def _layout_of(path: Path, inode: int, size: int, mtime_ns: int) -> Layout:
                 metadata = {record.name: dict(record.metadata) for record in reader.iter_metadata()}
                 return _indexed(summary, metadata, size)
         except DAMAGE:
-            pass  # its end is missing or damaged; what comes before may be whole
+            pass  # the end is missing or damaged, but the rest may be readable
         try:
             return _scans.layout(path, inode, stream, whole=_ends_whole(path, size))
         except DAMAGE as error:
-            raise RecordingError(f"{path.name}: no recording that can be read: {error}") from None
+            raise RecordingError(f"{path.name}: not a readable recording: {error}") from None
 
 
 def _indexed(summary: Summary, metadata: dict[str, dict[str, str]], size: int) -> Layout:
-    """What a summary tells, which anybody may have written.
+    """Return the layout in a file's summary, which another program may have written.
 
     Raises:
-        ValueError: If it cannot be so.
+        ValueError: If the summary is inconsistent.
     """
     assert summary.statistics is not None
     blocks = [_block_of(chunk, size) for chunk in summary.chunk_indexes]
@@ -130,7 +130,7 @@ def _indexed(summary: Summary, metadata: dict[str, dict[str, str]], size: int) -
     for each in summary.attachment_indexes:
         begin = each.offset + each.length - 4 - each.data_size
         if not 0 <= begin <= size - each.data_size:
-            raise ValueError(f"attachment {each.name!r} is told to lie outside the file")
+            raise ValueError(f"the position of attachment {each.name!r} is outside the file")
         attachments[each.name] = Attached(each.media_type, begin, each.data_size)
     return Layout(
         channels=summary.channels,
@@ -148,11 +148,11 @@ def _indexed(summary: Summary, metadata: dict[str, dict[str, str]], size: int) -
 def _block_of(chunk: ChunkIndex, size: int) -> Block:
     if chunk.uncompressed_size > MOST_RECORD_BYTES or chunk.chunk_length > MOST_RECORD_BYTES:
         raise RecordingError(
-            f"a chunk of {max(chunk.uncompressed_size, chunk.chunk_length) >> 20} MiB: "
-            f"{MOST_RECORD_BYTES >> 20} MiB at most"
+            f"a chunk has {max(chunk.uncompressed_size, chunk.chunk_length) >> 20} MiB: "
+            f"the limit is {MOST_RECORD_BYTES >> 20} MiB"
         )
     if chunk.chunk_start_offset + chunk.chunk_length > size:
-        raise ValueError("a chunk is told to lie outside the file")
+        raise ValueError("the position of a chunk is outside the file")
     return Block(
         chunk.message_start_time,
         chunk.message_end_time,
@@ -170,7 +170,7 @@ def _ends_whole(path: Path, size: int) -> bool:
 
 
 class _Scan:
-    """What a look through a file has found so far."""
+    """The scan of a file so far."""
 
     def __init__(self) -> None:
         self.channels: dict[int, Channel] = {}
@@ -179,24 +179,24 @@ class _Scan:
         self.blocks: list[Block] = []
         self.attachments: dict[str, Attached] = {}
         self.metadata: dict[str, dict[str, str]] = {}
-        # The stretch of unchunked messages that grows.
+        # The current block of unchunked messages.
         self.begin = self.end = 0
         self.start_ns, self.end_ns = 0, 0
         self.seen: set[int] = set()
-        # Up to which it has been looked through, and what lies before that.
+        # Position up to which the file is scanned, and the bytes before it.
         self.offset = len(MAGIC)
         self.before = b""
 
     def knows(self, stream: IO[bytes]) -> bool:
-        """Whether the file is the one that was looked through, perhaps grown."""
+        """Return whether the file is the scanned one, possibly with appended data."""
         stream.seek(self.offset - len(self.before))
         return stream.read(len(self.before)) == self.before
 
     def go_on(self, stream: IO[bytes]) -> None:
-        """Look through what has come since.
+        """Scan the data appended since the last call.
 
         Raises:
-            DAMAGE: One of these, at what cannot be read.
+            DAMAGE: One of these, if a record cannot be read.
         """
         stream.seek(self.offset)
         _scan(stream, self)
@@ -219,7 +219,7 @@ class _Scan:
         self.seen = set()
 
     def layout(self, *, whole: bool) -> Layout:
-        """What has been found so far."""
+        """Return the layout of the scanned part."""
         blocks = tuple(sorted((*self.blocks, *self._open_block()), key=lambda block: block[:4]))
         return Layout(
             channels=dict(self.channels),
@@ -241,21 +241,21 @@ class _Scan:
 
 
 class _Scans:
-    """Looks through files that may still grow: each goes on from where it was."""
+    """Scans of growing files, each of which continues at its last position."""
 
     def __init__(self) -> None:
         self._scans: OrderedDict[tuple[Path, int], _Scan] = OrderedDict()
         self._lock = threading.Lock()
 
     def layout(self, path: Path, inode: int, stream: IO[bytes], *, whole: bool) -> Layout:
-        """The layout of a file as it is now.
+        """Return the current layout of a file.
 
         Raises:
-            DAMAGE: One of these, at what cannot be read.
+            DAMAGE: One of these, if a record cannot be read.
         """
         key = path, inode
         with self._lock:
-            scan = self._scans.pop(key, None) or _Scan()  # this thread's alone until it is put back
+            scan = self._scans.pop(key, None) or _Scan()  # no other thread uses it until it is put back
         if not scan.knows(stream):
             scan = _Scan()
         scan.go_on(stream)
@@ -286,10 +286,10 @@ def _scan(stream: IO[bytes], scan: _Scan) -> None:
             missing = size - (len(buffer) - at)
             if missing > 0:
                 if missing > MOST_RECORD_BYTES:
-                    break  # no length that a record has: the bytes are damaged from here on
+                    break  # an invalid length: the file is damaged from here on
                 buffer, at = buffer[at:] + stream.read(max(missing, _BLOCK_BYTES)), 0
                 if len(buffer) < size:
-                    break  # what was being written when the writer was killed
+                    break  # an incomplete record, because the writer was killed
         if opcode == Opcode.MESSAGE:
             channel, _, log_time, _ = MESSAGE.unpack_from(buffer, at + RECORD.size)
             scan.message(offset, size, channel, log_time)
@@ -301,7 +301,7 @@ def _scan(stream: IO[bytes], scan: _Scan) -> None:
 
 
 def _note(scan: _Scan, opcode: int, offset: int, content: bytes) -> None:
-    """Take in a record that is no message."""
+    """Add a record that is not a message."""
     stream = stream_of(content)
     if opcode == Opcode.SCHEMA:
         schema = Schema.read(stream)
@@ -313,11 +313,11 @@ def _note(scan: _Scan, opcode: int, offset: int, content: bytes) -> None:
         metadata = Metadata.read(stream)
         scan.metadata[metadata.name] = dict(metadata.metadata)
     elif opcode == Opcode.CHUNK:
-        # A block of its own: what unchunked messages come before it may not be told from it.
+        # A chunk is one block, so end the block of unchunked messages before it.
         scan.close_block()
         start_ns, end_ns, *_ = _CHUNK.unpack_from(content)
         scan.blocks.append(Block(start_ns, end_ns, offset, RECORD.size + len(content), None, chunk=True))
-        with contextlib.suppress(*DAMAGE):  # who reads it is told; the others still read
+        with contextlib.suppress(*DAMAGE):  # reading this chunk fails later; other chunks stay readable
             for inner, body in walk_chunk(unpack_chunk(content)):
                 if inner == Opcode.MESSAGE:
                     scan.counts[MESSAGE.unpack_from(body)[0]] += 1

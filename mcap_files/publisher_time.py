@@ -1,52 +1,52 @@
 """Publishers' times on a recording's time axis.
 
-A message has the time when it was received, on the recorder's clock, and when it was so, on its publisher's.
-Which of both clocks is right cannot be known, but on one machine, or where clocks are kept, they agree. Where
-they do not, the publisher's times keep their spacing and begin at the first receipt.
+A message has a receive time on the recorder's clock and a source time on its publisher's clock. Nothing shows
+which clock is right, but on one machine, or with synchronised clocks, they agree. If they do not agree, the
+source times keep their spacing and begin at the first receive time.
 """
 
 from typing import Protocol
 
-# Nothing waits longer on its way: a connection that carries nothing for 2 s is given up.
+# No message takes longer: a connection without traffic for 2 s is closed.
 _MOST_APART_NS = 10_000_000_000
 
 
 class Recorded(Protocol):
-    """When a recorded message was so, and its number."""
+    """Times and sequence number of a recorded message."""
 
     @property
     def topic(self) -> str:
-        """The channel's topic."""
+        """Topic of the channel."""
         ...
 
     @property
     def received_ns(self) -> int:
-        """When the recorder received it, by its clock, ns since the Unix epoch."""
+        """Receive time on the recorder's clock, ns since the Unix epoch."""
         ...
 
     @property
     def source_ns(self) -> int:
-        """When it was so, by its publisher's clock, ns since the Unix epoch."""
+        """Source time on the publisher's clock, ns since the Unix epoch."""
         ...
 
     @property
     def sequence(self) -> int:
-        """Its publisher's number of it."""
+        """Sequence number of the publisher."""
         ...
 
 
 class PublisherTimes:
-    """Times of messages by their publishers' clocks; to be asked in the order of their receipt."""
+    """Source times of messages on the time axis; call `of` in the order of the receive times."""
 
     def __init__(self) -> None:
         self._apart_ns: dict[str, int] = {}
         self._newest_ns: dict[str, int] = {}
 
     def of(self, message: Recorded) -> int:
-        """Return when a message was so, on the recording's time axis [ns since the Unix epoch].
+        """Return a message's source time on the recording's time axis [ns since the Unix epoch].
 
-        What is told again with an old time (a picture of a robot that is silent) has the time of its receipt,
-        and so has what its publisher does not date.
+        Returns the receive time if the source time is missing or not newer than the last one (a repeated
+        picture of a silent robot).
         """
         topic, source_ns = message.topic, message.source_ns
         lag_ns = message.received_ns - source_ns

@@ -1,4 +1,4 @@
-"""Messages of a file by topic and time, only what is asked for."""
+"""Reading of a file's messages by topic and time, without reading the rest."""
 
 import heapq
 import os
@@ -16,17 +16,18 @@ from mcap_files.layout import Attached, Block, layout_of
 from mcap_files.records import DAMAGE, MESSAGE, RECORD, unpack_chunk
 
 FOREVER_NS = (1 << 64) - 1
-# What waits because its chunk overlaps with the next; beyond it a file's order is taken as it is.
+# Messages that wait for sorting because their chunk overlaps the next one; above this limit the file's order
+# counts.
 _MOST_WAITING_BYTES = 64 << 20
 
 
 class RecordedMessage(NamedTuple):
-    """A message of a file; sorts by its time.
+    """A recorded message; sorts by its receive time.
 
     Attributes:
-        received_ns: Recorder's clock, ns since the Unix epoch.
-        place: In the file, so that none is equal to another.
-        source_ns: Publisher's clock.
+        received_ns: On the recorder's clock, ns since the Unix epoch.
+        place: Position in the file, which makes the order unique.
+        source_ns: On the publisher's clock, ns since the Unix epoch.
     """
 
     received_ns: int
@@ -60,7 +61,7 @@ class RecordingFile:
         self.close()
 
     def close(self) -> None:
-        """Read no more."""
+        """Close the file."""
         self._stream.close()
 
     @cached_property
@@ -69,23 +70,23 @@ class RecordingFile:
 
     @cached_property
     def topics(self) -> dict[str, frozenset[int]]:
-        """The channels of each topic, by their numbers."""
+        """The channel ids of each topic."""
         found: dict[str, frozenset[int]] = {}
         for number, channel in self.layout.channels.items():
             found[channel.topic] = found.get(channel.topic, frozenset()) | {number}
         return found
 
     def schema_name(self, topic: str) -> str:
-        """Full name of what a topic's messages are: "foxglove.JointStates"; empty: they have none.
+        """Return the full name of a topic's schema: "foxglove.JointStates"; empty: no schema.
 
         Raises:
-            RecordingError: If there is no such topic.
+            RecordingError: If the topic is missing.
         """
         schema = self.layout.schemas.get(self.layout.channels[min(self._channels(topic))].schema_id)
         return schema.name if schema is not None else ""
 
     def decoder(self, topic: str) -> Callable[[bytes], Any] | None:
-        """What makes messages of a topic's bytes; None: they are not protobuf."""
+        """Return the function that decodes a topic's messages; None: they are not protobuf."""
         channel = self.layout.channels[min(self._channels(topic))]
         schema = self.layout.schemas.get(channel.schema_id)
         if schema is None:
@@ -102,10 +103,10 @@ class RecordingFile:
         start_ns: int = 0,
         end_ns: int = FOREVER_NS,
     ) -> Iterator[RecordedMessage]:
-        """Messages by their time, `start_ns` included and `end_ns` not.
+        """Yield messages by their receive time, from `start_ns` up to but excluding `end_ns`.
 
         Raises:
-            RecordingError: If there is no such topic, or the file is damaged there.
+            RecordingError: If the topic is missing, or the file is damaged there.
         """
         wanted = None if topics is None else frozenset().union(*map(self._channels, topics))
         waiting: list[RecordedMessage] = []
@@ -127,13 +128,13 @@ class RecordingFile:
     def newest(
         self, topic: str, at_ns: int, accept: Callable[[bytes], bool] = lambda data: True
     ) -> RecordedMessage | None:
-        """The newest message of a topic that was received until `at_ns`; None: there is none.
+        """Return the newest message of a topic that was received until `at_ns`; None: there is none.
 
         Args:
-            accept: Told its bytes: whether it counts.
+            accept: Returns whether a message with these bytes counts.
 
         Raises:
-            RecordingError: If there is no such topic, or the file is damaged there.
+            RecordingError: If the topic is missing, or the file is damaged there.
         """
         wanted = self._channels(topic)
         best: RecordedMessage | None = None
@@ -151,10 +152,10 @@ class RecordingFile:
         return best
 
     def last(self, topic: str, at_ns: int, count: int) -> list[RecordedMessage]:
-        """The newest so many messages of a topic that were received until `at_ns`, oldest first.
+        """Return the newest `count` messages of a topic that were received until `at_ns`, oldest first.
 
         Raises:
-            RecordingError: If there is no such topic, or the file is damaged there.
+            RecordingError: If the topic is missing, or the file is damaged there.
         """
         wanted = self._channels(topic)
         found: list[RecordedMessage] = []
@@ -166,10 +167,10 @@ class RecordingFile:
         return found
 
     def state_at(self, topics: Collection[str], at_ns: int) -> dict[str, RecordedMessage]:
-        """The newest message of each topic that was received until `at_ns`, where there is one.
+        """Return the newest message of each topic that was received until `at_ns`, if there is one.
 
         Raises:
-            RecordingError: If there is no such topic, or the file is damaged there.
+            RecordingError: If the topic is missing, or the file is damaged there.
         """
         channels = {topic: self._channels(topic) for topic in topics}
         newest: dict[str, RecordedMessage] = {}
@@ -190,10 +191,10 @@ class RecordingFile:
         return newest
 
     def attached(self, name: str) -> Attached:
-        """Where something attached lies.
+        """Return the position of an attachment.
 
         Raises:
-            RecordingError: If nothing of that name is.
+            RecordingError: If there is no attachment with that name.
         """
         try:
             return self.layout.attachments[name]
@@ -202,10 +203,10 @@ class RecordingFile:
             raise RecordingError(f"{self.path.name}: no attachment {name!r}; it has {there}") from None
 
     def attachment(self, name: str) -> bytes:
-        """The bytes of something attached.
+        """Return the bytes of an attachment.
 
         Raises:
-            RecordingError: If nothing of that name is.
+            RecordingError: If there is no attachment with that name.
         """
         found = self.attached(name)
         return self._bytes(found.offset, found.length)
@@ -238,7 +239,7 @@ class RecordingFile:
             while at + RECORD.size <= end:
                 opcode, length = RECORD.unpack_from(data, at)
                 if not opcode:
-                    raise ValueError("no record")
+                    raise ValueError("an invalid record")
                 at += RECORD.size
                 if opcode == Opcode.MESSAGE:
                     channel, sequence, received_ns, source_ns = MESSAGE.unpack_from(data, at)
@@ -256,7 +257,7 @@ class RecordingFile:
             raise RecordingError(f"{self.path.name}: damaged near byte {block.offset + at}") from None
 
     def _records(self, block: Block) -> bytes:
-        """A block's records, unpacked; the last one is kept, for most who ask go on where they were."""
+        """Return a block's unpacked records; caches the last block, where most callers read on."""
         if self._unpacked is not None and self._unpacked[0] == block:
             return self._unpacked[1]
         data = self._bytes(block.offset, block.length)

@@ -1,7 +1,7 @@
-"""Records of an MCAP file as bytes: written, walked, and what the end of a file tells of them.
+"""Records of an MCAP file as bytes: packing, iteration, and the summary at the end of a file.
 
-The library's writer takes 4 us a message and holds one file; records here are packed in under 1 us and
-copied from file to file as they are.
+The library's writer takes 4 us for each message; this module packs one in less than 1 us and copies records
+between files unchanged.
 """
 
 import struct
@@ -40,20 +40,20 @@ RECORD = struct.Struct("<BQ")
 MESSAGE = struct.Struct("<HIQQ")
 _WHOLE_MESSAGE = struct.Struct("<BQHIQQ")
 _FOOTER = struct.Struct("<BQQQ")
-# Longer ones are damage, not data: nobody attaches this much, and no chunk of ours is larger.
+# A longer record is damaged: attachments and our chunks are smaller.
 MOST_RECORD_BYTES = 256 << 20
 _READ_BYTES = 1 << 20
-# What the library raises, besides its own errors, where a file was cut or its bytes were changed.
+# Exceptions of the library for a truncated or modified file.
 DAMAGE = (McapError, EOFError, struct.error, ValueError, KeyError, IndexError, OverflowError, MemoryError)
 
 
 def start() -> bytes:
-    """What a file of ours begins with."""
+    """Return the first bytes of a file."""
     return MAGIC + record_bytes(Header(profile="", library="robomesh"))
 
 
 def record_bytes(record: McapRecord) -> bytes:
-    """A record of the library's, as bytes."""
+    """Return the bytes of a record."""
     builder = RecordBuilder()
     record.write(builder)
     data: bytes = builder.end()
@@ -61,9 +61,9 @@ def record_bytes(record: McapRecord) -> bytes:
 
 
 def message_head(channel: int, sequence: int, log_time: int, publish_time: int, size: int) -> bytes:
-    """What stands before a message's payload of `size` bytes; times in ns since the Unix epoch.
+    """Return the head of a message with `size` bytes of payload; times in ns since the Unix epoch.
 
-    The format has no time before that: a clock that says so is recorded as saying 0.
+    The format has no earlier times: a negative publish time becomes 0.
     """
     return _WHOLE_MESSAGE.pack(
         Opcode.MESSAGE,
@@ -76,22 +76,22 @@ def message_head(channel: int, sequence: int, log_time: int, publish_time: int, 
 
 
 def stream_of(body: bytes) -> ReadDataStream:
-    """A record's body, for the library to read."""
+    """Return a record's body as a stream for the library."""
     return ReadDataStream(BytesIO(body))
 
 
 def number_in(text: str) -> int:
-    """The number in a metadata record, which anybody may have written; 0: none."""
+    """Return the number in a metadata record, which another program may have written; 0 if it is invalid."""
     return int(text) if text.isdecimal() and len(text) < 10 else 0
 
 
 def walk(stream: IO[bytes]) -> Iterator[tuple[int, bytes, int]]:
-    """Opcode, body and end [bytes from the file's beginning] of every whole record, DATA_END the last.
+    """Yield opcode, body and end [bytes from the file's beginning] of every complete record up to DATA_END.
 
-    Ends without DATA_END where the file was cut, or damaged so that no length can be trusted.
+    Stops before DATA_END if the file is truncated, or a record's length is invalid.
     """
     if stream.read(len(MAGIC)) != MAGIC:
-        raise ValueError("no MCAP file: it does not begin as one")
+        raise ValueError("not an MCAP file: its first bytes are wrong")
     buffer, at, end = b"", 0, len(MAGIC)
     while True:
         if len(buffer) - at < RECORD.size:
@@ -115,23 +115,23 @@ def walk(stream: IO[bytes]) -> Iterator[tuple[int, bytes, int]]:
 
 
 def unpack_chunk(body: bytes) -> bytes:
-    """The records in a chunk's body; never more memory than it tells, nor than a record may have.
+    """Return the unpacked records of a chunk's body; uses no more memory than its declared, limited size.
 
     Raises:
-        DAMAGE: One of these, if it cannot be unpacked, or is not what it tells.
+        DAMAGE: One of these, if it cannot be unpacked, or its size or checksum is wrong.
     """
     chunk = Chunk.read(stream_of(body))
     size = chunk.uncompressed_size
     if size > MOST_RECORD_BYTES:
-        raise ValueError(f"a chunk of {size >> 20} MiB: {MOST_RECORD_BYTES >> 20} MiB at most")
+        raise ValueError(f"a chunk has {size >> 20} MiB: the limit is {MOST_RECORD_BYTES >> 20} MiB")
     try:
         data = _unpacked(chunk.compression, chunk.data, size + 1)
     except (zstandard.ZstdError, RuntimeError) as error:
-        raise ValueError(f"a chunk that cannot be unpacked: {error}") from None
+        raise ValueError(f"a chunk cannot be unpacked: {error}") from None
     if len(data) != size:
-        raise ValueError(f"a chunk that is not of the {size} bytes it tells")
+        raise ValueError(f"a chunk does not have its declared size of {size} bytes")
     if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
-        raise ValueError("a chunk whose checksum is not that of its bytes")
+        raise ValueError("a chunk has a wrong checksum")
     return data
 
 
@@ -140,33 +140,33 @@ def _unpacked(compression: str, data: bytes, most: int) -> bytes:
         case "":
             return data
         case "zstd":
-            # What the frame tells of itself, and not the record, decides how much the library takes at once.
+            # A stream reader limits the memory; otherwise the size in the zstd frame would decide.
             return zstandard.ZstdDecompressor().stream_reader(data).read(most)
         case "lz4":
             unpacked: bytes = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=most)
             return unpacked
-    raise ValueError(f"a chunk packed as {compression!r}: zstd and lz4 are known")
+    raise ValueError(f"a chunk has the unknown compression {compression!r}: zstd and lz4 are supported")
 
 
 def walk_chunk(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Opcode and body of every record in an unpacked chunk.
+    """Yield opcode and body of every record in an unpacked chunk.
 
     Raises:
-        DAMAGE: One of these, at what is no record.
+        DAMAGE: One of these, at an invalid record.
     """
     at = 0
     while at < len(data):
         opcode, length = RECORD.unpack_from(data, at)
         at += RECORD.size
         if not opcode or length > len(data) - at:
-            raise ValueError("a chunk with a record that is none")
+            raise ValueError("a chunk contains an invalid record")
         yield opcode, data[at : at + length]
         at += length
 
 
 @dataclass
 class Contents:
-    """What the end of a file tells of it. Offsets in bytes from the file's beginning."""
+    """Contents of a file for its summary. Offsets in bytes from the file's beginning."""
 
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
@@ -178,7 +178,7 @@ class Contents:
     chunks: list[ChunkIndex] = field(default_factory=list)
 
     def note_message(self, channel: int, log_time: int) -> None:
-        """One message more."""
+        """Count a message."""
         if not self.start_ns or log_time < self.start_ns:
             self.start_ns = log_time
         if log_time > self.end_ns:
@@ -186,7 +186,7 @@ class Contents:
         self.counts[channel] += 1
 
     def note(self, opcode: int, body: bytes, offset: int) -> None:
-        """A record that begins at `offset`.
+        """Add a record that begins at `offset`.
 
         Raises:
             DAMAGE: One of these, if it cannot be read.
@@ -220,7 +220,7 @@ class Contents:
                 )
 
     def end(self, offset: int) -> bytes:
-        """The end of a file whose records end at `offset`: DATA_END, summary, footer."""
+        """Return the bytes after the records, which end at `offset`: DATA_END, summary, footer."""
         head = record_bytes(DataEnd(0))
         begin = offset + len(head)
         summary = b""

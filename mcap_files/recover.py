@@ -1,4 +1,4 @@
-"""Recordings whose writer was killed, or whose disk was full, made whole."""
+"""Recovery of recordings after a killed writer or a full disk."""
 
 import contextlib
 import itertools
@@ -21,21 +21,21 @@ from mcap_files.reindex import rewrite
 
 
 class State(Enum):
-    """How far a file came."""
+    """State of a file."""
 
-    OPEN = auto()  # somebody writes it now
+    OPEN = auto()  # being written
     UNFINISHED = auto()  # its writer was killed
-    CLOSED = auto()  # whole, but without an index of its messages
+    CLOSED = auto()  # complete, but without an index of its messages
     INDEXED = auto()
 
 
 @dataclass(frozen=True)
 class Recovered:
-    """What a recovery found.
+    """Result of a recovery.
 
     Attributes:
-        cut: The file ended in the middle of a record, or without an end.
-        damaged: Chunks that could not be unpacked, and are left out.
+        cut: The file ended in the middle of a record, or without a summary.
+        damaged: Number of omitted chunks, which could not be unpacked.
     """
 
     messages: int
@@ -44,10 +44,10 @@ class Recovered:
 
 
 def state_of(path: Path) -> State:
-    """How far a file came.
+    """Return the state of a file.
 
     Raises:
-        CaptureError: If it is no MCAP file, or cannot be read.
+        CaptureError: If it is not an MCAP file, or cannot be read.
     """
     try:
         if is_being_written(path):
@@ -55,7 +55,7 @@ def state_of(path: Path) -> State:
         with path.open("rb") as stream:
             begin = stream.read(len(records.MAGIC))
             if begin != records.MAGIC[: len(begin)]:
-                raise CaptureError(f"{path.name}: no MCAP file: it does not begin as one")
+                raise CaptureError(f"{path.name}: not an MCAP file: its first bytes are wrong")
             stream.seek(0)
             try:
                 summary = make_reader(stream).get_summary()
@@ -69,7 +69,7 @@ def state_of(path: Path) -> State:
 
 
 def is_ours(path: Path) -> bool:
-    """Whether a recorder of ours wrote it: a stranger's file is not written again without being asked to.
+    """Return whether our recorder wrote the file; files of other programs are rewritten only on request.
 
     Raises:
         OSError: If it cannot be read.
@@ -82,28 +82,28 @@ def is_ours(path: Path) -> bool:
 
 
 def recover(path: Path, progress: Callable[[float], None] = lambda _: None) -> Recovered:
-    """Make a file whole, with an index; the original is kept until the new one is checked.
+    """Rewrite a file completely, with an index; keep the original until the new file is verified.
 
     Raises:
-        CaptureError: If there is nothing to recover, or the new one would not hold the same.
+        CaptureError: If there is nothing to recover, or the new file would differ.
         OSError: If the disk refuses.
     """
     if path.stat().st_size < len(records.MAGIC):
-        raise CaptureError(f"{path.name}: nothing to recover: its writer was killed before it wrote anything")
+        raise CaptureError(f"{path.name}: nothing to recover: its recorder was killed before the first write")
     unfinished = state_of(path) is State.UNFINISHED
     about = {"recovered": "yes"} if unfinished else None
     copied = rewrite([path], path, about=about, progress=progress)
     return Recovered(copied.messages.total(), copied.cut > 0, copied.damaged)
 
 
-def mend(path: Path, missed: Mapping[str, int] = MappingProxyType({})) -> None:
-    """Give an unfinished file an end where it is: for a full disk, where it cannot be written again.
+def close_in_place(path: Path, missed: Mapping[str, int] = MappingProxyType({})) -> None:
+    """Append the end of an unfinished file in place, for a full disk without space for a rewritten file.
 
     Args:
-        missed: Publications that are not in it, by topic.
+        missed: Number of publications that are not in the file, by topic.
 
     Raises:
-        OSError: If there is no room for that either.
+        OSError: If the disk has no space for the end either.
     """
     contents, end = records.Contents(), 0
     with path.open("rb") as stream:

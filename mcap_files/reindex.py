@@ -1,8 +1,8 @@
-"""A closed recording, or several in a row, written again: 1 MiB zstd chunks, an index, checked, renamed.
+"""Rewriting of one or several consecutive closed recordings: 1 MiB zstd chunks, an index, verified, renamed.
 
-`python -m mcap_files.reindex` is a process of its own beside a recorder, which never waits for it. It takes
-jobs, `{"target": "...", "sources": ["..."], "about": {...}}` a line, tells how far it is, a number from 0
-to 1 a line, and then `done` or `failed` and why.
+`python -m mcap_files.reindex` is a separate process, so that the recorder never waits for it. It reads jobs,
+`{"target": "...", "sources": ["..."], "about": {...}}` on a line; it prints its progress, a number from 0 to
+1 on a line, and then `done` or `failed` with the reason.
 """
 
 import contextlib
@@ -28,16 +28,16 @@ from mcap_files.errors import CaptureError
 from mcap_files.indexed_writer import Copied, IndexedWriter
 
 _STEP_BYTES = 8 << 20
-# What a kill or a power cut leaves unreadable at a file's end; more is damage.
+# Longest unreadable end of a file after a kill or a power cut; a longer one is damage.
 _MOST_TAIL_BYTES = 4 << 20
 Progress = Callable[[float], None]
 
 
 def index(path: Path, progress: Progress = lambda _: None) -> None:
-    """Write a closed file again, quick to read; it stays as it is when anything differs.
+    """Rewrite a closed file with an index; keep the original if the new file differs.
 
     Raises:
-        CaptureError: If the new one is not the same.
+        CaptureError: If the new file differs.
         OSError: If the disk refuses.
     """
     rewrite([path], path, progress=progress)
@@ -50,37 +50,37 @@ def rewrite(
     about: Mapping[str, str] | None = None,
     progress: Progress = lambda _: None,
 ) -> Copied:
-    """Write what sources hold into one file, check it, and only then give it the target's name.
+    """Copy the sources into one new file, verify it, and then rename it to the target.
 
-    A target that is one of the sources stays as it was until then.
+    The target may be one of the sources; it stays unchanged until the rename.
 
     Args:
-        about: What the metadata `robomesh` says more, or otherwise, than that of the first source.
+        about: Additions and changes to the first source's metadata `robomesh`.
 
     Raises:
-        CaptureError: If the new one does not hold what the sources do, none of them is a recording, or one
-            is damaged otherwise than by its writer's end or within a chunk, or still being written.
+        CaptureError: If the new file differs from the sources, no source is a recording, or one is still
+            being written, or is damaged other than at its end or within a chunk.
         OSError: If the disk refuses.
     """
     for source in sources:
         if is_being_written(source):
-            raise CaptureError(f"{source.name}: it is being recorded now: end that first")
+            raise CaptureError(f"{source.name} is being recorded: end the recording first")
     new = target.with_suffix(INDEXING)
     total = sum(source.stat().st_size for source in sources) or 1
     done = 0
 
-    def tell(size: int) -> None:
+    def report(size: int) -> None:
         nonlocal done
         done += size
-        progress(min(done / total, 1.0) * 0.8)  # the rest is the check
+        progress(min(done / total, 1.0) * 0.8)  # the rest is for the verification
 
     try:
         with new.open("wb") as stream:
             writer = IndexedWriter(stream, about or {})
             for source in sources:
-                _copy(source, writer, tell)
+                _copy(source, writer, report)
             if not writer.copied.messages and not writer.about:
-                raise CaptureError(f"{sources[0].name}: no recording that can be read")
+                raise CaptureError(f"{sources[0].name}: not a readable recording")
             writer.finish()
             stream.flush()
             os.fsync(stream.fileno())
@@ -99,15 +99,15 @@ def rewrite(
 
 
 class _Source:
-    """A file that is copied: its numbers of schemas and channels become the new file's."""
+    """A file being copied: maps its ids of schemas and channels to those of the new file."""
 
     def __init__(self, writer: IndexedWriter) -> None:
         self._writer = writer
         self._schemas: dict[int, tuple[int, Schema]] = {}
         self._channels: dict[int, int] = {}
         self._gaps = _Gaps()
-        self._told_lost = False
-        # Messages by this file's channels, those left out too.
+        self._has_lost = False
+        # Messages by this file's channels, including omitted ones.
         self.counts: Counter[int] = Counter()
 
     def take(self, opcode: int, body: bytes) -> None:
@@ -126,7 +126,7 @@ class _Source:
                 self._writer.attachment(Attachment.read(records.stream_of(body)))
             case Opcode.METADATA:
                 metadata = Metadata.read(records.stream_of(body))
-                self._told_lost = self._told_lost or metadata.name == LOST
+                self._has_lost = self._has_lost or metadata.name == LOST
                 self._writer.metadata(metadata)
             case Opcode.CHUNK:
                 try:
@@ -138,19 +138,19 @@ class _Source:
                     self.take(*each)
 
     def end(self) -> None:
-        """A writer that was killed could not tell what it had missed: the numbers do."""
-        if not self._told_lost and self._writer.about:
+        """Count the missing publications by their numbers if the writer was killed before it wrote them."""
+        if not self._has_lost and self._writer.about:
             self._writer.lost.update(self._gaps.by_topic(self._writer.topic))
 
     def _message(self, body: bytes) -> None:
         channel, sequence, log_time, publish_time = records.MESSAGE.unpack_from(body)
         if channel not in self._channels:
-            raise ValueError(f"what its channel {channel} is, is not there")
+            raise ValueError(f"its channel {channel} has no record")
         number = self._channels[channel]
         self.counts[channel] += 1
         mark = (sequence, publish_time)
         if number not in self._gaps.last and self._writer.newest.get(number) == mark:
-            return  # what a robot is stands at the beginning of each source
+            return  # each source repeats the description at its beginning
         self._gaps.take(number, *mark)
         self._writer.newest[number] = mark
         if number != channel:
@@ -159,7 +159,7 @@ class _Source:
 
 
 class _Gaps:
-    """Publications that are missing between those that are there, by channel."""
+    """Gaps in the publications' numbers, by channel."""
 
     def __init__(self) -> None:
         self.last: dict[int, tuple[int, int]] = {}
@@ -168,7 +168,7 @@ class _Gaps:
     def take(self, channel: int, sequence: int, publish_time: int) -> None:
         before, when = self.last.get(channel, (sequence - 1, 0))
         if sequence <= before and publish_time <= when:
-            self._missing[channel] -= 1  # it came late
+            self._missing[channel] -= 1  # it arrived late
             return
         if sequence > before:
             self._missing[channel] += sequence - before - 1
@@ -178,41 +178,43 @@ class _Gaps:
         return {topic(channel): number for channel, number in self._missing.items() if number > 0}
 
 
-def _copy(path: Path, writer: IndexedWriter, tell: Callable[[int], None]) -> None:
+def _copy(path: Path, writer: IndexedWriter, report: Callable[[int], None]) -> None:
     """Copy a source.
 
     Raises:
-        CaptureError: If more of it would be missing than what its writer's end cut off, or a damaged chunk.
+        CaptureError: If it is damaged other than at its end or within a chunk.
     """
-    source, last_told, end, whole = _Source(writer), 0, 0, False
+    source, reported, end, whole = _Source(writer), 0, 0, False
     size = path.stat().st_size
     with path.open("rb") as stream:
-        told = _told(stream)
+        statistics = _statistics(stream)
         stream.seek(0)
         try:
             for opcode, body, after in records.walk(stream) if size >= len(records.MAGIC) else ():
                 whole = opcode == Opcode.DATA_END
                 source.take(opcode, body)
                 end = after
-                if end - last_told >= _STEP_BYTES:
-                    tell(end - last_told)
-                    last_told = end
+                if end - reported >= _STEP_BYTES:
+                    report(end - reported)
+                    reported = end
         except records.DAMAGE as error:
-            words = f"damaged near byte {end}" if end else "no recording that can be read"
+            words = f"damaged near byte {end}" if end else "not a readable recording"
             raise CaptureError(f"{path.name}: {words}: {error}") from None
         if not whole and not _is_tail(stream, end, size):
             raise CaptureError(f"{path.name}: damaged near byte {end}, {size - end} bytes before its end")
-    if told is not None and (not whole or dict(source.counts) != dict(told.channel_message_counts)):
+    if statistics is not None and (
+        not whole or dict(source.counts) != dict(statistics.channel_message_counts)
+    ):
         raise CaptureError(
-            f"{path.name}: {source.counts.total()} of the {told.message_count} messages it tells can be read"
+            f"{path.name}: only {source.counts.total()} of {statistics.message_count} messages can be read"
         )
     source.end()
     writer.copied.cut += not whole
-    tell(size - last_told)
+    report(size - reported)
 
 
-def _told(stream: IO[bytes]) -> Statistics | None:
-    """What a file that was closed tells of itself; None: it was not."""
+def _statistics(stream: IO[bytes]) -> Statistics | None:
+    """Return the statistics of a closed file; None: the file was not closed."""
     try:
         summary = make_reader(stream).get_summary()
     except records.DAMAGE:
@@ -221,7 +223,7 @@ def _told(stream: IO[bytes]) -> Statistics | None:
 
 
 def _is_tail(stream: IO[bytes], begin: int, size: int) -> bool:
-    """Whether what cannot be read from there on is what a writer leaves that was killed."""
+    """Return whether the unreadable rest of a file is what a killed writer leaves."""
     if size - begin <= _MOST_TAIL_BYTES:
         return True
     stream.seek(begin)
@@ -233,14 +235,14 @@ def _is_tail(stream: IO[bytes], begin: int, size: int) -> bool:
         if head.count(0) != len(head):
             return False
         head = stream.read(_STEP_BYTES)
-    return True  # a system that lost its power had made room, and written nothing into it
+    return True  # zeros: allocated before a power cut, but not written
 
 
 def _check(path: Path, writer: IndexedWriter) -> None:
-    """Read the new file from the disk, every byte of it.
+    """Read every byte of the new file and compare it with the copied data.
 
     Raises:
-        CaptureError: If it does not hold what was copied.
+        CaptureError: If it differs.
     """
     found = Copied()
     with path.open("rb") as stream:
@@ -257,7 +259,7 @@ def _check(path: Path, writer: IndexedWriter) -> None:
             stream.seek(0)
             summary = make_reader(stream).get_summary()
         except records.DAMAGE as error:
-            raise CaptureError(f"{path}: cannot be read as it was written: {error}") from None
+            raise CaptureError(f"{path}: cannot be read back: {error}") from None
     expected = writer.copied
     counts = None if summary is None or summary.statistics is None else summary.statistics
     if (
@@ -266,17 +268,17 @@ def _check(path: Path, writer: IndexedWriter) -> None:
         or counts is None
         or counts.channel_message_counts != dict(expected.messages)
     ):
-        raise CaptureError(f"{path}: not the same as what it was written from; that was kept")
+        raise CaptureError(f"{path}: differs from its sources, which were kept")
 
 
 def main() -> None:
-    """Do the jobs that a recorder gives, one after the other; it ends with the recorder."""
+    """Do the recorder's jobs one after the other; exit when the recorder ends."""
     jobs: queue.SimpleQueue[str] = queue.SimpleQueue()
 
     def read() -> None:
         for line in sys.stdin:
             jobs.put(line)
-        os._exit(0)  # what is being written is thrown away at the next start
+        os._exit(0)  # the next start deletes the incomplete file
 
     threading.Thread(target=read, daemon=True).start()
     os.nice(10)
@@ -285,7 +287,7 @@ def main() -> None:
 
 
 def _do(job: dict[str, Any]) -> str:
-    """The last line of a job."""
+    """Do a job and return its last line of output."""
     sources = [Path(each) for each in job["sources"]]
     try:
         rewrite(

@@ -1,4 +1,4 @@
-"""Values over time, thinned so that no peak is lost: the lowest and highest of each piece of time."""
+"""Values over time, downsampled without losing peaks: the minimum and maximum of each interval."""
 
 import itertools
 import logging
@@ -21,11 +21,11 @@ from robomesh.schemas.robomesh_pb2 import Description
 
 POINTS, MOST_POINTS = 1000, 10_000
 MOST_VALUES = 64
-# Pieces that a whole recording is cut into once; what looks closer reads the file again.
+# Intervals of a whole recording, computed once; a closer view reads the file again.
 _PIECES = 20_000
 _MOST_NAMES = 2000
 _LOOKED_AT = 200
-# Kept for the next question: in all, and of a topic besides what was asked for.
+# Limits of the cache: total size, and values of a topic that were not requested.
 _MOST_KEPT_BYTES = 64 << 20
 _MOST_UNASKED = 32
 _JOINTS = "joints/"
@@ -37,10 +37,10 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Series:
-    """A value's lowest and highest in each piece of time in which there is something.
+    """Minimum and maximum of a value in each interval that contains data.
 
     Attributes:
-        times_s: Middle of the pieces, since the recording's start.
+        times_s: Middle of the intervals, since the recording's start [s].
     """
 
     name: str
@@ -52,11 +52,11 @@ class Series:
 
 @dataclass
 class _Pieces:
-    """Lowest and highest of values while they are read, a column a piece of time.
+    """Minimum and maximum of values while they are read, one column for each interval.
 
     Attributes:
-        asked: Which are taken however many there are.
-        all: None was left out.
+        asked: Requested values, which are never omitted.
+        all: No value was omitted.
     """
 
     asked: frozenset[str]
@@ -86,7 +86,7 @@ class _Pieces:
 
 
 class SeriesReader:
-    """Series of recordings; what a whole one was cut into is kept for the next question."""
+    """A reader of series with a cache of the intervals of whole recordings."""
 
     def __init__(self) -> None:
         self._kept: OrderedDict[tuple[str, int, int, str], _Pieces] = OrderedDict()
@@ -94,21 +94,20 @@ class SeriesReader:
     def read(
         self, file: RecordingFile, names: Sequence[str], *, start_ns: int, end_ns: int, points: int
     ) -> list[Series]:
-        """Series of values between two times (both included).
+        """Return the series of values between two times (both included).
 
         Raises:
-            RecordingError: If there is no such value, or the file is damaged.
+            RecordingError: If a value is missing, or the file is damaged.
         """
         if len(names) > MOST_VALUES:
-            raise RecordingError(f"{len(names)} values: {MOST_VALUES} at most at a time")
+            raise RecordingError(f"{len(names)} values are too many: request at most {MOST_VALUES}")
         topics = topics_of_values(file)
         wanted: dict[str, list[str]] = {}
         for name in names:
             topic = _topic_of(name, topics)
             if topic is None:
                 raise RecordingError(
-                    f"{file.path.name}: no value {name!r}; "
-                    f"topics that have some: {', '.join(topics) or 'none'}"
+                    f"{file.path.name}: no value {name!r}; topics with values: {', '.join(topics) or 'none'}"
                 )
             wanted.setdefault(topic, []).append(name)
         sliding = _sliding(file, names)
@@ -148,7 +147,7 @@ class SeriesReader:
 
 
 def topics_of_values(file: RecordingFile) -> dict[str, str]:
-    """The topics with numbers, as values are named after them, and their channels' names in the file."""
+    """Return the topics with numbers as in the names of values, and their channels' names in the file."""
     found: dict[str, str] = {}
     for key in sorted(file.topics):
         if has_values(file.schema_name(key)) and file.decoder(key) is not None:
@@ -160,7 +159,7 @@ def topics_of_values(file: RecordingFile) -> dict[str, str]:
 
 
 def known_values(file: RecordingFile) -> list[str]:
-    """The names of a recording's values, from the first messages of each topic and its last.
+    """Return the names of a recording's values, from the first messages and the last message of each topic.
 
     Raises:
         RecordingError: If the file is damaged.
@@ -176,7 +175,7 @@ def known_values(file: RecordingFile) -> list[str]:
 
 
 def _sliding(file: RecordingFile, names: Sequence[str]) -> frozenset[str]:
-    """The joints that slide: their unit is the metre."""
+    """Return the prismatic joints (unit: metre)."""
     topics = [topic for topic in file.topics if topic.endswith("/description")]
     if not any(name.startswith(_JOINTS) for name in names) or not topics:
         return frozenset()
@@ -193,7 +192,7 @@ def _topic_of(name: str, topics: dict[str, str]) -> str | None:
 
 
 class _Values:
-    """The values of a topic's messages; those that cannot be read have none, and are counted."""
+    """The values of a topic's messages; counts messages that cannot be read."""
 
     def __init__(self, file: RecordingFile, key: str) -> None:
         decode = file.decoder(key)
@@ -211,7 +210,7 @@ class _Values:
 
 
 def _cut(file: RecordingFile, topic: str, key: str, pieces: _Pieces) -> _Pieces:
-    """Pieces, with the file's values in them."""
+    """Fill intervals with the file's values."""
     start_ns, end_ns, count = pieces.start_ns, pieces.end_ns, pieces.count
     values = _Values(file, key)
     scale = count / max(end_ns - start_ns + 1, 1)
@@ -227,7 +226,7 @@ def _cut(file: RecordingFile, topic: str, key: str, pieces: _Pieces) -> _Pieces:
 
 
 def _thinned(name: str, pieces: _Pieces, zero_ns: int, start_ns: int, end_ns: int, points: int) -> Series:
-    """A value's pieces put together to as many as were asked for."""
+    """Combine a value's intervals into the requested number."""
     lowest, highest = pieces.lowest.get(name), pieces.highest.get(name)
     none = np.empty(0)
     if lowest is None or highest is None:

@@ -1,6 +1,6 @@
-"""Joints and tool as a table: a row a recorded state, SI, units in the header.
+"""Joints and tool as a table: a row for each recorded state, SI, units in the header.
 
-Knows messages only, no files: the caller gives them in the order of their receipt.
+Reads messages only, no files: the caller passes them in the order of their receive times.
 """
 
 from collections.abc import Iterable
@@ -11,9 +11,9 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from mcap_files.publisher_time import PublisherTimes, Recorded
 from robomesh.schemas import robomesh_pb2 as schema
 
-# The tool's place comes less often than the joints'; older than this it is left out.
+# The tool's position is recorded less often than the joints; an older one is omitted.
 _TOOL_FOR_NS = 250_000_000
-# A clock that was set back must not hold the tool's states back for longer.
+# Longest delay of the tool's states after a clock was set back.
 _TOOL_WAITS_NS = 1_000_000_000
 _TOOL = ("tool x [m]", "tool y [m]", "tool z [m]", "tool speed [m/s]", "clearance [m]")
 
@@ -22,9 +22,9 @@ class Table:
     """The rows of one recording.
 
     Args:
-        joints: Their names, in the table's order.
-        prismatic: Those that slide: their unit is the metre.
-        start_ns: From which the column `t [s]` counts, ns since the Unix epoch.
+        joints: Names of the joints in the table's order.
+        prismatic: Names of the prismatic joints (unit: metre).
+        start_ns: Zero of the column `t [s]`, ns since the Unix epoch.
     """
 
     def __init__(self, joints: Iterable[str], prismatic: Iterable[str], *, start_ns: int) -> None:
@@ -45,7 +45,7 @@ class Table:
         ]
 
     def take_tool(self, state: schema.KinematicState, recorded: Recorded) -> None:
-        """Take what the rows from here on say of the tool."""
+        """Set the tool's values for the following rows."""
         pose = [""] * 3
         if len(state.tool_to_base) == 16:
             pose = [repr(state.tool_to_base[index]) for index in (3, 7, 11)]
@@ -55,28 +55,28 @@ class Table:
         self._tool = recorded.source_ns, [*pose, speed, clearance]
 
     def row(self, state: JointStates, recorded: Recorded) -> list[str]:
-        """Return the row of a recorded state; what it does not tell is empty."""
-        joints = {joint.name: joint for joint in state.joints}
-        told = [joints.get(name) for name in self._joints]
+        """Return the row of a recorded state; missing values are empty."""
+        by_name = {joint.name: joint for joint in state.joints}
+        joints = [by_name.get(name) for name in self._joints]
         when, tool = self._tool
         return [
             _text(recorded.source_ns),
             _text(recorded.received_ns),
             str(recorded.sequence),
             f"{(self._times.of(recorded) - self._start_ns) * 1e-9:.9f}",
-            *("" if joint is None else repr(joint.position) for joint in told),
-            *(repr(joint.velocity) if joint and joint.HasField("velocity") else "" for joint in told),
+            *("" if joint is None else repr(joint.position) for joint in joints),
+            *(repr(joint.velocity) if joint and joint.HasField("velocity") else "" for joint in joints),
             *(tool if abs(recorded.source_ns - when) <= _TOOL_FOR_NS else [""] * len(tool)),
         ]
 
 
 def is_due(tool: Recorded, state: Recorded) -> bool:
-    """Return whether the row of a state, and those after it, say this of the tool."""
+    """Return whether the tool's state applies to the row of a joint state and the rows after it."""
     return tool.source_ns <= state.source_ns or tool.received_ns + _TOOL_WAITS_NS < state.received_ns
 
 
 def table_of(first: JointStates, description: schema.Description | None, *, start_ns: int) -> Table:
-    """The table of a recording: its joints as its first state tells them."""
+    """Return the empty table of a recording with the joints of its first state."""
     described = [] if description is None else description.joints
     sliding = [joint.name for joint in described if joint.type == schema.Description.Joint.PRISMATIC]
     return Table((joint.name for joint in first.joints), sliding, start_ns=start_ns)

@@ -1,6 +1,6 @@
-"""The numbers in recorded messages, by name: "joints/waist/position", "kinematics/tool/x", ...
+"""Numbers in recorded messages by name: "joints/waist/position", "kinematics/tool/x", ...
 
-A name is the topic below its robot, then the fields; what repeats is told apart by its name field.
+A name is the topic below its robot, then the fields; repeated messages are identified by their `name` field.
 """
 
 from collections.abc import Iterator
@@ -21,11 +21,11 @@ _NUMBERS = frozenset(
     }
 )
 _TIMES = frozenset({"google.protobuf.Timestamp", "google.protobuf.Duration"})
-# What a message may hold is its sender's affair; so many levels are somebody's mistake.
+# Deeper nesting in other programs' messages is ignored.
 _DEEPEST = 6
 _NO_NUMBERS = frozenset(
     {
-        "foxglove.FrameTransforms",  # 12 a link, 60 times a second: a picture shows them better
+        "foxglove.FrameTransforms",  # 12 numbers for each link at 60 Hz, which the 3-D view shows better
         "foxglove.CompressedVideo",
         "foxglove.CompressedImage",
         "robomesh.Description",
@@ -36,12 +36,12 @@ _NO_NUMBERS = frozenset(
 
 
 def has_values(schema: str) -> bool:
-    """Whether messages of a schema are looked through for numbers."""
+    """Return whether messages of a schema have values."""
     return schema not in _NO_NUMBERS
 
 
 def values_of(schema: str, message: Any) -> Iterator[tuple[str, float]]:
-    """The numbers of a message, by their names below its topic."""
+    """Yield the numbers of a message with their names below its topic."""
     if schema == "foxglove.JointStates":
         for joint in message.joints:
             yield f"{joint.name}/position", joint.position
@@ -54,7 +54,7 @@ def values_of(schema: str, message: Any) -> Iterator[tuple[str, float]]:
 
 
 def unit_of(name: str) -> str:
-    """The unit of a value, from its name; empty: none, or nobody knows."""
+    """Return the unit of a value by its name; empty: no unit, or unknown."""
     first, *_, last = name.split("/")
     if first == "joints":
         return {"position": "rad", "velocity": "rad/s"}.get(last, "")

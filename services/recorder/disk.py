@@ -15,7 +15,7 @@ from pathlib import Path
 
 from mcap_files import records
 from mcap_files.capture import Capture
-from mcap_files.recover import mend
+from mcap_files.recover import close_in_place
 from robomesh.topics import History, Topic
 from services.recorder.settings import MIB, Marks
 
@@ -132,7 +132,7 @@ class Disk:
             if capture.path.stat().st_size < len(records.MAGIC):
                 capture.path.unlink()
             else:
-                mend(capture.path, missed)
+                close_in_place(capture.path, missed)
 
     def check_space(self) -> None:
         """Measure the free space, and create the reserve file if there is room."""

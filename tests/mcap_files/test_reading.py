@@ -114,7 +114,7 @@ def test_a_file_cut_anywhere_is_read_up_to_there_or_refused_in_words(tmp_path, k
     else:
         with RecordingFile(path) as file:
             assert sum(1 for _ in file.messages()) == sum(topic.messages for topic in recording.topics)
-        assert recording.problem == "its writer was killed: it reads up to there"
+        assert recording.problem == "its recorder was killed: readable up to that point"
     assert not words or "trial.mcap" in words
 
 

@@ -55,7 +55,7 @@ def test_a_closer_look_tells_each_message(tmp_path):
 def test_an_unknown_value_is_refused_with_the_topics_that_have_some(tmp_path):
     path = write_recording(tmp_path / "trial.mcap")
     with pytest.raises(
-        RecordingError, match="no value 'power/x'; topics that have some: controller, events, joints"
+        RecordingError, match="no value 'power/x'; topics with values: controller, events, joints"
     ):
         series_of(path, "power/x")
     (nothing,) = series_of(path, "joints/none/position")

@@ -166,7 +166,7 @@ def test_every_command_refuses_a_file_that_is_not_a_recording(tmp_path, capsys):
     text.write_text("not a recording")
     for command in (["info", str(text)], ["export", str(text), "out.csv"], ["recover", str(text)]):
         assert run(["recordings", *command]) == 2
-        assert "notes.mcap: no MCAP file: it does not begin as one" in capsys.readouterr().err
+        assert "notes.mcap: not an MCAP file: its first bytes are wrong" in capsys.readouterr().err
 
 
 def test_an_interrupted_write_leaves_no_file(tmp_path):
