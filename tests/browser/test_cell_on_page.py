@@ -54,7 +54,7 @@ def plant(tmp_path_factory):
     build_page.build()
     with running_site(tmp_path_factory.mktemp("cell"), robots=SITE) as site:
         deadline = time.monotonic() + READY_S
-        while "still getting ready" in (homed := site.command("send", "arm", "home")).stdout:
+        while "still starting" in (homed := site.command("send", "arm", "home")).stdout:
             assert time.monotonic() < deadline, homed.stdout
         assert homed.returncode == 0, homed.stdout
         yield SimpleNamespace(address=site.console.rstrip("/"), site=site)

@@ -141,7 +141,7 @@ def test_a_killed_browser_loses_control_at_once_and_its_motion_is_stopped(open_a
     with pytest.raises(Error, match="crash"):
         alice.goto("chrome://crash")
     # Because its session is lost: its lease would have ended too, but later, and for another reason.
-    expect(bob.locator(".stopped")).to_contain_text("alice's page or program has gone")
+    expect(bob.locator(".stopped")).to_contain_text("alice's page or program has disconnected")
     expect(bob.locator(".holder")).to_have_text("Nobody is in control")
     expect(bob.locator(".headline .state")).to_have_text("Stopped")
     take(bob, "bob")

@@ -107,11 +107,13 @@ def test_the_audit_of_every_robot_is_there_and_its_logs_are_searched_when_asked(
     button(journal, "Search the audit logs").click()
     expect(journal.locator(".notice")).to_have_text(re.compile("^Found in the logs: [1-9]"))
     refused = journal.locator(".journal-line").filter(has_text="OFFER").first
-    expect(refused).to_contain_text("refused wang OFFER: nobody is in control, or the lease has ended")
+    expect(refused).to_contain_text("refused wang OFFER: no operator is in control, or the lease has ended")
     button(page, "中文").click()
     expect(refused).to_contain_text("已拒绝 wang OFFER: 无人控制，或控制权已结束：请先取得控制（ACQUIRE）")
     refused.click()
-    expect(page.locator(".entry-details [lang=en]")).to_contain_text("nobody is in control, or the lease")
+    expect(page.locator(".entry-details [lang=en]")).to_contain_text(
+        "no operator is in control, or the lease"
+    )
 
 
 def test_texts_of_others_change_the_order_of_nothing_beside_them(open_page, raised):

@@ -135,14 +135,14 @@ def test_a_hidden_page_gives_control_back(open_page):
     )
     expect(page.locator(".control .notice")).to_contain_text("this page was hidden")
     expect(page.locator(".holder")).to_have_text("Nobody is in control")
-    expect(page.locator(".event-list")).to_contain_text("li gave control back: window hidden or closed")
+    expect(page.locator(".event-list")).to_contain_text("li released control: window hidden or closed")
 
 
 def test_going_to_another_page_gives_control_back(open_page):
     page, other = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
     take(page)
     expect(other.locator(".holder")).to_have_text("li is in control")
-    given_back = other.locator(".event-list li", has_text="li gave control back")
+    given_back = other.locator(".event-list li", has_text="li released control")
     before = given_back.count()
     page.get_by_role("link", name="Fleet", exact=True).click()
     expect(other.locator(".holder")).to_have_text("Nobody is in control")

@@ -67,7 +67,7 @@ def test_a_flood_under_new_names_fills_neither_memory_nor_disk():
             counted = list(floods.counts(0.0001 * number))
             assert len(counted) <= MOST_KINDS + 2
             written += sum(1 + each.repeated for each in counted)
-            assert any(each.text == "no (the last of many askers)" for each in counted)
+            assert any(each.text == "no (the last of many callers)" for each in counted)
     assert written == flood
 
 
@@ -77,7 +77,7 @@ def test_a_long_text_leaves_room_for_the_count():
         floods.admits(entry(f"name-{number}", text="x" * 800), 0.0)
     (counted,) = floods.counts(1.0)
     assert len(counted.text) <= 800
-    assert counted.text.endswith("… (the last of many askers)")
+    assert counted.text.endswith("… (the last of many callers)")
 
 
 def test_a_new_connection_of_a_host_is_counted_with_the_previous_one():

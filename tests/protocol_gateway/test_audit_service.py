@@ -283,7 +283,7 @@ async def on_a_full_disk(site, log, full, words):
                 await site.lease(A.RENEW, ttl_s=5)
                 await site.command(C.TRACE_ON)
         text = await refusal(site.command(C.HOME))
-        assert f"{words}: make space on its disk), and what is not written down is not done" in text
+        assert f"{words}: make space on its disk); a command that cannot be recorded is not executed" in text
         stop = await site.stop(by="wang")
         assert stop.sent
         await until(lambda: site.controller.activity == STATE.STOPPED)

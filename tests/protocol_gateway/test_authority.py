@@ -100,7 +100,7 @@ def test_an_ended_lease_has_no_holder(action):
 
 def test_an_offer_passes_the_lease_on_but_not_while_its_holders_motion_runs():
     offered = ask(moving(), A.OFFER, lease="s", to="wang").authority
-    assert "motion still runs" in ask(offered, A.ACCEPT, "wang").answer.text
+    assert "motion is still running" in ask(offered, A.ACCEPT, "wang").answer.text
     offered = ask(held(), A.OFFER, lease="s", to="wang").authority
     passed = ask(offered, A.ACCEPT, "wang", secret="w")
     assert (passed.granted.holder, passed.ended.stop) == ("wang", False)
@@ -234,7 +234,7 @@ def test_every_stop_has_a_number_and_only_its_own_reset_clears_it():
     assert admit(state, reset, operator="li", now=at(2)).answer.accepted
     assert command_sent(state, reset, at(2)).stop is None
     assert stop_sent(state, 1, 1003.0) == state
-    assert "nothing is" in admit(held(), reset, operator="li", now=at(2)).answer.text
+    assert "no stop is" in admit(held(), reset, operator="li", now=at(2)).answer.text
 
 
 @pytest.mark.parametrize("kind", [C.HOME, C.RESUME, C.MOVE_ABSOLUTE, C.MOVE_RELATIVE, C.RUN_PROGRAM])

@@ -128,7 +128,7 @@ def test_a_refused_value_is_named_with_the_allowed_ones(asked, words):
 def test_a_robot_without_positions_is_homed_but_not_moved():
     untold = replace(READY, positions=None)
     for kind in (C.MOVE_RELATIVE, C.MOVE_ABSOLUTE, C.RESUME):
-        assert "has not told where the joints are" in obstacle(command(kind), untold, JOINTS).text
+        assert "has not reported joint positions" in obstacle(command(kind), untold, JOINTS).text
     assert not obstacle(command(C.HOME), untold, JOINTS)
 
 
@@ -136,7 +136,7 @@ def test_a_robot_with_stale_positions_is_not_even_homed():
     gone = replace(READY, positions=None, positions_stale=codes.POSITIONS_STALE(seconds=1.0))
     for kind in (C.MOVE_RELATIVE, C.MOVE_ABSOLUTE, C.RESUME, C.HOME):
         assert obstacle(command(kind), gone, JOINTS).text == (
-            "Not sent: where the robot is now is not known (joint positions have not come for 1 s)."
+            "Not sent: the robot's position is unknown (no joint positions for 1 s)."
         )
 
 

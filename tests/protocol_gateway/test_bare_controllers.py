@@ -50,9 +50,9 @@ def test_a_controller_without_a_proven_stop_is_read_only(mesh, tmp_path):
     async def main():
         async with simulator(demo=True) as port, gateway(mesh, tmp_path, port, stop_proven=False) as site:
             assert site.controller.read_only
-            assert "read-only: its stop is not proven: try the stop unit" in site.controller.link_text
-            assert "then write stop_proven = true" in await refusal(site.lease(A.ACQUIRE))
-            assert "then write stop_proven = true" in (await site.event("robot.read_only", 0)).text
+            assert "read-only: its stop is not proven: test the stop unit" in site.controller.link_text
+            assert "then set stop_proven = true" in await refusal(site.lease(A.ACQUIRE))
+            assert "then set stop_proven = true" in (await site.event("robot.read_only", 0)).text
             stop = await site.stop()
             assert not stop.sent
             assert "stop it at its own panel" in stop.text
@@ -92,10 +92,10 @@ def test_stale_positions_are_not_used(mesh, tmp_path):
             await site.lease(A.ACQUIRE, ttl_s=5)
             positions = ""
             await until(lambda: site.events("joints.gone"))
-            await until(lambda: "joint positions have not come for 1 s" in site.controller.link_text)
+            await until(lambda: "no joint positions for 1 s" in site.controller.link_text)
             assert site.controller.link == STATE.UP
             text = await refusal(site.command(C.MOVE_RELATIVE, joint_positions=[0.1] * 5))
-            assert "where the robot is now is not known" in text
+            assert "the robot's position is unknown" in text
             positions = "ABSOLUTE.DEG*1;2;3;4;5&"
             await until(lambda: "positions" not in site.controller.link_text)
             await site.lease(A.RENEW, ttl_s=5)

@@ -92,7 +92,7 @@ def test_a_query_is_not_started_after_its_timeout(tmp_path, monkeypatch):
             late = await asyncio.gather(
                 *(checker.motion(motion("arm")) for _ in range(20)), return_exceptions=True
             )
-            assert all(isinstance(each, CheckError) and "took longer" in str(each) for each in late)
+            assert all(isinstance(each, CheckError) and "waited longer" in str(each) for each in late)
             os.kill(checker.pid, signal.SIGCONT)
             monkeypatch.setattr("protocol_gateway.checking.checker.MOTION_TIMEOUT_S", 30.0)
             assert isinstance(await checker.motion(motion("arm")), Checked)

@@ -99,7 +99,7 @@ def test_required_a_collision_is_refused_without_motion(mesh, tmp_path):
             await until(lambda: site.joints[0] < before[0] - 0.1)
             assert site.controller.counters.units_sent <= units + 1
             text = await refusal(move(site, [0, 0, 0, 0, 0]))
-            assert "wait until it stands" in text
+            assert "wait until it has stopped" in text
 
     run(main(), timeout_s=90)
 
@@ -266,7 +266,7 @@ def test_required_an_unserved_robot_of_the_cell_is_refused(mesh, tmp_path):
             await until(lambda: not site.controller.check_text, timeout_s=60)
             await site.lease(A.ACQUIRE, ttl_s=5)
             text = await refusal(site.command(C.HOME))
-            assert "where arm-2 is or goes (this gateway does not serve it)" in text
+            assert "the position or the target of arm-2 (this gateway does not serve it)" in text
 
     run(main(), timeout_s=90)
 

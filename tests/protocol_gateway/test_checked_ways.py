@@ -128,7 +128,7 @@ def test_a_program_is_planned_from_the_robots_positions(mesh, tmp_path):
             await site.command(C.SPEED, speed_percent=5)
             await site.command(C.MOVE_ABSOLUTE, joint_positions=[radians(-60), 1.57, -1.57, 0, 0])
             await until(lambda: site.joints[0] < -0.02)
-            with pytest.raises(RefusedError, match="wait until it stands"):
+            with pytest.raises(RefusedError, match="wait until it has stopped"):
                 await start(site, "move_joints -20 90 -90 0 0\n")
 
     run(main(), timeout_s=60)

@@ -111,7 +111,7 @@ def test_a_motion_overtaken_by_hold_is_not_sent(tmp_path):
             motion = asyncio.create_task(bench.commands((C.HOME, {})))
             await asyncio.sleep(0)  # the command waits for the disk now
             hold = asyncio.create_task(bench.commands((C.HOLD, {}), first_id=2))
-            with pytest.raises(RefusedError, match="HOLD came before it could be sent"):
+            with pytest.raises(RefusedError, match="HOLD arrived before it could be sent"):
                 await motion
             await hold
             assert bench.socket == [b"1#COMMAND*hold@"]
@@ -132,7 +132,7 @@ def test_an_ended_session_ends_its_lease_and_stops_its_motion(tmp_path):
             assert bench.control.authority.lease is None
             assert bench.control.authority.ended.code == "lease.ended.session"
             assert bench.socket[-1] == b"1#COMMAND*stop@"
-            assert bench.control.authority.stop.reason == "dead-man: li's page or program has gone"
+            assert bench.control.authority.stop.reason == "dead-man: li's page or program has disconnected"
 
     run(main())
 
@@ -159,7 +159,7 @@ def test_a_lost_link_during_motion_is_a_stop(tmp_path):
 def test_a_request_for_control_is_shown_until_it_is_granted(tmp_path):
     async def main():
         async with control_bench(tmp_path) as bench:
-            with pytest.raises(RefusedError, match="nobody is in control: take it"):
+            with pytest.raises(RefusedError, match="no operator is in control: take control"):
                 await bench.lease(A.ASK, "wang")
             await bench.lease(A.ACQUIRE)
             with pytest.raises(RefusedError, match="li is in control already"):

@@ -235,7 +235,9 @@ def test_in_a_deluge_stops_and_other_robots_work(mesh, tmp_path):
             simulator(demo=True) as calm_port,
             gateway(mesh, tmp_path, port, calm_port, up=False) as site,
         ):
-            await until(lambda: "sends far too much: nothing of it is taken" in site.controller.link_text)
+            await until(
+                lambda: "sends far too much data: all of it is discarded" in site.controller.link_text
+            )
             assert site.controller.link == STATE.SILENT
             for number in range(3):
                 assert (await site.stop(by="wang")).sent

@@ -85,7 +85,7 @@ def test_stop_needs_no_lease_and_latches_until_the_holder_resets_that_stop(mesh,
             text = await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=TARGET))
             assert text == (
                 "Not sent: stop 1 is latched (wang: somebody in the cell): "
-                "see to it, then send RESET with stop_id 1."
+                "remove the cause, then send RESET with stop_id 1."
             )
             again = await site.stop(by="zhao", reason="really")
             text = await refusal(site.command(C.RESET, stop_id=stop.stop_id))
@@ -153,7 +153,7 @@ def test_releasing_control_during_motion_stops_it(mesh, tmp_path):
             await site.command(C.MOVE_ABSOLUTE, joint_positions=FAR)
             await site.lease(A.RELEASE)
             await until(lambda: site.controller.activity == STATE.STOPPED)
-            assert site.controller.stop.reason == "dead-man: li gave control back"
+            assert site.controller.stop.reason == "dead-man: li released control"
 
     run(main())
 
@@ -214,7 +214,7 @@ def test_a_command_id_with_other_content_is_refused_and_audited(mesh, tmp_path):
                 {"command": "RUN_PROGRAM", "program": "home"},
             ):
                 refused = await as_json(**other)
-                assert refused == "Not sent: id 9 was used for SPEED 50 %: count up with each command."
+                assert refused == "Not sent: id 9 was used for SPEED 50 %: use a higher id for each command."
             # Another encoding and time: the same command.
             soon = schema.CommandRequest().not_after
             soon.FromNanoseconds(time.time_ns() + 10**9)

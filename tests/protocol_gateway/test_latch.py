@@ -331,7 +331,7 @@ def test_without_an_allocated_file_motion_is_refused_and_stop_works(mesh, tmp_pa
             await until(lambda: site.controller.activity == STATE.IDLE)
             await site.command(C.HOME)
         # The homing ran during the shutdown: its stop is in the new file.
-        assert LatchFile(latch).found.stop.reason == "dead-man: the gateway is being ended"
+        assert LatchFile(latch).found.stop.reason == "dead-man: the gateway is shutting down"
 
     run(main())
 

@@ -111,7 +111,7 @@ async def test_a_killed_connection_stops_the_motion(mesh, tmp_path):
             await until(lambda: "moving" in watcher.words)
             one.writer.transport.abort()
             await until(lambda: site.events("stop.latched"))
-        assert "has gone" in (await site.event("stop.latched", 0)).text
+        assert "has disconnected" in (await site.event("stop.latched", 0)).text
         await until(lambda: "stopped" in watcher.words)
         await until(lambda: not site.seen["lease"][-1].holder)
 

@@ -72,7 +72,7 @@ def test_two_units_that_report_rest_at_the_target_prove_that_a_motion_has_ended(
     assert accepted.granted.holder == "wang"
     assert not accepted.ended.stop
     refused = ask(ask(once, A.OFFER, lease="s", to="wang").authority, A.ACCEPT, "wang")
-    assert "motion still runs" in refused.answer.text
+    assert "motion is still running" in refused.answer.text
 
 
 def test_the_two_units_are_consecutive(at_rest):

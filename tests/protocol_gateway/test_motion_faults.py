@@ -144,7 +144,8 @@ def test_a_stop_is_not_reset_during_motion_and_the_dead_man_stays(mesh, tmp_path
             stop_id = (await site.stop()).stop_id
             text = await refusal(site.command(C.RESET, stop_id=stop_id))
             assert text == (
-                f"Not sent: the robot still moves after stop {stop_id}: wait until it stands, then RESET."
+                f"Not sent: the robot is still moving after stop {stop_id}: "
+                "wait until it has stopped, then send RESET."
             )
             assert site.controller.stop.id == stop_id
             activity = "idle"

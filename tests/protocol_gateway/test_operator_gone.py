@@ -39,13 +39,13 @@ def test_a_killed_program_loses_control_with_its_session(mesh, tmp_path):
             async with homing(site, mesh) as process:
                 process.send_signal(signal.SIGKILL)
                 await until(lambda: site.controller.HasField("stop"))
-            assert site.controller.stop.reason == "dead-man: wang's page or program has gone"
+            assert site.controller.stop.reason == "dead-man: wang's page or program has disconnected"
             await until(lambda: site.controller.activity == STATE.STOPPED)
             assert site.controller.homed == STATE.NO
-            await until(lambda: site.seen["lease"][-1].ended == "wang's page or program has gone")
+            await until(lambda: site.seen["lease"][-1].ended == "wang's page or program has disconnected")
             entries = {entry.request: entry for entry in read_entries(site.audit)}
             # The lease did not expire: it was ended.
-            assert entries["REVOKE"].text == "wang's page or program has gone"
+            assert entries["REVOKE"].text == "wang's page or program has disconnected"
             assert "EXPIRE" not in entries
 
     run(main())

@@ -192,9 +192,9 @@ def test_a_program_ends_with_the_lease_even_while_it_waits(mesh, tmp_path):
             await start(site, "wait 600\nmove_joints -140 90 -90 0 0\n")
             await until(lambda: states(site)[-1].outcome == RUN.RUNNING)
             text = await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=LAST))
-            assert "the program weld runs: stop it, or wait until it has ended" in text
+            assert "program weld is running: stop it, or wait until it has ended" in text
             # The check holds only at its speed.
-            assert "the program weld runs" in await refusal(site.command(C.SPEED, speed_percent=100))
+            assert "program weld is running" in await refusal(site.command(C.SPEED, speed_percent=100))
             await site.lease(A.RELEASE)
             await until(lambda: states(site)[-1].outcome == RUN.ENDED)
             assert states(site)[-1].text.startswith("control ended: ")
@@ -249,7 +249,7 @@ def test_a_held_program_ends_with_reset(mesh, tmp_path):
             where = list(site.joints)
             await site.command(C.RESET)
             state = await ended(site, RUN.ENDED)
-            assert state.text == "given up with RESET"
+            assert state.text == "cancelled by RESET"
             await until(lambda: site.controller.activity == STATE.IDLE)
             await site.lease(A.RENEW, ttl_s=5)
             await asyncio.sleep(1.5)
@@ -316,7 +316,7 @@ def test_a_program_is_not_run_after_its_senders_timeout(mesh, tmp_path, told):
                     not_after = Timestamp(seconds=until_ns // 10**9, nanos=until_ns % 10**9)
                     words = await refusal(start(site, "home\n", not_after=not_after))
                     assert words.startswith(
-                        "Not run: it was not checked before its asker gives up: wait longer"
+                        "Not run: its check did not finish before its sender's deadline: allow more time"
                     )
                 else:
                     # Without an answer, Zenoh may return an error; the gateway's answer comes later.
@@ -367,7 +367,7 @@ def test_a_hold_cancels_a_program_during_its_check(mesh, tmp_path):
                 await asyncio.sleep(0.3)  # the gateway has it by then; otherwise HOLD finds nothing to cancel
                 answer = await site.command(C.HOLD)
                 assert answer.text == "HOLD: the program was not started, and nothing is on hold"
-                assert await asked == "Not run: HOLD came while it was being checked: not started."
+                assert await asked == "Not run: HOLD arrived during its check: not started."
             await in_control(site)
             await planned(site)
             assert site.controller.counters.units_sent == 0

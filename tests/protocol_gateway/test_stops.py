@@ -166,7 +166,7 @@ def test_a_stop_is_not_reset_while_the_robot_moves(tmp_path):
             bench.control.observe(moving=True)
             press(bench)
             with pytest.raises(
-                RefusedError, match="still moves after stop 1: wait until it stands, then RESET"
+                RefusedError, match="still moving after stop 1: wait until it has stopped, then send RESET"
             ):
                 await bench.commands((C.RESET, {"stop_id": 1}), first_id=2)
             assert bench.control.authority.stop.id == 1

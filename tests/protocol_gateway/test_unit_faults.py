@@ -205,7 +205,7 @@ def test_a_missing_status_is_unknown_until_it_returns(mesh, tmp_path):
             assert site.controller.homed == STATE.UNKNOWN
             assert site.controller.link == STATE.UP
             await site.lease(A.ACQUIRE, ttl_s=5)
-            assert "does not tell whether" in await refusal(site.command(C.HOME))
+            assert "does not report whether" in await refusal(site.command(C.HOME))
             await fault("mute", off=True)
             await until(lambda: site.controller.mode == STATE.REMOTE)
 

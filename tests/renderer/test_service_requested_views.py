@@ -55,7 +55,7 @@ def test_a_requested_view_is_drawn_shared_and_ends_without_subscribers(mesh, tmp
             named.CopyFrom(BESIDE)
             named.name = "mine"
             assert await ask(monitor, view=named, width=240, height=200, fps=25.0) == answer
-            with pytest.raises(RefusedError, match="no room: 1 requested views exist"):
+            with pytest.raises(RefusedError, match="no capacity: 1 requested views exist"):
                 await ask(monitor, of="top", width=240, height=200)
             # The renderer's own views do not count.
             for name in ("front", "top", "left", "free", "close", "far"):
@@ -110,7 +110,7 @@ def test_an_invalid_request_is_rejected_and_does_not_affect_others(mesh, tmp_pat
             # Quotas of operators are independent.
             mine = await ask(monitor, of="top", width=240, height=200)
             assert await ask(monitor, of="top", width=240, height=200) == mine
-            with pytest.raises(QuotaError, match="no room: li has 1 views already: quota views = 1 a name"):
+            with pytest.raises(QuotaError, match="no capacity: li already has 1 views: quota views = 1"):
                 await ask(monitor, of="left", width=240, height=200)
             await ask(monitor, "wang", of="left", width=240, height=200)
             key = f"{ARM}/video/front/keyframe"

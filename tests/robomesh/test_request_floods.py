@@ -137,7 +137,7 @@ def test_a_busy_owner_is_asked_again_until_the_time_is_over_and_begins_it_once(m
             asked = [once(eve, "li") for _ in range(16)]
             await until(lambda: len(owner.begun) >= 16)
             key = "robomesh/site/arm/command/li"
-            with pytest.raises(BusyError, match="too many requests wait"):
+            with pytest.raises(BusyError, match="too many requests are waiting"):
                 await li.ask(key, HOME, timeout_s=0.3)
             patient = asyncio.create_task(li.ask(key, HOME, timeout_s=20.0))
             await asyncio.sleep(0.2)

@@ -160,7 +160,7 @@ def test_line_near_a_singular_position_is_reported(pt600: Cell) -> None:
     near = checked(pt600, f"{begin}move_line 599.9 0 230 180 0 0\n", pt600.arms["arm"].joints.home)
     (singular,) = near.violations
     assert (singular.kind, singular.line, singular.pair) == (ViolationKind.SINGULARITY, 3, ())
-    assert singular.text.endswith(", 0.02 is asked for along a line")
+    assert singular.text.endswith(", but motion along a line needs 0.02")
     assert singular.until_s == pytest.approx(near.duration_s)
     # Between joint positions it does not matter.
     last = " ".join(f"{each:.6f}" for each in np.degrees(near.path.joint_positions[-1]))

@@ -112,7 +112,7 @@ def test_whoever_signs_in_is_greeted_by_name_and_may_do_what_the_role_may(mesh, 
                 answer = await browser.ask(2, f"{LEASE}/wang.s", lease())
                 assert (answer.ok, answer.error) == (
                     False,
-                    "li asks in the name li.s only, not as wang.s",
+                    "li may send requests only as li.s, not as wang.s",
                 )
                 assert len(asked) == 1
 
@@ -133,7 +133,7 @@ def test_a_monitor_sees_everything_and_asks_for_nothing_but_a_stop_in_its_own_na
                     assert "zhao is a monitor" in answer.error
                     assert "needs an operator" in answer.error
                 answer = await browser.ask(8, "robomesh/s/r/views/li.s", b"")
-                assert answer.error == "zhao asks in the name zhao.s only, not as li.s"
+                assert answer.error == "zhao may send requests only as zhao.s, not as li.s"
                 forged = schema.StopRequest(by="li", reason="the page").SerializeToString()
                 assert (await browser.ask(9, "robomesh/s/r/stop", forged)).ok
                 assert [(what, message.by) for what, _, message in asked] == [("stop", "zhao.s")]

@@ -32,7 +32,7 @@ def test_a_page_without_accounts_at_a_site_with_keys_passes_for_nobody_else(secu
                 hello = browser.other[0].hello
                 assert (hello.account, hello.operator, hello.may_command) == ("", "console.hall", True)
                 answer = await browser.ask(1, f"{ARM}/lease/request/li.hall", ACQUIRE)
-                assert answer.error == "this page asks in the name console.hall only, not as li.hall"
+                assert answer.error == "this page may send requests only as console.hall, not as li.hall"
                 assert (await browser.ask(2, f"{ARM}/lease/request/console.hall", ACQUIRE)).ok
                 said = schema.StopRequest(by="li.hall").SerializeToString()
                 assert (await browser.ask(3, f"{ARM}/stop", said)).ok

@@ -112,7 +112,7 @@ def test_a_busy_gateway_is_to_the_page_one_that_does_not_answer_and_may_be_asked
                     await asyncio.sleep(0.01)
             answer = await browser.ask(1, KEY, payload, timeout_s=0.3)
             assert (answer.ok, answer.no_answer) == (False, True)
-            assert "too many requests wait" in answer.error
+            assert "too many requests are waiting" in answer.error
             go_on.set()
             assert (await browser.ask(2, KEY, payload)).ok
             await asyncio.gather(*waiting)

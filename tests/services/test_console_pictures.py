@@ -228,7 +228,7 @@ def test_a_still_is_the_newest_picture_as_jpeg_or_png(mesh, page):  # noqa: F811
         ("video/s/r/back.mp4", 404, "no view 'back'; there are front"),
         ("image/s/r/front.jpg?width=2000&height=1000", 400, "up to 1920 are possible"),
         ("image/s/r/front.jpg?width=wide", 400, "width='wide' is not a number of pixels"),
-        ("image/s/r/front.jpg?width=1920", 503, "no room: 1 requested views exist"),
+        ("image/s/r/front.jpg?width=1920", 503, "no capacity: 1 requested views exist"),
         ("image/s/r/front.jpg?width=640", 429, "li has had its views"),
         ("video/s/r/front.mp4?fps=fast", 400, "fps='fast' is not a number"),
         ("video/s/r/front.mp4?quality=5", 400, "width, height and fps"),

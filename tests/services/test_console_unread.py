@@ -62,6 +62,9 @@ def test_a_long_key_is_refused_without_being_repeated(mesh, page):
     async def main():
         async with console(mesh, page) as (address, _), browse(address) as browser:
             answer = await browser.ask(1, LONG)
-            assert (answer.ok, answer.error) == (False, "a key of 900013 characters: 200 at most")
+            assert (answer.ok, answer.error) == (
+                False,
+                "the key has 900013 characters: at most 200 are allowed",
+            )
 
     run(main())

@@ -259,7 +259,7 @@ def test_commands_are_one_operators_and_control_ends_with_their_client(mesh, tmp
                 answer = await client.call(f"{ARM}/move_absolute", joint_positions=[1.0, float("nan")])
                 assert "not finite" in answer["text"]
                 answer = await client.call(f"{ARM}/home", at="once")
-                assert answer["text"] == "home takes no 'at'; it takes nothing: {}"
+                assert answer["text"] == "home has no field 'at'; it takes nothing: {}"
                 await called(client, "home")
                 await client.until(lambda: plant.controller.homed == STATE.YES)
                 await client.until(lambda: not plant.seen["lease"][-1].holder)

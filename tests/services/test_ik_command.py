@@ -139,7 +139,7 @@ def test_a_request_on_the_mesh_gets_solutions_or_the_reason() -> None:
 @pytest.mark.parametrize(
     ("request_", "error"),
     [
-        (schema.InverseRequest(pose=TOOL.ravel()), "task 0: POSE_6D or POSITION_AND_AXIS_5D is right"),
+        (schema.InverseRequest(pose=TOOL.ravel()), "task 0 is unknown: use POSE_6D or POSITION_AND_AXIS_5D"),
         (schema.InverseRequest(task=SIX_D), "the pose has 0 numbers"),
         (schema.InverseRequest(pose=-TOOL.ravel(), task=SIX_D), "the pose has the last row"),
         (schema.InverseRequest(pose=TOOL.ravel(), task=SIX_D, near=[1.0]), "near: .* takes \\(5,\\)"),

@@ -174,7 +174,7 @@ async def _after_restart(trial: Trial, state: STATE) -> None:
     # The controller's own word for stopped is no help here: it was started again, too.
     trial.controller.stopped = False
     if report.numbers:
-        while "stopped: see to it" in (refused := await trial.move()):
+        while "stopped: remove the cause" in (refused := await trial.move()):
             await asyncio.sleep(0.02)
         if f"stop {report.numbers[-1]} is latched" not in refused:
             report.problems.append(f"after the restart a motion without RESET got: {refused or 'accepted'}")
