@@ -1,8 +1,8 @@
-"""Ask whether a teach program would do harm: the mesh checks it from where the robot stands now.
+"""Check a teach program from the robot's current position.
 
     ./dev run python examples/check.py examples/square.program [ROBOT] [ROUTER]
 
-Exit status 1 when something is wrong with it. Nothing moves.
+Exit status 1 if the check finds a problem. The robot does not move.
 """
 
 import asyncio

@@ -1,8 +1,8 @@
-"""Take control of a robot, send it home, wait until it is there, give control back.
+"""Take control of a robot, send it home, wait until it arrives, release control.
 
     ./dev run python examples/home.py [ROBOT] [ROUTER]
 
-Control is a lease: it is renewed while the block runs, and the robot stops when it is not.
+Control is a lease, which is renewed while the block runs; the robot stops if it expires.
 """
 
 import asyncio

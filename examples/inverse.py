@@ -1,8 +1,8 @@
-"""Ask where the joints must be for the tool to be there: the mesh answers for any robot, nothing moves.
+"""Ask the mesh for joint positions that bring the tool to a point; the robot does not move.
 
     ./dev run python examples/inverse.py X Y Z [ROBOT] [ROUTER]      mm, the tool pointing down
 
-Exit status 1 when the arm cannot get there; the answer says why.
+Exit status 1 if the arm cannot reach it; the answer says why.
 """
 
 import asyncio

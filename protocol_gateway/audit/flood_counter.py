@@ -81,7 +81,7 @@ def _count(last: Entry, more: int, *, many: bool) -> Entry:
         return last
     if not many:
         return replace(last, repeated=more)
-    ending = " (the last of many askers)"
+    ending = " (the last of many callers)"
     text = one_line(last.text, LONGEST_SENTENCE - len(ending)) + ending
     reason = None if last.reason is None else codes.LAST_OF_MANY(last.reason)
     return replace(last, repeated=more, text=text, reason=reason)

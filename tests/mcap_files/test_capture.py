@@ -1,4 +1,4 @@
-"""Recordings as they are written, cut, recovered and written again."""
+"""Writing, truncating, recovering and rewriting recordings."""
 
 import os
 import struct
@@ -28,7 +28,7 @@ def payload(number):
 
 
 def write(path, numbers, *, missed=None, end=True, about=ABOUT):
-    """A file of these numbers, a hundredth of a second apart; `end`: closed."""
+    """Write a file with these numbers, 0.01 s apart; `end`: close it."""
     capture = Capture(path, about, start_ns=SECOND)
     capture.attach("robot.toml", "application/toml", b'name = "arm"', time_ns=SECOND)
     for number in numbers:
@@ -55,7 +55,7 @@ def attached_to(path):
         return {each.name: each.data for each in make_reader(stream).iter_attachments()}
 
 
-def test_a_closed_file_is_whole_and_an_indexed_one_holds_the_same(tmp_path):
+def test_closed_file_is_complete_and_an_indexed_one_has_the_same_contents(tmp_path):
     path = tmp_path / "a.mcap"
     write(path, range(20_000), missed={JOINTS: 3, EVENTS: 0})
     assert state_of(path) is State.CLOSED
@@ -76,7 +76,7 @@ def test_a_closed_file_is_whole_and_an_indexed_one_holds_the_same(tmp_path):
     assert all(chunk.uncompressed_size < 1.01 * (1 << 20) for chunk in summary.chunk_indexes)
 
 
-def test_a_file_cut_at_any_byte_is_recovered_to_its_last_whole_message(tmp_path):
+def test_file_cut_at_any_byte_is_recovered_to_its_last_complete_message(tmp_path):
     whole, cut = tmp_path / "whole.mcap", tmp_path / "cut.mcap"
     write(whole, range(6), end=False)
     data = whole.read_bytes()
@@ -90,7 +90,7 @@ def test_a_file_cut_at_any_byte_is_recovered_to_its_last_whole_message(tmp_path)
         assert describe_file(cut).problem == ""
 
 
-def test_a_recovered_file_tells_what_its_numbers_show_to_be_missing(tmp_path):
+def test_recovered_file_lists_the_messages_missing_by_their_numbers(tmp_path):
     path = tmp_path / "a.mcap"
     write(path, [0, 1, 5, 6, 9], end=False)
     recover(path)
@@ -98,7 +98,7 @@ def test_a_recovered_file_tells_what_its_numbers_show_to_be_missing(tmp_path):
     assert (joints.messages, joints.lost) == (5, 5)
 
 
-def test_an_original_is_kept_where_the_new_file_is_not_the_same(tmp_path, monkeypatch):
+def test_original_is_kept_if_the_new_file_differs(tmp_path, monkeypatch):
     path = tmp_path / "a.mcap"
     write(path, range(100))
     before = path.read_bytes()
@@ -118,10 +118,10 @@ def test_an_original_is_kept_where_the_new_file_is_not_the_same(tmp_path, monkey
     assert [each.name for each in tmp_path.iterdir()] == ["a.mcap"]
 
 
-def test_several_files_become_one_without_what_each_began_with_again(tmp_path):
+def test_several_files_become_one_without_repeated_first_messages(tmp_path):
     first, second, target = tmp_path / "1.mcap", tmp_path / "2.mcap", tmp_path / "saved.mcap"
     write(first, range(10), missed={JOINTS: 2})
-    write(second, [9, *range(10, 20)], end=False)  # what is known of a robot stands in each
+    write(second, [9, *range(10, 20)], end=False)  # each repeats the robot's description
     rewrite([first, second], target, about={"name": "saved", "cause": "link lost"})
     assert numbers_in(target) == list(range(20))
     recording = describe_file(target)
@@ -130,7 +130,7 @@ def test_several_files_become_one_without_what_each_began_with_again(tmp_path):
     assert first.exists()
 
 
-def test_a_file_on_a_full_disk_gets_its_end_where_it_is(tmp_path):
+def test_file_on_a_full_disk_is_closed_in_place(tmp_path):
     path = tmp_path / "a.mcap"
     write(path, range(10), end=False)
     os.truncate(path, path.stat().st_size - 3)
@@ -141,7 +141,7 @@ def test_a_file_on_a_full_disk_gets_its_end_where_it_is(tmp_path):
 
 
 @pytest.mark.parametrize("content", [b"", b"\x89MCAP0\r\n"[:5], b"no recording at all", bytes(100)])
-def test_what_is_no_recording_is_refused_in_words_and_left_as_it_is(tmp_path, content):
+def test_other_file_is_refused_with_a_sentence_and_unchanged(tmp_path, content):
     path = tmp_path / "a.mcap"
     path.write_bytes(content)
     with pytest.raises(CaptureError, match=r"a\.mcap: no"):
@@ -149,13 +149,13 @@ def test_what_is_no_recording_is_refused_in_words_and_left_as_it_is(tmp_path, co
     assert path.read_bytes() == content
 
 
-def test_a_file_that_cannot_be_created_is_refused_in_words(tmp_path):
+def test_file_that_cannot_be_created_is_refused_with_a_sentence(tmp_path):
     (tmp_path / "folder").write_text("a file")
     with pytest.raises(CaptureError, match="cannot be written"):
         Capture(tmp_path / "folder" / "a.mcap", ABOUT, start_ns=0)
 
 
-def test_a_damaged_chunk_of_a_cut_file_is_left_out_and_told_and_the_rest_is_kept(tmp_path):
+def test_damaged_chunk_of_a_cut_file_is_omitted_and_counted(tmp_path):
     whole = write_recording(tmp_path / "whole.mcap", video=False)
     blocks, messages = layout_of(whole).blocks, sum(topic.messages for topic in describe_file(whole).topics)
     data = bytearray(whole.read_bytes()[: max(block.offset + block.length for block in blocks) + 5])
@@ -168,7 +168,7 @@ def test_a_damaged_chunk_of_a_cut_file_is_left_out_and_told_and_the_rest_is_kept
     assert sum(topic.messages for topic in describe_file(path).topics) == recovered.messages
 
 
-def test_a_whole_file_of_which_a_part_would_be_missing_stays_as_it_is(tmp_path):
+def test_closed_file_with_unreadable_messages_is_not_rewritten(tmp_path):
     whole = write_recording(tmp_path / "whole.mcap", chunked=False)
     data = bytearray(whole.read_bytes())
     begin = layout_of(whole).blocks[0].offset
@@ -180,7 +180,7 @@ def test_a_whole_file_of_which_a_part_would_be_missing_stays_as_it_is(tmp_path):
     assert path.read_bytes() == data
 
 
-def test_damage_far_before_the_end_of_a_killed_file_is_refused_but_room_never_written_is_cut(tmp_path):
+def test_damage_far_before_the_end_is_refused_but_trailing_zeros_are_cut(tmp_path):
     path = tmp_path / "a.mcap"
     write(path, range(30_000), end=False)
     assert path.stat().st_size > 6 << 20
@@ -195,7 +195,7 @@ def test_damage_far_before_the_end_of_a_killed_file_is_refused_but_room_never_wr
     assert path.read_bytes() == data
 
 
-def test_metadata_that_a_stranger_wrote_cuts_nothing(tmp_path):
+def test_metadata_of_another_program_truncates_nothing(tmp_path):
     path = tmp_path / "a.mcap"
     with path.open("wb") as stream:
         writer = Writer(stream, use_chunking=False)
@@ -214,7 +214,7 @@ def test_metadata_that_a_stranger_wrote_cuts_nothing(tmp_path):
     assert is_ours(own)
 
 
-def test_a_file_that_is_being_written_is_not_made_whole_away_from_its_writer(tmp_path):
+def test_file_that_is_being_written_is_not_recovered(tmp_path):
     path = tmp_path / "a.mcap"
     capture = Capture(path, ABOUT, start_ns=SECOND)
     capture.write_out()

@@ -1,4 +1,4 @@
-"""A capture while it is open: its file is locked, and its descriptor is its own."""
+"""The lock and the descriptor of an open capture."""
 
 import errno
 
@@ -15,7 +15,7 @@ def add(capture):
     capture.add(KEY, topic("joints"), Header(1, 1, 1), b"AAAA", received_ns=5)
 
 
-def test_a_file_is_told_to_be_written_until_it_is_closed_or_given_up(tmp_path):
+def test_file_counts_as_being_written_until_it_is_closed_or_given_up(tmp_path):
     closed, failed = (Capture(tmp_path / name, {}, start_ns=1) for name in ("a.mcap", "b.mcap"))
     assert is_being_written(closed.path)
     assert is_being_written(failed.path)
@@ -25,7 +25,7 @@ def test_a_file_is_told_to_be_written_until_it_is_closed_or_given_up(tmp_path):
     assert not is_being_written(failed.path)
 
 
-def test_a_file_that_was_given_up_writes_into_no_other_that_has_its_descriptor(tmp_path):
+def test_abandoned_capture_does_not_write_into_a_reused_descriptor(tmp_path):
     first = Capture(tmp_path / "a.mcap", {}, start_ns=1)
     first.give_up(OSError(errno.ENOSPC, "full"))
     second = Capture(tmp_path / "b.mcap", {}, start_ns=1)

@@ -1,4 +1,4 @@
-"""Recordings whose messages came in bunches: what is shown of them goes by their publishers' times."""
+"""Recordings of messages received in bursts are shown by their source times."""
 
 import csv
 import io
@@ -24,7 +24,7 @@ HOUR_NS = 3600 * 10**9
 
 
 def bunched(path, *, clock_ahead_ns=0):
-    """States at 100 Hz of a waist that turns by 1 rad a second, eight of which are received at once."""
+    """Write states at 100 Hz of a waist that turns at 1 rad/s, received in bursts of eight."""
     with path.open("wb") as stream:
         writer = Writer(stream)
         writer.start(library="test")
@@ -55,7 +55,7 @@ def exported(path, folder):
     return out.read_text()
 
 
-def test_the_table_has_a_row_a_state_and_its_time_can_be_differentiated(tmp_path, capsys):
+def test_table_has_a_row_for_each_state_with_evenly_spaced_times(tmp_path, capsys):
     header, *rows = csv.reader(io.StringIO(exported(bunched(tmp_path / "a.mcap"), tmp_path)))
     capsys.readouterr()
     assert header[:3] == ["time", "received", "sequence"]
@@ -67,12 +67,12 @@ def test_the_table_has_a_row_a_state_and_its_time_can_be_differentiated(tmp_path
     waist, tool_x = header.index("waist [rad]"), header.index("tool x [m]")
     speed = np.diff([float(row[waist]) for row in rows]) / (np.diff(times) * 1e-9)
     assert speed == pytest.approx(np.ones(STATES - 1))
-    # The tool's state of the same stamp stands in the state's row.
+    # The row of a joint state has the tool's state with the same time.
     assert all(row[tool_x] == row[waist] for row in rows[::5])
 
 
 @pytest.mark.parametrize("clock_ahead_ns", [0, -HOUR_NS, 30 * 365 * 24 * HOUR_NS])
-def test_series_go_by_the_publishers_times_whatever_its_clock_says(tmp_path, clock_ahead_ns):
+def test_series_use_source_times_for_any_clock_offset(tmp_path, clock_ahead_ns):
     with RecordingFile(bunched(tmp_path / "a.mcap", clock_ahead_ns=clock_ahead_ns)) as file:
         first, last = file.layout.start_ns, file.layout.end_ns
         (series,) = SeriesReader().read(
@@ -84,7 +84,7 @@ def test_series_go_by_the_publishers_times_whatever_its_clock_says(tmp_path, clo
     assert steps == pytest.approx(np.full(len(steps), 0.01), abs=0.001)
 
 
-def test_a_replay_puts_each_state_at_its_publishers_time(tmp_path):
+def test_replay_publishes_each_state_at_its_source_time(tmp_path):
     source = RecordingSource(bunched(tmp_path / "a.mcap"))
     try:
         source.seek(source.start_ns)
@@ -99,7 +99,7 @@ def message(received_ns, source_ns, topic=JOINTS):
     return RecordedMessage(received_ns, (0, 0), topic, source_ns, 0, b"")
 
 
-def test_what_is_told_again_with_an_old_time_goes_by_its_receipt():
+def test_repeated_message_with_an_old_time_uses_its_receive_time():
     times, second = PublisherTimes(), 10**9
     assert times.of(message(100 * second, 100 * second - MS)) == 100 * second - MS
     assert times.of(message(101 * second, 100 * second - MS)) == 101 * second

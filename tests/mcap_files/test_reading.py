@@ -1,4 +1,4 @@
-"""Files read by topic and time: finished, unchunked, cut, and foreign."""
+"""Reading files by topic and time: closed, unchunked, truncated, and of other programs."""
 
 import struct
 import tracemalloc
@@ -40,31 +40,31 @@ def file(request, tmp_path):
         yield opened
 
 
-def test_a_range_of_one_topic_holds_what_was_received_then(file):
+def test_range_of_one_topic_has_the_messages_received_in_it(file):
     found = list(file.messages([JOINTS], start_ns=at(1.0), end_ns=at(1.05)))
     assert seconds(found) == [1.0, 1.01, 1.02, 1.03, 1.04]
     assert {message.topic for message in found} == {JOINTS}
     assert found[0].source_ns == at(1.0) - 1000
 
 
-def test_all_topics_come_in_the_order_of_their_times(file):
+def test_messages_of_all_topics_are_sorted_by_time(file):
     times = [message.received_ns for message in file.messages(start_ns=at(0.5), end_ns=at(1.5))]
     assert len(times) > 100
     assert times == sorted(times)
 
 
-def test_what_was_so_at_a_time_is_the_newest_of_each_topic(file):
+def test_state_at_a_time_is_the_newest_message_of_each_topic(file):
     newest = file.state_at([*file.topics], at(2.345))
     assert seconds([newest[JOINTS], newest["robomesh/site/arm/events"]]) == [2.34, 2.0]
     assert seconds([newest["robomesh/site/arm/description"]]) == [0.0]
 
 
-def test_the_last_so_many_of_a_topic_come_oldest_first(file):
+def test_last_messages_of_a_topic_are_sorted_oldest_first(file):
     assert seconds(file.last(JOINTS, at(2.0), 4)) == [1.97, 1.98, 1.99, 2.0]
     assert seconds(file.last("robomesh/site/arm/events", at(2.5), 100)) == [0.0, 1.0, 2.0]
 
 
-def test_video_begins_at_the_key_frame_before(file):
+def test_video_begins_at_the_previous_key_frame(file):
     key_frame = file.newest(VIDEO, at(1.3), holds_key_frame)
     assert key_frame is not None
     assert seconds([key_frame]) == [1.0]
@@ -73,18 +73,18 @@ def test_video_begins_at_the_key_frame_before(file):
     assert not holds_key_frame(later.data)
 
 
-def test_an_attachment_is_read_where_it_lies(file):
+def test_attachment_is_read_from_its_position(file):
     assert file.attachment("mesh/base") == b"glTF of the base"
     with pytest.raises(RecordingError, match="no attachment 'x'; it has mesh/base"):
         file.attachment("x")
 
 
-def test_a_topic_that_is_not_there_is_told_with_those_that_are(file):
+def test_error_of_a_missing_topic_lists_the_topics(file):
     with pytest.raises(RecordingError, match=r"no topic 'x'; it has .*robomesh/site/arm/joints"):
         next(file.messages(["x"]))
 
 
-def test_a_message_that_came_late_into_its_chunk_is_still_in_order(tmp_path):
+def test_late_message_in_a_chunk_is_still_in_order(tmp_path):
     path = tmp_path / "late.mcap"
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=64)
@@ -103,7 +103,7 @@ def test_a_message_that_came_late_into_its_chunk_is_still_in_order(tmp_path):
 
 
 @pytest.mark.parametrize("keep", range(0, 4000, 391))
-def test_a_file_cut_anywhere_is_read_up_to_there_or_refused_in_words(tmp_path, keep):
+def test_truncated_file_is_read_to_its_end_or_refused_with_a_sentence(tmp_path, keep):
     path = write_recording(tmp_path / "trial.mcap", seconds=0.3)
     path.write_bytes(path.read_bytes()[:keep])
     words = ""
@@ -118,7 +118,7 @@ def test_a_file_cut_anywhere_is_read_up_to_there_or_refused_in_words(tmp_path, k
     assert not words or "trial.mcap" in words
 
 
-def test_a_changed_byte_in_a_chunk_is_told_and_the_rest_still_reads(tmp_path):
+def test_changed_byte_in_a_chunk_is_an_error_and_the_rest_is_readable(tmp_path):
     path = write_recording(tmp_path / "trial.mcap", video=False)
     block = layout_of(path).blocks[3]
     data = bytearray(path.read_bytes())
@@ -131,7 +131,7 @@ def test_a_changed_byte_in_a_chunk_is_told_and_the_rest_still_reads(tmp_path):
         assert seconds(after)[-1] == 3.99
 
 
-def test_a_finished_file_tells_the_same_as_the_records_in_it(tmp_path):
+def test_summary_of_a_closed_file_equals_a_scan_of_its_records(tmp_path):
     chunked, plain = (
         describe_file(write_recording(tmp_path / f"{name}.mcap", chunked=name == "chunked"))
         for name in ("chunked", "plain")
@@ -141,7 +141,7 @@ def test_a_finished_file_tells_the_same_as_the_records_in_it(tmp_path):
     assert (chunked.problem, plain.problem, plain.attachments) == ("", "", ["mesh/base"])
 
 
-def test_names_never_lead_out_of_the_folder(tmp_path):
+def test_names_never_lead_outside_the_folder(tmp_path):
     folder = tmp_path / "recordings"
     (folder / "arm").mkdir(parents=True)
     outside = write_recording(tmp_path / "outside.mcap", seconds=0.1)
@@ -154,7 +154,7 @@ def test_names_never_lead_out_of_the_folder(tmp_path):
 
 
 def write_bomb(path, told, packed):
-    """A file of one chunk, which tells what it holds, and whose bytes hold something else."""
+    """Write a file of one chunk with a false declared size."""
     chunk = Chunk(
         compression="zstd",
         data=packed,
@@ -185,7 +185,7 @@ def write_bomb(path, told, packed):
 
 
 @pytest.mark.parametrize("told", [1 << 20, 32 << 20])
-def test_a_chunk_that_holds_more_than_it_tells_or_nothing_is_refused_and_takes_no_memory(tmp_path, told):
+def test_chunk_with_a_false_size_is_refused_and_takes_no_memory(tmp_path, told):
     path = tmp_path / "bomb.mcap"
     packed = zstandard.ZstdCompressor().compress(bytes(32 << 20))
     write_bomb(path, told, packed)
@@ -199,7 +199,7 @@ def test_a_chunk_that_holds_more_than_it_tells_or_nothing_is_refused_and_takes_n
         tracemalloc.stop()
 
 
-def test_lengths_that_no_file_has_are_refused_in_words(tmp_path):
+def test_impossible_lengths_are_refused_with_a_sentence(tmp_path):
     path = write_recording(tmp_path / "trial.mcap", video=False)
     offset = layout_of(path).blocks[3].offset
     data = path.read_bytes()
@@ -210,7 +210,7 @@ def test_lengths_that_no_file_has_are_refused_in_words(tmp_path):
             RecordingFile(path)
 
 
-def test_a_growing_file_is_looked_through_once_and_a_new_one_of_its_name_anew(tmp_path, monkeypatch):
+def test_growing_file_is_scanned_once_and_a_replaced_file_again(tmp_path, monkeypatch):
     whole = write_recording(tmp_path / "whole.mcap", chunked=False).read_bytes()
     path = tmp_path / "grows.mcap"
     path.write_bytes(whole[: len(whole) // 2 + 7])
@@ -218,11 +218,11 @@ def test_a_growing_file_is_looked_through_once_and_a_new_one_of_its_name_anew(tm
     read = []
     go_on = layout._Scan.go_on
 
-    def noted(scan, stream):
+    def record_scan(scan, stream):
         read.append(scan.offset)
         go_on(scan, stream)
 
-    monkeypatch.setattr(layout._Scan, "go_on", noted)
+    monkeypatch.setattr(layout._Scan, "go_on", record_scan)
     end = len(whole) * 3 // 4
     path.write_bytes(whole[:end])
     grown = layout_of(path)

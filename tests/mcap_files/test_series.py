@@ -1,4 +1,4 @@
-"""Values over time: their names, and that thinning loses no peak."""
+"""Values over time: their names, and downsampling without losing peaks."""
 
 import math
 
@@ -20,14 +20,14 @@ def series_of(path, *names, start_s=0.0, end_s=None, points=1000):
         return SeriesReader().read(file, names, start_ns=start_ns, end_ns=end_ns, points=points)
 
 
-def test_the_values_of_a_recording_are_known_by_name(tmp_path):
+def test_values_of_a_recording_have_names(tmp_path):
     with RecordingFile(write_recording(tmp_path / "trial.mcap")) as file:
         known = known_values(file)
     assert {"joints/waist/position", "joints/elbow/position", "controller/rate_hz"} <= set(known)
     assert not any(name.startswith(("video", "frames", "description")) for name in known)
 
 
-def test_a_peak_of_one_message_among_many_is_never_lost(tmp_path):
+def test_peak_of_one_message_among_many_is_never_lost(tmp_path):
     path = tmp_path / "peak.mcap"
     with Written(path) as file:
         for number in range(5000):
@@ -42,7 +42,7 @@ def test_a_peak_of_one_message_among_many_is_never_lost(tmp_path):
     assert all(waist.lowest <= waist.highest)
 
 
-def test_a_closer_look_tells_each_message(tmp_path):
+def test_short_time_span_has_each_message(tmp_path):
     path = write_recording(tmp_path / "trial.mcap")
     (elbow, waist) = series_of(
         path, "joints/elbow/position", "joints/waist/position", start_s=1.0, end_s=1.1, points=1000
@@ -52,7 +52,7 @@ def test_a_closer_look_tells_each_message(tmp_path):
     assert waist.times_s == pytest.approx(waist.highest, abs=0.001)
 
 
-def test_an_unknown_value_is_refused_with_the_topics_that_have_some(tmp_path):
+def test_error_of_an_unknown_value_lists_the_topics(tmp_path):
     path = write_recording(tmp_path / "trial.mcap")
     with pytest.raises(
         RecordingError, match="no value 'power/x'; topics with values: controller, events, joints"
@@ -62,7 +62,7 @@ def test_an_unknown_value_is_refused_with_the_topics_that_have_some(tmp_path):
     assert len(nothing.times_s) == 0
 
 
-def test_a_joint_that_slides_is_in_metres(tmp_path):
+def test_prismatic_joint_is_in_metres(tmp_path):
     path = tmp_path / "slides.mcap"
     description = schema.Description()
     description.joints.add(name="waist", type=schema.Description.Joint.ROTARY)
@@ -74,7 +74,7 @@ def test_a_joint_that_slides_is_in_metres(tmp_path):
     assert [series.unit for series in found] == ["m", "rad"]
 
 
-def test_kinematics_have_names_of_their_own_in_metres():
+def test_values_of_kinematics_have_short_names_and_metres():
     state = schema.KinematicState(
         tool_to_base=[0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 1],
         linear_velocity=schema.Vector3(x=3, y=4),
@@ -94,7 +94,7 @@ def test_kinematics_have_names_of_their_own_in_metres():
     assert (units["tool/x"], units["tool/speed"], units["clearance"]) == ("m", "m/s", "m")
 
 
-def test_any_protobuf_messages_numbers_have_names_maps_and_times_left_out():
+def test_numbers_of_any_protobuf_message_have_names_except_maps_and_times():
     message = FileDescriptorProto()
     message.public_dependency.extend([4, 5])
     field = message.message_type.add(name="Thing").field.add(name="size", number=7)
@@ -105,7 +105,7 @@ def test_any_protobuf_messages_numbers_have_names_maps_and_times_left_out():
 
 
 class Nonsense:
-    """What no reader of the topic can read."""
+    """A message with invalid bytes."""
 
     DESCRIPTOR = joints().DESCRIPTOR
 
@@ -113,7 +113,7 @@ class Nonsense:
         return b"\xff"
 
 
-def test_a_message_that_cannot_be_read_costs_itself_alone(tmp_path, caplog):
+def test_unreadable_message_is_omitted_alone(tmp_path, caplog):
     path = tmp_path / "trial.mcap"
     with Written(path) as file:
         for number in range(10):
@@ -126,7 +126,7 @@ def test_a_message_that_cannot_be_read_costs_itself_alone(tmp_path, caplog):
     assert "10 messages of joints cannot be read" in caplog.text
 
 
-def test_of_a_thousand_values_those_asked_for_are_kept_and_few_besides(tmp_path):
+def test_of_a_thousand_values_the_requested_ones_and_few_others_are_cached(tmp_path):
     path = tmp_path / "names.mcap"
     with Written(path) as file:
         for number in range(2):

@@ -339,7 +339,7 @@ def test_invalid_lines_are_left_out_of_a_search(tmp_path):
 
 
 def test_a_search_for_too_many_entries_is_refused():
-    with pytest.raises(RefusedError, match="most = 10001: at most 10000"):
+    with pytest.raises(RefusedError, match="most = 10001 is too many: at most 10000"):
         query_of(schema.AuditQuery(most=10_001))
 
 

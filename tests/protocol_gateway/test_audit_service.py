@@ -140,7 +140,7 @@ def test_entries_are_found_over_the_mesh_by_operator_request_and_time(mesh, tmp_
             (found,) = (await site.session.ask(FIND, schema.AuditQuery(request="TRACE_ON"))).entries
             assert found == site.seen["audit"][2]
             text = await refusal(site.session.ask(FIND, schema.AuditQuery(most=20_000)))
-            assert "most = 20000: at most 10000" in text
+            assert "most = 20000 is too many: at most 10000" in text
 
     run(main())
 
@@ -157,7 +157,7 @@ def test_the_command_lists_entries_of_robots_and_of_log_files(mesh, router, tmp_
                 site.session.declare_presence("hall", robot, "gateway")
             lines = await robomesh_to(router, "audit", "list", "arm", "--outcome", "refused")
             assert len(lines) == 1
-            assert "li            HOME           REFUSED   Not sent: nobody is in control" in lines[0]
+            assert "li            HOME           REFUSED   Not sent: no operator is in control" in lines[0]
             rows = [json.loads(row) for row in await robomesh_to(router, "audit", "list", "--json")]
             assert [(row["robot"], row["request"]) for row in rows[:3]] == [
                 ("hall/arm", "HOME"),

@@ -1,4 +1,4 @@
-"""A worker for the tests: echoes, fails, dies, takes its time."""
+"""A worker for the tests: echoes, fails, crashes or sleeps."""
 
 import os
 import sys

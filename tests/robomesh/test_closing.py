@@ -1,4 +1,4 @@
-"""What ends quietly when it is closed at an awkward moment."""
+"""Closing subscriptions and processes while threads still read."""
 
 import asyncio
 import subprocess
@@ -11,7 +11,7 @@ from robomesh.subscription import Subscription
 from tests.conftest import run
 
 
-def test_a_subscription_that_is_closed_before_it_is_read_from_ends_in_silence(mesh, monkeypatch):
+def test_subscription_closed_before_its_first_read_ends_without_error(mesh, monkeypatch):
     read, begin = Subscription._read, threading.Event()
 
     def late(subscription):
@@ -24,14 +24,14 @@ def test_a_subscription_that_is_closed_before_it_is_read_from_ends_in_silence(me
             subscription = monitor.subscribe("robomesh/site/arm/joints", history=False)
             subscription.close()
             begin.set()
-            # What its thread raised would fail this test.
+            # An error in the thread would fail this test.
             await asyncio.to_thread(subscription._thread.join)
             assert [sample async for sample in subscription] == []
 
     run(main())
 
 
-# On a busy machine a thread that reads may wake up late.
+# On a busy machine a reading thread may wake up late.
 _ENDS_WHILE_A_THREAD_READS = """
 import asyncio, sys, time
 from robomesh.session import SessionSettings, open_session
@@ -53,7 +53,7 @@ asyncio.run(main())
 """
 
 
-def test_a_process_waits_at_its_end_for_the_threads_that_read(router):
+def test_process_exit_waits_for_reading_threads(router):
     ended = subprocess.run(
         [sys.executable, "-c", _ENDS_WHILE_A_THREAD_READS, router],
         cwd=Path(__file__).parents[2],
@@ -62,5 +62,5 @@ def test_a_process_waits_at_its_end_for_the_threads_that_read(router):
         timeout=120.0,
         check=False,
     )
-    # A thread that Python ends within Zenoh's code aborts the process: "exception not rethrown".
+    # Python would abort the process if it ended a thread inside Zenoh's code: "exception not rethrown".
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "has ended\n", "")

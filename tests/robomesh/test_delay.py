@@ -1,4 +1,4 @@
-"""What waited on its way is as old as it is."""
+"""Delays of samples that waited on their way."""
 
 import asyncio
 import time
@@ -20,69 +20,69 @@ def header(sequence: int, source_s: float, publisher: int = 1) -> Header:
 
 
 @pytest.mark.parametrize("offset_s", [0.0, 86_400.0, -3_600.5])
-def test_a_sample_is_late_by_what_it_took_longer_than_the_quickest_whatever_the_clocks_say(offset_s):
+def test_delay_is_the_time_above_the_quickest_sample_for_any_clock_offset(offset_s):
     delay = Delay()
-    came = [(0.00, 0.04), (0.01, 0.05), (0.02, 1.54), (0.03, 1.55), (1.60, 1.64)]
-    late = [delay.of(header(n, at), got + offset_s) for n, (at, got) in enumerate(came, 1)]
+    arrivals = [(0.00, 0.04), (0.01, 0.05), (0.02, 1.54), (0.03, 1.55), (1.60, 1.64)]
+    late = [delay.of(header(n, at), got + offset_s) for n, (at, got) in enumerate(arrivals, 1)]
     assert late == pytest.approx([0.0, 0.0, 1.48, 1.48, 0.0], abs=0.01)
 
 
-def test_two_quicker_ones_show_that_those_before_were_late():
+def test_two_quicker_samples_lower_the_least_lag():
     delay = Delay()
-    came = [(0.0, 3.0), (3.0, 3.1), (3.1, 3.2), (0.2, 3.3)]
-    late = [delay.of(header(n, at), got) for n, (at, got) in enumerate(came, 1)]
+    arrivals = [(0.0, 3.0), (3.0, 3.1), (3.1, 3.2), (0.2, 3.3)]
+    late = [delay.of(header(n, at), got) for n, (at, got) in enumerate(arrivals, 1)]
     assert late == pytest.approx([0.0, 0.0, 0.0, 3.0], abs=0.01)
 
 
-def test_a_sample_dated_an_hour_ahead_makes_no_other_late_and_hides_no_late_one():
+def test_one_sample_dated_an_hour_ahead_changes_no_other_delay():
     delay = Delay()
-    came = [(0.0, 0.1), (3600.0, 0.2), (0.3, 0.4), (0.4, 0.5), (0.5, 2.6), (3605.0, 2.7), (0.6, 2.7)]
-    late = [delay.of(header(n, at), got) for n, (at, got) in enumerate(came, 1)]
+    arrivals = [(0.0, 0.1), (3600.0, 0.2), (0.3, 0.4), (0.4, 0.5), (0.5, 2.6), (3605.0, 2.7), (0.6, 2.7)]
+    late = [delay.of(header(n, at), got) for n, (at, got) in enumerate(arrivals, 1)]
     assert late == pytest.approx([0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 2.0], abs=0.01)
 
 
-def test_a_first_sample_dated_an_hour_ahead_makes_no_other_late_and_hides_no_late_one():
+def test_first_sample_dated_an_hour_ahead_changes_no_other_delay():
     delay = Delay()
-    came = [(3600.0, 0.1), (0.1, 0.2), (0.2, 0.3), (0.3, 2.4)]
-    late = [delay.of(header(n, at), got) for n, (at, got) in enumerate(came, 1)]
+    arrivals = [(3600.0, 0.1), (0.1, 0.2), (0.2, 0.3), (0.3, 2.4)]
+    late = [delay.of(header(n, at), got) for n, (at, got) in enumerate(arrivals, 1)]
     assert late == pytest.approx([0.0, 0.0, 0.0, 2.0], abs=0.01)
 
 
 @pytest.mark.parametrize("clock_s", [-5.0, 0.0, 5.0])
-def test_a_burst_after_the_first_sample_is_as_old_as_it_is_by_whatever_clock(clock_s):
+def test_burst_after_the_first_sample_is_late_for_any_clock_offset(clock_s):
     delay = Delay()
-    came = [(0.0, 0.1), *((n * 0.01, 3.0) for n in range(1, 300))]
-    late = [delay.of(header(n, at + clock_s), got) for n, (at, got) in enumerate(came, 1)]
+    arrivals = [(0.0, 0.1), *((n * 0.01, 3.0) for n in range(1, 300))]
+    late = [delay.of(header(n, at + clock_s), got) for n, (at, got) in enumerate(arrivals, 1)]
     assert late[1] == pytest.approx(2.89, abs=0.01)
     assert late[-1] == pytest.approx(0.0, abs=0.02)
 
 
-def test_clocks_that_part_slowly_make_nothing_late():
+def test_slow_clock_drift_makes_no_sample_late():
     delay = Delay()
     # The publisher's clock loses 0.5 ms in each second, for an hour.
     late = [delay.of(header(n, n * 0.1 * 0.9995), n * 0.1) for n in range(36_000)]
     assert max(late) < 0.001
 
 
-def test_after_an_hour_of_silence_what_waited_is_late_still():
+def test_sample_that_waited_after_a_long_pause_is_late():
     delay = Delay()
     delay.of(header(1, 0.0), 0.0)
     assert delay.of(header(2, 3600.0), 3602.0) == pytest.approx(2.0, abs=0.01)
 
 
-def test_a_publisher_that_starts_anew_begins_anew():
+def test_restarted_publisher_starts_over():
     delay = Delay()
     delay.of(header(1, 0.0), 0.0)
     assert delay.of(header(1, 5.0, publisher=2), 15.0) == 0.0
 
 
-def test_a_publisher_that_tells_no_time_is_never_late():
+def test_publisher_without_source_times_is_never_late():
     delay = Delay()
     assert [delay.of(Header(1, n, 0), n * 10.0) for n in range(1, 4)] == [0.0, 0.0, 0.0]
 
 
 def ages_of(mesh, robot: str) -> tuple[float, float, float]:
-    """The age of a sample that came at once, and then how late is one that waited 3 s, and how old."""
+    """Return the age of an immediate sample, then delay and age of one that waited 3 s."""
 
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
@@ -92,28 +92,28 @@ def ages_of(mesh, robot: str) -> tuple[float, float, float]:
                 await asyncio.sleep(0.01)
             publisher.put(JointStates())
             await anext(subscription)
-            at_once = subscription.age_s(publisher.key)
+            immediate = subscription.age_s(publisher.key)
             publisher.put(JointStates(), source_time_ns=time.time_ns() - 3 * S)
             waited = await anext(subscription)
-            return at_once, waited.late_s, subscription.age_s(publisher.key)
+            return immediate, waited.late_s, subscription.age_s(publisher.key)
 
     return run(main())
 
 
-def test_a_sample_that_waited_on_its_way_is_old_when_it_comes(mesh):
-    at_once, late, then = ages_of(mesh, "arm")
-    assert at_once >= 0.0
-    # Measured by the first, which may itself have taken a moment.
+def test_sample_that_waited_on_its_way_is_old_on_arrival(mesh):
+    immediate, late, then = ages_of(mesh, "arm")
+    assert immediate >= 0.0
+    # Relative to the first sample, which also took some time.
     assert late > 1.0
     assert then >= late
 
 
-def test_a_recording_played_back_is_never_late_with_the_times_of_then(mesh):
+def test_replay_with_old_source_times_is_never_late(mesh):
     _, late, _ = ages_of(mesh, "replay-1")
     assert late == 0.0
 
 
-def test_a_publisher_whose_clock_was_set_begins_anew_and_is_not_late_for_it(mesh, monkeypatch):
+def test_publisher_with_a_set_clock_takes_another_identity(mesh, monkeypatch):
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
             publisher = gateway.declare_publisher("hall", "arm", "joints")
@@ -127,7 +127,7 @@ def test_a_publisher_whose_clock_was_set_begins_anew_and_is_not_late_for_it(mesh
             other = publisher.put(JointStates())
             assert (other.publisher != one.publisher, other.sequence) == (True, one.sequence + 1)
             assert (await anext(states)).late_s < 1.0
-            # What is dated by another's clock begins anew when that one does, and only then.
+            # With another publisher's source times the identity changes only with that publisher.
             by_one = [publisher.put(JointStates(), source_time_ns=7 * S, dated_by=1) for _ in range(2)]
             by_two = publisher.put(JointStates(), source_time_ns=3 * S, dated_by=2)
             assert by_one[0].publisher == by_one[1].publisher != by_two.publisher

@@ -1,4 +1,4 @@
-"""What is told on a key that stands for many is told by nobody who may: it is left out everywhere."""
+"""Publications, replies and tokens on keys with wildcards are ignored."""
 
 import asyncio
 
@@ -17,7 +17,7 @@ JOINTS = joints(7.0).SerializeToString()
 STOP = schema.StopAnswer(stop_id=666).SerializeToString()
 
 
-def test_samples_answers_and_tokens_on_keys_for_many_are_left_out(mesh):
+def test_samples_replies_and_tokens_on_wildcard_keys_are_ignored(mesh):
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
             states = monitor.subscribe("robomesh/site/arm/joints", newest=10, history=False)
@@ -34,14 +34,14 @@ def test_samples_answers_and_tokens_on_keys_for_many_are_left_out(mesh):
                 assert (await anext(states)).message() == joints(1.0)
                 assert states.keys == ("robomesh/site/arm/joints",)
 
-                lying = "robomesh/site/*/joints"
+                wildcard = "robomesh/site/*/joints"
                 forger.declare_queryable(
-                    lying, lambda query: query.reply(lying, JOINTS, attachment=pack(Header(1, 1, 1)))
+                    wildcard, lambda query: query.reply(wildcard, JOINTS, attachment=pack(Header(1, 1, 1)))
                 )
                 token = forger.liveliness().declare_token("robomesh/site/*/alive/gateway/f")
                 present = forger.liveliness().declare_token("robomesh/site/arm/alive/player/f")
                 async with asyncio.timeout(30.0):
-                    # The second comes after the first, on the same link.
+                    # The second token arrives after the first, on the same link.
                     while not any(who.service == "player" for who in await monitor.present()):
                         await asyncio.sleep(0.01)
                 assert [who.service for who in await monitor.present()] == ["player"]
@@ -55,7 +55,7 @@ def test_samples_answers_and_tokens_on_keys_for_many_are_left_out(mesh):
     run(main())
 
 
-def test_who_answers_for_everything_takes_no_stop_away_from_its_owner(mesh):
+def test_queryable_for_everything_does_not_answer_a_stop_for_its_owner(mesh):
     async def main():
         stopped = []
 

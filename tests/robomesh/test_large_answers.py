@@ -1,4 +1,4 @@
-"""Answers as large as meshes are: whatever their last piece comes to, they arrive whole."""
+"""Answers of many sizes, with last pieces of any length."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from tests.conftest import run
 
 
 @pytest.mark.parametrize("size", [40_956, 133_596, 187_244, 241_624, 3_000_000])
-def test_an_answer_of_any_size_arrives_whole_at_the_first_asking(mesh, size):
+def test_answer_of_any_size_arrives_with_one_request(mesh, size):
     async def main():
         async with open_session(mesh) as owner, open_session(mesh) as asker:
             asked = []

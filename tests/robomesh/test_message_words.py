@@ -1,4 +1,4 @@
-"""What is said of a request or a message that is none."""
+"""Error texts for invalid requests and messages."""
 
 import pytest
 
@@ -15,7 +15,7 @@ from robomesh.schemas.robomesh_pb2 import CheckRequest, Event, EventList, Invers
         (CheckRequest, b'{"program": 1}', "not a CheckRequest: "),
     ],
 )
-def test_a_request_that_is_none_is_named_as_it_is_spoken(schema, payload, words):
+def test_error_of_an_invalid_request_has_the_right_article(schema, payload, words):
     with pytest.raises(MessageError, match=words):
         decode_request(schema, payload, JSON)
 
@@ -27,7 +27,7 @@ def dated(seconds=0, nanos=0):
 
 
 @pytest.mark.parametrize(("seconds", "nanos"), [(1 << 40, 0), (-(1 << 40), 0), (0, -1), (0, 1_000_000_000)])
-def test_a_message_with_a_time_that_is_none_is_none(seconds, nanos):
+def test_message_with_an_invalid_time_is_an_error(seconds, nanos):
     event = dated(seconds, nanos)
     for message in (event, EventList(events=[dated(), event])):
         with pytest.raises(MessageError, match=f"timestamp: {seconds} s and {nanos} ns is not a valid time"):
@@ -35,7 +35,7 @@ def test_a_message_with_a_time_that_is_none_is_none(seconds, nanos):
 
 
 @pytest.mark.parametrize("second", [-62_135_596_800, 0, 253_402_300_799])
-def test_every_time_from_year_1_to_9999_is_one(second):
+def test_every_time_from_year_1_to_9999_is_valid(second):
     message = EventList(events=[dated(second, 999_999_999)])
     assert decode(EventList, message.SerializeToString()) == message
     assert message.events[0].timestamp.ToNanoseconds() == second * 1_000_000_000 + 999_999_999

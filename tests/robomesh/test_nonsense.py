@@ -1,4 +1,4 @@
-"""What others say that makes no sense: it is left out, and hides nothing that does."""
+"""Invalid answers and late requests of other programs."""
 
 import asyncio
 import time
@@ -19,12 +19,12 @@ STOP = "robomesh/site/{}/stop"
 
 @pytest.fixture
 def plain(mesh):
-    """Somebody who keeps to nothing."""
+    """A plain Zenoh session, without the library's checks."""
     with zenoh.open(client_config(mesh.connect)) as session:
         yield session
 
 
-def test_an_owner_whose_answer_is_none_hides_no_others(mesh, plain):
+def test_invalid_answer_hides_no_other_answer(mesh, plain):
     async def stop(request):
         return schema.StopAnswer(stop_id=7, sent=True)
 
@@ -48,7 +48,7 @@ def test_an_owner_whose_answer_is_none_hides_no_others(mesh, plain):
     run(main())
 
 
-def test_a_refusal_that_is_no_text_is_a_refusal(mesh, plain):
+def test_refusal_with_invalid_utf_8_is_a_refusal(mesh, plain):
     def refuse(query):
         with query:
             query.reply_err(b"no\xff", encoding=TEXT)
@@ -63,14 +63,14 @@ def test_a_refusal_that_is_no_text_is_a_refusal(mesh, plain):
     run(main())
 
 
-def test_a_request_that_comes_as_its_owner_closes_is_not_done(mesh, plain):
+def test_request_that_arrives_during_close_is_not_handled(mesh, plain):
     done = []
 
     async def stop(request):
         done.append(request)
         return schema.StopAnswer(stop_id=1)
 
-    def it_came(answerer):
+    def wait_until_received(answerer):
         deadline = time.monotonic() + 40.0
         while not answerer._unanswered:
             assert time.monotonic() < deadline
@@ -83,7 +83,7 @@ def test_a_request_that_comes_as_its_owner_closes_is_not_done(mesh, plain):
                 pass
             done.clear()
             plain.get(STOP.format("arm"), lambda reply: None)
-            it_came(answerer)  # while the loop stands still: it waits for that
+            wait_until_received(answerer)  # blocks the loop, so that the request waits for it
             answerer.close()
             for _ in range(10):
                 await asyncio.sleep(0)

@@ -1,4 +1,4 @@
-"""Long answers in pieces: what is lost, forgotten, or asked for without end."""
+"""Long answers in pieces: losses, dropped answers and too many requests."""
 
 import asyncio
 from contextlib import asynccontextmanager
@@ -22,14 +22,14 @@ def mesh_of(name):
 
 
 @asynccontextmanager
-async def hall(mesh):
-    """An asker, the meshes that were asked for, and what their owner keeps; of NAMED the same."""
+async def owner_and_caller(mesh):
+    """Yield a caller, the requested meshes, and the owner's kept answers for KEY and for NAMED."""
     async with open_session(mesh) as owner, open_session(mesh) as asker:
         asked = []
 
         async def answer(request):
             asked.append(request.chunk)
-            return mesh_of(request.chunk)  # never the same object twice
+            return mesh_of(request.chunk)  # a new object for each request
 
         answerer = owner.answer("hall", "arm", "mesh/*", answer)
         await asker.ask_bytes(KEY.format("ready"), timeout_s=20.0)
@@ -42,7 +42,7 @@ async def hall(mesh):
 
 
 async def get(asker, selector):
-    """One reply, as it is."""
+    """Return the one reply to a query."""
     replies = await asyncio.to_thread(lambda: list(asker.zenoh_session.get(selector, timeout=20.0)))
     assert len(replies) == 1
     return replies[0]
@@ -55,13 +55,13 @@ async def token_of(asker, name, key=KEY):
 
 
 async def piece(asker, name, token, offset, key=KEY):
-    """Its bytes; None: refused."""
+    """Return a piece's bytes; None: refused."""
     reply = await get(asker, f"{key.format(name)}?piece={token}:{offset}")
     return None if reply.ok is None else reply.ok.payload.to_bytes()
 
 
-def between(monkeypatch, act):
-    """What happens to the n-th question for a piece before its owner sees it; True: it is lost."""
+def intercept(monkeypatch, act):
+    """Call `act` before the n-th request for a piece reaches its owner; True: lose the request."""
     answered, seen = pieces.LongAnswers.reply_piece, []
 
     def reply_piece(self, query):
@@ -76,64 +76,64 @@ def between(monkeypatch, act):
     monkeypatch.setattr(pieces.LongAnswers, "reply_piece", reply_piece)
 
 
-def test_lost_pieces_are_asked_for_again_and_the_owner_is_not(mesh, monkeypatch):
+def test_lost_pieces_are_requested_again_and_the_handler_is_not(mesh, monkeypatch):
     async def main():
-        async with hall(mesh) as (asker, asked, *_):
-            between(monkeypatch, lambda answers, number: number % 3 == 0)
+        async with owner_and_caller(mesh) as (asker, asked, *_):
+            intercept(monkeypatch, lambda answers, number: number % 3 == 0)
             assert await asker.ask_bytes(KEY.format("base"), timeout_s=20.0) == mesh_of("base")
             assert asked == ["base"]
 
     run(main())
 
 
-def test_what_its_owner_forgot_while_it_was_taken_is_asked_anew(mesh, monkeypatch):
+def test_answer_dropped_during_the_transfer_is_requested_again(mesh, monkeypatch):
     async def main():
-        async with hall(mesh) as (asker, asked, *_):
-            between(monkeypatch, lambda answers, number: number == 3 and answers._kept.clear())
+        async with owner_and_caller(mesh) as (asker, asked, *_):
+            intercept(monkeypatch, lambda answers, number: number == 3 and answers._kept.clear())
             assert await asker.ask_bytes(KEY.format("base"), timeout_s=20.0) == mesh_of("base")
             assert asked == ["base", "base"]
 
     run(main())
 
 
-def test_an_answer_that_breaks_off_is_told_as_such(mesh, monkeypatch):
+def test_answer_that_ends_early_is_an_error(mesh, monkeypatch):
     async def main():
-        async with hall(mesh) as (asker, *_):
-            between(monkeypatch, lambda answers, number: number > 1)
-            told = rf"mesh/base: [36]0000 of {LENGTH} bytes arrived, then none for 2 s"
-            with pytest.raises(BrokenAnswerError, match=told):
+        async with owner_and_caller(mesh) as (asker, *_):
+            intercept(monkeypatch, lambda answers, number: number > 1)
+            text = rf"mesh/base: [36]0000 of {LENGTH} bytes arrived, then none for 2 s"
+            with pytest.raises(BrokenAnswerError, match=text):
                 await asker.ask_bytes(KEY.format("base"), timeout_s=2.0)
 
     run(main())
 
 
-def test_of_too_much_what_was_taken_goes_first_and_the_same_is_kept_once(mesh, monkeypatch):
+def test_fetched_answers_are_dropped_first_and_equal_ones_are_kept_once(mesh, monkeypatch):
     async def main():
         monkeypatch.setattr(pieces, "_KEPT_BYTES", 2 * LENGTH)
-        async with hall(mesh) as (asker, _, answers, _):
-            taking, taken = await token_of(asker, "a"), await token_of(asker, "b")
+        async with owner_and_caller(mesh) as (asker, _, answers, _):
+            unfinished, fetched = await token_of(asker, "a"), await token_of(asker, "b")
             for number in range(1, PIECES):
-                assert await piece(asker, "b", taken, number * pieces.PIECE_BYTES)
-            # Many who ask for one mesh push out nothing.
+                assert await piece(asker, "b", fetched, number * pieces.PIECE_BYTES)
+            # Many requests for one mesh drop no other answer.
             assert {await token_of(asker, "c") for _ in range(4)} == {await token_of(asker, "c")}
-            assert await piece(asker, "a", taking, LENGTH - 7) == b"a" * 7
-            assert await piece(asker, "b", taken, LENGTH - 7) is None
+            assert await piece(asker, "a", unfinished, LENGTH - 7) == b"a" * 7
+            assert await piece(asker, "b", fetched, LENGTH - 7) is None
             assert len(answers._kept) == 2
 
     run(main())
 
 
-def test_what_is_asked_in_a_name_is_given_out_a_few_times_and_no_longer(mesh):
+def test_answer_in_a_callers_name_is_sent_a_few_times_only(mesh):
     async def main():
-        async with hall(mesh) as (asker, _, _, answers):
+        async with owner_and_caller(mesh) as (asker, _, _, answers):
             another, token = await token_of(asker, "li", NAMED), await token_of(asker, "li", NAMED)
             assert another != token
             for offset in (LENGTH, "9" * 5000, "-1", "x", ""):
                 assert await piece(asker, "li", token, offset, NAMED) is None
-            given = 0
+            sent = 0
             while await piece(asker, "li", token, 0, NAMED) is not None:
-                given += 1
-            assert given == pieces._TIMES * (PIECES - 1)
+                sent += 1
+            assert sent == pieces._TIMES * (PIECES - 1)
             assert list(answers._kept) == [another]
 
     run(main())
@@ -142,7 +142,7 @@ def test_what_is_asked_in_a_name_is_given_out_a_few_times_and_no_longer(mesh):
 def test_an_idle_owner_keeps_nothing(mesh, monkeypatch):
     async def main():
         monkeypatch.setattr(pieces, "_KEPT_S", 0.1)
-        async with hall(mesh) as (asker, _, answers, _):
+        async with owner_and_caller(mesh) as (asker, _, answers, _):
             await token_of(asker, "a")
             await until(lambda: not answers._kept)
 

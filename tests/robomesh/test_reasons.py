@@ -1,4 +1,4 @@
-"""Codes of refusals: the table, and their way over the mesh."""
+"""Codes of refusals: the table, and their encoding on the mesh."""
 
 import asyncio
 import string
@@ -19,18 +19,18 @@ TABLE = [each for each in vars(codes).values() if isinstance(each, Code)]
 
 
 def sent(reason, when=""):
-    """A reason as the other end reads it."""
+    """Return a reason as the other end reads it."""
     return reason_of(pairs_of(to_parameters(reason, when)), reason.text)
 
 
-def test_each_code_stands_once_in_the_table_and_is_a_dotted_word():
+def test_codes_are_unique_dotted_words():
     names = [each.name for each in TABLE]
     assert len(names) == len(set(names)) > 100
     assert set("".join(names)) <= set(string.ascii_lowercase + "._")
     assert {each.name for each in TABLE if each.problem.endswith(".")} == set()
 
 
-def test_a_sentence_is_the_problem_and_the_advice_with_values_and_causes():
+def test_sentence_has_problem_advice_values_and_causes():
     reason = codes.LINK_DOWN(codes.LINK_FAILED(where="10.0.0.7:5400", detail="refused"))
     assert str(reason) == "the link to the controller is down (cannot connect to 10.0.0.7:5400: refused)"
     assert str(codes.COMMAND_WAITED(waited=1.26, seconds=1.0)).startswith("it waited 1.3 s in the gateway")
@@ -47,7 +47,7 @@ def test_a_sentence_is_the_problem_and_the_advice_with_values_and_causes():
         codes.COMMAND_CHANGED(codes.ROBOT_OTHER_MOVED(name="left")),
     ],
 )
-def test_the_other_end_reads_what_was_sent(reason):
+def test_other_end_reads_the_sent_reason(reason):
     found = sent(reason, "again_s=0.500")
     assert (found.code, found.text) == (reason.code, reason.text)
     assert found.values == reason.values
@@ -56,7 +56,7 @@ def test_the_other_end_reads_what_was_sent(reason):
     ]
 
 
-def test_what_does_not_fit_is_left_out_and_the_code_never():
+def test_parameters_that_do_not_fit_are_omitted_but_never_the_code():
     reason = codes.STOP_LATCHED(id=7, by="操" * 200, reason="x" * 200)
     written = to_parameters(reason, "again_s=0.500")
     assert len(written.encode()) <= MOST_PARAMETER_BYTES
@@ -70,7 +70,7 @@ def test_what_does_not_fit_is_left_out_and_the_code_never():
     assert sent(codes.SEVERAL(codes.ROBOT_MOVED(), codes.ROBOT_NOT_HOMED())).causes == ()
 
 
-def test_a_value_is_one_line_without_control_characters():
+def test_value_is_one_line_without_control_characters():
     reason = codes.ALARM_UNKNOWN(id="a\x1b[2J\nb\u202e" + "x" * 2000)
     assert reason.text.startswith("no alarm 'a [2J b<U+202E>xxx")
     assert len(reason.values["id"]) == 800
@@ -79,12 +79,12 @@ def test_a_value_is_one_line_without_control_characters():
 @pytest.mark.parametrize(
     "parameters", ["", "busy", "quota=0.5", "%", "&&&=", "code=", "cause.code=x", "\ud800"]
 )
-def test_what_names_no_code_is_no_reason(parameters):
+def test_encoding_without_a_code_has_no_reason(parameters):
     assert reason_of(pairs_of(parameters), "") is None
 
 
 async def refusals(session, error):
-    """A refusal as our client has it, and as a plain Zenoh client: text and encoding."""
+    """Return the refusal that our client receives."""
 
     async def refuse(_):
         raise error
@@ -98,7 +98,7 @@ async def refusals(session, error):
     return refused.value
 
 
-def test_a_refusal_keeps_its_code_over_a_router(mesh):
+def test_refusal_keeps_its_code_over_a_router(mesh):
     reason = codes.STOP_LATCHED(id=7, by="li " * 60, reason="%&=;" * 60)
 
     async def main():
@@ -106,7 +106,7 @@ def test_a_refusal_keeps_its_code_over_a_router(mesh):
             found = await refusals(session, RefusedError(reason, text=f"Not sent: {reason}."))
             assert (type(found), str(found)) == (RefusedError, f"Not sent: {reason}.")
             assert (found.reason.code, found.reason.values["id"]) == ("stop.latched", "7")
-            # The session goes on: over 255 bytes would have ended it.
+            # The session still works: more than 255 bytes would have ended it.
             found = await refusals(session, BusyError(codes.BUSY()))
             assert (type(found), found.reason.code) == (BusyError, "request.busy")
             over = codes.OVER_QUOTA(asker="li", quota="checks_a_minute", most=120, seconds=9.0)
@@ -117,8 +117,8 @@ def test_a_refusal_keeps_its_code_over_a_router(mesh):
     run(main())
 
 
-def test_an_older_client_gets_what_it_knows(mesh):
-    """Its question does not ask for codes, and it compares the encoding with those two."""
+def test_older_client_gets_the_encodings_that_it_knows(mesh):
+    """It does not request codes, and compares the whole encoding."""
     errors = iter(
         [BusyError(codes.BUSY()), QuotaError(codes.BUSY(), again_s=0.25), RefusedError(codes.BUSY())]
     )
@@ -151,7 +151,7 @@ def test_an_older_client_gets_what_it_knows(mesh):
 @pytest.mark.parametrize(
     ("encoding", "kind"), [("busy", BusyError), ("quota=0.250", QuotaError), ("quota=nan", RefusedError)]
 )
-def test_an_older_owner_is_understood(mesh, encoding, kind):
+def test_older_owners_encodings_are_understood(mesh, encoding, kind):
     def refuse(query):
         with query:
             query.reply_err(b"no", encoding=f"{TEXT};{encoding}")

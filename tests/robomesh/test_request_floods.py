@@ -1,4 +1,4 @@
-"""More requests than their owner can begin."""
+"""Floods of requests to one owner."""
 
 import asyncio
 import contextlib
@@ -20,7 +20,7 @@ HOME = schema.CommandRequest(command=schema.CommandRequest.HOME)
 
 
 class Owner:
-    """Begins whatever comes, and answers once it is let."""
+    """An owner that begins every request, and answers when `go_on` is set."""
 
     def __init__(self, session):
         self.begun, self.go_on = [], asyncio.Event()
@@ -54,32 +54,32 @@ class Owner:
 async def site(mesh):
     async with open_session(mesh) as gateway, open_session(mesh) as eve, open_session(mesh) as li:
         owner = Owner(gateway)
-        # The router knows of it from here on: what is asked before has no answer.
+        # Wait until the router knows the owner; earlier requests would get no answer.
         await li.ask("robomesh/site/arm/command/ready", HOME, timeout_s=20.0)
         yield owner, eve, li
 
 
 def once(session, name, what="command"):
-    """Asked as a flooder asks, who is answered and does not wait."""
+    """Send a request without repeating it, like a flooding client."""
     key = f"robomesh/site/arm/{what}/{name}"
     payload = HOME.SerializeToString() if what == "command" else b""
     return asyncio.create_task(ask_all(session.zenoh_session, key, payload, timeout_s=60.0))
 
 
-def until_it_is_so(condition):
-    """Wait without letting the event loop go on: what comes meanwhile waits for it."""
+def block_until(condition):
+    """Wait while blocking the event loop, so that requests queue up."""
     deadline = time.monotonic() + 20.0
     while not condition():
         assert time.monotonic() < deadline
         time.sleep(0.005)
 
 
-def flood_while_the_loop_is_held(owner, session):
-    """Fill every place of the owner's with requests that its event loop has not seen; keep the result."""
+def flood_while_the_loop_is_blocked(owner, session):
+    """Fill the owner's queue with requests that its event loop has not seen; keep the result alive."""
     keys = [f"robomesh/site/arm/command/eve-{number}" for number in range(600)]
     payload = HOME.SerializeToString()
     asked = [session.zenoh_session.get(key, payload=payload, encoding=PROTOBUF) for key in keys]
-    until_it_is_so(lambda: owner.commands.turned_away >= 600 - 256)
+    block_until(lambda: owner.commands.turned_away >= 600 - 256)
     return asked
 
 
@@ -87,7 +87,7 @@ def is_busy(task):
     return task.done() and isinstance(task.result()[0][2], BusyError)
 
 
-def test_who_floods_an_owner_fills_his_own_share_and_others_are_answered_meanwhile(mesh):
+def test_flooding_caller_fills_only_its_own_share(mesh):
     async def main():
         async with site(mesh) as (owner, eve, li):
             asked = [once(eve, "eve") for _ in range(500)]
@@ -104,7 +104,7 @@ def test_who_floods_an_owner_fills_his_own_share_and_others_are_answered_meanwhi
     run(main())
 
 
-def test_a_flooder_of_many_names_is_bounded_too(mesh):
+def test_flood_with_many_names_is_limited(mesh):
     async def main():
         async with site(mesh) as (owner, eve, li):
             asked = [once(eve, f"eve-{number}") for number in range(600)]
@@ -117,7 +117,7 @@ def test_a_flooder_of_many_names_is_bounded_too(mesh):
     run(main())
 
 
-def test_a_flooder_with_one_name_has_one_share_whatever_views_it_names(mesh):
+def test_flood_with_one_name_has_one_share_over_all_views(mesh):
     async def main():
         async with site(mesh) as (owner, eve, li):
             asked = [once(eve, "eve", f"video/view-{number}/keyframe") for number in range(40)]
@@ -131,7 +131,7 @@ def test_a_flooder_with_one_name_has_one_share_whatever_views_it_names(mesh):
     run(main())
 
 
-def test_a_busy_owner_is_asked_again_until_the_time_is_over_and_begins_it_once(mesh):
+def test_request_to_a_busy_owner_is_repeated_and_handled_once(mesh):
     async def main():
         async with site(mesh) as (owner, eve, li):
             asked = [once(eve, "li") for _ in range(16)]
@@ -150,12 +150,12 @@ def test_a_busy_owner_is_asked_again_until_the_time_is_over_and_begins_it_once(m
     run(main())
 
 
-def test_a_stop_is_begun_before_the_requests_that_came_earlier(mesh):
+def test_stop_begins_before_earlier_requests(mesh):
     async def main():
         async with site(mesh) as (owner, eve, li):
-            asked = flood_while_the_loop_is_held(owner, eve)
+            asked = flood_while_the_loop_is_blocked(owner, eve)
             stop = li.zenoh_session.get("robomesh/site/arm/stop")
-            until_it_is_so(lambda: owner.stops.waiting)
+            block_until(lambda: owner.stops.waiting)
             await until(lambda: owner.begun_before_stop is not None)
             assert owner.begun_before_stop <= 2
             owner.go_on.set()
@@ -165,14 +165,14 @@ def test_a_stop_is_begun_before_the_requests_that_came_earlier(mesh):
     run(main())
 
 
-def test_a_flood_for_one_robot_takes_no_other_robots_turn(mesh):
+def test_flood_for_one_robot_does_not_delay_another_robot(mesh):
     async def main():
         async with site(mesh) as (owner, eve, li):
-            asked = flood_while_the_loop_is_held(owner, eve)
+            asked = flood_while_the_loop_is_blocked(owner, eve)
             other = li.zenoh_session.get(
                 "robomesh/site/other/command/li", payload=HOME.SerializeToString(), encoding=PROTOBUF
             )
-            until_it_is_so(lambda: owner.commands_of_other.waiting)
+            block_until(lambda: owner.commands_of_other.waiting)
             await until(lambda: owner.begun_before_other is not None)
             assert owner.begun_before_other <= 3
             owner.go_on.set()
@@ -182,14 +182,14 @@ def test_a_flood_for_one_robot_takes_no_other_robots_turn(mesh):
     run(main())
 
 
-def test_what_is_limited_may_come_in_a_burst_and_then_at_its_rate():
+def test_rate_limit_allows_a_burst_and_then_its_rate():
     limit = RateLimit(per_s=10.0, burst=3)
     assert [limit.take(5.0) for _ in range(5)] == [True, True, True, False, False]
     assert [limit.take(5.1), limit.take(5.1), limit.take(5.2)] == [True, False, True]
     assert [limit.take(99.0) for _ in range(4)] == [True, True, True, False]
 
 
-def test_what_begins_now_runs_to_its_first_wait_and_goes_on_in_a_task():
+def test_begin_now_runs_to_the_first_wait_and_continues_in_a_task():
     async def main():
         loop, seen, go_on = asyncio.get_running_loop(), [], asyncio.Event()
 

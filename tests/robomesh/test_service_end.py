@@ -38,7 +38,7 @@ def service():
     process.communicate()
 
 
-def test_a_second_sigterm_leaves_the_clean_up_alone(service):
+def test_second_sigterm_does_not_interrupt_the_clean_up(service):
     service.send_signal(signal.SIGTERM)
     assert service.stdout.readline() == "cleaning up\n"
     service.send_signal(signal.SIGTERM)
@@ -48,7 +48,7 @@ def test_a_second_sigterm_leaves_the_clean_up_alone(service):
     assert service.wait(20.0) == 0
 
 
-def test_a_second_sigint_ends_the_clean_up_too(service):
+def test_second_sigint_cancels_the_clean_up(service):
     service.send_signal(signal.SIGINT)
     assert service.stdout.readline() == "cleaning up\n"
     service.send_signal(signal.SIGINT)

@@ -33,7 +33,7 @@ async def until(condition, timeout_s=30.0):
             await asyncio.sleep(0.01)
 
 
-def test_what_is_put_arrives_with_key_number_and_source_time(mesh):
+def test_publication_arrives_with_key_number_and_source_time(mesh):
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
             subscription = monitor.subscribe("robomesh/*/*/joints", newest=10)
@@ -52,12 +52,12 @@ def test_what_is_put_arrives_with_key_number_and_source_time(mesh):
     run(main())
 
 
-def test_a_value_that_is_published_while_it_is_answered_is_live(mesh):
+def test_value_published_during_its_query_is_live(mesh):
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
             publisher = gateway.declare_publisher("site", "arm", "joints")
             publisher.put(joints(1.0))
-            # As in the middle of `put`: what is about to be published is answered already.
+            # As in the middle of `put`: the reply has the value before its publication.
             put_unheard(publisher, joints(2.0))
             subscription = monitor.subscribe("robomesh/site/arm/joints", newest=10)
             answer = await anext(subscription)
@@ -65,8 +65,8 @@ def test_a_value_that_is_published_while_it_is_answered_is_live(mesh):
             for _ in range(2):
                 publisher._publisher.put(answer.payload, attachment=pack(answer.header))
             publisher.put(joints(3.0))
-            came = [await anext(subscription) for _ in range(2)]
-            assert [(each.live, each.message()) for each in came] == [
+            arrived = [await anext(subscription) for _ in range(2)]
+            assert [(each.live, each.message()) for each in arrived] == [
                 (True, joints(2.0)),
                 (True, joints(3.0)),
             ]
@@ -76,7 +76,7 @@ def test_a_value_that_is_published_while_it_is_answered_is_live(mesh):
     run(main())
 
 
-def test_live_samples_that_an_answer_overtakes_are_not_lost(mesh, monkeypatch):
+def test_live_samples_overtaken_by_a_reply_are_not_lost(mesh, monkeypatch):
     monkeypatch.setattr(subscription_module, "_EARLY_S", 3.0)
 
     async def main():
@@ -100,9 +100,9 @@ def test_live_samples_that_an_answer_overtakes_are_not_lost(mesh, monkeypatch):
             for more, value in ((1, 2.0), (2, 3.0)):
                 header = first.header._replace(sequence=first.header.sequence + more)
                 publisher._publisher.put(joints(value).SerializeToString(), attachment=pack(header))
-            came = [await anext(states) for _ in range(3)]
-            # The last one never comes live: then the answer counts.
-            assert [(each.live, each.message().joints[0].position) for each in came] == [
+            arrived = [await anext(states) for _ in range(3)]
+            # The last one never arrives live, so the reply counts.
+            assert [(each.live, each.message().joints[0].position) for each in arrived] == [
                 *((True, 2.0), (True, 3.0), (False, 4.0))
             ]
             assert states.lost(first.key) == 0
@@ -110,13 +110,13 @@ def test_live_samples_that_an_answer_overtakes_are_not_lost(mesh, monkeypatch):
     run(main())
 
 
-def test_a_late_joiner_gets_the_last_state_whose_age_is_not_known(mesh):
+def test_late_joiner_gets_the_last_state_with_unknown_age(mesh):
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
             publisher = gateway.declare_publisher("site", "arm", "joints")
             publisher.put(joints(1.0))
             publisher.put(joints(2.0))
-            # The first of them may still be on its way when it is asked for the last.
+            # The second may still be on its way during the first query.
             while await monitor.last("robomesh/site/arm/joints") != joints(2.0):
                 pass
             subscription = monitor.subscribe("robomesh/site/arm/joints")
@@ -132,7 +132,7 @@ def test_a_late_joiner_gets_the_last_state_whose_age_is_not_known(mesh):
     run(main())
 
 
-def test_a_plain_zenoh_get_is_answered_once_with_an_attachment_of_24_bytes(mesh):
+def test_plain_zenoh_get_has_one_reply_with_24_bytes_attached(mesh):
     async def main():
         async with open_session(mesh) as gateway:
             publisher = gateway.declare_publisher("site", "arm", "joints")
@@ -147,7 +147,7 @@ def test_a_plain_zenoh_get_is_answered_once_with_an_attachment_of_24_bytes(mesh)
     run(main())
 
 
-def test_lists_come_whole_before_what_follows_them_and_without_repetition(mesh):
+def test_list_arrives_complete_before_later_messages_without_duplicates(mesh):
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
             publisher = gateway.declare_publisher("site", "arm", "events")
@@ -167,7 +167,7 @@ def test_lists_come_whole_before_what_follows_them_and_without_repetition(mesh):
     run(main())
 
 
-def test_a_joiner_of_a_video_gets_the_frames_since_the_last_key_frame(mesh):
+def test_late_joiner_of_a_video_gets_the_frames_since_the_last_key_frame(mesh):
     async def main():
         from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
@@ -184,7 +184,7 @@ def test_a_joiner_of_a_video_gets_the_frames_since_the_last_key_frame(mesh):
     run(main())
 
 
-def test_a_slow_consumer_keeps_the_newest_and_starves_nobody(mesh):
+def test_slow_consumer_keeps_the_newest_and_delays_no_other(mesh):
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
             slow = monitor.subscribe("robomesh/site/arm/joints", newest=3)
@@ -204,14 +204,14 @@ def test_a_slow_consumer_keeps_the_newest_and_starves_nobody(mesh):
     run(main())
 
 
-def test_a_gap_in_the_numbers_is_counted_as_lost(mesh):
+def test_gap_in_the_numbers_is_counted_as_lost(mesh):
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
             subscription = monitor.subscribe("robomesh/site/arm/joints", newest=10)
             publisher = gateway.declare_publisher("site", "arm", "joints")
             await until(lambda: publisher.watched)
             publisher.put(joints(1))
-            publisher._sequence += 5  # what a full link drops, nobody hears of
+            publisher._sequence += 5  # a full link drops messages silently
             publisher.put(joints(2))
             assert [(await anext(subscription)).message().joints[0].position for _ in range(2)] == [1, 2]
             assert subscription.lost(publisher.key) == 5
@@ -219,7 +219,7 @@ def test_a_gap_in_the_numbers_is_counted_as_lost(mesh):
     run(main())
 
 
-def test_the_first_put_and_the_first_get_on_the_second_link_wait_for_their_declarations(mesh):
+def test_first_put_and_get_on_the_second_link_wait_for_their_declarations(mesh):
     async def main():
         async with open_session(mesh) as monitor:
             subscription = monitor.subscribe("robomesh/*/*/description", newest=100, history=False)
@@ -234,7 +234,7 @@ def test_the_first_put_and_the_first_get_on_the_second_link_wait_for_their_decla
     run(main())
 
 
-def test_a_publisher_restarted_while_the_link_was_down_is_asked_for_what_it_said(mesh):
+def test_publisher_restarted_during_an_outage_is_queried_again(mesh):
     async def main():
         async with open_session(mesh) as monitor:
             subscription = monitor.subscribe("robomesh/site/arm/description", newest=10)
@@ -245,7 +245,7 @@ def test_a_publisher_restarted_while_the_link_was_down_is_asked_for_what_it_said
                 publisher.put(schema.Description(name="first"))
                 assert (await anext(subscription)).message().name == "first"
             async with open_session(mesh) as second:
-                # As after an outage: its put was not heard, only its presence comes.
+                # As after an outage: its put was lost, only its presence arrives.
                 publisher = second.declare_publisher("site", "arm", "description")
                 publisher.remember(schema.Description(name="second"), source_time_ns=1)
                 second.declare_presence("site", "arm", "kinematics")
@@ -254,11 +254,11 @@ def test_a_publisher_restarted_while_the_link_was_down_is_asked_for_what_it_said
     run(main())
 
 
-def test_what_an_outage_took_of_a_list_comes_with_the_answer_and_the_rest_is_counted(mesh):
+def test_list_entries_lost_in_an_outage_arrive_with_the_reply_or_are_counted(mesh):
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
             subscription = monitor.subscribe("robomesh/site/arm/events", newest=1000)
-            # Its question for what was before is over, and so is no answer to come with event 1 in it.
+            # Its first query must end before event 1, so that no reply contains it.
             await until(lambda: subscription._waiting is None)
             publisher = gateway.declare_publisher("site", "arm", "events")
             publisher.put(schema.Event(code="1"))
@@ -282,7 +282,7 @@ async def answer_lease(request: Request):
     return schema.LeaseAnswer(holder=request.chunk)
 
 
-def test_a_request_is_answered_and_refused_in_words(mesh):
+def test_request_is_answered_or_refused_with_a_sentence(mesh):
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as operator:
             gateway.answer("site", "arm", "lease/request/*", answer_lease)
@@ -306,7 +306,7 @@ def test_a_request_is_answered_and_refused_in_words(mesh):
     run(main())
 
 
-def test_a_request_in_json_is_answered_in_json_with_the_protos_names_and_defaults(mesh):
+def test_json_request_has_a_json_answer_with_proto_names_and_defaults(mesh):
     async def main():
         async with open_session(mesh) as gateway:
             gateway.answer("site", "arm", "lease/request/*", answer_lease)
@@ -341,7 +341,7 @@ def test_a_request_in_json_is_answered_in_json_with_the_protos_names_and_default
     run(main())
 
 
-def test_a_slow_request_does_not_hold_up_the_next(mesh):
+def test_slow_request_does_not_delay_the_next(mesh):
     async def main():
         gate = asyncio.Event()
 
@@ -362,7 +362,7 @@ def test_a_slow_request_does_not_hold_up_the_next(mesh):
     run(main())
 
 
-def test_asking_for_everything_stops_nobody_but_asking_all_to_stop_stops_all(mesh):
+def test_query_for_everything_stops_no_robot_but_wildcard_stop_stops_all(mesh):
     async def main():
         stopped = []
 
@@ -398,7 +398,7 @@ with zenoh.open(router_config((sys.argv[1],))):
 
 
 @pytest.mark.processes
-def test_a_router_that_does_not_say_who_is_alive_is_not_taken_for_a_mesh_without_anybody():
+def test_router_without_a_reply_is_not_taken_for_an_empty_mesh():
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     command = [sys.executable, "-c", _ROUTER, endpoint]
     router = subprocess.Popen(command, stdin=subprocess.PIPE, cwd=Path(__file__).parents[2])
@@ -419,7 +419,7 @@ def test_a_router_that_does_not_say_who_is_alive_is_not_taken_for_a_mesh_without
         router.communicate()
 
 
-def test_who_watches_presence_is_always_told_of_all_when_it_asks(mesh):
+def test_session_that_watches_presence_still_lists_every_token(mesh):
     async def main():
         async with open_session(mesh) as monitor, open_session(mesh) as service:
             for robot in "abc":
@@ -434,7 +434,7 @@ def test_who_watches_presence_is_always_told_of_all_when_it_asks(mesh):
     run(main())
 
 
-def test_presence_comes_and_goes(mesh):
+def test_presence_appears_and_disappears(mesh):
     async def main():
         async with open_session(mesh) as monitor:
             watch = monitor.watch_presence()
@@ -442,7 +442,7 @@ def test_presence_comes_and_goes(mesh):
                 service.declare_presence("site", "arm", "gateway")
                 key, alive = await anext(watch)
                 assert (key.site, key.robot, key.service, alive) == ("site", "arm", "gateway", True)
-                # A router in its first milliseconds may know less than it has told already.
+                # A new router may list fewer tokens than it has reported.
                 while await monitor.present() != [key]:
                     await asyncio.sleep(0.01)
             key, alive = await anext(watch)
@@ -451,7 +451,7 @@ def test_presence_comes_and_goes(mesh):
     run(main())
 
 
-def test_a_session_waits_for_its_router_and_outlives_it():
+def test_session_waits_for_its_router_and_survives_its_restart():
     async def main():
         endpoint = f"tcp/127.0.0.1:{free_port()}"
         settings = SessionSettings(connect=(endpoint,), wait_s=10.0)
@@ -490,7 +490,7 @@ def test_a_session_waits_for_its_router_and_outlives_it():
     run(main())
 
 
-def test_no_router_is_one_line_that_says_what_to_do():
+def test_missing_router_is_one_line_with_advice():
     async def main():
         settings = SessionSettings(connect=(f"tcp/127.0.0.1:{free_port()}",), wait_s=0.0)
         with pytest.raises(SessionError, match=r"no router at tcp/127\.0\.0\.1:.*robomesh up"):

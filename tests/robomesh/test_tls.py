@@ -1,4 +1,4 @@
-"""Mutual TLS between a client and its router, with certificates of a test's own authority."""
+"""Mutual TLS between a client and its router, with a test authority's certificates."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ def certificates(authority: trustme.CA, folder: Path, name: str) -> Tls:
     return tls
 
 
-def test_with_certificates_of_one_authority_data_flows_and_without_one_nobody_gets_in(tmp_path):
+def test_router_accepts_only_certificates_of_its_authority(tmp_path):
     authority = trustme.CA()
     endpoint = f"tls/127.0.0.1:{free_port()}"
     strangers = tmp_path / "strangers"

@@ -7,7 +7,7 @@ from robomesh.wall_clock import WallClock
 S = 1_000_000_000
 
 
-def test_two_readers_of_one_machine_agree_on_the_order_of_times():
+def test_two_readers_on_one_machine_agree_on_the_order_of_times():
     earlier, later = WallClock(), WallClock()
     for _ in range(1000):
         now_ns = time.monotonic_ns()
@@ -20,7 +20,7 @@ def test_two_readers_of_one_machine_agree_on_the_order_of_times():
 @pytest.mark.parametrize(
     ("by_ns", "was_set"), [(5 * S, True), (-2 * S, True), (-900_000, True), (200_000, False), (100, False)]
 )
-def test_a_clock_that_is_set_is_noticed_once(monkeypatch, by_ns, was_set):
+def test_set_clock_is_reported_once(monkeypatch, by_ns, was_set):
     clock, real = WallClock(), time.time_ns
     monkeypatch.setattr(time, "time_ns", lambda: real() + by_ns)
     assert clock.was_set() is was_set
@@ -28,7 +28,7 @@ def test_a_clock_that_is_set_is_noticed_once(monkeypatch, by_ns, was_set):
     assert abs(clock.earliest_ns(time.monotonic_ns()) - time.time_ns()) < 0.2 * S
 
 
-def test_a_process_that_waits_between_two_readings_takes_no_clock_for_set(monkeypatch):
+def test_suspended_reading_is_not_taken_for_a_set_clock(monkeypatch):
     clock, real, waited_ns = WallClock(), time.monotonic_ns, 0
 
     def slowly():

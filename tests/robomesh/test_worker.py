@@ -28,7 +28,7 @@ def run(coroutine):
 
 
 @pytest.mark.slow
-def test_a_worker_answers_in_a_process_of_its_own_and_keeps_it():
+def test_worker_answers_in_its_process_and_keeps_it():
     async def main():
         async with running() as worker:
             settings, pid, question = await worker.ask({"a": 1}, timeout_s=30)
@@ -40,7 +40,7 @@ def test_a_worker_answers_in_a_process_of_its_own_and_keeps_it():
 
 
 @pytest.mark.slow
-def test_what_the_handler_raises_is_raised_and_the_process_goes_on():
+def test_handlers_exception_is_raised_and_the_process_goes_on():
     async def main():
         async with running() as worker:
             with pytest.raises(ValueError, match="no such pose"):
@@ -54,7 +54,7 @@ def test_what_the_handler_raises_is_raised_and_the_process_goes_on():
 
 
 @pytest.mark.slow
-def test_a_worker_that_cannot_begin_says_why():
+def test_error_of_a_worker_that_cannot_begin_has_the_reason():
     async def main():
         async with running("wrong") as worker:
             with pytest.raises(WorkerError, match="settings are wrong"):
@@ -66,7 +66,7 @@ def test_a_worker_that_cannot_begin_says_why():
 
 
 @pytest.mark.slow
-def test_what_takes_too_long_is_ended_and_the_next_question_is_answered_by_another_process():
+def test_worker_is_killed_on_timeout_and_the_next_question_starts_another():
     async def main():
         async with running() as worker:
             await worker.start()
@@ -81,7 +81,7 @@ def test_what_takes_too_long_is_ended_and_the_next_question_is_answered_by_anoth
 
 
 @pytest.mark.slow
-def test_a_worker_that_dies_over_a_question_is_told_of_and_started_anew():
+def test_crash_of_a_worker_is_an_error_and_the_worker_restarts():
     async def main():
         async with running() as worker:
             with pytest.raises(WorkerError, match="status 3"):
@@ -92,7 +92,7 @@ def test_a_worker_that_dies_over_a_question_is_told_of_and_started_anew():
 
 
 @pytest.mark.slow
-def test_the_answer_to_somebody_who_is_gone_is_not_given_to_the_next():
+def test_answer_for_a_cancelled_caller_is_not_given_to_the_next():
     async def main():
         async with running() as worker:
             await worker.start()
@@ -107,7 +107,7 @@ def test_the_answer_to_somebody_who_is_gone_is_not_given_to_the_next():
 
 
 @pytest.mark.slow
-def test_close_waits_for_a_process_that_another_caller_began_to_end():
+def test_close_waits_for_a_process_that_another_caller_is_ending():
     async def main():
         async with running() as worker:
             await worker.start()
@@ -123,7 +123,7 @@ def test_close_waits_for_a_process_that_another_caller_began_to_end():
 
 
 @pytest.mark.slow
-def test_questions_wait_for_each_other_and_waiting_counts():
+def test_questions_wait_for_each_other_and_the_wait_counts():
     async def main():
         async with running() as worker:
             await worker.start()
@@ -137,7 +137,7 @@ def test_questions_wait_for_each_other_and_waiting_counts():
 
 
 @pytest.mark.slow
-def test_a_worker_ends_with_its_owner_in_the_middle_of_a_question_too():
+def test_worker_ends_with_its_parent_during_a_question():
     owner = (
         "import asyncio\n"
         "from robomesh.worker import Worker\n"
@@ -148,7 +148,7 @@ def test_a_worker_ends_with_its_owner_in_the_middle_of_a_question_too():
         "    await worker.ask(('say and sleep', 300), timeout_s=300)\n"
         "asyncio.run(main())\n"
     )
-    # The worker says what it has to say where its owner does: whoever reads that waits for both to end.
+    # The worker shares its parent's standard error, so `communicate` waits for both processes to end.
     with subprocess.Popen([sys.executable, "-c", owner], stdout=PIPE, stderr=PIPE, text=True) as process:
         worker = psutil.Process(int(process.stdout.readline()))
         assert process.stderr.readline() == "asleep\n"

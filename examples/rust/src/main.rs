@@ -1,8 +1,8 @@
-//! Print what every robot's controller does: a plain Zenoh client with the mesh's protobuf schema.
+//! Print the state of every robot's controller: a plain Zenoh client with the mesh's protobuf schema.
 //!
 //!     cargo run -- [tcp/127.0.0.1:7447] [keys.pem]
 //!
-//! Get, then subscribe: the answer to a get is the last value, as old as it may be; what comes afterwards is live.
+//! Get, then subscribe: the reply to a get is the last value, of unknown age; later samples are live.
 
 use std::io::{self, ErrorKind, Write};
 
@@ -19,7 +19,7 @@ const STATES: &str = "robomesh/*/*/controller";
 
 fn main() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
     match watch() {
-        // Whoever read it has gone: `| head`.
+        // The reader has closed the pipe: `| head`.
         Err(error) if error.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == ErrorKind::BrokenPipe) => Ok(()),
         ended => ended,
     }
