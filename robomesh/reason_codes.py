@@ -353,7 +353,7 @@ ALARM_NO_REASON = Code(
     "say why the alarm is shelved, as in 'switched off for service until noon'",
 )
 ALARM_SHELF_TIME = Code(
-    "alarm.shelf_time", "shelve_s is {seconds:g} s", "it must be above 0 and at most {most:g} (a day)"
+    "alarm.shelf_time", "shelve_s is {seconds:g} s", "it must be more than 0 and at most {most:g} (a day)"
 )
 ALARM_NOT_SHELVED = Code("alarm.not_shelved", "alarm '{id}' is not shelved")
 ALARM_NONE_NAMED = Code("alarm.none_named", "the list of alarms is empty", "name at least one alarm in `ids`")

@@ -131,7 +131,7 @@ def test_an_unexpected_error_is_reported_and_the_worker_goes_on(tmp_path):
 def test_another_robot_without_shapes_or_meshes_is_refused(tmp_path):
     for name, text, words in (
         ("bare", BARE, "no link in bare's description has a shape"),
-        ("half", HALF, "half cannot be checked whole: no such mesh file: nowhere.stl"),
+        ("half", HALF, "half cannot be checked completely: mesh file not found: nowhere.stl"),
     ):
         (tmp_path / f"{name}.urdf").write_text(text)
         robots = (

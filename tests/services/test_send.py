@@ -151,7 +151,7 @@ def test_the_advice_of_a_refusal_is_a_command():
         return send.with_commands(error, discovery.Robot("hall", "arm"))
 
     assert sentence(codes.STOP_LATCHED(id=3, by="li", reason="with another lease")) == (
-        "stop 3 is latched (li: with another lease): see to it, then `robomesh send hall/arm reset`"
+        "stop 3 is latched (li: with another lease): remove the cause, then `robomesh send hall/arm reset`"
     )
     other = codes.LEASE_OTHER(name="li")
     assert sentence(other, f"{other}.") == (

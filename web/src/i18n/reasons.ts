@@ -504,7 +504,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   [
     "alarm.shelf_time",
     [
-      "shelve_s is {seconds} s: it must be above 0 and at most {most} (a day)",
+      "shelve_s is {seconds} s: it must be more than 0 and at most {most} (a day)",
       "shelve_s：{seconds} 秒：应大于 0 且不超过 {most}（一天）",
     ],
   ],
