@@ -116,7 +116,7 @@ def test_an_invalid_request_is_rejected_and_does_not_affect_others(mesh, tmp_pat
             key = f"{ARM}/video/front/keyframe"
             while not (await monitor.ask(f"{key}/li", KeyFrameRequest())).forced:
                 await asyncio.sleep(0.05)
-            with pytest.raises(QuotaError, match="key_frames_a_minute = 1 a name"):
+            with pytest.raises(QuotaError, match="key_frames_a_minute = 1 for each name"):
                 await monitor.ask(f"{key}/li", KeyFrameRequest())
             await monitor.ask(f"{key}/wang", KeyFrameRequest())
             await frames(video, 3)

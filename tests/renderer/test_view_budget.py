@@ -34,7 +34,7 @@ def test_the_largest_view_is_within_each_operators_share_and_a_second_one_is_not
     there = views(["li"], of=spec())
     budget().check(there, spec(), "li")
     with pytest.raises(
-        QuotaError, match=r"li has 1 views already: .* together 55\.3 million pixels a second"
+        QuotaError, match=r"li already has 1 views: .* together 55\.3 million pixels a second"
     ):
         budget().check(there, largest, "li")
     budget().check(there, spec(1280, 720, 30.0), "wang")
@@ -58,7 +58,7 @@ def test_a_view_with_two_askers_is_reassigned_before_a_request_is_rejected():
     small.check(there, spec(), "li")
     assert [view.askers for view in there] == [["wang", "li"], ["li"]]
     there += views(["li"])
-    with pytest.raises(QuotaError, match="li has 2 views already: quota views = 2 a name"):
+    with pytest.raises(QuotaError, match="li already has 2 views: quota views = 2 for each name"):
         small.check(there, spec(), "li")
     # No view is reassigned to an operator with a used-up share.
     there = views(["li", "wang"], ["li"], ["wang"], ["wang"])
@@ -75,5 +75,5 @@ def test_most_views_of_zero_rejects_every_request():
 def test_a_slow_view_counts_for_its_memory():
     slow = spec(1920, 1080, 1.0)
     budget().check(views(["li"], of=slow), slow, "li")
-    with pytest.raises(QuotaError, match="li has 2 views already"):
+    with pytest.raises(QuotaError, match="li already has 2 views"):
         budget().check(views(["li"], ["li"], of=slow), slow, "li")
