@@ -10,7 +10,7 @@ from cryptography.x509.oid import NameOID
 
 
 def self_signed(folder):
-    """A certificate for 127.0.0.1 and localhost, and its key, as files."""
+    """Write a certificate for 127.0.0.1 and localhost, and its key."""
     key = ec.generate_private_key(ec.SECP256R1())
     name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "console")])
     now = datetime.datetime.now(datetime.UTC)

@@ -1,4 +1,4 @@
-"""Define's server on a port of its own, as a page talks to it."""
+"""A running console with Define, and a client that acts like a page."""
 
 import asyncio
 import json
@@ -19,7 +19,7 @@ from services.site_file.site import Define, Robot, Site
 
 @dataclass
 class Answer:
-    """Of a request."""
+    """A response."""
 
     status: int
     body: bytes
@@ -27,28 +27,28 @@ class Answer:
 
     @property
     def json(self) -> Any:
-        """What it holds."""
+        """The response's JSON."""
         return json.loads(self.body)
 
     @property
     def text(self) -> str:
-        """What it says."""
+        """The response's text."""
         return self.body.decode()
 
 
 @dataclass
 class Page:
-    """The page's end."""
+    """A page's client."""
 
     address: str
     folder: Path
 
     def get(self, path: str, **headers: str) -> Answer:
-        """Ask for something."""
+        """Send a GET request."""
         return self._ask(urllib.request.Request(f"{self.address}/define{path}", headers=headers))
 
     def post(self, path: str, body: Any = None, **headers: str) -> Answer:
-        """Ask for something to be done, from the page's own origin unless told otherwise."""
+        """Send a POST request, by default from the page's own origin."""
         data = body if isinstance(body, bytes) else json.dumps(body).encode()
         headers = {"Origin": self.address} | headers
         return self._ask(
@@ -60,14 +60,14 @@ class Page:
         )
 
     def upload(self, content: bytes, name: str = "a.wrl") -> str:
-        """Upload a file; its SHA-256."""
+        """Upload a file; return its SHA-256."""
         answer = self.post(f"/files?name={name}", content)
         assert answer.status == 200, answer.text
         sha: str = answer.json["sha"]
         return sha
 
     def draft(self, robot: str = "pt500", name: str = "mine") -> dict[str, Any]:
-        """A library robot as a draft of another name."""
+        """Return a library robot as a draft with another name."""
         found = self.get(f"/robots/{robot}").json
         return {"description": found["description"] | {"name": name}, "files": found["files"]}
 
@@ -83,7 +83,7 @@ class Page:
 
 @contextmanager
 def defining(mesh: SessionSettings, folder: Path, **settings: Any) -> Iterator[Page]:
-    """A running console with Define, in a thread of its own."""
+    """A running console with Define, in its own thread."""
     page = folder / "page"
     page.mkdir()
     (page / "index.html").write_text("<!doctype html>")

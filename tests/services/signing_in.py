@@ -1,4 +1,4 @@
-"""A console with accounts, and browsers before it that sign in: real sockets, no library's help."""
+"""A console with accounts, and browsers that sign in over real sockets, without a client library."""
 
 import json
 from contextlib import asynccontextmanager
@@ -20,18 +20,18 @@ ROLES = {"li": AccountRole.OPERATOR, "zhao": AccountRole.MONITOR, "chen": Accoun
 
 @cache
 def cheap_hasher():
-    """As the real one, but quick: tests sign in a hundred times."""
+    """A cheap hasher for tests, which sign in a hundred times."""
     return PasswordHasher(time_cost=1, memory_cost=64, parallelism=1)
 
 
 @cache
 def hashed():
-    """Of the password."""
+    """Return a password's hash."""
     return cheap_hasher().hash(PASSWORD)
 
 
 def accounts_file(folder):
-    """A file with an operator li, a monitor zhao and an administrator chen."""
+    """Write a file with an operator li, a monitor zhao and an administrator chen."""
     path = folder / "accounts.toml"
     for name, role in ROLES.items():
         change_account(path, "add", name, role=role, hashed=hashed())
@@ -40,7 +40,7 @@ def accounts_file(folder):
 
 @dataclass
 class Client:
-    """A browser's side: its cookie, and requests as a page sends them."""
+    """A browser: its cookie, and requests like those of a page."""
 
     address: str
     cookie: str = ""
@@ -49,7 +49,7 @@ class Client:
         return await get(self.address, path, **self._with_cookie(headers))
 
     async def post(self, path, body=None, **headers):
-        """Status, headers and the JSON of the answer."""
+        """Return status, headers and JSON of the response."""
         data = body if isinstance(body, bytes) else json.dumps(body or {}).encode()
         own = {"Origin": f"http://{self.address}", "Content-Type": "application/json"}
         given = {**own, "Content-Length": str(len(data)), **headers}
@@ -60,7 +60,7 @@ class Client:
         return status, answer, told
 
     async def sign_in(self, name, password=PASSWORD):
-        """As `post`; keeps the cookie."""
+        """Sign in, and keep the cookie."""
         answer = await self.post("/account/sign-in", {"name": name, "password": password})
         self.keep(answer[1])
         return answer
@@ -84,7 +84,7 @@ class Client:
 
 @asynccontextmanager
 async def guarded(mesh, page, folder, **settings):
-    """A running console with accounts: a client that is signed in nowhere yet, a session, the file."""
+    """A running console with accounts; yields a client that is not signed in, a session, and the file."""
     path = accounts_file(folder)
     with patch.object(passwords, "_hasher", cheap_hasher):
         async with console(mesh, page, accounts=path, **settings) as (address, other):

@@ -1,4 +1,4 @@
-"""Accounts without a console: their file, their passwords, their sessions, tries that must wait."""
+"""Accounts without a console: file, passwords, sessions, and limits of attempts."""
 
 import stat
 from datetime import UTC, datetime
@@ -174,7 +174,7 @@ class Page:
 
 
 def watched(signed_in, *, in_control=False):
-    """A page of it that is open."""
+    """An open page of a session."""
     page = Page()
     page.in_control = in_control
     signed_in.pages.add(page)
@@ -207,7 +207,7 @@ def test_the_right_to_command_rests_once_nobody_touched_the_page_until_the_passw
     assert signed_in.may_command
     sessions.expire(1000.0 + COMMANDS_UNTOUCHED_S + 1)
     assert (signed_in.may_command, signed_in.resting, len(page.told)) == (False, True, 1)
-    # Touching it gives nothing back: whoever touches may be another.
+    # Activity alone restores nothing: another person may be at the page.
     sessions.touched(signed_in, 1000.0 + COMMANDS_UNTOUCHED_S + 2)
     assert not signed_in.may_command
     fresh = sessions.unlock(signed_in, 5000.0)
@@ -251,7 +251,7 @@ def test_an_account_that_was_removed_and_made_anew_is_another_one(sessions):
     assert (sessions.find(token, 1.0), signed_in.ended) == (None, "removed")
 
 
-# ------------------------------------------------------------------------------ the tries
+# ------------------------------------------------------------------------------ attempts
 
 
 def test_waiting_grows_from_a_second_and_ends_at_the_longest():
@@ -262,7 +262,7 @@ def test_waiting_grows_from_a_second_and_ends_at_the_longest():
         now += waits[-1]
     assert waits == [0, 0, 1, 2, 4, 8, 16, 32, 60, 60, 60, 60]
     assert tries.wait_s("zhao", now) == 0
-    # Long enough ago, it is forgotten.
+    # After this time it is forgotten.
     tries.begin("li", now + 4000)
     assert tries.wait_s("li", now + 4000) == 0
 

@@ -1,4 +1,4 @@
-"""Alarms after ISA-18.2: the state machine alone, with the clock as an argument."""
+"""Alarms after ISA-18.2: the state machine, with the time as an argument."""
 
 import json
 import math
@@ -27,7 +27,7 @@ def states(alarms: Alarms) -> dict[str, int]:
     return {each.id: each.state for each in alarms.sorted()}
 
 
-# What happens, and what the alarm is then; None: it is forgotten.
+# Inputs, and the state that follows; None: the alarm is removed.
 WAYS = (
     (("come",), UNACKNOWLEDGED),
     (("come", "come"), UNACKNOWLEDGED),
@@ -85,7 +85,7 @@ def test_an_alarm_that_comes_and_goes_is_counted_and_not_repeated():
     alarms = Alarms()
     alarms.activate(alarm(), 0.0)
     alarms.acknowledge(["arm:link"], "li", 1.0)
-    # Acknowledged and gone it is forgotten, and comes as a new one; three times in a minute is chatter.
+    # Acknowledged and cleared, it is removed and can start again; three times in a minute is chattering.
     alarms.clear("arm:link", 2.0)
     alarms.activate(alarm(), 3.0)
     for second in range(5, 60, 5):
@@ -200,7 +200,7 @@ STEPS = st.lists(
 @settings(max_examples=200, deadline=None)
 @given(STEPS)
 def test_whatever_happens_nothing_unseen_is_forgotten(steps):
-    """A second, naive book: what has come since it was last seen must be in the list."""
+    """A naive reference: an alarm that was activated since its last acknowledgement must be listed."""
     alarms, now = Alarms(), 0.0
     unseen, counts = set(), {"a": 0, "b": 0}
     for what, name, passes in steps:
@@ -321,7 +321,7 @@ def test_one_event_of_the_future_silences_nothing_and_none_is_told_twice():
     events.handle_history(key, [before, ahead, away], now + 20.0)
     counts = {each.code: each.count for each in events.alarms.by_id.values()}
     assert counts == {"before": 1, "ahead": 1, "while.away": 1}
-    # Nor when the list holds it no more.
+    # Nor when the list no longer contains it.
     events.handle(key, ahead, now + 30.0)
     events.handle_history(key, [event("later", 1040)], now + 50.0)
     assert "arm:later" in events.alarms.by_id

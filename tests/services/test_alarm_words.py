@@ -1,4 +1,4 @@
-"""The page's Chinese words for alarms, events and refusals keep up with who tells them."""
+"""The page has Chinese texts for all alarms, events and refusals."""
 
 import re
 from pathlib import Path
@@ -14,7 +14,7 @@ PAGE = HOUSE / "web/src"
 
 
 def table(name: str) -> set[str]:
-    """The keys of a table of words."""
+    """Return the keys of a table of texts."""
     return set(re.findall(r'^  "([a-z_.]+)":', (PAGE / name).read_text(encoding="utf-8"), re.MULTILINE))
 
 
@@ -31,7 +31,7 @@ def test_every_event_that_asks_nobody_to_act_has_chinese_words_on_the_page():
             text = source.read_text(encoding="utf-8")
             told |= set(re.findall(r'\bINFO\b[^"()]{0,40}"([a-z_]+\.[a-z_]+)"', text))
     assert len(told) > 15
-    # The page has words of its own for stops, in both languages.
+    # The page has its own texts for stops, in both languages.
     known = table("i18n/event-text.ts") | table("i18n/alarm-words.ts") | {"stop.reset"}
     assert told - known == set()
 

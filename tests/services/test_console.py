@@ -1,4 +1,4 @@
-"""The console's server over a real router: what goes down to a browser, and what comes up."""
+"""The console's server over a real router: samples to a browser, and requests from it."""
 
 import asyncio
 import contextlib
@@ -66,7 +66,7 @@ class Page:
         await self.send(watch={"key": key})
 
     async def until(self, condition, timeout_s=30.0):
-        """Reads until the condition holds."""
+        """Read until the condition holds."""
         async with asyncio.timeout(timeout_s):
             while not condition():
                 message = schema.ToPage.FromString(await self.socket.recv())
@@ -88,9 +88,9 @@ async def browse(address):
 
 
 async def get(address, path, *, method="GET", body=b"", **headers):
-    """Status, headers and body of the answer to a request."""
+    """Return status, headers and body of the response to a request."""
     host, port = address.split(":")
-    # Of the loopback addresses, the one that is asked: so a test has clients at several.
+    # The loopback address that the client uses, so that a test has clients at several addresses.
     source = (host, 0) if host.startswith("127.") else None
     reader, writer = await asyncio.open_connection(host, int(port), local_addr=source)
     lines = {"Host": address, "Connection": "close", **headers}
@@ -124,13 +124,13 @@ def test_payload_and_attachment_reach_the_page_as_they_were(mesh, page):
     async def main():
         async with console(mesh, page) as (address, other), browse(address) as browser:
             publisher = other.declare_publisher("s", "r", "joints")
-            publisher.remember(joints(1.0), source_time_ns=5)  # nothing on its way when the page comes
+            publisher.remember(joints(1.0), source_time_ns=5)  # nothing is in flight when the page connects
             await browser.watch("robomesh/*/*/joints")
             await browser.until(lambda: browser.samples)
             first = browser.samples[0]
             assert first.key == "robomesh/s/r/joints"
             assert not first.live
-            assert not first.HasField("age_s")  # nobody knows how old the last value is
+            assert not first.HasField("age_s")  # the last value's age is unknown
             header = publisher.put(joints(2.0), source_time_ns=77)
             await browser.until(lambda: browser.samples[-1].live)
             last = browser.samples[-1]
@@ -185,7 +185,7 @@ def test_a_page_that_reads_nothing_gets_the_newest_then_and_delays_no_other(mesh
                         await quick.until(lambda n=number: shown(quick, n), timeout_s=1.0)
                 quick.samples.clear()
             await slow.until(lambda: shown(slow, 200))
-            assert len(slow.samples) < 150  # 20 MB were published: it was spared most of it
+            assert len(slow.samples) < 150  # of 20 MB published, most was dropped
 
     run(main())
 
@@ -366,7 +366,7 @@ def test_a_mesh_is_asked_of_the_robot_and_checked_by_its_hash(mesh, page):
                 status, headers, body = await get(address, f"/mesh/s/r/base?sha={sha256}")
                 assert (status, body) == (200, b"glTF bytes")
                 assert "immutable" in headers["cache-control"]
-            assert asked == ["base"]  # the second came from the console's own store
+            assert asked == ["base"]  # the second came from the console's cache
             assert (await get(address, f"/mesh/s/r/base?sha={'0' * 64}"))[0] == 409
             assert (await get(address, "/mesh/s/R/base"))[0] == 400
 

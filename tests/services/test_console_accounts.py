@@ -1,4 +1,4 @@
-"""A console with accounts over a real router: who gets in, what each may ask, and what ends it."""
+"""A console with accounts over a real router: sign-in, rights, and the end of sessions."""
 
 import asyncio
 import json
@@ -20,7 +20,7 @@ LEASE = "robomesh/s/r/lease/request"
 
 
 def owner(other):
-    """A gateway's answers; what it was asked."""
+    """A gateway's answers, and the requests that it got."""
     asked = []
 
     async def lease(request):
@@ -46,7 +46,7 @@ async def hello(browser):
 
 
 async def closing(browser, timeout_s=10.0):
-    """The code and the reason of the close that comes."""
+    """Return the code and the reason of the close frame."""
     async with asyncio.timeout(timeout_s):
         try:
             while True:
@@ -56,7 +56,7 @@ async def closing(browser, timeout_s=10.0):
 
 
 async def fetch(client, path):
-    """All that comes of a GET until the connection ends, whole or not."""
+    """Return all bytes of a GET until the connection ends, complete or not."""
     host, port = client.address.split(":")
     reader, writer = await asyncio.open_connection(host, int(port))
     writer.write(f"GET {path} HTTP/1.1\r\nHost: {client.address}\r\nCookie: {client.cookie}\r\n\r\n".encode())
@@ -108,7 +108,7 @@ def test_whoever_signs_in_is_greeted_by_name_and_may_do_what_the_role_may(mesh, 
                 answer = await browser.ask(1, f"{LEASE}/li.s", lease())
                 assert answer.ok, answer.error
                 assert asked[-1][1] == "li.s"
-                # Somebody else's name is not asked in, not even at the gateway.
+                # Not even the gateway gets a request under another operator's name.
                 answer = await browser.ask(2, f"{LEASE}/wang.s", lease())
                 assert (answer.ok, answer.error) == (
                     False,
@@ -219,7 +219,7 @@ def test_a_session_is_never_one_that_the_browser_came_with(mesh, page, tmp_path)
             planted = Client(client.address, first.split("=")[0] + "=planted-by-somebody-else")
             await planted.sign_in("zhao")
             assert "planted" not in planted.cookie
-            # And of a browser that was signed in, the old one ends.
+            # A new sign-in in the same browser ends the old session.
             await client.sign_in("li")
             assert client.cookie != first
             assert (await Client(client.address, first).get("/account/sessions"))[0] == 401
@@ -360,7 +360,7 @@ def test_an_administrator_changes_accounts_and_nobody_else_does(mesh, page, tmp_
             assert (await Client(client.address).sign_in("wang"))[0] == 200
             status, _, told = await client.post("/account/accounts", {"action": "remove", "name": "chen"})
             assert (status, "last administrator" in told["text"]) == (422, True)
-            # And another one's session is ended by the list.
+            # The list ends another account's session, too.
             _, _, body = await client.get("/account/sessions")
             of_li = next(each["id"] for each in json.loads(body)["sessions"] if each["account"] == "li")
             assert (await client.post("/account/sessions", {"end": of_li}))[0] == 200

@@ -1,4 +1,4 @@
-"""What strangers may try at a console's door: each is refused, and the next honest request is answered."""
+"""Attacks on a console: each is rejected, and the next valid request is answered."""
 
 import asyncio
 import contextlib
@@ -38,7 +38,7 @@ async def connected(address, **where):
 
 
 async def told(address, raw):
-    """The status of the answer to raw bytes; 0: the connection was closed without one."""
+    """Return the status of the response to raw bytes; 0 if the connection was closed without one."""
     async with connected(address) as (reader, writer), asyncio.timeout(ENDS_S):
         try:
             writer.write(raw)
@@ -49,7 +49,7 @@ async def told(address, raw):
 
 
 async def ended(reader):
-    """Reads until the connection ends."""
+    """Read until the connection ends."""
     async with asyncio.timeout(ENDS_S):
         try:
             return await reader.read()
@@ -123,7 +123,7 @@ TRAVERSALS = [
 
 
 def test_no_path_leads_out_of_pages_meshes_and_recordings(mesh, page, tmp_path, monkeypatch):
-    # Nobody answers for the meshes and recordings of this mesh.
+    # No service of this mesh answers for meshes and recordings.
     monkeypatch.setattr(meshes, "_TIMEOUTS_S", (0.2,))
     monkeypatch.setattr(recordings, "_TIMEOUTS_S", (0.2,))
     (page.parent / "pyproject.toml").write_text("root: secret")
@@ -288,7 +288,7 @@ def test_one_address_cannot_have_all_connections(mesh, page, tmp_path, monkeypat
             held = [await asyncio.open_connection(host, int(port)) for _ in range(8)]
             async with connected(client.address) as (reader, _):
                 assert await ended(reader) == b""
-            # Somebody elsewhere is answered all the same.
+            # A client at another address still gets a response.
             async with connected(client.address, local_addr=("127.0.0.2", 0)) as (reader, writer):
                 writer.write(http("GET", "/health", client.address, [("Connection", "close")]))
                 assert (await ended(reader)).startswith(b"HTTP/1.1 200")
@@ -318,7 +318,7 @@ def test_a_page_that_sends_nonsense_is_cut_off_and_the_others_are_not(mesh, page
                     with contextlib.suppress(ConnectionClosed):
                         while True:
                             await browser.socket.recv()
-                assert browser.socket.close_code in (code, 1006)  # or cut off before it could be told
+                assert browser.socket.close_code in (code, 1006)  # 1006: cut off before the close frame
                 await other.until(lambda: other.other)
                 assert other.other[0].hello.account == "li"
 
@@ -346,7 +346,7 @@ def test_a_stranger_who_waits_in_the_handshake_is_counted_like_any_other(monkeyp
 
 @asynccontextmanager
 async def page_of_bytes(address):
-    """A page's WebSocket as bare bytes, of which hardly any are read."""
+    """A page's WebSocket as raw bytes that are hardly read."""
     host, port = address.split(":")
     connection = socket.socket()
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -364,7 +364,7 @@ async def page_of_bytes(address):
 
 
 def masked(first, payload=b""):
-    """A WebSocket frame of a browser's: its first byte, and less than 126 bytes."""
+    """Return a browser's WebSocket frame: its first byte, and less than 126 bytes."""
     return bytes([first, 0x80 | len(payload), 0, 0, 0, 0]) + payload
 
 
@@ -383,7 +383,7 @@ def test_a_page_whose_frames_never_end_is_cut_off_before_it_takes_memory(
     mesh, page, monkeypatch, begin, again
 ):
     monkeypatch.setattr(websocket_transport, "_MAX_BUFFERED", 1 << 20)
-    monkeypatch.setattr(uvicorn_server, "_PING_EACH_S", 300.0)  # it is not that it answers none
+    monkeypatch.setattr(uvicorn_server, "_PING_EACH_S", 300.0)  # missing pongs are not the reason here
 
     async def main():
         async with console(mesh, page) as (address, _), page_of_bytes(address) as writer:
@@ -409,7 +409,7 @@ def test_a_page_that_reads_nothing_any_more_is_gone_once_it_answers_no_ping(mesh
             async with asyncio.timeout(2 * ENDS_S):
                 while not publisher.watched:
                     await asyncio.sleep(0.01)
-                # What it was sent waits to be read, and it is gone all the same.
+                # Unread data does not keep the connection open.
                 while publisher.watched:
                     publisher.put(large)
                     await asyncio.sleep(0.05)

@@ -1,4 +1,4 @@
-"""Which hosts and origins the console answers."""
+"""Hosts and origins that the console accepts."""
 
 import pytest
 

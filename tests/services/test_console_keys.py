@@ -1,4 +1,4 @@
-"""A console with a certificate and no accounts: whoever opens its page asks in the console's name alone."""
+"""A console with a certificate and no accounts: its pages act under the console's name only."""
 
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run

@@ -1,4 +1,4 @@
-"""What a page is told where a mesh cannot be had: now, for a while, or at all."""
+"""Errors for a page when a mesh is missing or temporarily unavailable."""
 
 import pytest
 from starlette.requests import Request
@@ -10,7 +10,7 @@ from tests.conftest import run
 
 
 class Owner:
-    """A session whose meshes' owner answers so."""
+    """A session on which the service for meshes gives this answer."""
 
     def __init__(self, error):
         self._error = error

@@ -1,4 +1,4 @@
-"""Whoever has control through a page is present on the mesh as long as the page's connection lasts."""
+"""An operator with control through a page is present as long as the page's connection lasts."""
 
 import asyncio
 
@@ -18,7 +18,7 @@ def asked(action):
 
 
 def owner(other):
-    """Answers lease requests of a robot: all but TAKE are granted."""
+    """Answer lease requests of a robot: grant all but TAKE."""
 
     async def lease(request):
         if request.message.action == ACTION.TAKE:
@@ -29,7 +29,7 @@ def owner(other):
 
 
 async def until_present(session, *ids, timeout_s=30.0):
-    """Waits until just these operators are present."""
+    """Wait until exactly these operators are present."""
     async with asyncio.timeout(timeout_s):
         while [who.id for who in await session.present() if who.service == "operator"] != [*ids]:
             await asyncio.sleep(0.01)
@@ -50,7 +50,7 @@ def test_a_page_in_control_is_present_and_gone_with_its_connection(mesh, page):
                 await onlooker.ask(1, KEY, asked(ACTION.ASK))
                 assert (await browser.ask(1, KEY, asked(ACTION.ACQUIRE))).ok
                 await until_present(other, mine)
-                # As a killed browser does: without a word.
+                # A killed browser closes without a message.
                 browser.socket.transport.abort()
                 await until_present(other)
 

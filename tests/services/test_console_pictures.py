@@ -1,4 +1,4 @@
-"""Pictures over HTTP: MJPEG, MP4 and stills of a robot, before a renderer that is played."""
+"""Pictures over HTTP: MJPEG, MP4 and stills of a robot, with a simulated renderer."""
 
 import asyncio
 import io
@@ -36,7 +36,7 @@ def jpeg(shade):
 
 
 class Video:
-    """Shades as H.264, each picture a packet."""
+    """Return shades as H.264, one packet per picture."""
 
     def __init__(self):
         self._codec = av.CodecContext.create("libx264", "w")
@@ -51,7 +51,7 @@ class Video:
 
 @asynccontextmanager
 async def rendered(mesh, page):  # noqa: F811
-    """A console, and a renderer's part played: its views, its pictures 20 times a second while watched."""
+    """A console and a simulated renderer: its views, and 20 pictures a second while watched."""
     async with console(mesh, page) as (address, other):
 
         async def views(request):
@@ -91,7 +91,7 @@ async def rendered(mesh, page):  # noqa: F811
 
 
 async def stream(address, path, *, until_bytes, method="GET", timeout_s=15.0):
-    """Status, headers, the beginning of a stream's body, how to read on and how to end it."""
+    """Return status, headers, the beginning of a stream's body, and functions to read on and to end it."""
     host, port = address.split(":")
     reader, writer = await asyncio.open_connection(host, int(port))
     text = f"{method} {path} HTTP/1.1\r\nHost: {address}\r\nAccept-Encoding: gzip\r\n\r\n"
@@ -103,7 +103,7 @@ async def stream(address, path, *, until_bytes, method="GET", timeout_s=15.0):
 
 
 async def pieces_of(reader, until_bytes):
-    """Chunks of a body, until it is as long, or ends."""
+    """Return chunks of a body until it is this long, or ends."""
     body = b""
     while len(body) < until_bytes and (size := int(await reader.readline(), 16)):
         body += (await reader.readexactly(size + 2))[:-2]
@@ -128,7 +128,7 @@ def test_mjpeg_is_one_picture_after_another_until_its_reader_goes(mesh, page):  
                 with suppress(av.FFmpegError):  # the last one may be cut
                     shades += [frame.to_ndarray(format="gray").mean() for frame in container.decode(video=0)]
             assert len({round(shade) for shade in shades}) > 2
-            # What everybody sees: nothing is drawn for this reader alone.
+            # The shared view: nothing is rendered for this reader only.
             assert [publisher.watched for publisher in images] == [True, False]
             writer.close()
             await unwatched(images)
@@ -164,7 +164,7 @@ def test_a_head_of_a_stream_ends_with_its_headers(mesh, page):  # noqa: F811
                 assert "200 ok" in head
                 assert kind in head
                 assert "content-length" not in head
-                # The connection is free for more.
+                # The connection accepts another request.
                 writer.write(f"GET /none HTTP/1.1\r\nHost: {address}\r\n\r\n".encode())
                 async with asyncio.timeout(40):
                     assert b"404" in await reader.readline()

@@ -1,4 +1,4 @@
-"""What pages are sent, and when: together, the same bytes; the newest to who was slow."""
+"""Writes to pages: shared bytes in one write; the newest samples for a slow page."""
 
 import asyncio
 import time
@@ -24,7 +24,7 @@ def sample(number, *, key=KEY, payload=b"state", received=None):
 
 
 def numbers(frames):
-    """The numbers of the samples in WebSocket frames of 126 bytes to 64 KiB, or less than 126."""
+    """Return the numbers of the samples in WebSocket frames of up to 64 KiB."""
     found = []
     while frames:
         assert frames[0] == 0x82  # binary, whole
@@ -39,7 +39,7 @@ def numbers(frames):
 
 
 class SharedSubscriptions:
-    """One feed."""
+    """A single subscription."""
 
     def __init__(self):
         self.scheduler, self.sinks = WriteScheduler(), []
@@ -58,7 +58,7 @@ class SharedSubscriptions:
 
 
 class WebSocketTransport:
-    """A line that may take nothing."""
+    """A transport that can refuse data."""
 
     def __init__(self):
         self.ready, self.written, self.on_ready = True, [], None
@@ -72,7 +72,7 @@ class WebSocketTransport:
 
 
 class Socket:
-    """A WebSocket whose page watches one key, and then only reads."""
+    """A WebSocket of a page that watches one key, and then only reads."""
 
     def __init__(self, line, key=KEY):
         self.key = key
@@ -90,7 +90,7 @@ class Socket:
 def test_who_keeps_step_gets_all_in_one_write_and_who_does_not_the_newest_until_it_does(monkeypatch):
     monkeypatch.setattr(
         "services.console.websocket.framing._SAME_AGE_S", 60.0
-    )  # a busy machine's turn may be long
+    )  # a round may be long on a busy machine
 
     async def main():
         feeds, lines = (
@@ -132,7 +132,7 @@ def test_who_keeps_step_gets_all_in_one_write_and_who_does_not_the_newest_until_
 
 
 class Asked:
-    """A session that is only asked."""
+    """A session that only gets requests."""
 
     def __init__(self):
         self.asked = []

@@ -1,4 +1,4 @@
-"""A console's TLS: what it needs beyond loopback, cookies over it, renewed certificates, wrong ones."""
+"""A console's TLS: requirements beyond loopback, cookies, renewed and invalid certificates."""
 
 import asyncio
 import json
@@ -43,7 +43,7 @@ def test_over_tls_the_cookie_is_for_this_host_alone_and_browsers_come_back_by_tl
             assert "strict-transport-security: max-age=" in head
             assert "set-cookie: __host-robomesh-s=" in head
             assert "; secure" in head
-            # Who speaks plain HTTP there, or stops in mid-handshake, harms nobody.
+            # Plain HTTP, or an unfinished handshake, affects no other client.
             assert await told(here, http("GET", "/", here, [])) == 0
 
     run(main())
@@ -66,7 +66,7 @@ def test_beyond_loopback_it_starts_with_accounts_and_tls_or_says_what_is_missing
         with pytest.raises(ListenError, match=f"without {lacks}: give it accounts"):
             async with console(mesh, page, **settings):
                 pass
-        # In so many words it does, and says so on every page.
+        # With `insecure` it does, and every page shows that.
         async with console(mesh, page, **settings, insecure=True) as (address, _):
             assert address.endswith(address.rpartition(":")[2])
 

@@ -1,4 +1,4 @@
-"""A page that asks and does not read takes no memory: it is cut off."""
+"""A page that sends requests and does not read is cut off before it takes memory."""
 
 import asyncio
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ LONG = "robomesh/s/r/" + "x" * 900_000
 
 
 class Full:
-    """A line that took one write."""
+    """A transport that has taken one write."""
 
     ready = True
 
@@ -26,7 +26,7 @@ class Full:
 
 @dataclass
 class Deaf:
-    """A WebSocket whose other end asks again and again, and takes nothing."""
+    """A WebSocket whose peer keeps sending requests, and reads nothing."""
 
     asked: int = 0
     scope: dict = field(default_factory=lambda: {"extensions": {"robomesh.line": {"line": Full()}}})

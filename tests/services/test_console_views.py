@@ -1,4 +1,4 @@
-"""Less of a view for a slow line: what is asked of the renderer, and when."""
+"""Reduced views for a slow line: the requests to the renderer, and their times."""
 
 import asyncio
 from types import SimpleNamespace
@@ -44,7 +44,7 @@ def test_a_small_view_is_never_reduced_to_a_size_that_no_picture_has():
 
 
 class SharedSubscriptions:
-    """Who watches what."""
+    """Records subscriptions."""
 
     def __init__(self):
         self.joined = {}
@@ -69,7 +69,7 @@ class SharedSubscriptions:
 
 
 class Steps:
-    """A renderer's lower views; `refused`: it has none."""
+    """A renderer's reduced views; `refused`: there are none."""
 
     def __init__(self, refused=False):
         self.refused, self.asked = refused, 0
@@ -148,7 +148,7 @@ def test_for_who_takes_nothing_at_all_nothing_smaller_is_drawn(monkeypatch):
             feeds.give(KEY, sample(number, DELTA if number % 60 else KEY_FRAME))
             await settled()
         assert steps.asked == 0
-        video.pop()  # it takes something again
+        video.pop()  # the line accepts data again
         await settled()
         assert (video.step, list(feeds.joined)) == (1, [f"{KEY}-1"])
         video.close()
@@ -220,7 +220,7 @@ def test_who_takes_all_again_is_given_more_later_and_less_soon_after_too_much(mo
         assert video.step == 0
         await choke()
         assert video.step == 1
-        # It was too much: it is tried again after twice the time.
+        # It was too much: the next attempt is after twice the time.
         await take(12.0)
         assert video.step == 1
         await take(10.0)

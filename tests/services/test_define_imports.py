@@ -1,4 +1,4 @@
-"""What Define makes of files: meshes of every format, URDF, pairs of links."""
+"""Define's imports: meshes of every format, URDF, pairs of links."""
 
 import io
 import zipfile
@@ -105,7 +105,7 @@ def test_igs_is_refused_in_words_that_name_step(page):
 
 
 def kinds(page, draft):
-    """What the page shows of each pair: the server's plan, and the draft's own ticks."""
+    """Return what the page shows of each pair: the server's plan, and the draft's own choices."""
     answer = page.post("/collisions", draft)
     assert answer.status == 200, answer.text
     ticked = {frozenset(pair) for pair in draft["description"].get("collision", {}).get("ignore", [])}
@@ -152,7 +152,7 @@ def test_an_imported_robot_is_checked_against_itself_like_its_urdf(page):
     assert len([path for path in draft["files"] if "collision" in path]) == 7
     found = kinds(page, draft)
 
-    # Rows have no levers: these stand still on the links that carry them.
+    # Rows have no linkages: these parts are fixed to the links that carry them.
     arm = ("base_link", *(f"link_{number}" for number in range(1, 7)))
     of_urdf = {
         frozenset(link.replace("base_link", "base") for link in each.links): each.kind
@@ -168,7 +168,7 @@ def test_an_imported_robot_is_checked_against_itself_like_its_urdf(page):
     assert touching.isdisjoint(of_urdf.values())
     assert touching.isdisjoint(found.values())
 
-    # Saved, it is as the page showed it.
+    # After saving, it is as the page showed it.
     assert page.post("/save", draft).status == 200
     saved = plan_of(load(page.folder / "robots" / "imported"))
     assert {frozenset(each.links): each.kind for each in saved.verdicts} == found

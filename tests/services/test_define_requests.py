@@ -1,4 +1,4 @@
-"""What the page's Define asks of the console, over real HTTP."""
+"""Requests of the page's Define to the console, over real HTTP."""
 
 import hashlib
 import io
@@ -217,7 +217,7 @@ def test_who_saves_what_another_has_changed_is_asked(page):
     asked = page.post("/save", other)
     assert (asked.status, asked.json["exists"], asked.json["changed"]) == (409, True, True)
     assert load(page.folder / "robots" / "shared").title == "One's"
-    # Who saved last goes on without a question.
+    # The client that saved last needs no confirmation.
     one["description"]["title"] = "One's again"
     again = page.post("/save", one | {"revision": after.json["revision"]})
     assert again.status == 200

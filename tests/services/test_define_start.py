@@ -1,4 +1,4 @@
-"""A robot defined on the page, started beside a running site's own: real processes throughout."""
+"""A robot defined on the page, started in addition to a running site's own; all processes are real."""
 
 import json
 import signal
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.processes
 
 
 def processes(site) -> dict[str, int]:
-    """Process ids of all that `up` runs, by service and robot: "gateway mine"."""
+    """Return the process ids of all that `up` runs, by service and robot: "gateway mine"."""
     named = {}
     for pid, (service, *words) in site.services():
         robot = words[words.index("--started") + 1] if "--started" in words else ""
@@ -29,7 +29,7 @@ def processes(site) -> dict[str, int]:
 
 
 def on_the_mesh(site) -> dict[str, str]:
-    """Each robot's link to its controller."""
+    """Return each robot's link to its controller."""
 
     async def look():
         async with open_session(site.mesh) as session:
@@ -44,7 +44,7 @@ def on_the_mesh(site) -> dict[str, str]:
 
 
 def answers(page: Page) -> bool:
-    """Whether the console is there."""
+    """Return whether the console runs."""
     try:
         return page.get("/robots").status == 200
     except OSError:
@@ -52,7 +52,7 @@ def answers(page: Page) -> bool:
 
 
 def descendants(pid: int) -> list[int]:
-    """Every process below one."""
+    """Return every process below one."""
     found = subprocess.run(["ps", "--ppid", str(pid), "-o", "pid="], capture_output=True, text=True).stdout
     children = [int(word) for word in found.split()]
     return [*children, *(below for child in children for below in descendants(child))]
@@ -189,7 +189,7 @@ def test_it_is_there_at_the_next_up_and_nothing_is_left_after(site, page, mine, 
             other = Page(second.console.rstrip("/"), folder)
             other.post("/check", other.draft())
             wait_until(lambda: on_the_mesh(second).get("mine") == "up")
-            # 8 of the site, 3 of the robot, Define's worker, and what checks motions of each gateway.
+            # 8 of the site, 3 of the robot, Define's worker, and each gateway's checker.
             wait_until(lambda: len(descendants(second.process.pid)) >= 14)
             everything = descendants(second.process.pid)
             begun = time.monotonic()

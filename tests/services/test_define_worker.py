@@ -1,4 +1,4 @@
-"""Define's workers: what hangs, dies or grows over a file harms nobody else."""
+"""Define's workers: a file that makes one hang, crash or grow affects no other job."""
 
 import asyncio
 import contextlib
@@ -28,7 +28,7 @@ LIMITS = Limits(quick_s=5.0, slow_s=5.0)
 
 
 def workers() -> list[int]:
-    """Process ids of this process's workers, the oldest first."""
+    """Return the process ids of this process's workers, oldest first."""
     found = subprocess.run(
         ["ps", "-ww", "--ppid", str(os.getpid()), "-o", "pid=,args="], capture_output=True, text=True
     ).stdout
@@ -54,7 +54,7 @@ def test_a_hanging_worker_is_ended_and_the_next_request_is_answered(page):
         target=lambda: answers.append(page.post("/mesh", mesh | {"file": "meshes/wrist.wrl"}))
     )
     asking.start()
-    # Whoever types goes on meanwhile.
+    # Typing continues during it.
     assert page.post("/check", draft).status == 200
     assert asking.is_alive()
     asking.join(30.0)
@@ -71,7 +71,7 @@ def test_a_worker_that_is_killed_is_replaced_and_nobody_notices(page):
     answers = []
     asking = threading.Thread(target=lambda: answers.append(page.post("/check", draft)))
     asking.start()
-    # Before the request lies in its pipe or after: any instant is right.
+    # Before or after the worker has read the request: both must work.
     os.kill(first, signal.SIGKILL)
     asking.join(30.0)
     assert answers[0].status == 200
@@ -81,7 +81,7 @@ def test_a_worker_that_is_killed_is_replaced_and_nobody_notices(page):
 
 
 def test_a_request_over_which_every_worker_dies_is_told_so(mesh, tmp_path):
-    # Not even the libraries fit into this.
+    # The limit is too small even for the libraries.
     with defining(mesh, tmp_path, limits=Limits(memory_bytes=20 * 1024**2)) as page:
         answer = page.post("/check", page.draft())
         assert answer.status == 422
@@ -101,7 +101,7 @@ def test_a_file_that_needs_too_much_memory_is_told_so(mesh, tmp_path):
 
 def test_what_a_hanging_worker_started_is_ended_with_it(mesh, tmp_path):
     with defining(mesh, tmp_path, limits=Limits(slow_s=4.0)) as page:
-        # Open CASCADE, in a process of the worker's, hangs on a length that is no number.
+        # Open CASCADE, in a child process of the worker, hangs on an invalid length.
         endless = step_box((10, 20, 30)).replace("10.000000", "nan").encode()
         answer = page.post("/mesh", {"file": "a.step", "files": {"a.step": page.upload(endless, "a.step")}})
         assert (answer.status, answer.text) == (422, "this took more than 4 s and was stopped")
@@ -149,7 +149,7 @@ BOX = b"#VRML V2.0 utf8\nShape { geometry Box { } }\n"
 
 
 def comb(teeth):
-    """A face with many corners, slow to cut into triangles."""
+    """A face with many corners, slow to triangulate."""
     corners = [(0, 0)]
     for y in range(0, 4 * teeth, 4):
         corners += [(1, y), (100, y + 0.5), (100, y + 1.5), (1, y + 2)]
@@ -161,7 +161,7 @@ def comb(teeth):
 
 
 async def stopped_workers(workshop, folder):
-    """The process ids of the main and the brief worker for slow jobs, started and then stopped."""
+    """Return the process ids of the main and the brief worker for slow jobs, started and then stopped."""
     started = [workshop.slow.run("mesh", folder, {"file": "box.wrl"}) for _ in range(2)]
     await asyncio.gather(*started)
     main, brief = workshop.slow.pids
@@ -285,7 +285,7 @@ def test_the_oldest_files_go_when_there_are_too_many(tmp_path):
     first, second = (store.put(kept, letter * 1000) for letter in (b"a", b"b"))
     os.utime(kept.files / first, (1, 1))
     os.utime(kept.files / second, (2, 2))
-    assert store.stored(kept, first) is not None  # used again, so the second is the oldest now
+    assert store.stored(kept, first) is not None  # used again, so the second is now the oldest
     third = store.put(kept, b"c" * 1000)
     assert [store.stored(kept, sha) is not None for sha in (first, second, third)] == [True, False, True]
 

@@ -442,7 +442,7 @@ def test_doctor_tries_every_certificate_and_finds_deviations_of_a_router(site, c
             [
                 "WRONG: mo.hall can publish robomesh/hall/arm/joints, and should not",
                 "WRONG: mo.hall can delete robomesh/hall/arm/joints, and should not",
-                # A lease request would be granted, so it is not tried: the rules are compared.
+                # A lease request would be granted, so the rules are compared instead of trying it.
                 "allow mo.hall ingress query robomesh/hall/arm/lease/request/li.hall: not a rule",
             ],
         ),

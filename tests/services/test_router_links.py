@@ -1,4 +1,4 @@
-"""Routers that link: two sites and what each may bring in, a hub, a slow border, two routers of one site."""
+"""Links between routers: rights of two sites, a hub, a slow border, two routers of one site."""
 
 import asyncio
 import json
@@ -134,7 +134,7 @@ def test_a_neighbour_that_shows_one_of_our_own_names_is_cut_off_and_our_own_rout
 
     async def main():
         (here, at_here), (there, at_there), link = await linked_sites(tmp_path)
-        # The other site's authority signs what it likes.
+        # The other site's authority can sign any name.
         other = certificates.read_authority(here.authority_key.read_bytes(), here.authority.read_bytes())
         made = certificates.issue(
             other, name, "router", now=authority.now(), lifetime=timedelta(days=1), serves=True

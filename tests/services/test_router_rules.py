@@ -1,4 +1,4 @@
-"""A router follows its rules and keys while it runs; who is not on its list gets nothing, and is told why."""
+"""A router follows its rules and keys while it runs; a client without a rule is rejected, with an event."""
 
 import asyncio
 import json
@@ -42,7 +42,7 @@ def settings_of(folder, endpoint, *links):
 
 @asynccontextmanager
 async def routing(*every):
-    """Routers that run as the service does."""
+    """Routers that run like the service."""
     ready = [asyncio.Event() for _ in every]
     tasks = [
         asyncio.create_task(service.serve(settings, ready=lambda text, there=there: there.set()))
@@ -63,9 +63,9 @@ def attached(endpoint, file, wait_s=10.0):
 
 
 async def until(condition):
-    """Until an awaitable answers true; the test's deadline ends it."""
+    """Wait until an awaitable returns true; the test's deadline ends it."""
     while True:
-        # A router that follows new rules begins anew.
+        # A router restarts to follow new rules.
         with suppress(NoAnswerError):
             if await condition():
                 return
@@ -163,7 +163,7 @@ def test_what_are_no_rules_at_all_is_told_so(tmp_path, text):
 def test_an_expired_certificate_is_refused_by_its_holder_in_words_and_by_the_router(tmp_path):
     folder, endpoint = prepared(tmp_path)
     authority.issue(folder, "old", Role.MONITOR, lifetime=timedelta(seconds=-60))
-    # As made elsewhere: nobody at this end sees its date.
+    # The file is not in the list, so this side does not know its date.
     text = folder.person("old").read_text()
     unsaid = tmp_path / "unsaid.pem"
     unsaid.write_text(text[text.index("-----BEGIN") :])
@@ -205,7 +205,7 @@ def test_another_authoritys_certificate_and_none_at_all_open_no_session(tmp_path
     folder, endpoint = prepared(tmp_path)
     stranger, _ = prepared(tmp_path, "elsewhere")
     authority.issue(stranger, "mo", Role.MONITOR)
-    # It trusts the right router, and shows a certificate that the router does not know.
+    # It trusts the right router, but shows a certificate that the router does not know.
     forged = stranger.person("mo").read_text().rpartition("-----BEGIN")[0] + folder.authority.read_text()
     (tmp_path / "forged.pem").write_text(forged)
     with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):

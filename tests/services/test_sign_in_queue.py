@@ -1,4 +1,4 @@
-"""Whose password is verified next, and whose has no place."""
+"""The order of password verifications, and rejections by a full queue."""
 
 import asyncio
 import threading

@@ -1,4 +1,4 @@
-"""Cells of a site file: what stands in them, how motions are checked, and what is said of a wrong one."""
+"""Cells of a site file: fixtures, checks of motion, and errors."""
 
 import re
 from pathlib import Path
@@ -141,7 +141,7 @@ def test_what_is_wrong_with_a_cell_is_named_with_what_would_be_right(tmp_path, t
 )
 def test_a_site_file_gives_the_height_of_the_floor_or_that_there_is_none(tmp_path, text, floor):
     assert cells_of(load(tmp_path, ROBOT + text))["arm"].floor == floor
-    # What one robot of a cell gives counts for all of it, whichever comes first.
+    # A floor given for one robot applies to its whole cell, in any order.
     mate = '[[robot]]\nname = "mate"\nmodel = "pt500"\ncell = "a"\npose = { xyz = [0.0, 0.0, -300.0] }\n'
     for both in (f"{IN_A}{text}\n{mate}", f"{mate}{IN_A}{text}\n"):
         cells = cells_of(load(tmp_path, both))
@@ -214,7 +214,7 @@ def test_a_robot_cannot_require_checks_beside_one_whose_meshes_are_missing(tmp_p
         load(tmp_path, f'{half}check = "require"\n')
     with pytest.raises(SiteFileError, match=r"robot arm: check.* robot half of its cell: .*nowhere.stl"):
         load(tmp_path, f'{half}cell = "a"\n{whole}cell = "a"\n')
-    # Apart they never meet.
+    # In different cells they never collide.
     assert len(load(tmp_path, f"{half}{whole}").robot) == 2
 
 

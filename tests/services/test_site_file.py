@@ -1,4 +1,4 @@
-"""Site files: what is read, and what is said of a wrong one."""
+"""Site files: values, and the errors of invalid ones."""
 
 from pathlib import Path
 
@@ -233,7 +233,7 @@ def test_beyond_loopback_needs_tls_or_a_word_taken_for_it():
             check_reach("it", host, secured=False, insecure=False)
 
 
-# ------------------------------------------------------------------- what was started from the page
+# ------------------------------------------------------------------- started robots
 
 
 def started(folder: Path, text: str) -> tuple[site.Robot, ...]:

@@ -1,4 +1,4 @@
-"""The watch of a site over a real router: alarms held and acknowledged, the mesh looked at."""
+"""The watch of a site over a real router: alarms, acknowledgements, and the state of the mesh."""
 
 import asyncio
 import time
@@ -21,7 +21,7 @@ Alarm, Request = schema.Alarm, schema.AlarmRequest
 
 
 class Desk:
-    """What a page would see: the newest list and the newest mesh, and all events of the watch."""
+    """A page's view: the newest alarms and mesh state, and all events of the watch."""
 
     def __init__(self, session):
         self.session = session
@@ -52,7 +52,7 @@ class Desk:
                 while not condition():
                     for task in self.working:
                         if task.done():
-                            task.result()  # what ended it is what went wrong
+                            task.result()  # raises the error that ended it
                     await asyncio.sleep(0.02)
         except TimeoutError:
             raise AssertionError(f"{self.alarms}\n{self.mesh}\n{self.events}") from None
@@ -64,7 +64,7 @@ class Desk:
         return {each.id: each for each in answer.alarms}
 
     async def sees(self, service):
-        """Until the watch has looked at who is there, that service among them."""
+        """Wait until the watch has seen that service."""
         await self.until(lambda: any(each.service == service for each in self.mesh.services))
         told = self.mesh.timestamp.ToNanoseconds()
         await self.until(lambda: self.mesh.timestamp.ToNanoseconds() > told)
@@ -75,7 +75,7 @@ class Desk:
 
 @asynccontextmanager
 async def watched(mesh, folder, *, settled_s=0.2):
-    """A watch of site `s`, and a desk that follows it."""
+    """Run a watch of site `s`, and a page that follows it."""
     async with open_session(mesh) as own, open_session(mesh) as others:
         desk = Desk(others)
         served = Served(service="watch", present_for=(("s", "-"),))
@@ -94,7 +94,7 @@ async def watched(mesh, folder, *, settled_s=0.2):
 
 @asynccontextmanager
 async def controller(session, **state):
-    """A gateway's `controller` of robot `arm`, told again and again; its state may be changed."""
+    """Publish a gateway's `controller` of robot `arm` repeatedly; the test may change the state."""
     publisher = session.declare_publisher("s", "arm", "controller")
     told = State(**({"link": State.UP, "activity": State.IDLE, "mode": State.REMOTE} | state))
 
@@ -155,7 +155,7 @@ def test_a_restart_forgets_neither_an_acknowledgement_nor_what_was_put_aside(mes
                 shelved = desk.alarms["arm:controller.fault"]
                 assert (shelved.state, shelved.reason, shelved.by) == (Alarm.SHELVED, "service", "li.s")
                 assert desk.alarms["arm:link"].state == Alarm.ACKNOWLEDGED
-                # What stood at the restart ends as it would have without one.
+                # An alarm from before the restart clears as if there had been none.
                 state.link, state.fault = State.UP, ""
                 await desk.until(lambda: "arm:link" not in desk.alarms)
 
@@ -187,7 +187,7 @@ def test_events_are_alarms_by_the_table_and_end_as_it_says(mesh, tmp_path):
             await desk.until(lambda: desk.alarms["-:recorder.space"].state == Alarm.RETURNED)
             await desk.until(lambda: desk.alarms["-:kinematics.limit:waist"].state == Alarm.RETURNED)
             assert desk.alarms["-:kinematics.limit:elbow"].state == Alarm.UNACKNOWLEDGED
-            # What happened, and nothing will end, is over when somebody has seen it.
+            # An alarm that no event clears ends when it is acknowledged.
             left = await desk.ask(action=Request.ACKNOWLEDGE, ids=sorted(names))
             assert left.keys() == {"-:kinematics.limit:elbow"}
 
@@ -214,7 +214,7 @@ def test_what_cannot_be_done_with_alarms_is_refused_in_words(mesh, tmp_path, req
 
 
 async def seem(session, service, *, robot="-", host="host-b", version="0.1.0", ahead_s=0.0):
-    """A process on another machine: its health, and a clock that is ahead; until cancelled."""
+    """Run a process of another machine, with health and a clock that is ahead, until cancelled."""
     session.declare_presence("s", robot, service)
     answer_clock(session, "s", wall_ns=lambda: time.time_ns() + round(ahead_s * 1e9))
     publisher = session.declare_publisher("s", "-", f"health/{service}.{session.identity}")
@@ -299,7 +299,7 @@ def test_a_service_that_is_gone_is_an_alarm_until_it_is_back_or_known(mesh, tmp_
             async with seeming(mesh, "recorder"):
                 await desk.until(lambda: desk.alarms["-:service.gone:recorder"].state == Alarm.RETURNED)
             await desk.until(lambda: desk.alarms["-:service.gone:recorder"].state == Alarm.UNACKNOWLEDGED)
-            # Taken away for good: who acknowledges it knows.
+            # Removed for good: acknowledging the alarm ends it.
             left = await desk.ask(action=Request.ACKNOWLEDGE, ids=["-:service.gone:recorder"])
             assert "-:service.gone:recorder" not in left
 
@@ -322,7 +322,7 @@ def test_what_a_process_told_is_over_when_another_has_taken_its_place(mesh, tmp_
                 await desk.ask(action=Request.ACKNOWLEDGE, ids=["-:recorder.space"])
             await desk.until(lambda: "-:service.gone:recorder" in desk.alarms)
             assert "-:recorder.space" in desk.alarms, "nobody knows whether there is space again"
-        # The machine of both is started again: there is more space than before, and no word of it.
+        # The machine of both restarts; there is more free space, and no event says so.
         async with watched(mesh, tmp_path) as desk, seeming(mesh, "recorder") as recorder:
             await desk.until(lambda: "-:recorder.space" in desk.alarms)
             await desk.until(lambda: "-:recorder.space" not in desk.alarms)
@@ -342,11 +342,11 @@ def test_a_robot_whose_gateway_is_gone_is_forgotten_once_somebody_knows(mesh, tm
                 controller(gateway, mode=State.LOCAL),
             ):
                 await desk.until(lambda: "arm:controller.local" in desk.alarms)
-                # Who was never seen is never missed.
+                # A service that was never seen is not expected.
                 await desk.sees("gateway")
             gone = "-:service.gone:gateway.arm"
             await desk.until(lambda: gone in desk.alarms)
-            # What it was in when the gateway went, it may be in still.
+            # A robot may still be in the state in which its gateway disappeared.
             assert desk.alarms["arm:controller.local"].state == Alarm.UNACKNOWLEDGED
             await desk.ask(action=Request.ACKNOWLEDGE, ids=[gone, "arm:controller.local"])
             await desk.until(lambda: not desk.alarms)
@@ -359,7 +359,7 @@ def test_what_was_so_in_a_replay_is_no_alarm_now(mesh, tmp_path):
         async with watched(mesh, tmp_path) as desk, open_session(mesh) as others:
             told = {
                 (robot, topic): others.declare_publisher("s", robot, topic)
-                for robot in ("replay-1", "arm")  # the replay first: it has come when the arm has
+                for robot in ("replay-1", "arm")  # the replay first: it has arrived when the arm has
                 for topic in ("controller", "events", "events/kinematics")
             }
             state = State(link=State.UP, mode=State.LOCAL)
@@ -385,12 +385,12 @@ def test_a_router_that_was_away_is_no_alarm_of_everybody_behind_it(tmp_path):
                 async with open_session(mesh) as session, present(session, recorder):
                     await desk.until(lambda: {"recorder", "watch"} <= {s.service for s in desk.mesh.services})
                     await asyncio.to_thread(router.close)
-                    await asyncio.sleep(3.5)  # longer than who comes and goes has time for
+                    await asyncio.sleep(3.5)  # longer than the time for a restart
                     router = await asyncio.to_thread(zenoh.open, router_config((endpoint,)))
                     before = desk.mesh.timestamp.ToNanoseconds()
                     await desk.until(lambda: desk.mesh.timestamp.ToNanoseconds() > before + 5 * 10**9)
                     assert not desk.alarms, desk.alarms
-                # And who really goes is told, as before.
+                # A service that really disappears is reported as before.
                 await desk.until(lambda: "-:service.gone:recorder" in desk.alarms)
         finally:
             await asyncio.to_thread(router.close)

@@ -1,4 +1,4 @@
-"""What a slow browser is sent, and what one that joins late is given."""
+"""Send queues: samples for a slow browser, and for one that joins later."""
 
 import time
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What of the mesh should not be so: pure, from what processes told."""
+"""Conditions of the mesh, from the processes' reports."""
 
 import pytest
 
@@ -47,7 +47,7 @@ def test_losses_are_told_above_a_mark_and_until_another():
     mesh = mesh_of(health(received=1000))
     name = "-:mesh.loss:recorder.a1"
     mesh.record_health("s", health(received=2000, lost=4), 1.0)
-    assert found(mesh) == {}  # a few
+    assert found(mesh) == {}  # too few
     mesh.record_health("s", health(received=3000, lost=40), 2.0)
     assert "2.0 %" in found(mesh)[name]
     for second in range(40):
@@ -171,7 +171,7 @@ def test_who_is_ended_on_purpose_is_not_missed(service, robot, missed):
     assert gone() == []
     mesh.remove_presence(who)
     assert gone() == ["service.gone"] * missed
-    # Nor is one that was missed at the watch's restart, by a file of before.
+    # Nor does one from an earlier version's file, after the watch's restart.
     then = Condition(
         code="service.gone", text=f"{service} of s is gone", values=(("service", service), ("robots", robot))
     )

@@ -1,4 +1,4 @@
-"""Who tries passwords too often waits, and nobody else does."""
+"""Failed sign-ins delay further attempts by the same client, and by no other."""
 
 import asyncio
 from unittest.mock import patch
@@ -21,7 +21,7 @@ def test_who_tries_too_often_waits_and_is_told_how_long(mesh, page, tmp_path):
             _, headers, answer = told[-1]
             assert answer["error"] == "wait"
             assert int(headers["retry-after"]) == answer["seconds"] >= 1
-            # The right password waits too: otherwise waiting would tell which one is right.
+            # The right password has to wait, too: otherwise the wait would reveal it.
             assert (await client.sign_in("li"))[0] == 429
             assert (await client.sign_in("zhao"))[0] == 200
 
@@ -72,7 +72,7 @@ def test_who_names_another_address_each_time_is_the_same_stranger(mesh, page, tm
 
 
 def test_a_flood_of_tries_from_one_address_keeps_nobody_at_another_out(mesh, page, tmp_path):
-    """Every try takes a real argon2 hash; 127.0.0.2 is another address of the same machine."""
+    """Each attempt takes a real argon2 hash; 127.0.0.2 is another address of the same machine."""
 
     async def main():
         async with guarded(mesh, page, tmp_path, listen="0.0.0.0:0", insecure=True) as (client, _, _):
