@@ -191,7 +191,7 @@ def test_a_session_with_a_page_open_lasts_for_days_and_no_longer_than_a_week(ses
     assert signed_in.ended == "expired"
 
 
-def test_a_session_that_nobody_looks_at_ends_within_the_hour(sessions):
+def test_a_session_without_pages_ends_within_the_hour(sessions):
     token, signed_in = opened(sessions)
     assert sessions.find(token, IDLE_S - 1) is signed_in
     assert sessions.find(token, 2 * IDLE_S - 2) is signed_in
@@ -199,7 +199,7 @@ def test_a_session_that_nobody_looks_at_ends_within_the_hour(sessions):
     assert signed_in.ended == "idle"
 
 
-def test_the_right_to_command_rests_once_nobody_touched_the_page_until_the_password_is_given(sessions):
+def test_the_right_to_command_is_suspended_without_activity(sessions):
     token, signed_in = opened(sessions)
     page = watched(signed_in)
     sessions.touched(signed_in, 1000.0)
@@ -244,7 +244,7 @@ def test_an_account_has_so_many_sessions_and_the_least_used_goes(sessions):
     assert len(list(sessions)) == MOST_OF_ACCOUNT
 
 
-def test_an_account_that_was_removed_and_made_anew_is_another_one(sessions):
+def test_an_account_that_was_removed_and_added_is_another_account(sessions):
     token, signed_in = opened(sessions)
     other = Account(name="li", role=AccountRole.ADMIN, hash=hashed(), created=AT.replace(hour=9))
     sessions.apply_accounts({"li": other})

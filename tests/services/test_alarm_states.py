@@ -104,7 +104,7 @@ def test_an_alarm_that_comes_and_goes_is_counted_and_not_repeated():
     assert states(alarms) == {}
 
 
-def test_what_only_happened_stands_until_somebody_acknowledges_it():
+def test_a_latching_alarm_is_active_until_acknowledged():
     alarms = Alarms()
     alarms.activate(alarm(by_state=False, latching=True), 0.0)
     alarms.update(1e6)
@@ -113,7 +113,7 @@ def test_what_only_happened_stands_until_somebody_acknowledges_it():
     assert states(alarms) == {}
 
 
-def test_what_is_over_by_its_silence_returns_then_and_not_before():
+def test_an_alarm_that_ends_by_silence_clears_after_its_time():
     alarms = Alarms()
     alarms.activate(alarm(by_state=False, over_after_s=60.0), 0.0)
     alarms.activate(alarm(by_state=False, over_after_s=60.0), 50.0)
@@ -139,7 +139,7 @@ def test_more_than_ten_in_ten_minutes_is_a_flood_until_they_are_few():
     assert not alarms.flooding
 
 
-def test_the_most_urgent_stand_first_and_what_is_shelved_last():
+def test_alarms_are_sorted_by_urgency_with_shelved_ones_last():
     alarms = Alarms()
     for number, priority in enumerate((Message.LOW, Message.CRITICAL, Message.HIGH, Message.CRITICAL)):
         alarms.activate(alarm(f"arm:{number}", priority=priority), float(number))
@@ -178,7 +178,7 @@ def test_a_name_that_is_no_alarm_changes_nothing_of_the_others():
     assert states(alarms) == {"arm:link": UNACKNOWLEDGED}
 
 
-def test_what_cannot_all_be_held_goes_least_urgent_first():
+def test_the_least_urgent_alarms_are_evicted_first():
     alarms = Alarms()
     alarms.activate(alarm("arm:urgent", priority=Message.CRITICAL), 0.0)
     for number in range(600):
@@ -246,7 +246,7 @@ def test_alarms_survive_in_their_file_as_they_were(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[]", '{"alarms": [{}], "told_ns": {}}', '{"alarms": 3}', "\x00"])
-def test_a_file_that_is_none_of_alarms_is_named(tmp_path, text):
+def test_an_invalid_file_of_alarms_is_named(tmp_path, text):
     path = tmp_path / "site.json"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ValueError, match=r"site\.json: not a file of alarms"):
@@ -295,7 +295,7 @@ def test_a_clock_that_is_set_back_keeps_no_alarm_standing_for_longer():
     assert states(alarms)["arm:shelved"] == UNACKNOWLEDGED
 
 
-def test_an_event_whose_time_is_none_is_an_alarm_all_the_same():
+def test_an_event_with_an_invalid_time_is_an_alarm():
     key, events = parse_key("robomesh/s/arm/events"), EventHandler(Alarms())
     event = Event(severity=Event.ERROR, code="live")
     event.timestamp.nanos = 2_000_000_000
@@ -306,7 +306,7 @@ def test_an_event_whose_time_is_none_is_an_alarm_all_the_same():
     assert {"arm:live", "arm:behind"} == events.alarms.by_id.keys()
 
 
-def test_one_event_of_the_future_silences_nothing_and_none_is_told_twice():
+def test_an_event_dated_in_the_future_hides_and_repeats_none():
     now, key = 1000.0, parse_key("robomesh/s/arm/events")
     events = EventHandler(Alarms())
 

@@ -23,7 +23,7 @@ def test_every_alarm_that_the_watch_can_raise_has_chinese_words_on_the_page():
     assert wanted - table("i18n/alarm-words.ts") == set()
 
 
-def test_every_event_that_asks_nobody_to_act_has_chinese_words_on_the_page():
+def test_every_event_without_an_alarm_has_a_chinese_text():
     told = set()
     for folder in ("protocol_gateway", "renderer", "services"):
         for source in (HOUSE / folder).rglob("*.py"):

@@ -43,7 +43,7 @@ def test_a_process_that_is_there_and_says_nothing_hangs():
     assert "recorder of s at host-a" in found(mesh, now_s=11.0)["-:service.silent:recorder.a1"]
 
 
-def test_losses_are_told_above_a_mark_and_until_another():
+def test_losses_are_reported_between_two_thresholds():
     mesh = mesh_of(health(received=1000))
     name = "-:mesh.loss:recorder.a1"
     mesh.record_health("s", health(received=2000, lost=4), 1.0)
@@ -66,13 +66,13 @@ def test_losses_are_told_above_a_mark_and_until_another():
         (float("-inf"), "expired on 1970-01-01"),
     ],
 )
-def test_a_certificate_that_ends_soon_is_told(left_s, said):
+def test_a_certificate_that_expires_soon_is_reported(left_s, said):
     assert found(mesh_of(health(values={"certificate_seconds": 900000.0}))) == {}
     told = found(mesh_of(health(values={"certificate_seconds": left_s})))
     assert said in told["-:certificate.expires:recorder.a1"]
 
 
-def test_a_router_that_misses_a_link_is_told():
+def test_a_router_with_a_missing_link_is_reported():
     assert found(mesh_of(health("router", values={"links": 2.0, "links_wanted": 2.0}))) == {}
     told = found(mesh_of(health("router", values={"links": 1.0, "links_wanted": 2.0})))
     assert "reaches 1 of the 2 routers" in told["-:router.unlinked:a1"]
@@ -158,7 +158,7 @@ def test_a_site_that_is_seen_no_more_is_gone_once():
     ],
     ids=str,
 )
-def test_who_is_ended_on_purpose_is_not_missed(service, robot, missed):
+def test_only_required_services_are_missed(service, robot, missed):
     mesh, expected, who = Mesh(), Expected(), PresenceKey("s", robot, service, "a1")
 
     def gone() -> list[str]:
@@ -215,7 +215,7 @@ def test_a_frozen_controller_that_is_connected_to_again_and_again_is_one_alarm_i
     assert judged(5.0) == ([], [], ["link.silent"])
 
 
-def test_a_link_that_stays_down_for_another_reason_is_told_with_that_reason():
+def test_a_link_that_is_down_for_a_new_reason_is_reported_with_it():
     tracker, state = (
         ConditionTracker(),
         ControllerState(link=ControllerState.DOWN, link_text="connecting to 10.0.0.7"),

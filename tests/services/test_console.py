@@ -232,7 +232,7 @@ def test_events_come_as_a_list_and_then_one_by_one(mesh, page):
     run(main())
 
 
-def test_events_that_an_outage_took_follow_those_before_also_for_who_comes_later(mesh, page):
+def test_events_missed_in_an_outage_are_appended_also_for_later_pages(mesh, page):
     def texts(browser):
         return [
             [event.text for event in schema.EventList.FromString(sample.payload).events]
@@ -286,7 +286,7 @@ def test_requests_are_passed_on_and_answered_and_refusals_come_in_words(mesh, pa
     run(main())
 
 
-def test_presence_is_told_at_once_and_when_it_changes(mesh, page):
+def test_presence_is_sent_on_connect_and_on_each_change(mesh, page):
     async def main():
         async with console(mesh, page) as (address, _), browse(address) as first:
 
@@ -303,7 +303,7 @@ def test_presence_is_told_at_once_and_when_it_changes(mesh, page):
     run(main())
 
 
-def test_a_page_that_watches_nonsense_or_sends_it_is_told_and_cut_off(mesh, page):
+def test_a_page_with_invalid_messages_is_closed_with_a_reason(mesh, page):
     async def main():
         async with console(mesh, page) as (address, _):
             for message, words in (
@@ -389,7 +389,7 @@ def test_beyond_loopback_it_refuses_to_start_and_a_taken_port_is_named(mesh, pag
     run(main())
 
 
-def test_beyond_loopback_every_page_is_told(mesh, page):
+def test_every_page_shows_an_insecure_address(mesh, page):
     async def main():
         async with console(mesh, page, listen="0.0.0.0:0", insecure=True) as (address, _):
             own = address.replace("0.0.0.0", "127.0.0.1")

@@ -93,7 +93,7 @@ def test_without_a_session_only_the_page_itself_and_the_sign_in_are_open(mesh, p
     run(main())
 
 
-def test_whoever_signs_in_is_greeted_by_name_and_may_do_what_the_role_may(mesh, page, tmp_path):
+def test_sign_in_gives_the_name_and_the_roles_rights(mesh, page, tmp_path):
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, other, _):
             asked = owner(other)
@@ -144,7 +144,7 @@ def test_a_monitor_sees_everything_and_asks_for_nothing_but_a_stop_in_its_own_na
     run(main())
 
 
-def test_a_wrong_password_and_a_name_that_nobody_has_are_refused_alike(mesh, page, tmp_path):
+def test_a_wrong_password_and_an_unknown_name_get_the_same_refusal(mesh, page, tmp_path):
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, _, _):
             wrong = await client.sign_in("li", "not the password")
@@ -173,7 +173,7 @@ def test_a_session_is_over_everywhere_once_it_is_signed_out(mesh, page, tmp_path
     run(main())
 
 
-def test_what_is_being_fetched_for_a_session_ends_with_it(mesh, page, tmp_path):
+def test_a_download_ends_with_its_session(mesh, page, tmp_path):
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, other, _):
             begun, go_on = asyncio.Event(), asyncio.Event()
@@ -272,7 +272,7 @@ def test_a_lesser_role_holds_at_once_and_takes_control_away(mesh, page, tmp_path
     run(main())
 
 
-def test_a_file_that_became_wrong_signs_nobody_out_and_is_told_of(mesh, page, tmp_path):
+def test_an_invalid_accounts_file_is_reported_and_keeps_sessions(mesh, page, tmp_path):
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, other, path):
             events = other.subscribe("robomesh/s/-/events/console", newest=100)
@@ -339,7 +339,7 @@ def test_a_new_password_of_ones_own_keeps_this_session_and_ends_the_others(mesh,
     run(main())
 
 
-def test_an_administrator_changes_accounts_and_nobody_else_does(mesh, page, tmp_path):
+def test_only_an_administrator_changes_accounts(mesh, page, tmp_path):
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, _, _):
             li = Client(client.address)
@@ -369,7 +369,7 @@ def test_an_administrator_changes_accounts_and_nobody_else_does(mesh, page, tmp_
     run(main())
 
 
-def test_a_console_without_accounts_asks_nobody_to_sign_in(mesh, page):
+def test_a_console_without_accounts_needs_no_sign_in(mesh, page):
     async def main():
         async with console(mesh, page) as (address, _):
             client = Client(address)

@@ -60,7 +60,7 @@ async def ended(reader):
 TOKENS = ["", "A" * 43, "A" * 9000, "%00", "../../etc/passwd", '"; DROP TABLE', "\xff\xfe"]
 
 
-def test_a_forged_token_is_nobodys(mesh, page, tmp_path):
+def test_a_forged_token_has_no_session(mesh, page, tmp_path):
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, _, _):
             for token in TOKENS:
@@ -213,7 +213,7 @@ def test_requests_that_are_too_large_or_of_two_minds_are_refused(mesh, page, tmp
     run(main())
 
 
-def test_what_is_no_json_or_not_what_it_should_be_is_refused_in_words(mesh, page, tmp_path):
+def test_invalid_json_is_refused_with_a_sentence(mesh, page, tmp_path):
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, _, _):
             for body, status in (
@@ -325,7 +325,7 @@ def test_a_page_that_sends_nonsense_is_cut_off_and_the_others_are_not(mesh, page
     run(main())
 
 
-def test_a_stranger_who_waits_in_the_handshake_is_counted_like_any_other(monkeypatch):
+def test_a_connection_in_its_handshake_counts_against_the_limit(monkeypatch):
     monkeypatch.setattr(Listener, "most_of_one", 1)
     with Listener(socket.AF_INET, socket.SOCK_STREAM) as listener:
         listener.bind(("127.0.0.1", 0))

@@ -10,7 +10,7 @@ ACQUIRE = schema.LeaseRequest(action=schema.LeaseRequest.ACQUIRE).SerializeToStr
 ARM = "robomesh/hall/arm"
 
 
-def test_a_page_without_accounts_at_a_site_with_keys_passes_for_nobody_else(secured, page):
+def test_a_page_without_accounts_acts_as_the_console_only(secured, page):
     async def main():
         folder, endpoint = secured
         asked = []

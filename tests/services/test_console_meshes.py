@@ -28,7 +28,7 @@ class Owner:
         (RefusedError("no mesh 'base' here"), 404, None),
     ],
 )
-def test_who_is_busy_may_be_asked_again_and_who_has_no_mesh_need_not(monkeypatch, error, status, again):
+def test_a_busy_service_is_retried_and_a_missing_mesh_is_not(monkeypatch, error, status, again):
     monkeypatch.setattr(meshes, "_TIMEOUTS_S", (0.1, 0.1))
     path = {"site": "s", "robot": "r", "name": "base"}
     request = Request({"type": "http", "query_string": b"", "headers": [], "path_params": path})

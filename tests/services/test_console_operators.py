@@ -72,7 +72,7 @@ def test_a_page_that_is_refused_or_gives_control_back_is_not_present(mesh, page)
     run(main())
 
 
-def test_nobody_is_present_at_a_robot_that_does_not_answer(mesh, page):
+def test_no_operator_is_present_at_a_robot_that_does_not_answer(mesh, page):
     async def main():
         async with console(mesh, page) as (address, other), browse(address) as browser:
             answer = await browser.ask(1, KEY, asked(ACTION.ACQUIRE))
@@ -82,7 +82,7 @@ def test_nobody_is_present_at_a_robot_that_does_not_answer(mesh, page):
     run(main())
 
 
-def test_a_lease_request_that_is_none_is_refused_in_words(mesh, page):
+def test_an_invalid_lease_request_is_refused_with_a_sentence(mesh, page):
     async def main():
         async with console(mesh, page) as (address, _), browse(address) as browser:
             answer = await browser.ask(1, KEY, b"\xff")
@@ -120,7 +120,7 @@ def test_a_busy_gateway_is_to_the_page_one_that_does_not_answer_and_may_be_asked
     run(main())
 
 
-def test_nobody_is_present_where_no_replay_was_opened(mesh, page):
+def test_no_operator_is_present_without_a_replay(mesh, page):
     async def main():
         async with console(mesh, page) as (address, other), browse(address) as browser:
             for number in range(1, 4):

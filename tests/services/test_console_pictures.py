@@ -235,7 +235,7 @@ def test_a_still_is_the_newest_picture_as_jpeg_or_png(mesh, page):  # noqa: F811
         ("image/S!/r/front.jpg", 404, "S!"),
     ],
 )
-def test_what_cannot_be_shown_is_said_in_words(mesh, page, path, status, words):  # noqa: F811
+def test_a_missing_picture_is_refused_with_a_sentence(mesh, page, path, status, words):  # noqa: F811
     async def main():
         async with rendered(mesh, page) as (address, *_):
             answered, headers, body = await get(address, f"/{path}")
@@ -278,7 +278,7 @@ def test_more_streams_than_there_is_room_for_are_refused_and_room_comes_back(mes
     run(main())
 
 
-def test_what_a_slow_reader_is_given_next_is_the_newest():
+def test_a_slow_reader_gets_the_newest_picture_next():
     class SharedSubscriptions:
         def join(self, key, sink):
             self.sink = sink

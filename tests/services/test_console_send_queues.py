@@ -48,7 +48,7 @@ def test_of_state_that_came_in_one_burst_all_is_passed_on():
     assert len(queue.held()) < 10
 
 
-def test_of_what_a_stall_held_back_the_last_moment_and_the_newest_of_each_key_are_passed_on():
+def test_after_a_stall_recent_samples_and_the_newest_of_each_key_pass():
     row, now = topics.topic("joints"), time.monotonic() + 3600.0
     old = [sample(number) for number in range(5)]
     other = replace(sample(5), key="robomesh/s/other/joints")
@@ -70,7 +70,7 @@ def test_events_keep_their_order_and_are_bounded():
     assert numbers(queue) == list(range(800, 1000))
 
 
-def test_a_list_of_another_publisher_stands_for_all_before_it():
+def test_another_publishers_list_replaces_all_entries():
     queue = queue_for(topics.topic("events"), hold=True)
     for number in range(5):
         queue.push(sample(number, topic="events"))
@@ -78,7 +78,7 @@ def test_a_list_of_another_publisher_stands_for_all_before_it():
     assert [each.header.sequence for each in queue.held()] == [5]
 
 
-def test_a_list_of_what_was_missed_in_an_outage_follows_what_came_before_it():
+def test_entries_missed_in_an_outage_are_appended():
     queue = queue_for(topics.topic("events"), hold=True)
     for number in range(5):
         queue.push(sample(number, topic="events"))
@@ -116,7 +116,7 @@ def test_video_without_key_frames_does_not_grow_but_asks_for_one():
     assert queue.starved
 
 
-def test_who_joins_gets_the_frames_since_the_last_key_frame():
+def test_a_new_browser_gets_the_frames_since_the_last_key_frame():
     held = queue_for(topics.topic("video/top"), hold=True)
     for number, data in enumerate([KEY, DELTA, DELTA, KEY, DELTA], start=1):
         held.push(frame(number, data))

@@ -87,7 +87,7 @@ class Socket:
         return {"type": "websocket.receive", "bytes": watch.SerializeToString()}
 
 
-def test_who_keeps_step_gets_all_in_one_write_and_who_does_not_the_newest_until_it_does(monkeypatch):
+def test_a_fast_page_gets_all_in_one_write_and_a_slow_one_the_newest(monkeypatch):
     monkeypatch.setattr(
         "services.console.websocket.framing._SAME_AGE_S", 60.0
     )  # a round may be long on a busy machine
@@ -141,7 +141,7 @@ class Asked:
         self.asked.append(key)
 
 
-def test_who_takes_nothing_has_no_key_frames_made_for_all_who_watch():
+def test_a_blocked_page_requests_no_key_frames():
     async def main():
         feeds, line, session = SharedSubscriptions(), WebSocketTransport(), Asked()
         browser = Browser(session, feeds, None, greet=lambda _: ToPage(), site="s", own_name="li")
@@ -161,7 +161,7 @@ def test_who_takes_nothing_has_no_key_frames_made_for_all_who_watch():
     run(main())
 
 
-def test_the_same_bytes_are_sent_to_all_for_a_moment_then_the_age_is_told_anew(monkeypatch):
+def test_encoded_bytes_are_shared_until_the_age_is_updated(monkeypatch):
     moment = SampleBatch([sample(1, received=time.monotonic() - 2.0)])
     first = moment.frames()
     assert moment.frames() is first or time.monotonic() - moment._at > 0.005
@@ -172,7 +172,7 @@ def test_the_same_bytes_are_sent_to_all_for_a_moment_then_the_age_is_told_anew(m
     assert 0.9 < ages[1] - ages[0] < 31.0
 
 
-def test_what_is_given_to_a_line_at_once_is_little_and_in_order():
+def test_a_write_is_small_and_in_order():
     samples = [sample(number, payload=bytes(1000)) for number in range(20)]
     pieces = list(batches(samples))
     assert [each for piece in pieces for each in piece.samples] == samples
@@ -181,7 +181,7 @@ def test_what_is_given_to_a_line_at_once_is_little_and_in_order():
     assert list(batches([])) == []
 
 
-def test_a_page_that_cannot_be_served_takes_nobody_elses_turn(caplog):
+def test_an_error_in_one_page_does_not_delay_the_others(caplog):
     async def main():
         scheduler, served = WriteScheduler(), []
         scheduler.schedule(lambda: 1 / 0)

@@ -13,7 +13,7 @@ from tests.services.test_console import page
 __all__ = ["page"]  # a fixture
 
 
-def test_who_tries_too_often_waits_and_is_told_how_long(mesh, page, tmp_path):
+def test_too_many_attempts_wait_for_a_stated_time(mesh, page, tmp_path):
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, _, _):
             told = [await client.sign_in("li", "not the password") for _ in range(4)]
@@ -28,7 +28,7 @@ def test_who_tries_too_often_waits_and_is_told_how_long(mesh, page, tmp_path):
     run(main())
 
 
-def test_tries_at_the_door_keep_nobody_inside_from_giving_the_password_again(mesh, page, tmp_path):
+def test_failed_sign_ins_do_not_block_a_password_within_a_session(mesh, page, tmp_path):
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, _, _):
             await client.sign_in("li")
@@ -45,7 +45,7 @@ def test_tries_at_the_door_keep_nobody_inside_from_giving_the_password_again(mes
     run(main())
 
 
-def test_what_nobody_had_time_to_look_at_is_no_wrong_try(mesh, page, tmp_path):
+def test_an_unverified_attempt_is_not_a_failure(mesh, page, tmp_path):
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, _, _):
             with patch.object(sign_in_queue, "MOST_OF_NAME", 0):
@@ -55,7 +55,7 @@ def test_what_nobody_had_time_to_look_at_is_no_wrong_try(mesh, page, tmp_path):
     run(main())
 
 
-def test_who_names_another_address_each_time_is_the_same_stranger(mesh, page, tmp_path):
+def test_a_forged_address_does_not_evade_the_limit(mesh, page, tmp_path):
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, _, _):
             told = []
@@ -71,7 +71,7 @@ def test_who_names_another_address_each_time_is_the_same_stranger(mesh, page, tm
     run(main())
 
 
-def test_a_flood_of_tries_from_one_address_keeps_nobody_at_another_out(mesh, page, tmp_path):
+def test_a_flood_from_one_address_does_not_block_another(mesh, page, tmp_path):
     """Each attempt takes a real argon2 hash; 127.0.0.2 is another address of the same machine."""
 
     async def main():

@@ -52,9 +52,7 @@ def test_over_tls_the_cookie_is_for_this_host_alone_and_browsers_come_back_by_tl
 @pytest.mark.parametrize(
     ("has", "lacks"), [((), "accounts and without TLS"), (("accounts",), "TLS"), (("tls",), "accounts")]
 )
-def test_beyond_loopback_it_starts_with_accounts_and_tls_or_says_what_is_missing(
-    mesh, page, tmp_path, has, lacks
-):
+def test_beyond_loopback_it_needs_accounts_and_tls(mesh, page, tmp_path, has, lacks):
     certificate, key = self_signed(tmp_path)
     settings = {"listen": "0.0.0.0:0"}
     if "accounts" in has:
@@ -103,7 +101,7 @@ def test_a_renewed_certificate_is_taken_up_without_a_restart_and_half_a_one_is_n
     run(main())
 
 
-def test_a_certificate_that_is_none_is_named(mesh, page, tmp_path):
+def test_an_invalid_certificate_is_named(mesh, page, tmp_path):
     (tmp_path / "c.pem").write_text("no certificate")
 
     async def main():

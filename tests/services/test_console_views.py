@@ -99,7 +99,7 @@ async def settled():
         await asyncio.sleep(0)
 
 
-def test_who_takes_every_frame_is_never_reduced(monkeypatch):
+def test_a_fast_browser_is_never_reduced(monkeypatch):
     async def main():
         clock, feeds = Clock(monkeypatch), SharedSubscriptions()
         video = watch(feeds)
@@ -115,7 +115,7 @@ def test_who_takes_every_frame_is_never_reduced(monkeypatch):
     run(main())
 
 
-def test_who_takes_too_little_is_stepped_down_and_is_sent_nothing_old(monkeypatch):
+def test_a_slow_browser_is_reduced_and_gets_no_old_frames(monkeypatch):
     async def main():
         clock, feeds = Clock(monkeypatch), SharedSubscriptions()
         video = watch(feeds)
@@ -139,7 +139,7 @@ def test_who_takes_too_little_is_stepped_down_and_is_sent_nothing_old(monkeypatc
     run(main())
 
 
-def test_for_who_takes_nothing_at_all_nothing_smaller_is_drawn(monkeypatch):
+def test_a_blocked_browser_requests_no_reduced_view(monkeypatch):
     async def main():
         clock, feeds, steps = Clock(monkeypatch), SharedSubscriptions(), Steps()
         video = watch(feeds, steps)
@@ -175,7 +175,7 @@ def test_a_view_that_cannot_be_reduced_goes_on_at_key_frames(monkeypatch):
     run(main())
 
 
-def test_who_cannot_be_given_less_is_not_asked_about_with_every_picture(monkeypatch):
+def test_a_refused_reduction_is_not_requested_with_every_frame(monkeypatch):
     async def main():
         clock, feeds, steps = Clock(monkeypatch), SharedSubscriptions(), Steps(refused=True)
         video = watch(feeds, steps)
@@ -191,7 +191,7 @@ def test_who_cannot_be_given_less_is_not_asked_about_with_every_picture(monkeypa
     run(main())
 
 
-def test_who_takes_all_again_is_given_more_later_and_less_soon_after_too_much(monkeypatch):
+def test_a_recovered_browser_gets_the_larger_view_later_after_each_failure(monkeypatch):
     async def main():
         monkeypatch.setattr(adaptive_video, "_ADAPT_EVERY_S", 0.0)
         clock, feeds = Clock(monkeypatch), SharedSubscriptions()
@@ -230,7 +230,7 @@ def test_who_takes_all_again_is_given_more_later_and_less_soon_after_too_much(mo
     run(main())
 
 
-def test_a_renderer_is_asked_for_less_of_what_everybody_watches_and_of_what_a_page_asked_for(mesh):
+def test_shared_and_requested_views_are_reduced(mesh):
     async def main():
         asked = []
 

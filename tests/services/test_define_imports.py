@@ -69,7 +69,7 @@ def test_a_step_file_is_converted_in_the_confined_worker(page):
 
 
 @pytest.mark.slow
-def test_a_broken_step_file_is_told(page):
+def test_a_broken_step_file_is_reported(page):
     answer = converted(page, "part.step", b"ISO-10303-21;\nHEADER;\nnonsense")
     assert answer.status == 422
     assert answer.text.startswith("part.step: cannot be read as STEP")
@@ -231,7 +231,7 @@ def test_an_openhrp_file_gives_joints_axes_and_limits(page):
     ],
 )
 @pytest.mark.slow
-def test_a_wrong_urdf_is_told_in_words(page, text, words):
+def test_an_invalid_urdf_is_reported(page, text, words):
     answer = page.post("/import", {"file": "a.urdf", "files": {"a.urdf": page.upload(text)}})
     assert answer.status == 422
     assert words in answer.text

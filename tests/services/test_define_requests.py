@@ -51,7 +51,7 @@ def page(tmp_path_factory):
     ["files?name=a.wrl", "mesh", "check", "collisions", "import", "unzip", "save", "zip", "start", "stop"],
 )
 @pytest.mark.parametrize("origin", ["", "null", "http://evil.example", "http://127.0.0.1:1"])
-def test_what_another_page_asks_for_is_not_done(page, path, origin):
+def test_a_request_from_another_page_is_refused(page, path, origin):
     answer = page.post(f"/{path}", {}, Origin=origin)
     assert answer.status == 403
     assert "is not this page's" in answer.text
@@ -73,7 +73,7 @@ def test_the_librarys_robots_can_be_opened(page):
 
 
 @pytest.mark.parametrize("name", ["none", "..", "%2e%2e", "..%2fpt500", ".git", "*"])
-def test_a_robot_that_is_not_there_is_told(page, name):
+def test_a_missing_robot_is_reported(page, name):
     assert page.get(f"/robots/{name}").status == 404
 
 
@@ -107,7 +107,7 @@ def test_an_inlined_file_is_found_beside_the_other(page):
 
 
 @pytest.mark.slow
-def test_a_broken_mesh_is_told_with_its_place_and_without_the_servers_folders(page):
+def test_a_broken_mesh_is_reported_without_the_servers_folders(page):
     broken = page.post("/mesh", {"file": "a.wrl", "files": {"a.wrl": page.upload(TRIANGLE[:-9])}})
     assert broken.status == 422
     assert broken.text.startswith("a.wrl")
@@ -145,7 +145,7 @@ def test_a_right_draft_has_no_problems_and_its_tool_is_where_the_arm_ends(page):
 
 
 @pytest.mark.slow
-def test_problems_are_told_with_their_places_and_the_links_are_still_shown(page):
+def test_problems_have_places_and_the_links_are_still_shown(page):
     draft = page.draft() | {"files": {}}
     draft["description"] = draft["description"] | {"base": {}}
     answer = page.post("/check", draft).json
@@ -162,7 +162,7 @@ def test_problems_are_told_with_their_places_and_the_links_are_still_shown(page)
 def test_joints_of_another_robot_are_refused(page, joints):
     answer = page.post("/check", page.draft() | {"joints": joints})
     assert answer.status == 422
-    assert "5 in all" in answer.text
+    assert "5 in total" in answer.text
 
 
 @pytest.mark.parametrize(
@@ -186,7 +186,7 @@ def test_a_wrong_request_is_refused_in_words(page, body, status, words):
 
 
 @pytest.mark.slow
-def test_a_draft_is_saved_replaced_when_told_so_and_opened_again(page):
+def test_a_draft_is_saved_replaced_on_request_and_opened(page):
     draft = page.draft(name="saved")
     saved = page.post("/save", draft).json
     assert (saved["name"], saved["folder"]) == ("saved", f"{page.folder}/robots/saved")
@@ -205,7 +205,7 @@ def test_a_draft_is_saved_replaced_when_told_so_and_opened_again(page):
 
 
 @pytest.mark.slow
-def test_who_saves_what_another_has_changed_is_asked(page):
+def test_saving_over_another_clients_change_needs_confirmation(page):
     first = page.draft(name="shared")
     assert page.post("/save", first).status == 200
     one, other = page.get("/robots/shared").json, page.get("/robots/shared").json
@@ -226,7 +226,7 @@ def test_who_saves_what_another_has_changed_is_asked(page):
 
 
 @pytest.mark.slow
-def test_what_was_put_into_a_robots_folder_since_it_was_opened_is_not_lost(page):
+def test_files_added_to_an_open_robots_folder_are_kept(page):
     page.post("/save", page.draft(name="visited"))
     opened = page.get("/robots/visited").json
     folder = page.folder / "robots" / "visited"
@@ -273,7 +273,7 @@ def test_a_draft_whose_mesh_cannot_be_drawn_is_not_saved(page, file, content):
 
 @pytest.mark.parametrize("value", ["1979-05-27", "nan", "[1.0, -inf]", "9" * 400])
 @pytest.mark.slow
-def test_a_saved_robot_that_holds_no_robots_value_is_told_in_words(page, value):
+def test_a_saved_robot_with_invalid_values_is_reported(page, value):
     robot = page.folder / "robots" / "dated"
     robot.mkdir(parents=True, exist_ok=True)
     (robot / "robot.toml").write_text(f'name = "dated"\nprovenance = {value}\n')
@@ -292,7 +292,7 @@ def test_a_saved_robot_that_holds_no_robots_value_is_told_in_words(page, value):
     [("9" * 400, "a number of 400 digits"), ("[" * 900 + "]" * 900, "nested too deeply")],
     ids=["digits", "nested"],
 )
-def test_a_zip_of_what_no_robot_holds_is_refused_in_words(page, value, words):
+def test_a_zip_of_invalid_values_is_refused(page, value, words):
     answer = page.post("/zip", f'{{"description": {{"name": "a", "title": {value}}}}}'.encode())
     assert answer.status in (400, 422)
     assert words in answer.text
@@ -340,7 +340,7 @@ def test_half_a_character_is_refused_in_words(page):
 
 
 @pytest.mark.slow
-def test_starting_writes_down_what_the_supervisor_follows(page):
+def test_starting_writes_the_file_that_the_supervisor_follows(page):
     page.post("/save", page.draft(name="runner"))
     assert page.post("/start", {"name": "runner"}).json == {"site": "s", "robot": "runner"}
     started = page.folder / "robots" / "started.toml"
@@ -369,7 +369,7 @@ def test_a_robot_whose_mesh_cannot_be_read_is_not_started(page):
     assert answer.text.startswith("meshes/base.wrl")
 
 
-def test_without_a_supervisor_the_lines_for_the_site_file_are_told(mesh, tmp_path):
+def test_without_a_supervisor_the_refusal_has_the_lines_for_the_site_file(mesh, tmp_path):
     with defining(mesh, tmp_path, can_start=False) as page:
         assert page.get("/robots").json["can_start"] is False
         page.post("/save", page.draft(name="later"))
@@ -408,7 +408,7 @@ def test_a_running_robot_of_the_pages_reads_its_own_folder_only(tmp_path, monkey
 
 
 @pytest.mark.parametrize("job", ["mesh", "collisions", "import_robot", "unzip"])
-def test_a_job_whose_asker_has_gone_takes_nobody_elses_time(tmp_path, job):
+def test_an_abandoned_job_delays_no_other(tmp_path, job):
     site = Site(site="s", define=DefinePart(folder=tmp_path / "robots"))
 
     async def main():

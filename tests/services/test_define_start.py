@@ -103,7 +103,7 @@ def test_it_is_commanded_drawn_and_recorded_as_any_other(site, page, mine, tmp_p
     assert robomesh("audit", "verify", str(site.folder / "audit" / "test" / "mine.jsonl")).returncode == 0
 
 
-def test_saved_anew_it_starts_anew_and_nobody_else_does(site, page, mine):
+def test_saving_a_started_robot_restarts_only_that_robot(site, page, mine):
     before = processes(site)
     mine["description"]["joint"][0]["limits"] = [-60, 60]
     assert page.post("/save", mine | {"overwrite": True}).status == 200
@@ -121,7 +121,7 @@ def test_saved_anew_it_starts_anew_and_nobody_else_does(site, page, mine):
 
 
 @pytest.mark.parametrize("name", ["gateway mine", "simulate mine", "console"])
-def test_what_is_killed_comes_back(site, page, mine, name):
+def test_a_killed_process_is_restarted(site, page, mine, name):
     before = processes(site)
     workers = descendants(before["console"])
     kill(before[name])

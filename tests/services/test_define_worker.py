@@ -63,7 +63,7 @@ def test_a_hanging_worker_is_ended_and_the_next_request_is_answered(page):
     assert page.post("/mesh", mesh | {"file": "meshes/forearm.3ds"}).status == 200
 
 
-def test_a_worker_that_is_killed_is_replaced_and_nobody_notices(page):
+def test_a_killed_worker_is_replaced(page):
     draft = page.draft()
     assert page.post("/check", draft).status == 200
     (first,) = workers()
@@ -80,7 +80,7 @@ def test_a_worker_that_is_killed_is_replaced_and_nobody_notices(page):
     assert page.post("/check", draft).status == 200
 
 
-def test_a_request_over_which_every_worker_dies_is_told_so(mesh, tmp_path):
+def test_a_request_that_crashes_every_worker_is_refused(mesh, tmp_path):
     # The limit is too small even for the libraries.
     with defining(mesh, tmp_path, limits=Limits(memory_bytes=20 * 1024**2)) as page:
         answer = page.post("/check", page.draft())
@@ -89,7 +89,7 @@ def test_a_request_over_which_every_worker_dies_is_told_so(mesh, tmp_path):
         assert page.get("/robots").status == 200
 
 
-def test_a_file_that_needs_too_much_memory_is_told_so(mesh, tmp_path):
+def test_a_file_that_needs_too_much_memory_is_refused(mesh, tmp_path):
     limits = Limits(memory_bytes=400 * 1024**2)
     with defining(mesh, tmp_path, limits=limits) as page:
         sha = page.upload(POINTS % (b"1 2 3 " * 6_000_000))
@@ -99,7 +99,7 @@ def test_a_file_that_needs_too_much_memory_is_told_so(mesh, tmp_path):
         assert page.post("/check", page.draft()).json["problems"] == []
 
 
-def test_what_a_hanging_worker_started_is_ended_with_it(mesh, tmp_path):
+def test_a_hanging_workers_children_are_killed_with_it(mesh, tmp_path):
     with defining(mesh, tmp_path, limits=Limits(slow_s=4.0)) as page:
         # Open CASCADE, in a child process of the worker, hangs on an invalid length.
         endless = step_box((10, 20, 30)).replace("10.000000", "nan").encode()
@@ -128,7 +128,7 @@ def test_too_large_a_file_is_refused_before_it_is_kept(mesh, tmp_path):
     assert [path.name for path in (tmp_path / "store").iterdir() if path.is_file()] == []
 
 
-def test_what_nobody_waits_for_any_more_is_not_done(tmp_path):
+def test_an_abandoned_request_is_not_run(tmp_path):
     kept = store.open_store(tmp_path / "store")
 
     async def main():
@@ -290,7 +290,7 @@ def test_the_oldest_files_go_when_there_are_too_many(tmp_path):
     assert [store.stored(kept, sha) is not None for sha in (first, second, third)] == [True, False, True]
 
 
-def test_drafts_do_not_keep_what_must_go(tmp_path):
+def test_drafts_do_not_keep_evicted_files(tmp_path):
     kept = store.open_store(tmp_path / "store", most_bytes=2500)
     drafts = [store.lay_out(kept, {"a": store.put(kept, bytes([number]) * 400)}) for number in range(6)]
     for number, folder in enumerate(drafts):

@@ -76,7 +76,7 @@ async def names(session):
     return {(who.site, who.service) for who in await session.present()}
 
 
-def test_who_is_revoked_is_cut_off_while_the_router_runs_and_who_is_issued_a_certificate_comes_in(tmp_path):
+def test_a_running_router_follows_revoked_and_issued_certificates(tmp_path):
     folder, endpoint = prepared(tmp_path)
     authority.issue(folder, "li", Role.OPERATOR)
 
@@ -153,7 +153,7 @@ def test_rules_that_let_everybody_in_are_no_rules(tmp_path, changed):
 
 
 @pytest.mark.parametrize("text", ["{", "[]", "{}"])
-def test_what_are_no_rules_at_all_is_told_so(tmp_path, text):
+def test_an_invalid_rules_file_is_refused(tmp_path, text):
     path = tmp_path / "access.json5"
     path.write_text(text)
     with pytest.raises(AccessError, match="robomesh keys writes a new one"):
@@ -240,7 +240,7 @@ def test_no_certificate_but_a_routers_passes_for_a_router(tmp_path):
         run(main())
 
 
-def test_what_a_certificate_may_not_do_is_said_in_words_before_anybody_is_asked(tmp_path):
+def test_a_missing_right_is_reported_before_the_request_is_sent(tmp_path):
     folder, endpoint = prepared(tmp_path)
     for name, role in (("li", Role.OPERATOR), ("mo", Role.MONITOR)):
         authority.issue(folder, name, role)
@@ -269,7 +269,7 @@ def test_what_a_certificate_may_not_do_is_said_in_words_before_anybody_is_asked(
         run(main())
 
 
-def test_the_configuration_for_zenohd_is_what_our_router_runs_with(tmp_path):
+def test_zenohd_gets_the_routers_configuration(tmp_path):
     folder, endpoint = prepared(tmp_path)
     out = tmp_path / "zenohd.json5"
     assert "restart it after robomesh keys" in service.write_config(settings_of(folder, endpoint), out)
@@ -286,7 +286,7 @@ def test_the_configuration_for_zenohd_is_what_our_router_runs_with(tmp_path):
     assert "PRIVATE" not in out.read_text()
 
 
-def test_a_certificate_shows_whose_it_is_and_who_signed_it(tmp_path):
+def test_a_certificate_shows_its_name_and_authority(tmp_path):
     folder, _ = prepared(tmp_path)
     entry = authority.issue(folder, "li", Role.OPERATOR)
     shown = certificates.read_bundle(folder.person("li").read_bytes())
@@ -358,7 +358,7 @@ def test_rules_that_zenoh_refuses_are_not_said_to_be_followed(tmp_path, caplog):
     run(main(), timeout_s=60.0)
 
 
-def test_a_renewed_certificate_is_told_without_a_restart(tmp_path):
+def test_a_renewed_certificate_is_reported_without_a_restart(tmp_path):
     folder, endpoint = prepared(tmp_path)
     authority.issue(folder, "mo", Role.MONITOR, lifetime=timedelta(hours=1))
     with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):

@@ -53,7 +53,7 @@ def test_an_address_finds_a_place_in_a_queue_that_others_have_filled():
     assert "own" in taken(queue)[: len(addresses) + 1]
 
 
-def test_the_next_to_be_verified_is_not_who_sent_the_most():
+def test_the_sender_of_most_attempts_is_not_verified_next():
     held, begun, order = threading.Event(), threading.Event(), []
 
     async def main():

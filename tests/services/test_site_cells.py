@@ -121,7 +121,7 @@ def test_a_fixture_whose_part_is_outside_of_its_folder_is_refused_for_no_check_w
         (ROBOT + 'clearance = { stop = "1" }', "robot.arm.clearance.stop = '1'"),
     ],
 )
-def test_what_is_wrong_with_a_cell_is_named_with_what_would_be_right(tmp_path, text, words):
+def test_an_invalid_cell_is_named_with_what_would_be_right(tmp_path, text, words):
     with pytest.raises(SiteFileError) as raised:
         load(tmp_path, text)
     assert words in str(raised.value)
@@ -162,7 +162,7 @@ def test_a_site_file_gives_the_height_of_the_floor_or_that_there_is_none(tmp_pat
         ),
     ],
 )
-def test_what_is_wrong_with_a_floor_is_named(tmp_path, text, words):
+def test_an_invalid_floor_is_named(tmp_path, text, words):
     with pytest.raises(SiteFileError, match=re.escape(words)):
         load(tmp_path, text)
 
@@ -218,7 +218,7 @@ def test_a_robot_cannot_require_checks_beside_one_whose_meshes_are_missing(tmp_p
     assert len(load(tmp_path, f"{half}{whole}").robot) == 2
 
 
-def test_what_was_started_from_the_page_stands_in_no_cell(tmp_path):
+def test_a_started_robot_has_no_cell(tmp_path):
     (tmp_path / "robots").mkdir()
     (tmp_path / "robots" / "started.toml").write_text(f'site = "hall"\n{IN_A.replace("arm", "second")}')
     with pytest.raises(SiteFileError, match="cells belong in the site file"):

@@ -32,7 +32,7 @@ def test_paths_are_taken_from_the_files_own_folder(tmp_path):
     assert found.audit.folder == tmp_path / "audit"
 
 
-def test_what_is_recorded_unless_one_asks_is_a_view_that_is_rendered(tmp_path):
+def test_the_view_recorded_by_default_is_rendered(tmp_path):
     assert load(tmp_path, 'site = "hall"\n').recorded_views == ("free",)
     assert load(tmp_path, 'site = "hall"\n[renderer]\nviews = ["top"]\n').recorded_views == ("top",)
     assert load(tmp_path, 'site = "hall"\n[recorder]\nviews = ["far"]\n').recorded_views == ("far",)
@@ -98,7 +98,7 @@ def test_codes_are_numbers(tmp_path):
         ("site = ", "not TOML"),
     ],
 )
-def test_what_is_wrong_is_named_with_what_would_be_right(tmp_path, text, words):
+def test_an_invalid_value_is_named_with_what_would_be_right(tmp_path, text, words):
     with pytest.raises(SiteFileError) as raised:
         load(tmp_path, text)
     assert words in str(raised.value)
@@ -140,7 +140,7 @@ def test_wrong_settings_of_old_client_programs_are_named(tmp_path, more, words):
     assert "robot.arm.legacy_clients" in str(raised.value)
 
 
-def test_old_client_programs_come_from_elsewhere_only_where_the_file_takes_the_risk(tmp_path):
+def test_remote_legacy_clients_need_insecure(tmp_path):
     text = f'site = "hall"\n{ROBOT}legacy_clients = {{ listen = "0.0.0.0:5401"'
     with pytest.raises(SiteFileError, match="insecure = true"):
         load(tmp_path, text + " }\n")
@@ -159,7 +159,7 @@ def test_old_client_programs_come_from_elsewhere_only_where_the_file_takes_the_r
         ('[router]\nlisten = ["tcp/0.0.0.0:7447"]\n', "the router (tcp/0.0.0.0:7447) would listen on"),
     ],
 )
-def test_what_others_could_reach_is_refused_before_anything_starts(tmp_path, text, words):
+def test_an_insecure_address_is_refused_before_anything_starts(tmp_path, text, words):
     with pytest.raises(SiteFileError, match="insecure = true") as raised:
         load(tmp_path, f'site = "hall"\n{text}')
     assert str(raised.value).startswith(f"{tmp_path / 'site.toml'}: ")
@@ -218,12 +218,12 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["", "host", ":1", "host:", "host:x", "host:70000"])
-def test_what_is_no_address_is_refused(text):
+def test_an_invalid_address_is_refused(text):
     with pytest.raises(ListenError, match="HOST:PORT is right"):
         split_address(text)
 
 
-def test_beyond_loopback_needs_tls_or_a_word_taken_for_it():
+def test_beyond_loopback_needs_tls_or_insecure():
     assert check_reach("it", "127.0.0.1", secured=False, insecure=False) is None
     assert check_reach("it", "::1", secured=False, insecure=False) is None
     assert check_reach("it", "0.0.0.0", secured=True, insecure=False) is None
@@ -250,7 +250,7 @@ def test_robots_that_were_started_are_read_with_paths_from_their_own_folder(tmp_
     assert robot.simulated
 
 
-def test_what_is_written_down_is_read_back(tmp_path):
+def test_started_robots_are_read_back(tmp_path):
     hall = load(tmp_path, f'site = "hall"\n{ROBOT}')
     assert read_started(hall) == ()
     saved = tmp_path / "robots" / "mine"
@@ -287,13 +287,13 @@ def test_what_is_written_down_is_read_back(tmp_path):
         ),
     ],
 )
-def test_a_wrong_list_of_started_robots_is_told_in_words(tmp_path, text, words):
+def test_an_invalid_list_of_started_robots_is_reported(tmp_path, text, words):
     with pytest.raises(SiteFileError, match=r"started\.toml") as told:
         started(tmp_path, text)
     assert words in str(told.value)
 
 
-def test_a_router_reads_of_its_site_what_everybody_reads_of_it(tmp_path):
+def test_a_router_reads_the_same_values_as_other_services(tmp_path):
     path = tmp_path / "site.toml"
     path.write_text(
         'site = "plant"\n[router]\nlisten = ["tcp/127.0.0.1:7450"]\naccess = "rules.json5"\n'
@@ -307,7 +307,7 @@ def test_a_router_reads_of_its_site_what_everybody_reads_of_it(tmp_path):
 
 
 @pytest.mark.parametrize("more", ['[rooter]\nlisten = ["tcp/127.0.0.1:7450"]', "[router]\nlisten = 3", "[[["])
-def test_what_is_wrong_in_a_routers_part_is_left_to_who_says_it_in_words(tmp_path, more):
+def test_read_routed_leaves_errors_to_load(tmp_path, more):
     path = tmp_path / "site.toml"
     path.write_text(f'site = "plant"\n{more}\n')
     assert read_routed(path) is None

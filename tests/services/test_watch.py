@@ -138,7 +138,7 @@ def test_a_link_that_is_down_is_an_alarm_until_it_is_up_and_seen(mesh, tmp_path)
     run(main(), timeout_s=90.0)
 
 
-def test_a_restart_forgets_neither_an_acknowledgement_nor_what_was_put_aside(mesh, tmp_path):
+def test_a_restart_keeps_acknowledged_and_shelved_alarms(mesh, tmp_path):
     async def main():
         async with (
             open_session(mesh) as gateway,
@@ -204,7 +204,7 @@ def test_events_are_alarms_by_the_table_and_end_as_it_says(mesh, tmp_path):
     ],
     ids=["unknown", "none", "no reason", "no action"],
 )
-def test_what_cannot_be_done_with_alarms_is_refused_in_words(mesh, tmp_path, request_, said):
+def test_an_impossible_alarm_request_is_refused_with_a_sentence(mesh, tmp_path, request_, said):
     async def main():
         async with watched(mesh, tmp_path) as desk:
             with pytest.raises(RefusedError, match=said):
@@ -263,7 +263,7 @@ def test_a_clock_that_is_off_is_measured_and_both_machines_are_named(mesh, tmp_p
     run(main(), timeout_s=90.0)
 
 
-def test_a_name_used_twice_and_versions_that_differ_are_told_once_with_both_sides(mesh, tmp_path):
+def test_duplicate_names_and_differing_versions_are_reported_once_with_both_sides(mesh, tmp_path):
     async def main():
         async with watched(mesh, tmp_path) as desk, seeming(mesh, "gateway", robot="arm", host="host-a"):
             async with seeming(mesh, "gateway", robot="arm", host="host-b", version="9.9"):
@@ -281,7 +281,7 @@ def test_a_name_used_twice_and_versions_that_differ_are_told_once_with_both_side
     run(main(), timeout_s=90.0)
 
 
-def test_a_site_name_used_twice_is_told_by_both_watches(mesh, tmp_path):
+def test_both_watches_report_a_duplicate_site_name(mesh, tmp_path):
     async def main():
         async with watched(mesh, tmp_path / "a") as desk, watched(mesh, tmp_path / "b"):
             await desk.until(lambda: any("site s is used twice" in each.text for each in desk.events))
@@ -306,7 +306,7 @@ def test_a_service_that_is_gone_is_an_alarm_until_it_is_back_or_known(mesh, tmp_
     run(main(), timeout_s=90.0)
 
 
-def test_what_a_process_told_is_over_when_another_has_taken_its_place(mesh, tmp_path):
+def test_a_replaced_process_clears_its_alarms(mesh, tmp_path):
     async def main():
         async def telling(session, text):
             said = session.declare_publisher("s", "-", "events/recorder")
@@ -334,7 +334,7 @@ def test_what_a_process_told_is_over_when_another_has_taken_its_place(mesh, tmp_
     run(main(), timeout_s=120.0)
 
 
-def test_a_robot_whose_gateway_is_gone_is_forgotten_once_somebody_knows(mesh, tmp_path):
+def test_a_robot_without_a_gateway_is_forgotten_after_the_acknowledgement(mesh, tmp_path):
     async def main():
         async with watched(mesh, tmp_path) as desk:
             async with (
@@ -354,7 +354,7 @@ def test_a_robot_whose_gateway_is_gone_is_forgotten_once_somebody_knows(mesh, tm
     run(main(), timeout_s=90.0)
 
 
-def test_what_was_so_in_a_replay_is_no_alarm_now(mesh, tmp_path):
+def test_a_replay_raises_no_alarm(mesh, tmp_path):
     async def main():
         async with watched(mesh, tmp_path) as desk, open_session(mesh) as others:
             told = {
