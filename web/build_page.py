@@ -1,8 +1,8 @@
-"""Builds the page: types from the mesh's own schemas, then the type check, then Vite.
+"""Build of the page: types from the mesh's own schemas, then the type check, then Vite.
 
 Runs as a script (`python web/build_page.py [--check | --format]`) and as hatchling's build
 hook of the wheel. Needs the standard library, protobuf, Foxglove's modules and the Node that
-comes as a wheel; no protoc, no Node of the machine's, so that every build is the same build.
+comes as a wheel; it uses no protoc or Node of the machine, so that builds are reproducible.
 """
 
 import os
@@ -25,11 +25,11 @@ _SCHEMAS = (ROOT / "robomesh" / "topics.py", ROOT / "robomesh" / "schemas" / "ro
 
 
 class PageBuildError(Exception):
-    """A step of the build failed; the text says which, and what it printed."""
+    """A failed step of the build; the text names the step and its output."""
 
 
 def sources() -> Iterator[Path]:
-    """Every file that the built page depends on."""
+    """Yield every file that the built page depends on."""
     yield Path(__file__)
     yield from _SCHEMAS
     for name in ("index.html", "package.json", "package-lock.json", "tsconfig.json", "vite.config.ts"):
@@ -41,19 +41,19 @@ def sources() -> Iterator[Path]:
 
 
 def is_current() -> bool:
-    """Whether the built page is newer than everything it is built from."""
+    """Return whether the built page is newer than its sources."""
     built = DIST / "index.html"
     return built.exists() and built.stat().st_mtime > _newest(sources())
 
 
 def build(*, check_only: bool = False) -> bool:
-    """Builds the page where it is older than its sources.
+    """Build the page if it is older than its sources.
 
     Args:
         check_only: Write the types, check types, format and lint rules; no bundle.
 
     Returns:
-        Whether there was anything to do.
+        False if the page was current.
 
     Raises:
         PageBuildError: If a step failed.
@@ -88,7 +88,7 @@ def format_sources() -> None:
 
 
 def install() -> None:
-    """Installs the packages of package-lock.json, where that was not done since it changed."""
+    """Install the packages of package-lock.json if it changed since the last installation."""
     stamp = MODULES / ".package-lock.json"
     if stamp.exists() and stamp.stat().st_mtime >= (PAGE / "package-lock.json").stat().st_mtime:
         return
@@ -99,7 +99,7 @@ def install() -> None:
 
 
 def write_types() -> None:
-    """Writes the TypeScript of every message of the topic table to `web/src/gen`."""
+    """Write the TypeScript of every message of the topic table to `web/src/gen`."""
     from google.protobuf.compiler import plugin_pb2
 
     request = plugin_pb2.CodeGeneratorRequest(parameter="target=ts,import_extension=none")
@@ -119,7 +119,7 @@ def write_types() -> None:
 
 
 def _schema_files() -> list[Any]:
-    """Descriptors of the files that the topic table's schemas and requests stand in."""
+    """Return descriptors of the schema files of topics and requests."""
     sys.path.insert(0, str(ROOT))  # the build has no installed `robomesh`
     try:
         from robomesh import topics
@@ -130,7 +130,7 @@ def _schema_files() -> list[Any]:
 
 
 def _with_dependencies(files: Iterable[Any]) -> Iterator[Any]:
-    """The files, each once, each after the files that it imports."""
+    """Yield the files, each once, after the files that it imports."""
     seen: set[str] = set()
 
     def visit(file: Any) -> Iterator[Any]:
@@ -155,7 +155,7 @@ def _node_folder() -> Path:
 
 
 def _node(script: Path, *arguments: str, stdin: bytes | None = None) -> bytes:
-    """Runs a script with the wheel's Node in the page's folder; what it wrote to its output."""
+    """Run a script with the wheel's Node in the page's folder and return its output."""
     binary = _node_folder() / ("node.exe" if os.name == "nt" else "bin/node")
     environment = os.environ | {"PATH": os.pathsep.join((str(binary.parent), os.environ.get("PATH", "")))}
     done = subprocess.run(
@@ -172,7 +172,7 @@ def _say(text: str) -> None:
 
 
 def main(arguments: list[str]) -> int:
-    """The script: 0 when built or current, 2 when it could not be."""
+    """Run the command line: 0 when built or current, 2 on failure."""
     if arguments not in ([], ["--check"], ["--format"]):
         print("usage: build_page.py [--check | --format]", file=sys.stderr)
         return 2
@@ -198,9 +198,9 @@ except ModuleNotFoundError:  # imported where nothing is packaged: tests, type c
 else:
 
     class PageBuildHook(BuildHookInterface):  # type: ignore[type-arg, unused-ignore, misc]
-        """Puts the built page into the wheel."""
+        """Hatchling hook that puts the built page into the wheel."""
 
         def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-            """Builds the page; an editable install serves the checkout's, which `dev` builds."""
+            """Build the page, except for an editable install, which serves the page that `dev` builds."""
             if version != "editable":
                 build()

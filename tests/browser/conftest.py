@@ -29,7 +29,7 @@ from web import build_page
 
 CHROMIUM = Path("/usr/bin/chromium")
 PATIENCE_MS = 60_000
-LAUNCH_MS = 180_000  # a browser that starts beside four busy processes
+LAUNCH_MS = 180_000  # a browser start next to four busy processes
 # What an address bar offers is drawn for each page by two processes more, and a third waits for the next one.
 # The last such list counts: the others are Playwright's that could matter here.
 WITHOUT = (
@@ -82,12 +82,12 @@ class Plant:
     _started: threading.Event = field(default_factory=threading.Event)
 
     def call(self, work):
-        """What a coroutine returns, run in the plant's thread."""
+        """Run a coroutine in the plant's thread and return its result."""
         return asyncio.run_coroutine_threadsafe(work, self.loop).result(20)
 
     @contextmanager
     def standing_still(self):
-        """Nothing of the site goes on."""
+        """Block the site's event loop during the block."""
         go_on = threading.Event()
         self.loop.call_soon_threadsafe(go_on.wait)
         try:
@@ -228,7 +228,7 @@ def run_plant(running: Plant) -> Iterator[Plant]:
 
 @pytest.fixture(scope="session", autouse=True)
 def patient():
-    """What is expected of a page is waited for as long as a busy machine needs: 5 s are too short."""
+    """Wait for a page as long as a busy machine needs: the default of 5 s is too short."""
     from playwright.sync_api import expect
 
     expect.set_options(timeout=PATIENCE_MS)

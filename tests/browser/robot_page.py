@@ -123,7 +123,7 @@ def wait_to_move(page, joint, do):
 
 
 def audited(plant, request):
-    """How many such requests the gateway wrote down."""
+    """Return the number of these requests in the gateway's audit log."""
     text = (plant.audit / "hall" / "arm.jsonl").read_text() if (plant.audit / "hall").exists() else ""
     return text.count(f'"{request}"')
 

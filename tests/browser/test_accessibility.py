@@ -21,7 +21,7 @@ PAGES = {
     "#/events": ".alarm-line",
     "#/settings": ".panel.mesh",
 }
-# What the servers say stands in their own language, and says so.
+# Check that servers' texts are marked with their own language.
 ENGLISH = """
 const own = (node) => {
   for (let at = node.parentElement; at; at = at.parentElement) if (at.lang === "en") return false;

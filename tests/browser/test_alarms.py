@@ -1,4 +1,4 @@
-"""What the page says of an arm that does not do as it is told: stops not heeded, faults, local mode."""
+"""The page of an arm that does not obey: ignored stops, faults, local mode."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""A robot's page in a cell, before a real site: what stands around it, how near, what is checked and run."""
+"""A robot's page in a cell: surroundings, distances, checks and runs, against a real site."""
 
 import asyncio
 import re
@@ -19,7 +19,7 @@ from web import build_page
 pytestmark = pytest.mark.browser
 
 PAGE = "#/test/arm"
-# At 25 degrees of the waist the wrist is some 20 mm from the post; the mate stands out of reach.
+# At 25 degrees of the waist the wrist is some 20 mm from the post; the other arm is out of reach.
 SITE = """
 [[robot]]
 name = "arm"

@@ -117,7 +117,7 @@ def test_the_audit_of_every_robot_is_there_and_its_logs_are_searched_when_asked(
 
 
 def test_texts_of_others_change_the_order_of_nothing_beside_them(open_page, raised):
-    """What is said is of "Trojan Source" (CVE-2021-42574), and Hebrew, as another program may say it."""
+    """Texts of another program with "Trojan Source" characters (CVE-2021-42574) and Hebrew."""
     page = open_page(EVENTS, drawn=False)
     raised(
         "recorder.note", 'if access_level != "user\u202e \u2066// Check if admin\u2069 \u2066" {', Event.INFO

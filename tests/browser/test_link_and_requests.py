@@ -1,4 +1,4 @@
-"""How a robot's link does, its old clients, and floods of refusals, as its page tells them."""
+"""A robot's link, its legacy clients and floods of refusals on its page."""
 
 import asyncio
 import re

@@ -1,4 +1,4 @@
-"""What a page does whose line dies, whose machine sleeps, whose files or link are none."""
+"""The page after a lost connection, a sleeping machine, missing files or a wrong link."""
 
 import re
 

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.browser
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PICTURE = DOCS / "robot-page.png"
-# What stands around an arm, out of its demonstration's way.
+# Fixtures around an arm that its demonstration does not reach.
 FIXTURES = tuple(
     Fixture(row.name, (fixture_shape(row),), fixture_to_site(row))
     for row in (
@@ -56,7 +56,7 @@ def rendered(plant, tmp_path):
 
 
 def orange(png):
-    """How much of a picture has the arm's colour [px]."""
+    """Return the area of a picture with the arm's colour [px]."""
     blue, green, red = (
         cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR).astype(int).transpose(2, 0, 1)
     )
@@ -83,7 +83,7 @@ def test_the_page_shows_the_arm_moving_in_3d_and_as_video(open_page, rendered):
         page.screenshot(path=PICTURE)
         assert PICTURE.stat().st_size < LARGEST_BYTES
     for place, least in ((".canvas-place", 4000), (".camera .picture", 1000)):
-        # What is stale for a moment has no colour.
+        # A picture that is stale for a moment has no colour.
         wait_until(lambda place=place, least=least: orange(page.locator(place).screenshot()) > least)
 
 
@@ -101,7 +101,7 @@ move_joints 60 70 -80 0 0
 @pytest.mark.skipif(not WANTED, reason="makes the picture of the Program page, with ROBOMESH_PICTURES=1")
 def test_the_program_page_shows_where_a_program_collides(open_page):
     page = open_page("#/program/hall/pt600")
-    expect(page.locator("textarea")).not_to_have_value("")  # the example stands there first
+    expect(page.locator("textarea")).not_to_have_value("")  # the example is shown first
     page.locator("textarea").fill(COLLIDING)
     row = page.get_by_role("button", name="touches bench").first
     row.click()

@@ -15,7 +15,7 @@ from web import build_page
 pytestmark = pytest.mark.browser
 
 PAGE = "#/program/test/arm"
-# A post beside the arm: the forearm sweeps through it between 0 and 60 degrees of the waist.
+# A post next to the arm: the forearm hits it between 0 and 60 degrees of the waist.
 SITE = """
 [[robot]]
 name = "arm"
@@ -39,7 +39,7 @@ speed 50
 # through the post
 move_joints 60 90 -90 0 0
 """
-# 28 mm beside the post, where a warning is due: on three lines, of one cause.
+# 28 mm from the post, within the warning distance: on three lines, with one cause.
 NEAR = """home
 move_joints 14 90 -90 0 0
 wait 0.2
@@ -75,7 +75,7 @@ def verdict(page, ok):
 
 
 def positions(plant):
-    """Where the arm's joints are now, as anybody on the mesh hears it."""
+    """Return the arm's joint positions from the mesh."""
     state = json.loads(plant.site.command("monitor", "arm", "--json", "--count", "1").stdout)
     return state["joints"]
 

@@ -62,7 +62,7 @@ def recorded(plant, tmp_path_factory):
 
 
 def of_quarter(path):
-    """A copy beside it, whose frames and joints end after a quarter of it."""
+    """Write a copy whose frames and joints end after a quarter of it."""
     with path.open("rb") as file, path.with_name(QUARTER).open("wb") as to:
         reader, writer = make_reader(file), Writer(to)
         whole = reader.get_summary().statistics
@@ -134,7 +134,7 @@ def test_a_recording_is_listed_and_played_and_a_seek_moves_arm_curves_and_clock(
     expect(page.locator(".recorded-events")).to_contain_text("li asked acquire")
     expect(page.locator(".event-mark").first).to_be_visible()
 
-    # It plays by itself, to its end.
+    # It plays to its end without input.
     expect(page.locator(".player")).to_have_attribute("data-playing", "false")
     page.keyboard.press("Home")
     until(page, lambda: position(page) < 0.5)
@@ -149,7 +149,7 @@ def test_a_recording_is_listed_and_played_and_a_seek_moves_arm_curves_and_clock(
     page.mouse.click(box["x"] + 0.2 * box["width"], box["y"] + box["height"] / 2)
     until(page, lambda: position(page) < 1.4)
 
-    # As the joints move, so does the picture; slowly enough to be seen on a busy machine.
+    # The picture follows the joints, slowly enough for a busy machine.
     page.locator(".transport select").select_option("0.1")
     begun, before = position(page), arm(page)
     page.keyboard.press("Space")

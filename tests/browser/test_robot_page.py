@@ -59,7 +59,7 @@ def test_a_slider_moves_the_joint_when_it_is_let_go_and_not_before(open_page, pl
     page.mouse.up()
     expect(page.locator('[data-joint="waist"]')).to_have_text(f"{wanted:.2f}°".replace("-", "−"))
     assert audited(plant, "MOVE_ABSOLUTE") > moves
-    # A tap beside the handle sets nothing.
+    # A tap next to the handle sets no target.
     moves = audited(plant, "MOVE_ABSOLUTE")
     box = page.locator(".track").first.bounding_box()
     page.mouse.click(box["x"] + 4, box["y"] + box["height"] / 2)

@@ -24,7 +24,7 @@ def accounts(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def plant(accounts, tmp_path_factory):
-    """A site whose console has accounts and TLS."""
+    """Run a site whose console has accounts and TLS."""
     certificate, key = self_signed(tmp_path_factory.mktemp("tls"))
     settings = {"accounts": accounts, "certificate": certificate, "key": key}
     yield from run_plant(Plant(audit=tmp_path_factory.mktemp("audit"), robots=("arm",), console=settings))
@@ -57,7 +57,7 @@ def sign_in(page, name, password=PASSWORD):
 
 
 def asked_by(plant, request):
-    """Who asked the arm's gateway for that, by its audit log."""
+    """Return the operators of these requests in the gateway's audit log."""
     asked = plant.session.ask("robomesh/hall/arm/audit/find", AuditQuery(request=request), timeout_s=10)
     return [entry.operator for entry in plant.call(asked).entries]
 
@@ -90,7 +90,7 @@ def test_an_operator_signs_in_has_control_in_its_own_name_and_signs_out_in_all_t
         expect(tab.get_by_role("heading", name="Console of hall")).to_be_visible()
         expect(tab.locator(".sign-in")).to_contain_text("You have signed out.")
         expect(tab.locator("[data-joint]")).to_have_count(0)
-    # Control went with the session: the next one finds nobody there.
+    # Control ended with the session: the next session finds none in control.
     sign_in(page, "li")
     expect(page.locator(".holder")).to_have_text("Nobody is in control")
 

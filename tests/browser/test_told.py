@@ -1,4 +1,4 @@
-"""What the page tells ends with what it is about: speed, motions, losses of control."""
+"""End of the page's messages with their cause: speed, motions, losses of control."""
 
 import re
 
@@ -62,7 +62,7 @@ def test_a_motion_that_another_goes_on_from_has_not_failed(open_page):
     button(page, "waist +5°").click()
     expect(page.locator('[data-joint="waist"]')).to_have_text("5.00°")
     expect(page.locator(".joints .notice")).to_contain_text("Done: waist")
-    # As soon as it is there, while the gateway still waits whether it stays there.
+    # As soon as the target is reached, while the gateway still waits for the arm to settle.
     button(page, "Home").click()
     expect(page.locator('[data-joint="waist"]')).to_have_text("0.00°")
     button(page, "waist +5°").click()

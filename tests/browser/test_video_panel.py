@@ -41,7 +41,7 @@ def pixel(page):
 
 @contextmanager
 def repeated(act):
-    """Acts ten times a second meanwhile."""
+    """Call an action ten times a second during the block."""
     end = threading.Event()
 
     def go():
@@ -72,7 +72,7 @@ def test_a_joiner_sees_the_frames_since_the_key_frame_then_live_ones(open_page, 
     page = open_page("#/hall/arm", drawn=False)
     page.wait_for_selector('.camera canvas[data-drawn="true"]')
     page.wait_for_function("() => document.querySelector('.camera canvas').width === 320")
-    # What was there before is shown, but as old: nobody knows its age.
+    # The earlier picture is shown as stale, because its age is not known.
     expect(page.locator(".camera .age")).to_have_text("stale, age unknown")
     red, green, _ = pixel(page)
     assert green > 150 > red

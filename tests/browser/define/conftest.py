@@ -1,4 +1,4 @@
-"""One site for all of Define's tests: it has no robots, so that nothing takes the time of what is defined."""
+"""One site for all of Define's tests, without robots, which would take processor time."""
 
 import os
 from types import SimpleNamespace

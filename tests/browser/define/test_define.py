@@ -29,7 +29,7 @@ from tests.site import wait_until
 
 pytestmark = pytest.mark.browser
 
-# Name, a, alpha, d, theta, limits: the library's Pt500, whose shapes these are.
+# Name, a, alpha, d, theta, limits of the library's Pt500, the owner of these shapes.
 ROWS = [
     ("waist", 0, 90, 300, 0, (-150, 150)),
     ("shoulder", 250, 0, 0, 0, (-30, 130)),
@@ -45,7 +45,7 @@ def test_an_arm_of_dropped_files_gets_rows_and_limits_is_saved_started_and_moves
         expect(page.locator(f'.robot-card[href="#/define/{name}"]')).to_be_visible()
     drop(page, *map(shape, ("base.wrl", "column.3ds", "forearm.3ds", "upper_arm.wrl", "wrist.wrl")))
     expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "5")
-    # The upper arm comes before the forearm, by keys; the flange by a button, with a joint of its own.
+    # Keys move the upper arm before the forearm; a button gives the flange its own joint.
     choose(page, 2)
     page.keyboard.press("Alt+ArrowUp")
     button(page, "+ Add joint").click()
@@ -86,7 +86,7 @@ def test_an_arm_of_dropped_files_gets_rows_and_limits_is_saved_started_and_moves
     path = page.url.partition("/#")[2]
     page.close()
     page = open_page(f"#{path}", drawn=False)  # drawn by the processor here, it would leave a lease no time
-    # It is being started: there is nobody yet to give control.
+    # The robot is starting: no gateway can grant control yet.
     expect(page.locator(".headline .facts")).to_contain_text("remote · not homed")
     expect(page.locator(".holder")).to_have_text("Nobody is in control")
     page.get_by_label("Your name").fill("li")
@@ -234,7 +234,7 @@ def test_a_shape_is_dragged_to_its_place_in_one_step(open_page):
     page.mouse.move(x + 30, y, steps=4)
     page.mouse.move(x + 60, y, steps=4)
     page.mouse.up()
-    # The view stands three reaches away (0.9 m) and is as wide as a lens of 32° there.
+    # The view's eye is three reaches away (0.9 m), and its height that of a lens of 32° there.
     metre_px = box["height"] / (2 * 3 * 0.9 * math.tan(math.radians(16)))
     moved = float(field(page, "base/mesh_pose/xyz/0").input_value().replace("−", "-"))
     assert moved == pytest.approx(60 / metre_px * 1000, rel=0.05)
@@ -317,7 +317,7 @@ def test_a_urdf_whose_first_axis_points_down_keeps_its_base_frame(open_page, pla
     expect(page.locator(".dh-table tbody tr")).to_have_count(6)
     expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "7")
     drawn, said = tools(page)
-    # As the URDF adds it up at position zero, in its own base frame.
+    # The URDF's chain at position zero, in its base frame.
     assert np.allclose(drawn[:3, 3], [0.1 + 0.025 + 0.56 + 0.515, 0.2, 0.4 + 0.035 + 0.3], atol=1e-6)
     assert np.allclose(drawn, said, atol=1e-9)
     choose(page, "base")

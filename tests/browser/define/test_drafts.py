@@ -91,9 +91,9 @@ def test_a_save_that_is_answered_late_leaves_the_robot_opened_meanwhile_as_it_is
     assert load(plant.robots / "slow").title == ""
     expect(page).to_have_url(f"{plant.address}/#/define/pt500")
     expect(page.locator(".save-state")).to_have_text("No changes")
-    # It is nobody's of the site: it would have to be saved first.
+    # The site does not have it: it must be saved first.
     expect(button(page, "Save and start simulated")).to_have_count(1)
-    # What was saved is no unsaved draft any more.
+    # A saved draft is no longer listed as unsaved.
     page.get_by_role("link", name="New").click()
     expect(page.get_by_text("From link files")).to_be_visible()
     expect(page.locator(".start-draft")).to_have_count(0)

@@ -1,4 +1,4 @@
-"""How Define looks: on a phone, on a desk, in both languages, to a screen reader, in the README."""
+"""Layout of Define on a phone and a desktop, in both languages, for screen readers and the README."""
 
 import os
 from pathlib import Path
@@ -23,7 +23,7 @@ def go(page, path):
 
 
 def small(page):
-    """What is too small for a thumb."""
+    """Return the controls that are too small for a thumb."""
     return page.evaluate(
         """[...document.querySelectorAll("main button, main a, main input:not([type=file]), main select")]
            .map((each) => [each.outerHTML.slice(0, 80), each.getBoundingClientRect().height])
