@@ -1,6 +1,7 @@
 """A whole site as real processes, on ports of its own."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -115,8 +116,10 @@ def running_file(path: Path, router: str, console: str) -> Iterator[RunningSite]
         router: The address of the site's router, as the file has it.
         console: HOST:PORT of the page, as the file has it.
     """
+    # The kernel interrupts the site when the tests' process dies, however it dies.
+    end_with_the_tests = ("setpriv", "--pdeathsig", "INT") if shutil.which("setpriv") else ()
     process = subprocess.Popen(
-        [sys.executable, "-m", "services.command_line.main", "up", str(path)],
+        [*end_with_the_tests, sys.executable, "-m", "services.command_line.main", "up", str(path)],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

@@ -402,15 +402,15 @@ def test_every_page_shows_an_insecure_address(mesh, page):
 
 def test_a_value_whose_answer_was_lost_is_asked_for_again(mesh, page, monkeypatch):
     monkeypatch.setattr(shared_subscriptions, "_ASK_AGAIN_S", 0.1)
-    ask, lost = Subscription._ask, []
+    query, lost = Subscription._query, []
 
     def lose_the_first(subscription, key_expr):
         if key_expr.endswith("/description") and not lost:
             lost.append(key_expr)
         else:
-            ask(subscription, key_expr)
+            query(subscription, key_expr)
 
-    monkeypatch.setattr(Subscription, "_ask", lose_the_first)
+    monkeypatch.setattr(Subscription, "_query", lose_the_first)
 
     async def main():
         async with console(mesh, page) as (address, other), browse(address) as browser:
