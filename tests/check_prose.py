@@ -28,7 +28,8 @@ QUESTION_WORD = re.compile(
 IDIOM = re.compile(
     r"""\b(?:who-?ever|nobody|no\ one|somebody|someone|anew|tells?|told|meanwhile|thither|hither|nought|
     mend(?:s|ed|ing)?|becomes?\ of|came\ of|for\ itself|of\ its\ own|of\ one's\ own|all\ the\ same|
-    now\ and\ then|at\ once|by\ itself|beside|(?<!no\ )such(?!\ as\b)|whose|what\ is|as\ it\ is|is\ so|was\ so|were\ so|of\ ours|
+    now\ and\ then|at\ once|by\ itself|beside|(?<!no\ )such(?!\ as\b)|whose|
+    what\ is|as\ it\ is|is\ so|was\ so|were\ so|of\ ours|
     goes?\ lost|foreign|door|lies|stands?|mind:|does\ well|is\ none|long\ since|in\ vain)\b""",
     re.IGNORECASE | re.VERBOSE,
 )

@@ -23,7 +23,7 @@ export function shown(text: string): string {
   return text.replace(CONTROLS, (found: string, isolated: string | undefined) => isolated ?? numbered(found));
 }
 
-/** Isolate a foreign text for use within a sentence. */
+/** Isolate the text of another author for use within a sentence. */
 export function isolated(text: string): string {
   const plain = text.replace(/[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]/g, numbered);
   return FROM_THE_RIGHT.test(plain) ? FSI + plain + PDI : plain;

@@ -12,7 +12,7 @@ const FLOOR = "the floor";
 
 /** Return the height of the floor of a robot's cell in the site's frame [m]; null: no floor. */
 export function floorOf({ floor, baseToSite }: Description): number | null {
-  // Older gateways publish no floor: the robot stands on it.
+  // Older gateways publish no floor: it is at the robot's base.
   return floor ? (floor.height ?? null) : (baseToSite[11] ?? 0);
 }
 

@@ -14,7 +14,7 @@ import type { TextName } from "../i18n/texts";
 import { t } from "../i18n/texts";
 import { AskError, ask, hello, lostAt } from "./connection";
 
-/** The outcome of an action, in words, shown beside the action. */
+/** The outcome of an action, in words, shown next to the action. */
 export interface Notice {
   kind: "busy" | "done" | "refused" | "lost";
   text: string;
@@ -232,7 +232,7 @@ export async function release(text: string = t("released"), reason = ""): Promis
   try {
     await askLease(mine.robotKey, mine.operator, Action.RELEASE, { lease: mine.lease, reason });
   } catch {
-    // The lease expires by itself within its time to live.
+    // The lease expires within its time to live.
   }
 }
 

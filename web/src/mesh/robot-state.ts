@@ -85,7 +85,7 @@ export function stateWord(controller: Latest<ControllerState> | undefined, event
   return ACTIVITIES[activity] ?? { word: "state_unknown", level: "warning" };
 }
 
-/** Return whether the controller stopped by itself or has a fault; it moves again only after a reset. */
+/** Return whether the controller stopped without a request or has a fault; it moves again only after a reset. */
 export function stoppedByItself(state: ControllerState | undefined): boolean {
   return state !== undefined && !state.stop && [Activity.STOPPED, Activity.FAULT].includes(state.activity);
 }

@@ -117,7 +117,7 @@ export class Gap {
     this.words = { text, level };
   }
 
-  /** Place the label beside the line's middle in the drawn picture of a size [px]. */
+  /** Place the label next to the line's middle in the drawn picture of a size [px]. */
   placeLabel(camera: THREE.Camera, width: number, height: number): void {
     const [first, second] = this.ends.map((end) => end.position);
     this.label.hidden = !this.group.visible;

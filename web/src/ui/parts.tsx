@@ -19,7 +19,7 @@ export function Panel(props: { title: string; name: string; end?: ComponentChild
   );
 }
 
-/** The outcome of an action, beside the action; it keeps its height when empty. */
+/** The outcome of an action, next to the action; it keeps its height when empty. */
 export function NoticeLine({ notice, idle }: { notice: Notice | null; idle?: string }) {
   const bad = notice?.kind === "refused" || notice?.kind === "lost";
   return (

@@ -14,7 +14,7 @@ function* units(data: Uint8Array): Generator<{ kind: number; at: number }> {
   }
 }
 
-/** Return whether a picture (Annex B) can be decoded by itself. */
+/** Return whether a picture (Annex B) can be decoded without earlier pictures. */
 export function isKeyFrame(data: Uint8Array): boolean {
   for (const { kind } of units(data)) if (kind === KEY_SLICE) return true;
   return false;

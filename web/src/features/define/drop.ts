@@ -232,7 +232,7 @@ function shapeBody(of: Description, body: Body, path: string, info: MeshInfo): v
   body.mesh_pose = { xyz: [0, 0, 0], rpy: [info.up === "y" ? quarter : 0, 0, 0] };
 }
 
-/** Give a link the chosen file, with the files beside it. */
+/** Give a link the chosen file, with the files of its folder. */
 export function takeShapeFor(dropped: readonly Dropped[], find: (of: Description) => Body | undefined): Promise<void> {
   return inTurn(async () => {
     const sent = [...(await sendAll(dropped))].map(([path, sha]): [string, string] => [`${MESH_FOLDER}/${path}`, sha]);
@@ -277,7 +277,7 @@ async function readUrdf(file: string, files: Record<string, string>, without = f
       return;
     }
     waitingUrdf.value = null;
-    if (draft.value) throw new Error(d("urdf_twice")); // another draft was opened meanwhile
+    if (draft.value) throw new Error(d("urdf_twice")); // another draft has been opened
     const made: Draft = { description: complete(answer.description), files: answer.files };
     resetWorkbench();
     begin(made);

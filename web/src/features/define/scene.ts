@@ -177,7 +177,7 @@ export class DefineScene {
     return link;
   }
 
-  /** Load a link's model, unless another one is wanted meanwhile. */
+  /** Load a link's model, unless another one is wanted by then. */
   private async give(link: Link, shape: Shown | null): Promise<void> {
     const wanted = shape?.glb ?? "";
     if (link.glb !== wanted) {

@@ -27,7 +27,7 @@ export function commonOf(values: readonly string[]): string {
   return ends.size === 1 && values.length > 1 && !short ? ([...ends][0] ?? "") : "";
 }
 
-/** Return a value's short name: "joints/waist/position" is "waist position", or "waist" beside `common`. */
+/** Return a value's short name: "joints/waist/position" is "waist position", or "waist" if `common` is shown. */
 export function labelOf(value: string, common: string): string {
   const chunks = value.split("/").slice(1);
   if (common) chunks.pop();

@@ -12,7 +12,7 @@ import type { Wanted } from "../../video/own-view";
 import { standing } from "../../video/own-view";
 import { saveBlob, saveStill, useRecording } from "./export";
 
-/** Place of the video: beside the 3-D view, in its corner, or instead of it. */
+/** Place of the video: next to the 3-D view, in its corner, or instead of it. */
 export type VideoPlace = "beside" | "inset" | "large";
 const PLACES: readonly VideoPlace[] = ["beside", "inset", "large"];
 

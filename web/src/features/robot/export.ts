@@ -47,7 +47,7 @@ export interface VideoRecording {
   toggle: () => void;
 }
 
-/** Record a view's live MP4 between two presses, then save it; it ends by itself when the memory limit is reached. */
+/** Record a view's live MP4 between two presses, then save it; it ends when the memory limit is reached. */
 export function useRecording(address: string, name: string): VideoRecording {
   const [since, setSince] = useState<number | null>(null); // 0: no data yet
   const [seconds, setSeconds] = useState(0);
