@@ -135,9 +135,9 @@ def test_default_home_is_zero_or_the_middle_of_the_limits(folder: Path) -> None:
     ("key", "value", "path", "text"),
     [
         ("joint", [{"name": "j3"}], ("joint", 0, "name"),
-         "joint 'j3': the URDF has no such joint that moves"),
+         "joint 'j3': the URDF has no such movable joint"),
         ("joint", [{"name": "j1"}] * 2, ("joint", 0, "name"),
-         "joint 'j1': 2 tables have that name; one is right"),
+         "joint 'j1': 2 tables have that name; keep one"),
         ("joint", [{"name": "j2", "limits": [0, 300.0]}], ("joint", 0, "limits"),
          "joint 'j2' limits = [0, 300]: must be within the URDF's 200 to 400 mm"),
         ("joint", [{"name": "j2", "home": 0.0}], ("joint", 0, "home"),
@@ -169,7 +169,7 @@ def test_problems_in_the_urdf_are_reported_at_its_key(folder: Path) -> None:
     (folder / "u.urdf").write_text(URDF.replace('upper="1"', 'upper="-2"'))
     (problem,) = problems({"name": "u", "urdf": "u.urdf"}, folder)
     assert problem.path == ("urdf",)
-    assert problem.text == "joint 'j1' limit lower = -1, upper = -2: the lower must be below the upper"
+    assert problem.text == "joint 'j1' limit lower = -1, upper = -2: lower must be less than upper"
 
 
 JSON = st.recursive(

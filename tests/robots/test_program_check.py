@@ -148,7 +148,7 @@ def test_asserted_tool_speed_is_checked(alone: Cell) -> None:
     result = checked(alone, f"move_joints 45 0\ntool_speed {most * 1000 - 20:.3f}\nmove_joints 0 0\n")
     (fast,) = result.violations
     assert (fast.kind, fast.line, fast.pair, fast.distance_m) == (ViolationKind.SPEED, 3, (), None)
-    assert fast.text.startswith(f"the tool moves at {most * 1000:.0f} mm/s; ")
+    assert fast.text.startswith(f"the tool moves at {most * 1000:.0f} mm/s, ")
     assert result.path.tool_speeds.max() == pytest.approx(most)
     assert checked(alone, f"tool_speed {most * 1000 + 1:.3f}\nmove_joints 45 0\nmove_joints 0 0\n").ok
     assert checked(alone, f"speed 50\ntool_speed {most * 500 + 1:.3f}\nmove_joints 45 0\n").ok

@@ -96,7 +96,7 @@ def test_list_info_and_range_over_the_mesh_with_their_refusals(mesh, folder):
         ("trial.mcap", False),
         ("broken.mcap", False),
     ]
-    assert "does not begin as one" in listed.recordings[2].problem
+    assert "not an MCAP file" in listed.recordings[2].problem
     assert (listed.flight, listed.free_bytes > 0) == (True, True)
     assert {topic.topic: topic.messages for topic in info.topics}[JOINTS] == 400
     assert (messages.more, messages.schema, len(messages.messages)) == (True, "foxglove.JointStates", 10)

@@ -11,7 +11,7 @@ from robomesh.endpoints import Link, bundle, client_config, router_config
 from robomesh.keys import robot_key
 from robomesh.topics import Role
 from services.pki import authority, certificates
-from services.router.rolling_restart import neighbours, our_turn
+from services.router.rolling_restart import neighbours, wait_for_turn
 from services.router.router import read_access
 from tests.conftest import free_port, run
 from tests.services.test_router_rules import attached, names, prepared, routing, settings_of, until
@@ -189,8 +189,8 @@ def test_of_two_routers_of_a_site_the_second_waits_until_the_first_serves_again(
             early, late = sorted(routers, key=lambda endpoint: str(routers[endpoint].info.zid()))
             others = {endpoint: neighbours(routers[endpoint], tls[endpoint]) for endpoint in routers}
             assert others[early] == {str(routers[late].info.zid())}
-            await our_turn(routers[early], tls[early], others[early], settled_s=0.0)
-            waiting = asyncio.create_task(our_turn(routers[late], tls[late], others[late], settled_s=0.0))
+            await wait_for_turn(routers[early], tls[early], others[early], settled_s=0.0)
+            waiting = asyncio.create_task(wait_for_turn(routers[late], tls[late], others[late], settled_s=0.0))
             routers[early].close()
 
             async def gone():
