@@ -190,7 +190,9 @@ def test_of_two_routers_of_a_site_the_second_waits_until_the_first_serves_again(
             others = {endpoint: neighbours(routers[endpoint], tls[endpoint]) for endpoint in routers}
             assert others[early] == {str(routers[late].info.zid())}
             await wait_for_turn(routers[early], tls[early], others[early], settled_s=0.0)
-            waiting = asyncio.create_task(wait_for_turn(routers[late], tls[late], others[late], settled_s=0.0))
+            waiting = asyncio.create_task(
+                wait_for_turn(routers[late], tls[late], others[late], settled_s=0.0)
+            )
             routers[early].close()
 
             async def gone():
