@@ -70,7 +70,7 @@ class Plant:
     audit: Path
     fixtures: tuple[Fixture, ...] = ()
     robots: tuple[str, ...] = ("arm", "pt600")
-    app: dict = field(default_factory=dict)
+    console: dict = field(default_factory=dict)
     rate_hz: float = 25.0
     address: str = ""
     endpoint: str = field(default_factory=lambda: f"tcp/127.0.0.1:{free_port()}")
