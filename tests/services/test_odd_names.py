@@ -51,7 +51,7 @@ class Site:
     services: dict
     plain: zenoh.Session
     observer: object
-    app: str = ""
+    console: str = ""
     foxglove: asyncio.Task | None = None
 
     def call(self, coroutine):
