@@ -157,7 +157,7 @@ LIMITS = {
     "docstrings": (2.0, 2.0),
     "comments": (0.0, 2.0),
     "errors, logs and help": (0.0, 2.0),
-    "documents": (0.0, 8.0),
+    "documents": (0.0, 2.0),
     ".proto": (0.0, 2.0),
     "web": (0.0, 2.0),
 }
