@@ -173,4 +173,4 @@ def test_files_of_which_nothing_can_be_made_are_said(open_page):
     for name in ("part.off", "part.wrl.gz"):
         drop(page, (name, b"OFF\n0 0 0\n"))
         expect(page.locator(".outcome.refused")).to_contain_text(f"{name}: ")
-        expect(page.locator(".outcome.refused")).to_contain_text("is not read")
+        expect(page.locator(".outcome.refused")).to_contain_text("is not supported")
