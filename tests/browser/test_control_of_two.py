@@ -125,7 +125,9 @@ def test_a_running_motion_is_not_handed_over_but_stopped_by_a_take_over(open_arm
     ask(bob, "bob")
     button(alice, "Hand over to bob").click()
     button(bob, "Accept").click()
-    expect(bob.locator(".control .notice")).to_contain_text("Control not given: alice's motion is still running")
+    expect(bob.locator(".control .notice")).to_contain_text(
+        "Control not given: alice's motion is still running"
+    )
     button(bob, "Take over…").click()
     expect(bob.locator(".reason")).to_contain_text("alice's motion is running: it will be stopped")
     take_over(bob, "bob", "alice", "wrong way")
