@@ -17,7 +17,7 @@ import { fleetRobots } from "../mesh/known-robots";
 import { canBe, isReplay } from "../mesh/robot-name";
 import { stop, stopNotice } from "../mesh/stop";
 import { NoticeLine } from "../ui/parts";
-import { RobotNotFound } from "../ui/robot-not-found";
+import { RobotNotFound } from "../panels/robot-not-found";
 import { type Route, robotLink, robotOf, route } from "../ui/route";
 import { switchTheme, theme } from "../ui/theme";
 

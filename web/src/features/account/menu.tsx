@@ -4,7 +4,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { a, roleText } from "../../i18n/account";
 import { me, onlyWatches, rests, signOut } from "../../mesh/account";
 import { hello } from "../../mesh/connection";
-import { ChangePassword } from "../../ui/change-password";
+import { ChangePassword } from "../../panels/change-password";
 import "../../ui/account.css";
 
 export function AccountMenu() {

@@ -22,7 +22,7 @@ import {
 import { hello } from "../../mesh/connection";
 import type { Notice } from "../../mesh/control";
 import { operator, reasonOf, setOperator } from "../../mesh/control";
-import { setSound, sound } from "../../ui/alarm-sound";
+import { setSound, sound } from "../../panels/alarm-sound";
 import { Choice, NoticeLine, Toggle } from "../../ui/parts";
 import { Select } from "../../ui/select";
 import { AlarmLine } from "./alarm-line";

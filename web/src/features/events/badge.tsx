@@ -3,7 +3,7 @@
 import { useEffect } from "preact/hooks";
 import { e } from "../../i18n/events";
 import { anyWatch, counts, followAlarms, silentSites } from "../../mesh/alarms";
-import { followSound } from "../../ui/alarm-sound";
+import { followSound } from "../../panels/alarm-sound";
 import { PriorityMark, priorityWord } from "../../ui/priority";
 
 export function AlarmBadge() {

@@ -13,9 +13,9 @@ import type { Level, StateWord } from "../../mesh/robot-state";
 import { stateWord } from "../../mesh/robot-state";
 import { isClockOff, isMeshStale, isSilent, seenAge, useMesh } from "../../mesh/site-health";
 import { ageOf, now } from "../../mesh/topics";
-import { Services } from "../../ui/alive-services";
+import { Services } from "../../panels/alive-services";
 import { State } from "../../ui/parts";
-import { Replays } from "../../ui/replays";
+import { Replays } from "./replays";
 import { Tile } from "./tile";
 import "./fleet.css";
 

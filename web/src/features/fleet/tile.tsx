@@ -13,7 +13,7 @@ import { hello, watch } from "../../mesh/connection";
 import { robotNow } from "../../mesh/robot-snapshots";
 import { problemOf, stateWord } from "../../mesh/robot-state";
 import { ageOf, isStale, now, staleAfter, useTopic } from "../../mesh/topics";
-import { Services } from "../../ui/alive-services";
+import { Services } from "../../panels/alive-services";
 import { Silhouette, State, Tag } from "../../ui/parts";
 import { PriorityMark } from "../../ui/priority";
 import { robotLink } from "../../ui/route";

@@ -25,12 +25,12 @@ import { ageOf, isStale, jointsAge, useEvents, useTopic } from "../../mesh/topic
 import type { Stage } from "../../scene/scene";
 import { SceneView } from "../../scene/scene-view";
 import { jointsTopic } from "../../scene/topic-selection";
-import { ControlPanel } from "../../ui/control/control-panel";
+import { ControlPanel } from "../../panels/control/control-panel";
 import { State, Tag } from "../../ui/parts";
-import { Alarm } from "../../ui/robot-alarm";
-import { RobotNotFound, useRobotNotFound } from "../../ui/robot-not-found";
+import { Alarm } from "../../panels/robot-alarm";
+import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
 import { programLink } from "../../ui/route";
-import { ToolPanel } from "../../ui/tool-panel";
+import { ToolPanel } from "../../panels/tool-panel";
 import type { VideoPlace } from "./camera";
 import { Camera } from "./camera";
 import { EventsPanel } from "./events-panel";

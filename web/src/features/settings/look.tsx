@@ -2,7 +2,7 @@
 
 import { s } from "../../i18n/settings";
 import { language, switchLanguage } from "../../i18n/texts";
-import { setSound, sound } from "../../ui/alarm-sound";
+import { setSound, sound } from "../../panels/alarm-sound";
 import { Choice, Panel } from "../../ui/parts";
 import { switchTheme, theme } from "../../ui/theme";
 import { Facts } from "./facts";

@@ -7,7 +7,7 @@ import { presence } from "../../mesh/connection";
 import { isMeshStale, useMesh } from "../../mesh/site-health";
 import type { Latest } from "../../mesh/topics";
 import { ageOf } from "../../mesh/topics";
-import { Services } from "../../ui/alive-services";
+import { Services } from "../../panels/alive-services";
 import { Panel } from "../../ui/parts";
 import { Hops } from "./hops";
 import { COLUMNS, SeenRow } from "./seen-row";

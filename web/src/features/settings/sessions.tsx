@@ -5,7 +5,7 @@ import { fullTime } from "../../i18n/format";
 import { s } from "../../i18n/settings";
 import { post } from "../../mesh/account";
 import type { Notice } from "../../mesh/control";
-import { refusalText } from "../../ui/change-password";
+import { refusalText } from "../../panels/change-password";
 import { NoticeLine, Panel } from "../../ui/parts";
 
 const LOOK_EACH_MS = 5000;

@@ -11,7 +11,7 @@ import type { Motion } from "../../mesh/notice-end";
 import { useNoticeEnd } from "../../mesh/notice-end";
 import { stoppedByItself, whyNoMotion } from "../../mesh/robot-state";
 import type { Latest } from "../../mesh/topics";
-import { NoticeLine, Panel } from "../parts";
+import { NoticeLine, Panel } from "../../ui/parts";
 import { mayNotCommand } from "./no-control";
 import { Speed } from "./speed";
 import { Stopped } from "./stopped";

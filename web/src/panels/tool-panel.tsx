@@ -6,7 +6,7 @@ import { t } from "../i18n/texts";
 import type { Latest } from "../mesh/topics";
 import { ageOf, isStale } from "../mesh/topics";
 import { JointLimits } from "./joint-limits-panel";
-import { Age, Panel, Unit } from "./parts";
+import { Age, Panel, Unit } from "../ui/parts";
 
 export function ToolPanel(props: {
   robotKey: string;

@@ -4,7 +4,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { a, refusedText } from "../i18n/account";
 import type { Me } from "../mesh/account";
 import { AccountError, me, post } from "../mesh/account";
-import { PasswordField } from "./password-field";
+import { PasswordField } from "../ui/password-field";
 
 export function ChangePassword({ close }: { close: () => void }) {
   const [old, setOld] = useState("");

@@ -5,7 +5,7 @@ import { t } from "../i18n/texts";
 import { hello, lostAt } from "../mesh/connection";
 import { fleetRobots } from "../mesh/known-robots";
 import type { RobotName } from "../mesh/robot-name";
-import { robotLink } from "./route";
+import { robotLink } from "../ui/route";
 
 const SHOWS_WITHIN_MS = 4000;
 

@@ -5,8 +5,8 @@ import { a } from "../../i18n/account";
 import { me, onlyWatches, rests, unlock } from "../../mesh/account";
 import { hello } from "../../mesh/connection";
 import { refusalText } from "../change-password";
-import { PasswordField } from "../password-field";
-import "../account.css";
+import { PasswordField } from "../../ui/password-field";
+import "../../ui/account.css";
 
 /** Return whether the signed-in account may not request control now. */
 export function mayNotCommand(): boolean {

@@ -1,14 +1,14 @@
 // Running replays, separate from the live robots.
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
-import type { ReplayState } from "../gen/robomesh_pb";
-import { ReplayStateSchema } from "../gen/robomesh_pb";
-import { momentText } from "../i18n/recording-format";
-import { r } from "../i18n/recordings";
-import { ageOf, isStale, useTopics } from "../mesh/topics";
-import { ReplayTag } from "./replay-tag";
-import { recordingsLink, robotLink } from "./route";
-import "./replay.css";
+import type { ReplayState } from "../../gen/robomesh_pb";
+import { ReplayStateSchema } from "../../gen/robomesh_pb";
+import { momentText } from "../../i18n/recording-format";
+import { r } from "../../i18n/recordings";
+import { ageOf, isStale, useTopics } from "../../mesh/topics";
+import { ReplayTag } from "../../ui/replay-tag";
+import { recordingsLink, robotLink } from "../../ui/route";
+import "../../ui/replay.css";
 
 export function Replays() {
   const states = useTopics(ReplayStateSchema, "robomesh/*/*/replay");
