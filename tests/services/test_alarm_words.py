@@ -20,7 +20,7 @@ def table(name: str) -> set[str]:
 
 def test_every_alarm_that_the_watch_can_raise_has_chinese_words_on_the_page():
     wanted = {code for code, rule in RULES.items() if rule.priority is not None}
-    assert wanted - table("i18n/alarm-words.ts") == set()
+    assert wanted - table("i18n/alarm-text.ts") == set()
 
 
 def test_every_event_without_an_alarm_has_a_chinese_text():
@@ -32,7 +32,7 @@ def test_every_event_without_an_alarm_has_a_chinese_text():
             told |= set(re.findall(r'\bINFO\b[^"()]{0,40}"([a-z_]+\.[a-z_]+)"', text))
     assert len(told) > 15
     # The page has its own texts for stops, in both languages.
-    known = table("i18n/event-text.ts") | table("i18n/alarm-words.ts") | {"stop.reset"}
+    known = table("i18n/event-text.ts") | table("i18n/alarm-text.ts") | {"stop.reset"}
     assert told - known == set()
 
 

@@ -3,10 +3,10 @@
 import { signal } from "@preact/signals";
 import type { ComponentType } from "preact";
 import { useEffect, useRef } from "preact/hooks";
-import { AccountMenu } from "../features/account/menu";
+import { AccountMenu } from "../features/account/account-menu";
 import { SignIn } from "../features/account/sign-in";
-import { AlarmBadge } from "../features/events/badge";
-import { Fleet } from "../features/fleet/fleet";
+import { AlarmBadge } from "../features/events/alarm-badge";
+import { Fleet } from "../features/fleet/fleet-page";
 import { a } from "../i18n/account";
 import { timeOfDay } from "../i18n/format";
 import { language, switchLanguage, t } from "../i18n/texts";
@@ -52,14 +52,14 @@ function NotLoaded() {
 }
 
 // The robot's page needs three.js; the fleet's text must not wait for it.
-const Robot = onDemand(async () => (await import("../features/robot/robot")).Robot);
+const Robot = onDemand(async () => (await import("../features/robot/robot-page")).Robot);
 const ReplayRobot = onDemand(async () => (await import("../features/recordings/replay-robot")).ReplayRobot);
-const Program = onDemand(async () => (await import("../features/program/program")).Program);
-const Define = onDemand(async () => (await import("../features/define/define")).Define);
-const Wall = onDemand(async () => (await import("../features/wall/wall")).Wall);
-const Recordings = onDemand(async () => (await import("../features/recordings/recordings")).Recordings);
-const Events = onDemand(async () => (await import("../features/events/events")).Events);
-const Settings = onDemand(async () => (await import("../features/settings/settings")).Settings);
+const Program = onDemand(async () => (await import("../features/program/program-page")).Program);
+const Define = onDemand(async () => (await import("../features/define/define-page")).Define);
+const Wall = onDemand(async () => (await import("../features/wall/wall-page")).Wall);
+const Recordings = onDemand(async () => (await import("../features/recordings/recordings-page")).Recordings);
+const Events = onDemand(async () => (await import("../features/events/events-page")).Events);
+const Settings = onDemand(async () => (await import("../features/settings/settings-page")).Settings);
 
 const PAGES = ["fleet", "wall", "recordings", "define", "events", "settings"] as const;
 export function App() {

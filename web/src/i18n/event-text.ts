@@ -3,7 +3,7 @@
 
 import type { Event } from "../gen/robomesh_pb";
 import { Event_Severity as Severity } from "../gen/robomesh_pb";
-import { alarmTitle } from "./alarm-words";
+import { alarmTitle } from "./alarm-text";
 import { isolated } from "./foreign-text";
 import { language, t } from "./texts";
 

@@ -7,7 +7,7 @@ import { watch } from "../mesh/connection";
 import { isStale, useTopics } from "../mesh/topics";
 import type { Arm } from "./arm";
 import { useFramesAge } from "./frames-age";
-import type { RobotScene } from "./scene";
+import type { RobotScene } from "./robot-scene";
 
 /** The other robots of a cell. */
 export function Neighbours(props: { robotKey: string; cell: string; scene: RobotScene }) {

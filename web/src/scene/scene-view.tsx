@@ -19,8 +19,8 @@ import { useFramesAge } from "./frames-age";
 import { ghost, redLinks, toolPath } from "./ghost";
 import type { Nearest } from "./lines";
 import { Neighbours } from "./neighbours";
-import type { Stage } from "./scene";
-import { RobotScene } from "./scene";
+import type { Stage } from "./robot-scene";
+import { RobotScene } from "./robot-scene";
 import { framesOf, framesTopic } from "./topic-selection";
 
 // Eye of the free camera relative to its target, in multiples of the arm's reach.

@@ -7,8 +7,8 @@ import { CompressedImageSchema } from "../gen/foxglove/CompressedImage_pb";
 import { t } from "../i18n/texts";
 import { watch } from "../mesh/connection";
 import { isStale, now } from "../mesh/topics";
-import type { Wanted } from "./own-view";
-import { isStanding, withView } from "./own-view";
+import type { Wanted } from "./requested-view";
+import { isStanding, withView } from "./requested-view";
 import { decodesVideo, playVideo } from "./video-canvas";
 
 const QUIET_MS = 4000;

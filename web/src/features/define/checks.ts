@@ -5,10 +5,10 @@ import { d } from "../../i18n/define";
 import { bodies } from "./description";
 import type { Draft } from "./draft";
 import { draft, identity } from "./draft";
-import type { Checked, Problem } from "./server";
-import { check, Refused } from "./server";
-import { shapeOf } from "./shapes";
-import { positions } from "./workbench";
+import type { Checked, Problem } from "./server-requests";
+import { check, Refused } from "./server-requests";
+import { shapeOf } from "./mesh-files";
+import { positions } from "./selection";
 
 const AFTER_MS = 200;
 const AGAIN_MS = 1500;

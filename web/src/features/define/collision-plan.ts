@@ -4,8 +4,8 @@ import { computed, effect, signal } from "@preact/signals";
 import { concise, linkNames } from "./description";
 import type { Draft } from "./draft";
 import { draft, identity, isOpen } from "./draft";
-import type { Pair, PairKind } from "./server";
-import { collisions } from "./server";
+import type { Pair, PairKind } from "./server-requests";
+import { collisions } from "./server-requests";
 
 type Links = readonly [string, string];
 

@@ -16,7 +16,7 @@ import {
 } from "./collision-plan";
 import { draft, edit, seal } from "./draft";
 import { ProblemWords } from "./fields";
-import type { PairKind } from "./server";
+import type { PairKind } from "./server-requests";
 
 const WAYS: Readonly<Partial<Record<PairKind, DefineText>>> = {
   collision_meshes: "way_collision_meshes",

@@ -5,7 +5,7 @@ import { problemsAt } from "./checks";
 import { angleUnit, jointUnit } from "./description";
 import { draft, edit } from "./draft";
 import { NumberField } from "./fields";
-import { choose, chosen } from "./workbench";
+import { choose, chosen } from "./selection";
 
 const COLUMNS = ["a", "alpha", "d", "theta"] as const;
 const HEADS = { a: "a", alpha: "α", d: "d", theta: "θ" };

@@ -1,7 +1,7 @@
 // A button that opens the browser's file dialog.
 
 import { useRef } from "preact/hooks";
-import type { Dropped } from "./drop";
+import type { Dropped } from "./dropped-files";
 
 export function FileButton(props: { label: string; take: (files: Dropped[]) => void; quiet?: boolean; path?: string }) {
   const input = useRef<HTMLInputElement>(null);

@@ -9,7 +9,7 @@ import { jointUnit } from "./description";
 import { draft, edit } from "./draft";
 import { NumberField, numberText } from "./fields";
 import { poseOf } from "./placements";
-import { positionOf, slid } from "./workbench";
+import { positionOf, slid } from "./selection";
 
 const SI_TO_SHOWN: Units = { length: "mm", angle: "deg" };
 

@@ -2,7 +2,7 @@
 
 import { d } from "../../i18n/define";
 import { checked, checkFailed, checking, problems, readingShapes } from "./checks";
-import { goTo } from "./workbench";
+import { goTo } from "./selection";
 
 export function ProblemsPanel() {
   const found = problems.value;

@@ -14,11 +14,11 @@ import { bodies, linkNames } from "./description";
 import type { Draft } from "./draft";
 import { draft, edit, seal } from "./draft";
 import { poseMatrix, poseOf, rowAt } from "./placements";
-import type { Dragging, Picture, Shown } from "./scene";
-import { DefineScene } from "./scene";
-import { readShape, shapeOf } from "./shapes";
+import type { Dragging, Picture, Shown } from "./define-scene";
+import { DefineScene } from "./define-scene";
+import { readShape, shapeOf } from "./mesh-files";
 import { lookOf, sizeOf, USUAL_VIEWS } from "./views";
-import { choose, chosen, chosenBody, positions } from "./workbench";
+import { choose, chosen, chosenBody, positions } from "./selection";
 
 /** The scene's camera, for the views tab; null: there is no scene. */
 export const cameraNow = signal<(() => Look) | null>(null);

@@ -17,9 +17,9 @@ import {
   redo,
   undo,
 } from "./draft";
-import { fileNotices, reading } from "./drop";
-import { discardDraft } from "./opening";
-import { busy, download, isRunning, known, outcome, save, start, stop } from "./outcome";
+import { fileNotices, reading } from "./dropped-files";
+import { discardDraft } from "./open-robot";
+import { busy, download, isRunning, known, outcome, save, start, stop } from "./save-and-start";
 
 export function Toolbar() {
   const now = draft.value;

@@ -1,13 +1,13 @@
 // One alarm: priority, state, since when, source, advice, acknowledgement.
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
-import { alarmAdvice, alarmTitle } from "../../i18n/alarm-words";
+import { alarmAdvice, alarmTitle } from "../../i18n/alarm-text";
 import type { EventsTextName } from "../../i18n/events";
 import { e } from "../../i18n/events";
 import { fullTime, stampFull, stampTime, timeOfDay } from "../../i18n/format";
 import type { Alarm } from "../../mesh/alarms";
 import { isUnacknowledged, nameOf, State } from "../../mesh/alarms";
-import { PriorityMark } from "../../ui/priority";
+import { PriorityMark } from "../../ui/priority-mark";
 import { robotLink } from "../../ui/route";
 
 const STATE_WORDS = new Map<State, EventsTextName>([

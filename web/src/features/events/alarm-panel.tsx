@@ -26,7 +26,7 @@ import { setSound, sound } from "../../panels/alarm-sound";
 import { Choice, NoticeLine, Toggle } from "../../ui/parts";
 import { Select } from "../../ui/select";
 import { AlarmLine } from "./alarm-line";
-import { Shelve } from "./shelve";
+import { Shelve } from "./shelve-form";
 
 const SHOWN = ["all", "unacknowledged", "shelved"] as const;
 type Shown = (typeof SHOWN)[number];

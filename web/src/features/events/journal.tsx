@@ -2,7 +2,7 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "../../gen/robomesh_pb";
-import { alarmTitle } from "../../i18n/alarm-words";
+import { alarmTitle } from "../../i18n/alarm-text";
 import { entryText } from "../../i18n/audit-text";
 import { eventText } from "../../i18n/event-text";
 import { e } from "../../i18n/events";
@@ -14,7 +14,7 @@ import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
 import { Choice, NoticeLine, Toggle } from "../../ui/parts";
 import { Select } from "../../ui/select";
 import { Filters, SiteSelect } from "./alarm-panel";
-import { findInLogs, MOST_ASKED } from "./audit-logs";
+import { findInLogs, MOST_ASKED } from "./audit-log-search";
 import type { AuditLine, EventEntry } from "./entries";
 import { audits, events, MOST_KEPT, useEntries } from "./entries";
 import { VirtualList } from "./virtual-list";

@@ -15,9 +15,9 @@ import { problemOf, stateWord } from "../../mesh/robot-state";
 import { ageOf, isStale, now, staleAfter, useTopic } from "../../mesh/topics";
 import { Services } from "../../panels/alive-services";
 import { Silhouette, State, Tag } from "../../ui/parts";
-import { PriorityMark } from "../../ui/priority";
+import { PriorityMark } from "../../ui/priority-mark";
 import { robotLink } from "../../ui/route";
-import { useVisible } from "./visible";
+import { useVisible } from "./visibility";
 
 export function Tile({ robotKey }: { robotKey: string }) {
   const place = useRef<HTMLAnchorElement>(null);
@@ -116,7 +116,7 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
 function Picture(props: { robotKey: string; description: Description | undefined; stale: boolean }) {
   const { robotKey, description } = props;
   const canvas = useRef<HTMLCanvasElement>(null);
-  const [picture, setPicture] = useState<import("./pictures").TilePicture | null>(null);
+  const [picture, setPicture] = useState<import("./tile-pictures").TilePicture | null>(null);
   const [drawable, setDrawable] = useState(true);
   const [last] = useState<{ newAt: number | null }>({ newAt: null });
   const kind = description && `${description.urdf.length} ${description.links.map((link) => link.meshSha256).join()}`;
@@ -124,7 +124,7 @@ function Picture(props: { robotKey: string; description: Description | undefined
     if (!description || !canvas.current) return;
     let end: (() => void) | undefined;
     let wanted = true;
-    void import("./pictures").then(({ tilePictures }) => {
+    void import("./tile-pictures").then(({ tilePictures }) => {
       const pictures = tilePictures();
       setDrawable(pictures !== null);
       if (!pictures || !wanted || !canvas.current) return;

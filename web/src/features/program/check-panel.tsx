@@ -6,13 +6,13 @@ import { p } from "../../i18n/program";
 import { reasonText } from "../../i18n/reasons";
 import { t } from "../../i18n/texts";
 import { Panel } from "../../ui/parts";
-import { checked, checkFailed, checking, checkNow, errorsOf, isCurrent } from "./check";
+import { checked, checkFailed, checking, checkNow, errorsOf, isCurrent } from "./program-check";
 import { draft, goToLine } from "./draft";
-import type { Group } from "./grouped";
-import { grouped } from "./grouped";
-import { distanceText, seconds } from "./numbers";
-import { kindText, severityOf } from "./severity";
-import { chosen, showMoment } from "./showing";
+import type { Group } from "./violation-groups";
+import { grouped } from "./violation-groups";
+import { distanceText, seconds } from "./number-format";
+import { kindText, severityOf } from "./violation-severity";
+import { chosen, showMoment } from "./scene-overlay";
 import "./check-panel.css";
 
 export function CheckPanel({ moved }: { moved: boolean }) {

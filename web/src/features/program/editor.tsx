@@ -4,12 +4,12 @@ import { Component } from "preact";
 import { useLayoutEffect, useRef } from "preact/hooks";
 import { p } from "../../i18n/program";
 import { Panel } from "../../ui/parts";
-import { checked, isCurrent } from "./check";
+import { checked, isCurrent } from "./program-check";
 import { download, draft, insert, keepingFailed, LINE_PX, redo, setField, typed, undo } from "./draft";
-import { lineNow } from "./motion";
-import { runningLine } from "./running";
-import { severityOf } from "./severity";
-import { coloured } from "./text";
+import { lineNow } from "./checked-motion";
+import { runningLine } from "./running-program";
+import { severityOf } from "./violation-severity";
+import { coloured } from "./program-text";
 import "./editor.css";
 
 type Mark = "shown" | "warning" | "alarm" | "running";

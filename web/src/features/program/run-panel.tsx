@@ -11,11 +11,11 @@ import type { Notice } from "../../mesh/control";
 import { holds, ms } from "../../mesh/control";
 import { whyNoMotion } from "../../mesh/robot-state";
 import { NoticeLine, Panel } from "../../ui/parts";
-import { checked, errorsOf, isCurrent } from "./check";
+import { checked, errorsOf, isCurrent } from "./program-check";
 import type { Draft } from "./draft";
 import { draft } from "./draft";
-import { program } from "./running";
-import { hideMoment } from "./showing";
+import { program } from "./running-program";
+import { hideMoment } from "./scene-overlay";
 import "./run-panel.css";
 
 export function RunPanel(props: { robotKey: string; controller: ControllerState | undefined }) {

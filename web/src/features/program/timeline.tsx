@@ -3,12 +3,12 @@
 import { useEffect } from "preact/hooks";
 import { p } from "../../i18n/program";
 import { Panel } from "../../ui/parts";
-import { checked } from "./check";
-import { Curves } from "./curves";
-import { clearanceNow, duration, lineNow, moment, path, playing } from "./motion";
-import { distanceText, seconds } from "./numbers";
-import { severityOf } from "./severity";
-import { hideMoment, showMoment } from "./showing";
+import { checked } from "./program-check";
+import { Curves } from "./motion-curves";
+import { clearanceNow, duration, lineNow, moment, path, playing } from "./checked-motion";
+import { distanceText, seconds } from "./number-format";
+import { severityOf } from "./violation-severity";
+import { hideMoment, showMoment } from "./scene-overlay";
 import "./timeline.css";
 
 const STEP_S = 0.05;

@@ -4,8 +4,8 @@ import { useRef } from "preact/hooks";
 import type { Words } from "../../i18n/program";
 import { p } from "../../i18n/program";
 import { canRedo, canUndo, download, draft, FILE_ENDING, redo, rename, replace, undo } from "./draft";
-import { description } from "./subject";
-import { example } from "./text";
+import { description } from "./program-robot";
+import { example } from "./program-text";
 import "./toolbar.css";
 
 const LARGEST = 64 * 1024; // the check's maximum

@@ -7,7 +7,7 @@ import { lostText, sizeText, startedText, topicOf } from "../../i18n/recording-f
 import { r, viewName } from "../../i18n/recordings";
 import { Panel } from "../../ui/parts";
 import type { RecordingName } from "../../ui/route";
-import { Download } from "./card";
+import { Download } from "./recording-card";
 import "./contents.css";
 
 export function Contents(props: {

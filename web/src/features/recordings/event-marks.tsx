@@ -11,7 +11,7 @@ import { r } from "../../i18n/recordings";
 import { t } from "../../i18n/texts";
 import { SEVERITIES } from "../../ui/event-mark";
 import { Panel } from "../../ui/parts";
-import type { Asked, Happened } from "./asked";
+import type { Asked, Happened } from "./recorder-requests";
 import "./contents.css";
 
 const NONE: readonly Happened[] = [];

@@ -13,15 +13,15 @@ import { SceneView, viewsOf } from "../../scene/scene-view";
 import { ReplayTag } from "../../ui/replay-tag";
 import type { RecordingName } from "../../ui/route";
 import { recordingsLink } from "../../ui/route";
-import { useFirst, useHappened, useInfo } from "./asked";
-import { Beside } from "./beside";
+import { useFirst, useHappened, useInfo } from "./recorder-requests";
+import { Beside } from "./comparison";
 import { Contents } from "./contents";
 import { EventList } from "./event-marks";
-import { useFollowing, useMoment, useOpened } from "./opened";
+import { useFollowing, useMoment, useOpened } from "./open-replay";
 import { Plots } from "./plots";
 import { ReplayVideo } from "./replay-video";
 import { useSecondGhost } from "./second-ghost";
-import { Transport } from "./transport";
+import { Transport } from "./playback-controls";
 import "./player.css";
 
 const NOBODY = "robomesh/-/-"; // until the replay has its name

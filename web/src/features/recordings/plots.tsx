@@ -6,12 +6,12 @@ import type { Recording, SeriesAnswer_Series as Series } from "../../gen/robomes
 import { r } from "../../i18n/recordings";
 import { Panel, Toggle } from "../../ui/parts";
 import type { RecordingName } from "../../ui/route";
-import type { Window } from "./asked";
-import { useKnown, useSeries } from "./asked";
+import type { Window } from "./recorder-requests";
+import { useKnown, useSeries } from "./recorder-requests";
 import type { Curve } from "./chart";
 import { Chart } from "./chart";
-import { savePicture } from "./picture";
-import { Values } from "./values";
+import { savePicture } from "./save-picture";
+import { Values } from "./value-choice";
 import "./plots.css";
 
 const POINTS = 1000;

@@ -16,10 +16,10 @@ import { ReplayTag } from "../../ui/replay-tag";
 import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
 import { recordingsLink } from "../../ui/route";
 import { ToolPanel } from "../../panels/tool-panel";
-import { useMoment } from "./opened";
+import { useMoment } from "./open-replay";
 import { RecordedJoints } from "./recorded-joints";
 import { ReplayVideo } from "./replay-video";
-import { Transport } from "./transport";
+import { Transport } from "./playback-controls";
 import "../../ui/replay.css";
 import "./player.css";
 

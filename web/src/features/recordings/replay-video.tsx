@@ -10,7 +10,7 @@ import { useOfMoment } from "../../mesh/replay-moment";
 import { viewsOf } from "../../scene/scene-view";
 import { Panel } from "../../ui/parts";
 import { useLive } from "../../video/live-video";
-import { standing } from "../../video/own-view";
+import { standing } from "../../video/requested-view";
 
 const PICTURE_HOLDS_S = 2; // a busy renderer delivers fewer frames than requested
 

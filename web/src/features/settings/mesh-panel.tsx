@@ -9,8 +9,8 @@ import type { Latest } from "../../mesh/topics";
 import { ageOf } from "../../mesh/topics";
 import { Services } from "../../panels/alive-services";
 import { Panel } from "../../ui/parts";
-import { Hops } from "./hops";
-import { COLUMNS, SeenRow } from "./seen-row";
+import { Hops } from "./delay-chart";
+import { COLUMNS, SeenRow } from "./process-row";
 
 const GONE_TOLD_MS = 900_000;
 

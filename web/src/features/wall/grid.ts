@@ -1,7 +1,7 @@
 // Layout of the wall: columns of pictures of about 16:9, and the stream size for a tile.
 
-import type { Wanted } from "../../video/own-view";
-import { standing } from "../../video/own-view";
+import type { Wanted } from "../../video/requested-view";
+import { standing } from "../../video/requested-view";
 
 const GAP = 8;
 /** Height of a tile's line of text [px]. */

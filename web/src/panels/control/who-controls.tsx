@@ -19,7 +19,7 @@ import {
   take,
   takeOver,
 } from "../../mesh/control";
-import { Reason } from "../../ui/ask-reason";
+import { Reason } from "../../ui/reason-form";
 import { mayNotCommand, NoControl } from "./no-control";
 
 const MOST_ASKERS_SHOWN = 3;

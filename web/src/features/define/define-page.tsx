@@ -1,0 +1,179 @@
+// Define: a robot from nothing, from link files, a URDF or another robot, up to a simulated one on the mesh.
+
+import { signal } from "@preact/signals";
+import { useEffect, useLayoutEffect } from "preact/hooks";
+import { d } from "../../i18n/define";
+import { Chain } from "./kinematic-chain";
+import { keepChecking } from "./checks";
+import { CollisionsTab } from "./collisions-tab";
+import { Details } from "./part-details";
+import { DhTable } from "./dh-table";
+import { draft, keptFiles, leave, redo, undo } from "./draft";
+import { doneWithout, droppedFiles, goOnWithout, takeFiles, waitingUrdf } from "./dropped-files";
+import { FileButton } from "./file-button";
+import { keepOnly } from "./file-cache";
+import { ConstraintsTab, FramesTab } from "./lists-tabs";
+import { loading, open } from "./open-robot";
+import { listRobots, save } from "./save-and-start";
+import { PositionsPanel } from "./positions-panel";
+import { ProblemsPanel } from "./problems-panel";
+import { RobotTab } from "./robot-tab";
+import { ScenePanel } from "./scene-panel";
+import { keepReading, missingFiles } from "./mesh-files";
+import { Start } from "./new-robot";
+import { Outcomes, Toolbar } from "./toolbar";
+import { ViewsTab } from "./views-tab";
+import type { Tab } from "./selection";
+import { TABS, tab } from "./selection";
+import "./define.css";
+
+const draggedOver = signal(false);
+
+export function Define({ name }: { name: string }) {
+  useEffect(() => {
+    void keepOnly(keptFiles());
+    const ends = [keepChecking(), keepReading()];
+    void listRobots();
+    return () => {
+      for (const end of ends) end();
+      leave();
+    };
+  }, []);
+  // Open the draft before files can be dropped: they belong to it.
+  useLayoutEffect(() => void open(name), [name]);
+  useKeys();
+  useDrop();
+  return (
+    <div class={`define ${draft.value ? "editing" : "starting"}`}>
+      <div class="define-top">
+        <Toolbar />
+        <Outcomes />
+        <MissingFiles />
+      </div>
+      {draft.value ? <Workbench /> : loading.value ? <p class="dim define-loading">{loading.value}</p> : <Start />}
+      {draggedOver.value && <div class="drop-veil">{d("dropped")}</div>}
+    </div>
+  );
+}
+
+function Workbench() {
+  const tabs: Record<Tab, () => preact.ComponentChild> = {
+    details: () => <Details />,
+    robot: () => <RobotTab />,
+    frames: () => <FramesTab />,
+    constraints: () => <ConstraintsTab />,
+    collisions: () => <CollisionsTab />,
+    views: () => <ViewsTab />,
+  };
+  return (
+    <>
+      <div class="define-left">
+        <Chain />
+        <ProblemsPanel />
+      </div>
+      <ScenePanel />
+      <PositionsPanel />
+      <section class="panel define-right" aria-label={d("details")}>
+        <DhTable />
+        <div class="tabs" role="tablist" aria-label={d("details")}>
+          {TABS.map((each) => (
+            <button
+              key={each}
+              id={`tab-${each}`}
+              role="tab"
+              aria-selected={tab.value === each}
+              aria-controls="tab-panel"
+              onClick={() => (tab.value = each)}
+            >
+              {d(each)}
+            </button>
+          ))}
+        </div>
+        <div id="tab-panel" class="tab-panel" role="tabpanel" aria-labelledby={`tab-${tab.value}`} tabIndex={-1}>
+          {tabs[tab.value]()}
+        </div>
+      </section>
+    </>
+  );
+}
+
+/** Missing files that others refer to, until they are added or skipped. */
+function MissingFiles() {
+  const waiting = waitingUrdf.value;
+  const missing = waiting
+    ? waiting.missing.map((name) => ({ of: waiting.file, name, path: name }))
+    : missingFiles().filter(({ path }) => !doneWithout.value.has(path));
+  if (missing.length === 0) return null;
+  const goOn = () => {
+    if (waiting) void goOnWithout();
+    else doneWithout.value = new Set([...doneWithout.value, ...missing.map(({ path }) => path)]);
+  };
+  return (
+    <section class="panel missing" aria-label={d("missing_title")} role="alert">
+      <div>
+        <h2>{d("missing_title")}</h2>
+        <ul>
+          {missing.map(({ of, name }) => (
+            <li key={`${of} ${name}`}>
+              <span class="dim">{d("missing_for", { file: of })}</span> <strong>{name}</strong>
+            </li>
+          ))}
+        </ul>
+        <p class="dim small">{d("missing_words")}</p>
+      </div>
+      <div class="missing-actions">
+        <FileButton label={d("choose_files")} take={(files) => void takeFiles(files)} />
+        <button class="quiet" onClick={goOn}>
+          {d("go_on_without")}
+        </button>
+      </div>
+    </section>
+  );
+}
+
+/** Handle undo, redo and save keys, wherever the focus is. */
+function useKeys(): void {
+  useEffect(() => {
+    const onKey = (event: KeyboardEvent) => {
+      if (!(event.ctrlKey || event.metaKey) || event.altKey || !draft.value) return;
+      const key = event.key.toLowerCase();
+      const action =
+        key === "z" ? (event.shiftKey ? redo : undo) : key === "y" ? redo : key === "s" ? () => void save(false) : null;
+      if (!action) return;
+      event.preventDefault();
+      action();
+    };
+    addEventListener("keydown", onKey);
+    return () => removeEventListener("keydown", onKey);
+  }, []);
+}
+
+/** Accept dropped files anywhere on the page. */
+function useDrop(): void {
+  // Register first: a file dropped before would replace the page.
+  useLayoutEffect(() => {
+    const ending = new AbortController();
+    const { signal: until } = ending;
+    const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
+    const over = (event: DragEvent) => {
+      if (!hasFiles(event)) return;
+      event.preventDefault();
+      draggedOver.value = true;
+    };
+    addEventListener("dragover", over, { signal: until });
+    addEventListener("dragleave", (event) => event.relatedTarget === null && (draggedOver.value = false), {
+      signal: until,
+    });
+    addEventListener(
+      "drop",
+      (event) => {
+        if (!hasFiles(event) || !event.dataTransfer) return;
+        event.preventDefault();
+        draggedOver.value = false;
+        void takeFiles(droppedFiles(event.dataTransfer));
+      },
+      { signal: until },
+    );
+    return () => ending.abort();
+  }, []);
+}

@@ -1,0 +1,304 @@
+// Dropped or chosen files: uploaded, and used as links, companion files or a URDF's robot.
+
+import { signal } from "@preact/signals";
+import { d } from "../../i18n/define";
+import type { Body, Description } from "./description";
+import { complete, empty, radians, tidy } from "./description";
+import type { Draft, Identity } from "./draft";
+import { begin, draft, edit, identity, isOpen } from "./draft";
+import { freshName, insertJoint, nameFromFile } from "./edits";
+import { keep } from "./file-cache";
+import type { MeshInfo } from "./server-requests";
+import { importRobot, mesh, unzip, upload } from "./server-requests";
+import { beside, missingFiles, readShape, setShape } from "./mesh-files";
+import { choose, resetWorkbench } from "./selection";
+
+/** File types that may be meshes; the server decides which it can read. */
+const SHAPE = /\.(wrl|wrz|vrml|3ds|stl|obj|ply|off|dae|glb|gltf|dxf|ste?p|ige?s)(\.gz)?$/i;
+const MESH_FOLDER = "meshes";
+
+/** A file with its path in the dropped folder, or its name. */
+export interface Dropped {
+  path: string;
+  file: File;
+}
+
+export interface Notice {
+  kind: "done" | "refused";
+  text: string;
+}
+
+/** What is being read; "": nothing. */
+export const reading = signal("");
+/** The outcome of the last files. */
+export const fileNotices = signal<readonly Notice[]>([]);
+/** Paths of missing files that the user skipped. */
+export const doneWithout = signal<ReadonlySet<string>>(new Set());
+/** A URDF that waits for files. */
+export const waitingUrdf = signal<{ file: string; files: Record<string, string>; missing: string[] } | null>(null);
+
+let last: Promise<void> = Promise.resolve();
+/** The page or draft that the files were dropped on. */
+let place: Identity | null = null;
+
+/** Read files after earlier ones, unless their page or draft was closed. */
+function inTurn(read: () => Promise<void>): Promise<void> {
+  const own = identity.value;
+  last = last.then(async () => {
+    place = own;
+    if (isLeft()) return;
+    fileNotices.value = [];
+    try {
+      await read();
+    } catch (error) {
+      notice("refused", d("failed", { text: words(error) }));
+    }
+    reading.value = "";
+  });
+  return last;
+}
+
+function isLeft(): boolean {
+  return place !== null && !isOpen(place);
+}
+
+function words(error: unknown): string {
+  return error instanceof Error ? error.message : String(error);
+}
+
+function notice(kind: Notice["kind"], text: string): void {
+  if (!isLeft()) fileNotices.value = [...fileNotices.value, { kind, text }];
+}
+
+function refuse(name: string, error: unknown): void {
+  notice("refused", d("file_refused", { name, text: words(error) }));
+}
+
+/** Return every file of a drop, including those in folders. */
+export async function droppedFiles(data: DataTransfer): Promise<Dropped[]> {
+  const entries = [...data.items].map((item) => item.webkitGetAsEntry()).filter((entry) => entry !== null);
+  if (entries.length === 0) return [...data.files].map((file) => ({ path: file.name, file }));
+  return (await Promise.all(entries.map(filesOf))).flat();
+}
+
+async function filesOf(entry: FileSystemEntry): Promise<Dropped[]> {
+  if (entry instanceof FileSystemFileEntry || entry.isFile) {
+    const file = await new Promise<File>((resolve, reject) => (entry as FileSystemFileEntry).file(resolve, reject));
+    return [{ path: entry.fullPath.replace(/^\//, ""), file }];
+  }
+  const reader = (entry as FileSystemDirectoryEntry).createReader();
+  const found: FileSystemEntry[] = [];
+  for (;;) {
+    const some = await new Promise<FileSystemEntry[]>((resolve, reject) => reader.readEntries(resolve, reject));
+    if (some.length === 0) break; // a reader returns a hundred at a time
+    found.push(...some);
+  }
+  return (await Promise.all(found.map(filesOf))).flat();
+}
+
+/** Upload and keep files; return SHA-256 by path. A zip archive counts as its files. */
+async function sendAll(dropped: readonly Dropped[]): Promise<Map<string, string>> {
+  const sent = new Map<string, string>();
+  for (const [index, { path, file }] of dropped.entries()) {
+    if (isLeft()) break;
+    reading.value = d("reading", { name: file.name, number: index + 1, count: dropped.length });
+    try {
+      const { sha } = await upload(file.name, file);
+      await keep(sha, file);
+      if (!/\.zip$/i.test(path)) sent.set(path, sha);
+      else for (const [inside, its] of Object.entries(await unzip(file.name, sha))) sent.set(inside, its);
+    } catch (error) {
+      refuse(file.name, error);
+    }
+  }
+  return sent;
+}
+
+/** Process files: place missing ones, start a robot from a URDF or robot.toml, make each mesh file a link.
+ *
+ * @param asRobot A VRML file is a robot, as in OpenHRP, not a link. */
+export function takeFiles(dropped: readonly Dropped[] | Promise<readonly Dropped[]>, asRobot = false): Promise<void> {
+  return inTurn(async () => take(await dropped, asRobot));
+}
+
+async function take(dropped: readonly Dropped[], asRobot: boolean): Promise<void> {
+  if (dropped.length === 0) {
+    notice("refused", d("nothing_dropped"));
+    return;
+  }
+  const sorted = [...dropped].sort((one, other) =>
+    one.path.localeCompare(other.path, "en", { numeric: true, sensitivity: "base" }),
+  );
+  const sent = await sendAll(sorted);
+  if (isLeft()) return;
+  const paths = [...sent.keys()];
+  const robotFile =
+    paths.find((path) => /(^|\/)robot\.toml$/.test(path)) ??
+    paths.find((path) => /\.urdf$/i.test(path)) ??
+    (asRobot ? paths.find((path) => /\.(wrl|wrz|vrml)$/i.test(path)) : undefined);
+  const waiting = waitingUrdf.value;
+  if (waiting && !robotFile) await readUrdf(waiting.file, { ...waiting.files, ...Object.fromEntries(sent) });
+  else if (robotFile) await readUrdf(robotFile, Object.fromEntries(sent));
+  else await takeShapes(sent);
+}
+
+async function takeShapes(sent: Map<string, string>): Promise<void> {
+  const missing = missingFiles();
+  const held = draft.value?.files ?? {};
+  const added: Record<string, string> = {};
+  const changed: string[] = [];
+  const fresh: string[] = [];
+  for (const [path, sha] of sent) {
+    const name = path.split("/").at(-1) ?? path;
+    const wanted = missing.filter((each) => baseName(each.path) === baseName(name));
+    const own = `${MESH_FOLDER}/${path}`;
+    for (const each of wanted) {
+      added[each.path] = sha;
+      changed.push(each.of);
+    }
+    if (wanted.length > 0) continue;
+    if (held[own] === undefined && SHAPE.test(name)) fresh.push(own);
+    added[own] = sha;
+  }
+  const { infos, parts } = await readLinks(fresh, { ...held, ...added });
+  if (isLeft()) return;
+  if (!draft.value) {
+    if (infos.size === 0) {
+      if (fileNotices.value.length === 0) notice("refused", d("none_to_read"));
+      return;
+    }
+    begin({ description: empty(), files: {} });
+    resetWorkbench();
+  }
+  for (const path of fresh) if (!infos.has(path) && !parts.has(path)) delete added[path];
+  const links = draft.value?.description.joint.length ?? 0;
+  edit((now) => {
+    Object.assign(now.files, added); // it may have changed while these were read
+    for (const [path, info] of infos) addLink(now.description, path, info);
+  });
+  if ((draft.value?.description.joint.length ?? 0) > links) choose(links);
+  const files = draft.value?.files ?? {};
+  await Promise.all(changed.map((path) => readShape(path, files)));
+  const whole =
+    sent.size === 1 ? d("read_one", { name: [...sent.keys()][0] ?? "" }) : d("read_done", { count: sent.size });
+  if (fileNotices.value.length === 0) notice("done", whole);
+}
+
+/** Read new mesh files; those that another refers to (Inline) are its parts, not links. */
+async function readLinks(paths: readonly string[], files: Readonly<Record<string, string>>) {
+  const infos = new Map<string, MeshInfo>();
+  const parts = new Set<string>();
+  for (const [index, path] of paths.entries()) {
+    if (isLeft()) break;
+    reading.value = d("reading", { name: path, number: index + 1, count: paths.length });
+    try {
+      // Read it alone first: the other files that it then lacks are its parts.
+      const alone = Object.fromEntries(
+        Object.entries(files).filter(([name]) => name === path || !paths.includes(name)),
+      );
+      let info = await mesh(path, alone);
+      const own = info.missing.map((name) => beside(path, name)).filter((name) => paths.includes(name));
+      for (const part of own) parts.add(part);
+      if (own.length > 0) info = await mesh(path, files);
+      infos.set(path, info);
+      setShape(path, files, { info });
+    } catch (error) {
+      refuse(path.slice(MESH_FOLDER.length + 1), error);
+    }
+  }
+  for (const part of parts) infos.delete(part);
+  return { infos, parts };
+}
+
+/** Add links: the first of an empty description is its base; each other comes with a joint at the end. */
+function addLink(into: Description, path: string, info: MeshInfo): void {
+  if (into.joint.length === 0 && !into.base.mesh) {
+    shapeBody(into, into.base, path, info);
+    return;
+  }
+  const joint = insertJoint(into, into.joint.length);
+  const name = nameFromFile(path);
+  const taken = ["base", "tool", ...into.joint.flatMap((other) => [other.name, other.link.name])];
+  joint.link.name = taken.includes(name) ? freshName(`${name}_`, taken) : name;
+  shapeBody(into, joint.link, path, info);
+}
+
+/** Give a link a mesh file, with its guessed unit, and upright. */
+function shapeBody(of: Description, body: Body, path: string, info: MeshInfo): void {
+  body.mesh = path;
+  body.collision_mesh = "";
+  body.mesh_scale = info.scale;
+  const quarter = tidy(Math.PI / 2 / radians(of.units));
+  body.mesh_pose = { xyz: [0, 0, 0], rpy: [info.up === "y" ? quarter : 0, 0, 0] };
+}
+
+/** Give a link the chosen file, with the files of its folder. */
+export function takeShapeFor(dropped: readonly Dropped[], find: (of: Description) => Body | undefined): Promise<void> {
+  return inTurn(async () => {
+    const sent = [...(await sendAll(dropped))].map(([path, sha]): [string, string] => [`${MESH_FOLDER}/${path}`, sha]);
+    const added = Object.fromEntries(sent);
+    const { infos } = await readLinks(
+      Object.keys(added).filter((path) => SHAPE.test(path)),
+      { ...draft.value?.files, ...added },
+    );
+    const [first] = infos;
+    if (!first || isLeft()) return;
+    edit((now) => {
+      Object.assign(now.files, added);
+      const body = find(now.description);
+      if (body) shapeBody(now.description, body, ...first);
+    });
+  });
+}
+
+/** Open the waiting URDF without its missing files. */
+export function goOnWithout(): Promise<void> {
+  const waiting = waitingUrdf.value;
+  return inTurn(async () => {
+    if (waiting) await readUrdf(waiting.file, waiting.files, true);
+  });
+}
+
+/** Open a URDF's robot; if files are missing, wait for them. */
+async function readUrdf(file: string, files: Record<string, string>, without = false): Promise<void> {
+  reading.value = d("reading", { name: file, number: 1, count: 1 });
+  try {
+    if (draft.value) throw new Error(d("urdf_twice"));
+    let answer = await importRobot(file, files);
+    // Place files without folders where the URDF expects them.
+    const placed = placedWhereMissing(file, files, answer.missing);
+    if (placed) {
+      files = placed;
+      answer = await importRobot(file, files);
+    }
+    if (isLeft()) return;
+    if (answer.missing.length > 0 && !without) {
+      waitingUrdf.value = { file, files, missing: answer.missing };
+      return;
+    }
+    waitingUrdf.value = null;
+    if (draft.value) throw new Error(d("urdf_twice")); // another draft has been opened
+    const made: Draft = { description: complete(answer.description), files: answer.files };
+    resetWorkbench();
+    begin(made);
+    for (const text of answer.notes) notice("done", text);
+  } catch (error) {
+    refuse(file, error);
+  }
+}
+
+function placedWhereMissing(file: string, files: Readonly<Record<string, string>>, missing: readonly string[]) {
+  const byName = new Map(Object.entries(files).map(([path, sha]) => [baseName(path), sha]));
+  const placed: Record<string, string> = {};
+  for (const address of missing) {
+    const sha = byName.get(baseName(address));
+    const [, inPackage] = /^(?:package|model):\/\/(.*)$/.exec(address) ?? [];
+    const path = inPackage ?? beside(file, address.replace(/^file:(\/\/)?/, ""));
+    if (sha && files[path] !== sha) placed[path] = sha;
+  }
+  return Object.keys(placed).length > 0 ? { ...files, ...placed } : null;
+}
+
+function baseName(path: string): string {
+  return (path.split("/").at(-1) ?? path).toLowerCase();
+}

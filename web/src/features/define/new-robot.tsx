@@ -1,0 +1,93 @@
+// The ways to begin, while there is no draft.
+
+import { useEffect } from "preact/hooks";
+import { d } from "../../i18n/define";
+import { timeOfDay } from "../../i18n/format";
+import { empty } from "./description";
+import { begin, bringBack, hasKept, newDrafts } from "./draft";
+import { reading, takeFiles } from "./dropped-files";
+import { insertJoint } from "./edits";
+import { FileButton } from "./file-button";
+import { known, listRobots } from "./save-and-start";
+import { resetWorkbench } from "./selection";
+
+function startEmpty(): void {
+  const description = empty();
+  insertJoint(description, 0);
+  resetWorkbench();
+  begin({ description, files: {} });
+}
+
+export function Start() {
+  useEffect(() => void listRobots(), []);
+  const robots = known.value?.robots;
+  return (
+    <div class="start">
+      <div class="start-head">
+        <h1>{d("start_title")}</h1>
+        <p class="dim">{d("start_words")}</p>
+        {newDrafts().map(({ id, name, at }) => (
+          <p key={id} class="start-draft">
+            <button class="action" onClick={() => bringBack("", id)}>
+              {d("continue_draft", { name, time: timeOfDay(at) })}
+            </button>
+          </p>
+        ))}
+      </div>
+      <section class="panel start-drop" aria-label={d("start_files")}>
+        <DropMark />
+        <div>
+          <h2>{d("start_files")}</h2>
+          <p class="dim">{d("start_files_words")}</p>
+        </div>
+        <FileButton label={d("choose_files")} take={(files) => void takeFiles(files)} />
+        {reading.value && <p role="status">{reading.value}</p>}
+      </section>
+      <div class="start-more">
+        <section class="panel" aria-label={d("start_urdf")}>
+          <h2>{d("start_urdf")}</h2>
+          <p class="dim">{d("start_urdf_words")}</p>
+          <FileButton label={d("choose_files")} take={(files) => void takeFiles(files, true)} />
+        </section>
+        <section class="panel" aria-label={d("start_empty")}>
+          <h2>{d("start_empty")}</h2>
+          <p class="dim">{d("start_empty_words")}</p>
+          <button class="action" onClick={startEmpty}>
+            {d("start_empty_button")}
+          </button>
+        </section>
+      </div>
+      <section class="start-robots" aria-label={d("start_robot")}>
+        <h2>{d("start_robot")}</h2>
+        {robots?.length === 0 && <p class="dim">{d("start_none")}</p>}
+        <ul class="robot-cards">
+          {(robots ?? []).map(({ name, title, origin, joints, running }) => (
+            <li key={name}>
+              <a class="robot-card" href={`#/define/${encodeURIComponent(name)}`}>
+                <strong>{title || name}</strong>
+                <span class="dim small">
+                  {[
+                    d(`origin_${origin}`),
+                    joints === 1 ? d("joint_one") : d("joints_count", { count: joints }),
+                    ...(running ? [d("running")] : []),
+                    ...(hasKept(name) ? [d("unsaved_draft")] : []),
+                  ].join(" · ")}
+                </span>
+              </a>
+            </li>
+          ))}
+        </ul>
+      </section>
+    </div>
+  );
+}
+
+function DropMark() {
+  return (
+    <svg class="drop-mark" viewBox="0 0 48 48" width="48" height="48" aria-hidden="true">
+      <path d="M8 42h22M15 42V27l14-13 12 8" />
+      <circle cx="15" cy="27" r="4" />
+      <circle cx="29" cy="14" r="4" />
+    </svg>
+  );
+}

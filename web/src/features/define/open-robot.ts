@@ -1,0 +1,50 @@
+// Opening of a robot to define: as saved, or its unsaved draft.
+
+import { signal } from "@preact/signals";
+import { d } from "../../i18n/define";
+import { complete } from "./description";
+import { begin, bringBack, discard, identity, isOpen, leave } from "./draft";
+import { fileNotices, waitingUrdf } from "./dropped-files";
+import { known, listRobots, outcome } from "./save-and-start";
+import { robot } from "./server-requests";
+import { resetWorkbench } from "./selection";
+
+/** What is being opened; "": nothing. */
+export const loading = signal("");
+
+/** Open a robot, or its unsaved draft; "": a new one's. */
+export async function open(name: string): Promise<void> {
+  leave();
+  resetWorkbench();
+  outcome.value = null;
+  fileNotices.value = [];
+  waitingUrdf.value = null;
+  loading.value = "";
+  if (bringBack(name) || !name) return;
+  const place = identity.value;
+  loading.value = d("loading");
+  try {
+    await listRobots();
+    const origin = known.value?.robots.find((each) => each.name === name)?.origin ?? "site";
+    const { description, files, notes, revision } = await robot(name);
+    if (!isOpen(place)) return;
+    const read = complete(description);
+    // Library robots are read-only: a draft of one is another robot.
+    if (origin === "library") read.name = `${name}-copy`;
+    begin({ description: read, files }, name, origin, revision);
+    fileNotices.value = notes.map((text) => ({ kind: "done", text }));
+  } catch (error) {
+    if (!isOpen(place)) return;
+    const text = error instanceof Error ? error.message : String(error);
+    outcome.value = { kind: "refused", text: d("not_loaded", { name, text }) };
+  } finally {
+    if (isOpen(place)) loading.value = "";
+  }
+}
+
+/** Discard the draft: reload the saved robot; a new one is deleted. */
+export function discardDraft(): void {
+  const { owner } = identity.value;
+  discard();
+  void open(owner);
+}

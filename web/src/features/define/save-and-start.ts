@@ -1,0 +1,130 @@
+// Save, download and start, and their outcome.
+
+import { signal } from "@preact/signals";
+import { d } from "../../i18n/define";
+import { checked, placeOf, unread } from "./checks";
+import { draft, identity, isOpen, isUnsaved, savedAs } from "./draft";
+import type { Robots } from "./server-requests";
+import * as server from "./server-requests";
+import { goTo } from "./selection";
+
+export type Outcome =
+  | { kind: "done" | "refused"; text: string }
+  | { kind: "exists"; text: string; name: string; thenStart: boolean }
+  | { kind: "started"; site: string; robot: string };
+
+/** Outcome of the last action; null: dismissed. */
+export const outcome = signal<Outcome | null>(null);
+/** The action in progress; "": none. */
+export const busy = signal("");
+export const known = signal<Robots | null>(null);
+
+export async function listRobots(): Promise<void> {
+  try {
+    known.value = await server.robots();
+  } catch (error) {
+    outcome.value = { kind: "refused", text: d("failed", { text: words(error) }) };
+  }
+}
+
+function words(error: unknown): string {
+  return error instanceof Error ? error.message : String(error);
+}
+
+async function doing<T>(what: string, work: () => Promise<T>): Promise<T | undefined> {
+  if (busy.value) return undefined;
+  busy.value = what;
+  outcome.value = null;
+  try {
+    return await work();
+  } catch (error) {
+    outcome.value = { kind: "refused", text: d("failed", { text: words(error) }) };
+    return undefined;
+  } finally {
+    busy.value = "";
+  }
+}
+
+/** Save the draft at the site, and start it on request.
+ *
+ * @param over The robot that the user agreed to overwrite; "": none.
+ * @returns Whether it is saved. */
+export async function save(thenStart: boolean, over = ""): Promise<boolean> {
+  const now = draft.value;
+  const of = identity.value;
+  if (!now) return false;
+  const { name } = now.description;
+  const [typed] = unread.value.keys();
+  if (typed !== undefined) {
+    outcome.value = { kind: "refused", text: d("mend_first") };
+    goTo(placeOf(typed));
+    return false;
+  }
+  if (over !== name && known.value?.robots.some((robot) => robot.name === name && robot.running)) {
+    outcome.value = { kind: "exists", text: d("exists_running", { name }), name, thenStart };
+    return false;
+  }
+  // No question is needed while the site's copy is the one opened here.
+  const revision = of.siteName === name ? of.revision : "";
+  const done = await doing(d("saving"), async () => {
+    try {
+      return await server.save(now, revision, over !== "" && over === name);
+    } catch (error) {
+      if (!(error instanceof server.Refused) || !isOpen(of)) throw error;
+      if (error.status === 409) {
+        const text = error.isChanged
+          ? d("exists_changed", { name })
+          : d("exists", { text: error.message.replace(/\.$/, "") });
+        outcome.value = { kind: "exists", text, name, thenStart };
+        return undefined;
+      }
+      if (error.problems.length === 0) throw error;
+      checked.value = { tool: null, links: {}, ...checked.value, problems: error.problems };
+      outcome.value = { kind: "refused", text: d("mend_first") };
+      goTo(error.problems[0]?.path ?? []);
+      return undefined;
+    }
+  });
+  if (!done) return false;
+  savedAs(now, of, done.name, done.revision);
+  if (isOpen(of)) history.replaceState(null, "", `#/define/${encodeURIComponent(done.name)}`);
+  outcome.value = { kind: "done", text: d("saved", { name: done.name, folder: done.folder }) };
+  await listRobots();
+  if (thenStart && isOpen(of)) await start();
+  return true;
+}
+
+export async function download(): Promise<void> {
+  const now = draft.value;
+  if (!now) return;
+  const archive = await doing(d("download"), () => server.zip(now));
+  if (!archive) return;
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(archive);
+  link.download = `${now.description.name || "robot"}.zip`;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+export async function start(): Promise<void> {
+  const { siteName } = identity.value;
+  if (isUnsaved.value || !siteName) {
+    await save(true);
+    return;
+  }
+  const started = await doing(d("starting"), () => server.start(siteName));
+  if (started) outcome.value = { kind: "started", ...started };
+  await listRobots();
+}
+
+export async function stop(): Promise<void> {
+  const name = identity.value.siteName;
+  if (await doing(d("stop_simulated"), () => server.stop(name))) {
+    outcome.value = { kind: "done", text: d("stopped", { name }) };
+  }
+  await listRobots();
+}
+
+export function isRunning(): boolean {
+  return known.value?.robots.some(({ name, running }) => running && name === identity.value.siteName) ?? false;
+}

@@ -1,0 +1,14 @@
+// The page of alarms, events and audit entries of every robot and service of every site.
+
+import { AlarmPanel } from "./alarm-panel";
+import { Journal } from "./journal";
+import "./events-page.css";
+
+export function Events() {
+  return (
+    <div class="events-page">
+      <AlarmPanel />
+      <Journal />
+    </div>
+  );
+}

@@ -1,0 +1,33 @@
+// A form that shelves alarms for a time, with a reason.
+
+import { useState } from "preact/hooks";
+import { e } from "../../i18n/events";
+import type { Alarm } from "../../mesh/alarms";
+import { Reason } from "../../ui/reason-form";
+import { Choice } from "../../ui/parts";
+
+const TIMES = { minutes_15: 900, hour: 3600, hours_8: 28_800, day: 86_400 } as const;
+type Time = keyof typeof TIMES;
+
+export function Shelve(props: {
+  alarms: readonly Alarm[];
+  close: () => void;
+  done: (reason: string, shelveS: number) => void;
+}) {
+  const [time, setTime] = useState<Time>("hour");
+  const [first, ...others] = props.alarms;
+  return (
+    <Reason
+      required
+      title={e("shelve_do")}
+      text={
+        others.length ? e("shelve_count", { count: props.alarms.length }) : e("shelve_one", { text: first?.text ?? "" })
+      }
+      does={e("shelve_do")}
+      close={props.close}
+      done={(reason) => props.done(reason, TIMES[time])}
+    >
+      <Choice label={e("shelve_for")} values={Object.keys(TIMES) as Time[]} chosen={time} text={e} choose={setTime} />
+    </Reason>
+  );
+}

@@ -1,0 +1,89 @@
+// The text's points: show with the ghost, rename, delete.
+
+import { useState } from "preact/hooks";
+import type { Words } from "../../i18n/program";
+import { p } from "../../i18n/program";
+import { aim, aimAtPose, poseOf } from "./taught-pose";
+import { draft, goToLine, replace } from "./draft";
+import { teach } from "./scene-overlay";
+import { description, livePositions } from "./program-robot";
+import type { Point } from "./program-text";
+import { isName, jointsOf, pointsOf, renamed, usesOf, withoutLine } from "./program-text";
+
+export function Points({ tell }: { tell: (words: Words) => void }) {
+  const text = draft.value?.text ?? "";
+  const points = pointsOf(text);
+  const [naming, setNaming] = useState<string | null>(null);
+  const rename = (point: Point, to: string) => {
+    setNaming(null);
+    if (to === point.name) return;
+    if (!isName(to)) return tell(() => p("name_wrong", { name: to }));
+    if (points.some((each) => each.name === to)) return tell(() => p("name_taken", { name: to }));
+    replace(renamed(text, point.name, to), point.line);
+  };
+  const remove = (point: Point) => {
+    const uses = usesOf(text, point.name);
+    replace(withoutLine(text, point.line), Math.max(1, point.line - 1));
+    const lines = uses.map((line) => line - (line > point.line ? 1 : 0)).join(", ");
+    tell(() => (uses.length ? p("deleted_used", { name: point.name, lines }) : p("deleted", { name: point.name })));
+  };
+  if (points.length === 0) return <p class="points-none dim">{p("no_points")}</p>;
+  return (
+    <ul class="points" aria-label={p("points")}>
+      {points.map((point) => (
+        <li key={`${point.line} ${point.name}`} data-point={point.name}>
+          {naming === point.name ? (
+            <input
+              type="text"
+              class="point-name"
+              aria-label={p("rename_point", { name: point.name })}
+              autocomplete="off"
+              spellcheck={false}
+              maxLength={40}
+              ref={(field) => field?.focus()}
+              defaultValue={point.name}
+              onBlur={(event) => rename(point, event.currentTarget.value.trim())}
+              onKeyDown={(event) => {
+                if (event.key === "Enter") rename(point, event.currentTarget.value.trim());
+                else if (event.key === "Escape") setNaming(null);
+              }}
+            />
+          ) : (
+            <button
+              class="point-name quiet"
+              title={p("rename_point", { name: point.name })}
+              aria-label={p("rename_point", { name: point.name })}
+              onClick={() => setNaming(point.name)}
+            >
+              {point.name}
+            </button>
+          )}
+          <span class="point-value dim small" title={point.numbers.join(" ")}>
+            {p(`by_${point.kind}`)} {point.numbers.join(" ")}
+          </span>
+          <button class="quiet" aria-label={p("go_to_point", { name: point.name })} onClick={() => goTo(point, tell)}>
+            {p("go_to")}
+          </button>
+          <button class="quiet" aria-label={p("delete_point", { name: point.name })} onClick={() => remove(point)}>
+            {p("delete")}
+          </button>
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+/** Show a point with the ghost, as a start for teaching. */
+function goTo(point: Point, tell: (words: Words) => void): void {
+  goToLine(point.line);
+  const joints = description.value?.joints ?? [];
+  if (point.kind === "joints") {
+    const positions = jointsOf(joints, point);
+    if (positions) teach(positions);
+    else tell(() => p("point_wrong", { name: point.name, count: joints.length }));
+    return;
+  }
+  const from = aim.value ?? livePositions.value ?? joints.map((joint) => joint.home);
+  teach(from);
+  aimAtPose(poseOf(point.numbers));
+}

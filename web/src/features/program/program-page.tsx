@@ -1,0 +1,187 @@
+// Program: a teach program of one robot: write, teach, check before it moves, run.
+
+import { useEffect, useLayoutEffect, useState } from "preact/hooks";
+import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
+import { ControllerStateSchema, DescriptionSchema, LeaseSchema, ProgramStateSchema } from "../../gen/robomesh_pb";
+import type { Words } from "../../i18n/program";
+import { noWords, p } from "../../i18n/program";
+import { t } from "../../i18n/texts";
+import { seeLease } from "../../mesh/control";
+import { fleetRobots } from "../../mesh/known-robots";
+import type { RobotName } from "../../mesh/robot-name";
+import { disobeys, stateWord, stoppedByItself } from "../../mesh/robot-state";
+import { ageOf, isStale, jointsAge, useEvents, useTopic } from "../../mesh/topics";
+import type { Stage } from "../../scene/robot-scene";
+import { SceneView } from "../../scene/scene-view";
+import { ControlPanel } from "../../panels/control/control-panel";
+import { State, Tag } from "../../ui/parts";
+import { Alarm } from "../../panels/robot-alarm";
+import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
+import { programLink, robotLink } from "../../ui/route";
+import { keepChecking } from "./program-check";
+import { CheckPanel } from "./check-panel";
+import { begin, draft, open } from "./draft";
+import { Editor } from "./editor";
+import { addGizmo } from "./teach-gizmo";
+import { path } from "./checked-motion";
+import { RunPanel } from "./run-panel";
+import { isRunning, program } from "./running-program";
+import { keepShowing } from "./scene-overlay";
+import { description as described, livePositions, robotKey } from "./program-robot";
+import { Teach } from "./teach-panel";
+import { example } from "./program-text";
+import { Timeline } from "./timeline";
+import { Toolbar } from "./toolbar";
+import "./program-page.css";
+
+const MOVED = 0.005; // rad or m: a larger distance from the check's start makes the check outdated
+const TOLD_MS = 8000;
+
+/** The page of a robot's program; without a robot, the choice of one. */
+export function Program({ shown }: { shown: RobotName | null }) {
+  return shown ? <Workbench key={`${shown.site}/${shown.robot}`} {...shown} /> : <Choose />;
+}
+
+function Choose() {
+  const robots = fleetRobots.value.map((key) => key.split("/").slice(1) as [string, string]);
+  return (
+    <div class="program-choose">
+      <h1>{p("choose")}</h1>
+      <p class="dim">{p("choose_words")}</p>
+      {robots.length === 0 && <p class="dim">{t("no_robots")}</p>}
+      <ul>
+        {robots.map(([site, robot]) => (
+          <li key={`${site}/${robot}`}>
+            <a href={programLink(site, robot)}>
+              <strong>{robot}</strong>
+              <span class="dim small">{site}</span>
+            </a>
+          </li>
+        ))}
+      </ul>
+    </div>
+  );
+}
+
+function Workbench({ site, robot }: RobotName) {
+  const key = `robomesh/${site}/${robot}`;
+  const controller = useTopic(ControllerStateSchema, `${key}/controller`);
+  const lease = useTopic(LeaseSchema, `${key}/lease`);
+  const description = useTopic(DescriptionSchema, `${key}/description`);
+  const joints = useTopic(JointStatesSchema, `${key}/joints`);
+  const running = useTopic(ProgramStateSchema, `${key}/program`);
+  const events = useEvents(key);
+  const [told, tell] = useOutcome();
+  const [stage, setStage] = useState<Stage | null>(null);
+  useEffect(() => (stage ? addGizmo(stage) : undefined), [stage]);
+  const age = jointsAge(joints, controller);
+  const stale = isStale("joints", age);
+  const holder = lease && !isStale("lease", ageOf(lease)) ? lease.message.holder : null;
+  const state = controller?.message;
+  const rows = description?.message.joints ?? [];
+  const byName = new Map(joints?.message.joints.map((joint) => [joint.name, joint.position]));
+  const positions = rows.map((joint) => byName.get(joint.name));
+  const known = !stale && rows.length > 0 && positions.every((each) => each !== undefined);
+
+  const there = Boolean(controller ?? description ?? lease);
+  // Close the first of two robots before opening the second: effects after painting might run in reverse order.
+  // An unknown robot has no draft.
+  useLayoutEffect(() => {
+    if (!there) return;
+    robotKey.value = key;
+    const isKept = open(key);
+    const ends = [keepChecking(), keepShowing()];
+    setEmpty(!isKept);
+    return () => {
+      for (const end of ends) end();
+      draft.value = null;
+      described.value = undefined;
+      livePositions.value = null;
+      program.value = null;
+    };
+  }, [key, there]);
+  const [empty, setEmpty] = useState(false);
+  useEffect(() => void (described.value = description?.message), [description]);
+  useEffect(() => void (livePositions.value = known ? (positions as number[]) : null), [joints, known]);
+  useEffect(() => {
+    program.value = running && !isStale("program", ageOf(running)) ? running.message : null;
+  }, [running, running && isStale("program", ageOf(running))]);
+  // Show an example program to a beginner.
+  useEffect(() => {
+    if (!empty || rows.length === 0 || !description) return;
+    setEmpty(false);
+    if (!draft.value?.text) begin(example(description.message, p("example_comment")));
+  }, [empty, description]);
+  useEffect(() => {
+    if (lease) seeLease(key, lease.message);
+  }, [key, lease]);
+
+  if (useRobotNotFound(key, there)) return <RobotNotFound site={site} robot={robot} />;
+  const motion = {
+    running: lease?.message.motion === true,
+    stopped: state?.stop !== undefined || stoppedByItself(state),
+    positions,
+  };
+  return (
+    <>
+      <Alarm state={state} events={events} />
+      <div class="program">
+        <div class="headline">
+          <h1>{p("program_of", { robot })}</h1>
+          <State state={stateWord(controller, events)} />
+          {description?.message.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
+          <a class="page-link" href={robotLink(site, robot)}>
+            {p("to_robot")}
+          </a>
+          <span class="dim small told" role="status">
+            {told()}
+          </span>
+        </div>
+        <div class="program-left">
+          <Toolbar tell={tell} />
+          <Editor />
+          <CheckPanel moved={!isRunning() && hasMoved(positions)} />
+        </div>
+        <div class="program-middle">
+          <SceneView
+            robotKey={key}
+            description={description?.message}
+            stale={stale}
+            age={joints ? age : undefined}
+            lostAt={null}
+            staged={setStage}
+          />
+          <Timeline />
+        </div>
+        <div class="program-right">
+          <ControlPanel
+            robotKey={key}
+            controller={controller}
+            holder={holder}
+            lease={lease?.message}
+            description={description?.message}
+            motion={motion}
+            disobeyed={disobeys(state, events)}
+          />
+          <RunPanel robotKey={key} controller={state} />
+          <Teach />
+        </div>
+      </div>
+    </>
+  );
+}
+
+/** Return whether the robot is not where the check started. */
+function hasMoved(positions: readonly (number | undefined)[]): boolean {
+  const start = path.value?.jointPositions;
+  return start !== undefined && positions.some((each, i) => Math.abs((each ?? NaN) - (start[i] ?? NaN)) > MOVED);
+}
+
+function useOutcome(): [Words, (words: Words) => void] {
+  const [told, setTold] = useState<{ words: Words }>({ words: noWords });
+  useEffect(() => {
+    const timer = setTimeout(() => setTold({ words: noWords }), TOLD_MS);
+    return () => clearTimeout(timer);
+  }, [told]);
+  return [told.words, (words) => setTold({ words })];
+}

@@ -1,0 +1,122 @@
+// Teaching: points from the live robot, from sliders or from a pose; and the list of points.
+
+import { useState } from "preact/hooks";
+import { jointText, jointUnit } from "../../i18n/format";
+import type { Words } from "../../i18n/program";
+import { noWords, p } from "../../i18n/program";
+import { JointTrack } from "../../ui/joint-track";
+import { JointValue } from "../../ui/joint-value";
+import { Choice, NoticeLine, Panel } from "../../ui/parts";
+import { aim, aimProblem } from "./taught-pose";
+import { cursorLine, draft, replace } from "./draft";
+import { Points } from "./point-list";
+import { Pose } from "./pose-panel";
+import { teach } from "./scene-overlay";
+import { description, livePositions } from "./program-robot";
+import type { Move } from "./program-text";
+import { freeName, jointsText, withPoint } from "./program-text";
+import "./teach-panel.css";
+
+const WAYS = ["joints", "pose"] as const;
+const MOVES = ["move_joints", "move_line"] as const;
+const DEGREE = Math.PI / 180;
+
+export function Teach() {
+  const [way, setWay] = useState<(typeof WAYS)[number]>("joints");
+  const [move, setMove] = useState<Move>("move_joints");
+  const [told, setTold] = useState<{ words: Words }>({ words: noWords });
+  const joints = description.value?.joints ?? [];
+  const live = livePositions.value;
+  const add = (positions: readonly number[]) => {
+    const text = draft.value?.text ?? "";
+    const name = freeName(text);
+    const made = withPoint(text, name, jointsText(joints, positions), move, cursorLine());
+    replace(made.text, made.line);
+    setTold({ words: () => p("added", { name }) });
+  };
+  const begin = () => live && teach(live);
+  const aimed = aim.value;
+  return (
+    <Panel
+      name="teach"
+      title={p("teach")}
+      end={
+        <>
+          <span class="dim small">{p("move_with")}</span>
+          <Choice label={p("move_with")} values={MOVES} chosen={move} text={(each) => p(each)} choose={setMove} />
+        </>
+      }
+    >
+      <div class="teach-row">
+        <button class="action" disabled={!live} onClick={() => live && add(live)}>
+          {p("add_live")}
+        </button>
+        {aimed ? (
+          <button class="action" onClick={() => teach(null)}>
+            {p("end_ghost")}
+          </button>
+        ) : (
+          <button class="action" disabled={!live} onClick={begin}>
+            {p("begin_ghost")}
+          </button>
+        )}
+      </div>
+      {aimed && (
+        <div class="aim">
+          <div class="aim-head">
+            <Choice label={p("set_by")} values={WAYS} chosen={way} text={(each) => p(`by_${each}`)} choose={setWay} />
+            <button class="action primary" disabled={aimProblem.value !== ""} onClick={() => add(aimed)}>
+              {p("add_ghost")}
+            </button>
+          </div>
+          {way === "joints" ? <Sliders positions={aimed} /> : <Pose />}
+          <NoticeLine
+            notice={aimProblem.value ? { kind: "refused", text: aimProblem.value } : null}
+            idle={p("moves_nothing")}
+          />
+        </div>
+      )}
+      <Points tell={(words) => setTold({ words })} />
+      <p class="notice" role="status">
+        {told.words() || "\u00a0"}
+      </p>
+    </Panel>
+  );
+}
+
+function Sliders({ positions }: { positions: readonly number[] }) {
+  const set = (index: number, value: number) => teach(positions.map((each, i) => (i === index ? value : each)));
+  return (
+    <div class="joint-rows">
+      {description.value?.joints.map((joint, index) => (
+        <div key={joint.name} class="joint-row">
+          <span class="joint-name">{joint.name}</span>
+          <div class="joint-range">
+            <JointTrack
+              label={p("ghost_joint", { joint: joint.name })}
+              lower={joint.lower}
+              upper={joint.upper}
+              position={livePositions.value?.[index]}
+              target={positions[index]}
+              stale={false}
+              enabled
+              step={jointUnit(joint).unit === "°" ? DEGREE : 0.001}
+              text={(value) => jointText(joint, value)}
+              preview={(value) => value !== undefined && set(index, value)}
+              send={(value) => set(index, value)}
+            />
+          </div>
+          <JointValue
+            joint={joint}
+            position={positions[index]}
+            stale={false}
+            enabled
+            preview={() => undefined}
+            send={(value) => set(index, Math.min(joint.upper, Math.max(joint.lower, value)))}
+            wrong={() => undefined}
+          />
+        </div>
+      ))}
+    </div>
+  );
+}

@@ -1,0 +1,73 @@
+// Alignment of a second recording with the first: at their starts, or at an event of each.
+
+import { eventText } from "../../i18n/event-text";
+import { momentText } from "../../i18n/recording-format";
+import { r } from "../../i18n/recordings";
+import type { RecordingName } from "../../ui/route";
+import { recordingsLink } from "../../ui/route";
+import type { Happened } from "./recorder-requests";
+
+const SHOWN_TEXT = 60;
+
+export function Beside(props: {
+  first: RecordingName;
+  name: string;
+  problem: string;
+  /** The second's time less the first's [s]. */
+  shift: number;
+  setShift: (shift: number) => void;
+  events: readonly Happened[];
+  secondEvents: readonly Happened[];
+  ghosted: boolean;
+}) {
+  const { name, shift, setShift, events, secondEvents } = props;
+  const align = (form: HTMLFormElement) => {
+    const at = (field: string, list: readonly Happened[]) => list[Number(new FormData(form).get(field))]?.at ?? 0;
+    setShift(at("second", secondEvents) - at("first", events));
+  };
+  const words =
+    Math.abs(shift) < 0.01
+      ? r("compared_same", { name })
+      : r("compared", { name, shift: Math.abs(shift).toFixed(2), sense: r(shift > 0 ? "earlier" : "later") });
+  return (
+    <form class="beside" onSubmit={(event) => event.preventDefault()} onChange={(event) => align(event.currentTarget)}>
+      <p>
+        <strong>{words}</strong> {props.ghosted && <span class="dim">{r("ghost_of", { name })}</span>}
+      </p>
+      {props.problem && (
+        <p class="state warning" role="alert">
+          <span class="shape warning" aria-hidden="true" />
+          {props.problem}
+        </p>
+      )}
+      <div class="beside-row">
+        {events.length > 0 && secondEvents.length > 0 && (
+          <>
+            <span class="dim">{r("align_event")}</span>
+            <Events name="first" label={r("align_choose")} events={events} />
+            <Events name="second" label={r("align_choose_second")} events={secondEvents} />
+          </>
+        )}
+        <button type="reset" class="action" disabled={shift === 0} onClick={() => setShift(0)}>
+          {r("align_starts")}
+        </button>
+        <a class="action" href={recordingsLink(props.first)}>
+          {r("compare_end")}
+        </a>
+      </div>
+    </form>
+  );
+}
+
+function Events({ name, label, events }: { name: string; label: string; events: readonly Happened[] }) {
+  return (
+    <select name={name} aria-label={label}>
+      <option value="">{`${label}…`}</option>
+      {events.map(({ at, event }, i) => (
+        <option key={i} value={String(i)}>
+          {`${momentText(at)} ${eventText(event).slice(0, SHOWN_TEXT)}`}
+        </option>
+      ))}
+    </select>
+  );
+}

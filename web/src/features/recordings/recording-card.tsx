@@ -1,0 +1,139 @@
+// One recording in the list: thumbnail, contents, losses and actions.
+
+import type { Signal } from "@preact/signals";
+import { useState } from "preact/hooks";
+import type { Recording } from "../../gen/robomesh_pb";
+import { count, fullTime } from "../../i18n/format";
+import {
+  dateText,
+  durationS,
+  fileUrl,
+  isEmpty,
+  lostText,
+  messagesOf,
+  momentText,
+  sizeText,
+  startedText,
+  startMs,
+} from "../../i18n/recording-format";
+import { r } from "../../i18n/recordings";
+import { Silhouette } from "../../ui/parts";
+import type { RecordingName } from "../../ui/route";
+import { recordingsLink } from "../../ui/route";
+import type { Row } from "./recordings-of-sites";
+
+export function Card(props: { row: Row; sited: boolean; first: Signal<(RecordingName & { name: string }) | null> }) {
+  const { recording, site } = props.row;
+  const { file, open } = recording;
+  const name = recording.name || file;
+  const empty = isEmpty(recording);
+  const mine = { site, file };
+  const lost = lostText(recording);
+  const first = props.first.value;
+  const isFirst = first?.site === site && first.file === file;
+  const compare = () => (props.first.value = isFirst ? null : { ...mine, name });
+  return (
+    <li class={`recording ${open ? "open" : ""}`} data-file={file}>
+      <Thumbnail site={site} recording={recording} />
+      <div class="recording-body">
+        <div class="recording-title">
+          <strong title={file}>{name}</strong>
+          {open && (
+            <span class="tag recording-now">
+              <span class="record-dot" aria-hidden="true" />
+              {r("recording_now")}
+            </span>
+          )}
+          {recording.part > 0 && <span class="tag">{r("part", { part: recording.part })}</span>}
+          {recording.recovered && (
+            <span class="tag" title={r("recovered_hint")}>
+              {r("recovered")}
+            </span>
+          )}
+        </div>
+        <p class="recording-facts dim">
+          <span>{props.sited ? `${site} / ${recording.robot}` : recording.robot}</span>
+          <time title={fullTime(startMs(recording))}>{dateText(startMs(recording))}</time>
+          <span class="figure">{momentText(durationS(recording), 0)}</span>
+          <span class="figure">{sizeText(recording.bytes)}</span>
+          <span class="figure">{r("messages", { count: count(messagesOf(recording)) })}</span>
+          <span>{startedText(recording)}</span>
+        </p>
+        {recording.cause && <p class="recording-words">{r("cause", { text: recording.cause })}</p>}
+        {(lost || recording.problem || empty) && (
+          <p class="recording-words state warning">
+            <span class="shape warning" aria-hidden="true" />
+            {[recording.problem || (empty && r("nothing_written")), lost].filter(Boolean).join("; ")}
+          </p>
+        )}
+      </div>
+      <div class="recording-does">
+        {!empty && (
+          <>
+            <a
+              class={`action ${first ? "" : "primary"}`}
+              href={recordingsLink(mine)}
+              aria-label={r("play_of", { name })}
+            >
+              {r("play")}
+            </a>
+            {first && !isFirst ? (
+              <a class="action primary" href={recordingsLink(first, mine)}>
+                {r("compare_with", { name: first.name })}
+              </a>
+            ) : (
+              <button class="action" aria-pressed={isFirst} title={r("compare_hint")} onClick={compare}>
+                {r("compare")}
+              </button>
+            )}
+          </>
+        )}
+        <Download {...mine} name={name} kind="MCAP" hint={r("download_mcap_hint")} />
+        {!empty && <Download {...mine} name={name} kind="CSV" hint={r("download_csv_hint")} rest="/values.csv" />}
+      </div>
+    </li>
+  );
+}
+
+export function Download(props: RecordingName & { name: string; kind: string; hint: string; rest?: string }) {
+  const { site, file, rest = "", kind } = props;
+  const saved = file.replace(/\.mcap$/, kind === "CSV" ? ".csv" : ".mcap");
+  return (
+    <a
+      class="action"
+      href={fileUrl(site, file, rest)}
+      download={saved}
+      title={props.hint}
+      aria-label={r("download_of", { name: props.name, kind })}
+    >
+      {kind}
+    </a>
+  );
+}
+
+/** A thumbnail from the file; a drawing if it has none. */
+function Thumbnail({ site, recording }: { site: string; recording: Recording }) {
+  const [none, setNone] = useState(false);
+  if (isEmpty(recording)) {
+    return (
+      <span class="thumbnail" aria-hidden="true">
+        <Silhouette label={r("no_thumbnail")} />
+      </span>
+    );
+  }
+  const has = !recording.open && recording.attachments.includes("thumbnail.jpg") && !none;
+  return (
+    <a class="thumbnail" href={recordingsLink({ site, file: recording.file })} tabIndex={-1} aria-hidden="true">
+      {has ? (
+        <img
+          src={fileUrl(site, recording.file, "/thumbnail.jpg")}
+          alt=""
+          loading="lazy"
+          onError={() => setNone(true)}
+        />
+      ) : (
+        <Silhouette label={r("no_thumbnail")} />
+      )}
+    </a>
+  );
+}

@@ -1,0 +1,191 @@
+// Every recording of every site, newest first.
+
+import { signal } from "@preact/signals";
+import { useEffect, useState } from "preact/hooks";
+import { sizeText, startMs } from "../../i18n/recording-format";
+import { r } from "../../i18n/recordings";
+import type { Notice } from "../../mesh/control";
+import { fleetRobots } from "../../mesh/known-robots";
+import { Action, askRecorder } from "../../mesh/recorder";
+import { NoticeLine } from "../../ui/parts";
+import type { RecordingName } from "../../ui/route";
+import { Card } from "./recording-card";
+import type { Row, SiteAnswer } from "./recordings-of-sites";
+import { useListed } from "./recordings-of-sites";
+import "./recording-list.css";
+
+const HOUR_MS = 3_600_000;
+const SPANS = { any_time: Infinity, today: 24 * HOUR_MS, week: 168 * HOUR_MS } as const;
+type Span = keyof typeof SPANS;
+const LOW_BYTES = 2_000_000_000;
+const FULL_BYTES = 2_000_000; // with less space nothing can be written
+const EVERY = "";
+
+const search = signal("");
+const robot = signal(EVERY);
+const span = signal<Span>("any_time");
+/** The first of two to compare; null: none is chosen. */
+const first = signal<(RecordingName & { name: string }) | null>(null);
+
+export function List() {
+  const { rows, sites, waiting } = useListed();
+  const robots = [...new Set(rows.map(({ recording }) => recording.robot))].sort();
+  const shown = rows.filter(isWanted);
+  useEffect(() => () => void (first.value = null), []);
+  return (
+    <div class="recordings">
+      <div class="fleet-head">
+        <h1>{r("recordings")}</h1>
+        <span class="dim">{countText(shown.length, rows.length)}</span>
+        <div class="recordings-filters">
+          <input
+            type="search"
+            placeholder={r("search_short")}
+            aria-label={r("search")}
+            value={search.value}
+            onInput={(event) => (search.value = event.currentTarget.value)}
+          />
+          <select
+            aria-label={r("robot")}
+            value={robot.value}
+            onChange={(event) => (robot.value = event.currentTarget.value)}
+          >
+            <option value={EVERY}>{r("every_robot")}</option>
+            {robots.map((name) => (
+              <option key={name}>{name}</option>
+            ))}
+          </select>
+          <select
+            aria-label={r("time")}
+            value={span.value}
+            onChange={(event) => (span.value = event.currentTarget.value as Span)}
+          >
+            {(Object.keys(SPANS) as Span[]).map((name) => (
+              <option key={name} value={name}>
+                {r(name)}
+              </option>
+            ))}
+          </select>
+        </div>
+      </div>
+      {[...sites].map(([site, answer]) => (
+        <SiteLine key={site} site={site} answer={answer} named={sites.size > 1} />
+      ))}
+      {first.value && (
+        <p class="compare-line" role="status">
+          <span>{r("compare_second", { name: first.value.name })}</span>
+          <button class="action" onClick={() => (first.value = null)}>
+            {r("cancel")}
+          </button>
+        </p>
+      )}
+      {waiting && rows.length === 0 ? (
+        <Skeleton />
+      ) : (
+        <ol class="recording-list" aria-label={r("recordings")}>
+          {shown.map((row) => (
+            <Card key={`${row.site}/${row.recording.file}`} row={row} sited={sites.size > 1} first={first} />
+          ))}
+        </ol>
+      )}
+      {!waiting && shown.length === 0 && <p class="empty">{r(rows.length ? "no_match" : "none")}</p>}
+    </div>
+  );
+}
+
+function isWanted({ recording }: Row): boolean {
+  const wanted = search.value.trim().toLowerCase();
+  const words = [recording.robot, recording.name, recording.file, recording.cause].join(" ").toLowerCase();
+  return (
+    (robot.value === EVERY || recording.robot === robot.value) &&
+    Date.now() - startMs(recording) <= SPANS[span.value] &&
+    words.includes(wanted)
+  );
+}
+
+function countText(shown: number, count: number): string {
+  if (shown < count) return r("shown_of", { shown, count });
+  return count === 1 ? r("count_one") : r("count", { count });
+}
+
+/** State of a site's recorder: free space, flight recorder, problems. */
+function SiteLine({ site, answer: { list, problem }, named }: { site: string; answer: SiteAnswer; named: boolean }) {
+  const [notice, setNotice] = useState<Notice | null>(null);
+  const [of, setOf] = useState("");
+  const robots = fleetRobots.value
+    .filter((key) => key.startsWith(`robomesh/${site}/`))
+    .map((key) => key.split("/")[2] ?? "");
+  const chosen = robots.includes(of) ? of : (robots[0] ?? "");
+  const save = async () => {
+    setNotice({ kind: "busy", text: r("saving", { robot: chosen }) });
+    try {
+      const { name } = await askRecorder(`robomesh/${site}/${chosen}`, Action.SAVE);
+      setNotice({ kind: "done", text: r("saved", { robot: chosen, name }) });
+    } catch (error) {
+      setNotice({
+        kind: "refused",
+        text: r("not_saved", { text: error instanceof Error ? error.message : String(error) }),
+      });
+    }
+  };
+  const free = list?.freeBytes ?? 0n;
+  const low = free < LOW_BYTES;
+  const full = free < FULL_BYTES;
+  return (
+    <div class="recorder-line">
+      {named && <strong>{site}</strong>}
+      {list && (
+        <>
+          <span class={full ? "state alarm" : low ? "state warning" : "dim"}>
+            {low && <span class={`shape ${full ? "alarm" : "warning"}`} aria-hidden="true" />}
+            {r(full ? "free_none" : low ? "free_low" : "free", { size: sizeText(free) })}
+          </span>
+          {list.flight && full ? (
+            <span class="state alarm">{r("flight_full")}</span>
+          ) : (
+            <span class="dim" title={r(list.flight ? "flight_on_hint" : "flight_off_hint")}>
+              {r(list.flight ? "flight_on" : "flight_off")}
+            </span>
+          )}
+          {list.flight && chosen && (
+            <span class="save-last">
+              {robots.length > 1 && (
+                <select aria-label={r("robot")} value={chosen} onChange={(event) => setOf(event.currentTarget.value)}>
+                  {robots.map((name) => (
+                    <option key={name}>{name}</option>
+                  ))}
+                </select>
+              )}
+              <button class="action" disabled={notice?.kind === "busy"} onClick={() => void save()}>
+                {robots.length > 1 ? r("save_last") : r("save_of", { robot: chosen })}
+              </button>
+            </span>
+          )}
+        </>
+      )}
+      {problem && (
+        <span class="state warning" role="status">
+          <span class="shape warning" aria-hidden="true" />
+          {problem}
+        </span>
+      )}
+      {notice && <NoticeLine notice={notice} />}
+    </div>
+  );
+}
+
+function Skeleton() {
+  return (
+    <ol class="recording-list" aria-hidden="true">
+      {[0, 1, 2].map((each) => (
+        <li key={each} class="recording">
+          <span class="thumbnail" />
+          <div class="recording-body">
+            <p class="skeleton">{"\u00a0"}</p>
+            <p class="skeleton">{"\u00a0"}</p>
+          </div>
+        </li>
+      ))}
+    </ol>
+  );
+}

@@ -1,0 +1,140 @@
+// The renderer's picture of the robot: a view of the description, or the camera of the 3-D view.
+
+import { useEffect, useRef, useState } from "preact/hooks";
+import type { Description, View } from "../../gen/robomesh_pb";
+import { clock } from "../../i18n/format";
+import { t, viewText } from "../../i18n/texts";
+import { viewsOf } from "../../scene/scene-view";
+import { isRemote, reachOf } from "../../scene/topic-selection";
+import { Age, Panel } from "../../ui/parts";
+import { useLive } from "../../video/live-video";
+import type { Wanted } from "../../video/requested-view";
+import { standing } from "../../video/requested-view";
+import { saveBlob, saveStill, useRecording } from "./export";
+
+/** Place of the video: next to the 3-D view, in its corner, or instead of it. */
+export type VideoPlace = "beside" | "inset" | "large";
+const PLACES: readonly VideoPlace[] = ["beside", "inset", "large"];
+
+/** The renderer's view of every robot, which follows the arm. */
+const CLOSE = "close";
+const OWN = "own";
+/** A small picture of few bits, for slow links. */
+const FAR = "far";
+const OWN_SIZE = { width: 960, height: 540, fps: 30 };
+const LOOK_EACH_MS = 300;
+
+export function Camera(props: {
+  robotKey: string;
+  description: Description | undefined;
+  place: VideoPlace;
+  setPlace: (place: VideoPlace) => void;
+  /** Camera of the 3-D view; null: there is none. */
+  sceneView: () => View | null;
+}) {
+  const { robotKey, description } = props;
+  const isSlow = reachOf(robotKey) === "slow";
+  const [chosen, setView] = useState("");
+  const view = chosen || (isSlow ? FAR : "front");
+  const names = [
+    ...new Set([...viewsOf(description).map((each) => each.name), CLOSE, ...(isRemote(robotKey) ? [FAR] : []), OWN]),
+  ];
+  const shown = names.includes(view) ? view : (names[0] ?? "free");
+  const own = useOwnView(shown === OWN, props.sceneView);
+  const wanted: Wanted | null = shown !== OWN ? standing(shown) : own && { of: OWN, view: own, ...OWN_SIZE };
+  const live = useLive(robotKey, wanted, viewText(shown));
+  const picture = useRef<HTMLDivElement>(null);
+  const [, site = "", robot = ""] = robotKey.split("/");
+  const name = `${robot}-${shown}`;
+  const recording = useRecording(`/video/${site}/${robot}/${shown}.mp4`, `${name}.mp4`);
+  const [problem, setProblem] = useState("");
+  const keep = () =>
+    saveStill(live.place.current).then(
+      (blob) => (setProblem(""), saveBlob(blob, `${name}.png`)),
+      (error: Error) => setProblem(t("record_failed", { text: error.message })),
+    );
+  const words = problem || recording.problem || live.problem || (live.video ? "" : t("camera_still"));
+  return (
+    <Panel
+      name="camera"
+      title={t("camera")}
+      end={
+        <>
+          {live.step > 0 && (
+            <span class="reduced" title={t("reduced_hint")}>
+              {t("reduced")}
+            </span>
+          )}
+          <Age stale={live.stale} age={live.age} />
+          <select aria-label={t("view")} value={shown} onChange={(event) => setView(event.currentTarget.value)}>
+            {names.map((each) => (
+              <option key={each} value={each}>
+                {viewText(each)}
+              </option>
+            ))}
+          </select>
+          <select
+            class="video-place"
+            aria-label={t("video_place")}
+            value={props.place}
+            onChange={(event) => props.setPlace(event.currentTarget.value as VideoPlace)}
+          >
+            {PLACES.map((each) => (
+              <option key={each} value={each}>
+                {t(`video_${each}`)}
+              </option>
+            ))}
+          </select>
+        </>
+      }
+    >
+      <div ref={picture} class={`picture ${live.stale ? "stale" : ""}`}>
+        {live.picture}
+        {!live.any && <p class="picture-word dim">{t("camera_waiting", { view: viewText(shown) })}</p>}
+        <div class="picture-tools">
+          <button class="quiet" disabled={!live.any} onClick={() => void keep()}>
+            {t("save_still")}
+          </button>
+          {shown !== OWN && (
+            <button class="quiet" aria-pressed={recording.on} disabled={!live.any} onClick={recording.toggle}>
+              {recording.on ? t("recording_video", { time: clock(recording.seconds) }) : t("record_video")}
+            </button>
+          )}
+          <button class="quiet" onClick={() => void toggleFull(picture.current)}>
+            {t("full_screen")}
+          </button>
+        </div>
+      </div>
+      {words && <p class="footnote dim">{words}</p>}
+    </Panel>
+  );
+}
+
+function toggleFull(element: HTMLElement | null): Promise<void> | undefined {
+  return document.fullscreenElement ? document.exitFullscreen() : element?.requestFullscreen();
+}
+
+/** Return the 3-D view's camera once it is at rest: each new camera is a new stream of the renderer. */
+function useOwnView(on: boolean, sceneView: () => View | null): View | null {
+  const [view, setView] = useState<View | null>(null);
+  const look = useRef(sceneView);
+  look.current = sceneView;
+  useEffect(() => {
+    if (!on) return;
+    let before = "";
+    let settled = "";
+    const timer = setInterval(() => {
+      const next = look.current();
+      const identity = next
+        ? [next.eye, next.target].flatMap((p) => [p?.x, p?.y, p?.z].map((v) => v?.toFixed(3))).join()
+        : "";
+      if (next && identity === before && identity !== settled) {
+        settled = identity;
+        setView(next);
+      }
+      before = identity;
+    }, LOOK_EACH_MS);
+    return () => clearInterval(timer);
+  }, [on]);
+  return view;
+}

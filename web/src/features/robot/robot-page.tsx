@@ -1,0 +1,211 @@
+// The page of one robot: picture, state and control.
+
+import { useEffect, useRef, useState } from "preact/hooks";
+import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
+import type { ControllerState, Description, Event, ProgramState } from "../../gen/robomesh_pb";
+import {
+  ControllerState_Check as Check,
+  ControllerStateSchema,
+  DescriptionSchema,
+  KinematicStateSchema,
+  ControllerState_Known as Known,
+  LeaseSchema,
+  ControllerState_Link as Link,
+  ControllerState_Mode as Mode,
+  ProgramStateSchema,
+} from "../../gen/robomesh_pb";
+import { reasonsText, reasonText } from "../../i18n/reasons";
+import type { TextName } from "../../i18n/texts";
+import { t } from "../../i18n/texts";
+import { seeLease } from "../../mesh/control";
+import type { RobotName } from "../../mesh/robot-name";
+import { disobeys, stateWord, stoppedByItself, stopText } from "../../mesh/robot-state";
+import type { Latest } from "../../mesh/topics";
+import { ageOf, isStale, jointsAge, useEvents, useTopic } from "../../mesh/topics";
+import type { Stage } from "../../scene/robot-scene";
+import { SceneView } from "../../scene/scene-view";
+import { jointsTopic } from "../../scene/topic-selection";
+import { ControlPanel } from "../../panels/control/control-panel";
+import { State, Tag } from "../../ui/parts";
+import { Alarm } from "../../panels/robot-alarm";
+import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
+import { programLink } from "../../ui/route";
+import { ToolPanel } from "../../panels/tool-panel";
+import type { VideoPlace } from "./camera-panel";
+import { Camera } from "./camera-panel";
+import { EventsPanel } from "./events-panel";
+import { History } from "./joint-history";
+import { JointsPanel } from "./joints-panel";
+import { ClockHint, FarChoice } from "./low-bandwidth";
+import { isShown, ProgramLine } from "./program-line";
+import { RecordButton, RecordPanel } from "./record-panel";
+
+/** The page of a live robot; a replay has its own page, without commands. */
+export function Robot({ site, robot }: RobotName) {
+  const key = `robomesh/${site}/${robot}`;
+  const controller = useTopic(ControllerStateSchema, `${key}/controller`);
+  const lease = useTopic(LeaseSchema, `${key}/lease`);
+  const description = useTopic(DescriptionSchema, `${key}/description`);
+  const joints = useTopic(JointStatesSchema, `${key}/${jointsTopic(key)}`);
+  const kinematics = useTopic(KinematicStateSchema, `${key}/kinematics`);
+  const program = useTopic(ProgramStateSchema, `${key}/program`);
+  const events = useEvents(key);
+  const age = jointsAge(joints, controller);
+  const stale = isStale("joints", age);
+  const lost = useLostAt(stale, joints !== undefined);
+  const holder = lease && !isStale("lease", ageOf(lease)) ? lease.message.holder : null;
+  useEffect(() => {
+    if (lease) seeLease(key, lease.message);
+  }, [key, lease]);
+  const [videoPlace, setVideoPlace] = useState<VideoPlace>("beside");
+  const stage = useRef<Stage | null>(null);
+  const state = controller?.message;
+  const positions = new Map(joints?.message.joints.map((joint) => [joint.name, joint.position]));
+  const motion = {
+    running: lease?.message.motion === true,
+    stopped: state?.stop !== undefined || stoppedByItself(state),
+    positions: (description?.message.joints ?? []).map((joint) => positions.get(joint.name)),
+  };
+  if (useRobotNotFound(key, Boolean(controller ?? description ?? lease)))
+    return <RobotNotFound site={site} robot={robot} />;
+  return (
+    <>
+      <Alarm state={state} events={events} />
+      <div class={`robot video-${videoPlace}`}>
+        <Headline
+          site={site}
+          name={robot}
+          controller={controller}
+          description={description?.message}
+          program={program}
+          events={events}
+        />
+        <SceneView
+          robotKey={key}
+          description={description?.message}
+          stale={stale}
+          age={joints ? age : undefined}
+          lostAt={lost}
+          staged={(made) => (stage.current = made)}
+        />
+        <div class="side">
+          <ControlPanel
+            robotKey={key}
+            controller={controller}
+            holder={holder}
+            lease={lease?.message}
+            description={description?.message}
+            motion={motion}
+            disobeyed={disobeys(state, events)}
+          />
+          <JointsPanel
+            robotKey={key}
+            description={description?.message}
+            joints={joints?.message}
+            controller={state}
+            motion={motion}
+            stale={stale}
+            age={joints ? age : undefined}
+          />
+          <ToolPanel robotKey={key} kinematics={kinematics} description={description?.message} />
+          <EventsPanel robotKey={key} events={events} controller={controller} />
+        </div>
+        <Camera
+          robotKey={key}
+          description={description?.message}
+          place={videoPlace}
+          setPlace={setVideoPlace}
+          sceneView={() => stage.current?.view() ?? null}
+        />
+        <History robotKey={key} description={description?.message} />
+      </div>
+    </>
+  );
+}
+
+/** Return the time of day when live states ended; null: they are live, or none has arrived yet. */
+function useLostAt(stale: boolean, any: boolean): number | null {
+  const [at, setAt] = useState<number | null>(null);
+  useEffect(() => setAt(stale && any ? Date.now() : null), [stale, any]);
+  return at;
+}
+
+const CHECKS: Partial<Record<Check, TextName>> = {
+  [Check.OFF]: "check_off",
+  [Check.WARN]: "check_warn",
+  [Check.REQUIRE]: "check_require",
+};
+
+function Headline(props: {
+  site: string;
+  name: string;
+  controller: Latest<ControllerState> | undefined;
+  description: Description | undefined;
+  program: Latest<ProgramState> | undefined;
+  events: readonly Event[];
+}) {
+  const { controller, description, program, events } = props;
+  const message = controller?.message;
+  const state = stateWord(controller, events);
+  const facts: string[] = [];
+  // Do not show stale state as current.
+  if (message && !isStale("controller", ageOf(controller))) {
+    facts.push(
+      t(message.mode === Mode.LOCAL ? "mode_local" : message.mode === Mode.REMOTE ? "mode_remote" : "mode_unknown"),
+    );
+    facts.push(t(message.homed === Known.YES ? "homed" : message.homed === Known.NO ? "not_homed" : "homed_unknown"));
+    const check = CHECKS[message.check];
+    if (check) facts.push(t(check));
+    if (message.readOnly) facts.push(t("read_only"));
+    if (message.legacyClients?.attached) facts.push(t("legacy_some", { count: message.legacyClients.attached }));
+  }
+  const flooding = message?.health?.flooding === true;
+  const down = message?.link === Link.UP ? undefined : message;
+  const problem = message?.fault || down?.linkText;
+  const trouble = message?.fault || reasonsText(down?.linkReasons, down?.linkText);
+  return (
+    <div class="headline">
+      <h1>{props.name}</h1>
+      <State state={state} />
+      <span class="facts dim">{facts.join(" · ")}</span>
+      <a class="page-link" href={programLink(props.site, props.name)}>
+        {t("program")}
+      </a>
+      <RecordButton robotKey={`robomesh/${props.site}/${props.name}`} />
+      {description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
+      <FarChoice robotKey={`robomesh/${props.site}/${props.name}`} />
+      <ClockHint site={props.site} />
+      {trouble && (
+        <span class={`trouble ${state.level}`} lang={trouble === problem ? "en" : undefined}>
+          {trouble}
+        </span>
+      )}
+      {flooding && (
+        <span class="trouble warning">
+          <span class="shape warning" aria-hidden="true" />
+          {t("flooding")}
+        </span>
+      )}
+      {message?.stop && <span class="trouble">{stopText(message, disobeys(message, events))}</span>}
+      {message?.checkText && (
+        <span class="trouble warning">
+          <span class="shape warning" aria-hidden="true" />
+          {t(message.check === Check.REQUIRE ? "check_refuses" : "check_cannot", {
+            text: message.checkStarting ? t("check_starting") : reasonText(message.checkReason, message.checkText),
+          })}
+        </span>
+      )}
+      {/* Instead of less important facts, so that nothing below moves. */}
+      {isShown(program, events) ? (
+        <ProgramLine latest={program} />
+      ) : (
+        description?.provenance && (
+          <span class="provenance dim" lang="en" title={description.provenance}>
+            {description.title}: {description.provenance}
+          </span>
+        )
+      )}
+      <RecordPanel robotKey={`robomesh/${props.site}/${props.name}`} description={description} />
+    </div>
+  );
+}
