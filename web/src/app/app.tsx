@@ -16,7 +16,7 @@ import { held, release } from "../mesh/control";
 import { fleetRobots } from "../mesh/known-robots";
 import { canBe, isReplay } from "../mesh/robot-name";
 import { stop, stopNotice } from "../mesh/stop";
-import { NoticeLine } from "../ui/parts";
+import { NoticeLine } from "../ui/notice-line";
 import { RobotNotFound } from "../panels/robot-not-found";
 import { type Route, robotLink, robotOf, route } from "../ui/route";
 import { switchTheme, theme } from "../ui/theme";

@@ -7,7 +7,7 @@ import { fixed, toDegrees } from "../i18n/format";
 import { t } from "../i18n/texts";
 import { distanceText, ownLevel, pairText, useClearanceLevel } from "../mesh/clearance";
 import type { Level } from "../mesh/robot-state";
-import { Unit } from "../ui/parts";
+import { Unit } from "../ui/unit";
 
 // Values at which a bar is full.
 const FULL_CLEARANCE_M = 0.3;

@@ -6,7 +6,9 @@ import { t } from "../i18n/texts";
 import type { Latest } from "../mesh/topics";
 import { ageOf, isStale } from "../mesh/topics";
 import { JointLimits } from "./joint-limits-panel";
-import { Age, Panel, Unit } from "../ui/parts";
+import { Panel } from "../ui/panel";
+import { Age } from "../ui/state";
+import { Unit } from "../ui/unit";
 
 export function ToolPanel(props: {
   robotKey: string;

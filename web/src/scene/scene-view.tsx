@@ -12,7 +12,7 @@ import { distanceText, useClearanceLevel } from "../mesh/clearance";
 import { watch } from "../mesh/connection";
 import type { OfMoment } from "../mesh/replay-moment";
 import { ageOf, isStale, useTopic } from "../mesh/topics";
-import { Choice, Toggle } from "../ui/parts";
+import { Choice, Toggle } from "../ui/choice";
 import { theme } from "../ui/theme";
 import { forwardOf } from "./forward-kinematics";
 import { useFramesAge } from "./frames-age";

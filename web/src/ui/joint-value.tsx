@@ -4,7 +4,7 @@ import { useState } from "preact/hooks";
 import type { Description_Joint } from "../gen/robomesh_pb";
 import { DASH, fixed, jointUnit } from "../i18n/format";
 import { t } from "../i18n/texts";
-import { Unit } from "./parts";
+import { Unit } from "./unit";
 
 export function JointValue(props: {
   joint: Description_Joint;

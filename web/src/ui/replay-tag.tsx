@@ -3,7 +3,7 @@
 import { fullTime } from "../i18n/format";
 import { dateText } from "../i18n/recording-format";
 import { r } from "../i18n/recordings";
-import { Tag } from "./parts";
+import { Tag } from "./tag";
 
 /** The recorded robot, and the time of the recording. */
 export function ReplayTag({ robot, start }: { robot: string; start: number }) {

@@ -1,7 +1,7 @@
 // The chosen part: a joint's motion, a link's appearance, the tool's pose.
 
 import { d } from "../../i18n/define";
-import { Choice } from "../../ui/parts";
+import { Choice } from "../../ui/choice";
 import { fileName } from "./kinematic-chain";
 import type { Body, Description, Joint, Range } from "./description";
 import { angleUnit, jointUnit } from "./description";

@@ -2,7 +2,7 @@
 
 import { Matrix4 } from "three";
 import { d } from "../../i18n/define";
-import { Unit } from "../../ui/parts";
+import { Unit } from "../../ui/unit";
 import { checked, checkFailed, checking } from "./checks";
 import type { Joint, Units } from "./description";
 import { jointUnit } from "./description";

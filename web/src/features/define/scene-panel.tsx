@@ -7,7 +7,7 @@ import { d } from "../../i18n/define";
 import { t, viewText } from "../../i18n/texts";
 import { linkPlacements } from "../../scene/forward-kinematics";
 import type { Look } from "../../scene/viewpoint";
-import { Choice, Toggle } from "../../ui/parts";
+import { Choice, Toggle } from "../../ui/choice";
 import { theme } from "../../ui/theme";
 import type { Pose } from "./description";
 import { bodies, linkNames } from "./description";

@@ -4,7 +4,7 @@ import { useState } from "preact/hooks";
 import { e } from "../../i18n/events";
 import type { Alarm } from "../../mesh/alarms";
 import { Reason } from "../../ui/reason-form";
-import { Choice } from "../../ui/parts";
+import { Choice } from "../../ui/choice";
 
 const TIMES = { minutes_15: 900, hour: 3600, hours_8: 28_800, day: 86_400 } as const;
 type Time = keyof typeof TIMES;

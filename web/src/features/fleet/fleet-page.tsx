@@ -14,7 +14,7 @@ import { stateWord } from "../../mesh/robot-state";
 import { isClockOff, isMeshStale, isSilent, seenAge, useMesh } from "../../mesh/site-health";
 import { ageOf, now } from "../../mesh/topics";
 import { Services } from "../../panels/alive-services";
-import { State } from "../../ui/parts";
+import { State } from "../../ui/state";
 import { Replays } from "./replays";
 import { Tile } from "./tile";
 import "./fleet.css";

@@ -5,7 +5,7 @@ import { timeOfDay } from "../../i18n/format";
 import { p } from "../../i18n/program";
 import { reasonText } from "../../i18n/reasons";
 import { t } from "../../i18n/texts";
-import { Panel } from "../../ui/parts";
+import { Panel } from "../../ui/panel";
 import { checked, checkFailed, checking, checkNow, errorsOf, isCurrent } from "./program-check";
 import { draft, goToLine } from "./draft";
 import type { Group } from "./violation-groups";

@@ -3,7 +3,7 @@
 import { Component } from "preact";
 import { useLayoutEffect, useRef } from "preact/hooks";
 import { p } from "../../i18n/program";
-import { Panel } from "../../ui/parts";
+import { Panel } from "../../ui/panel";
 import { checked, isCurrent } from "./program-check";
 import { download, draft, insert, keepingFailed, LINE_PX, redo, setField, typed, undo } from "./draft";
 import { lineNow } from "./checked-motion";

@@ -3,7 +3,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { DASH, fixed } from "../../i18n/format";
 import { p } from "../../i18n/program";
-import { Choice } from "../../ui/parts";
+import { Choice } from "../../ui/choice";
 import { aimAtPose, aimPose, poseNumbers, poseOf, settle } from "./taught-pose";
 import { gizmoMode } from "./teach-gizmo";
 

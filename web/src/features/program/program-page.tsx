@@ -14,7 +14,8 @@ import { ageOf, isStale, jointsAge, useEvents, useTopic } from "../../mesh/topic
 import type { Stage } from "../../scene/robot-scene";
 import { SceneView } from "../../scene/scene-view";
 import { ControlPanel } from "../../panels/control/control-panel";
-import { State, Tag } from "../../ui/parts";
+import { State } from "../../ui/state";
+import { Tag } from "../../ui/tag";
 import { Alarm } from "../../panels/robot-alarm";
 import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
 import { programLink, robotLink } from "../../ui/route";

@@ -2,7 +2,7 @@
 
 import { useEffect } from "preact/hooks";
 import { p } from "../../i18n/program";
-import { Panel } from "../../ui/parts";
+import { Panel } from "../../ui/panel";
 import { checked } from "./program-check";
 import { Curves } from "./motion-curves";
 import { clearanceNow, duration, lineNow, moment, path, playing } from "./checked-motion";

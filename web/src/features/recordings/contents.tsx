@@ -5,7 +5,7 @@ import type { Recording } from "../../gen/robomesh_pb";
 import { count } from "../../i18n/format";
 import { lostText, sizeText, startedText, topicOf } from "../../i18n/recording-format";
 import { r, viewName } from "../../i18n/recordings";
-import { Panel } from "../../ui/parts";
+import { Panel } from "../../ui/panel";
 import type { RecordingName } from "../../ui/route";
 import { Download } from "./recording-card";
 import "./contents.css";

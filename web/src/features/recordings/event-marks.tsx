@@ -10,7 +10,7 @@ import { momentText } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
 import { t } from "../../i18n/texts";
 import { SEVERITIES } from "../../ui/event-mark";
-import { Panel } from "../../ui/parts";
+import { Panel } from "../../ui/panel";
 import type { Asked, Happened } from "./recorder-requests";
 import "./contents.css";
 

@@ -9,7 +9,7 @@ import { r } from "../../i18n/recordings";
 import { held } from "../../mesh/control";
 import type { Replay } from "../../mesh/replay";
 import { SPEEDS } from "../../mesh/replay";
-import { Toggle } from "../../ui/parts";
+import { Toggle } from "../../ui/choice";
 import type { Happened } from "./recorder-requests";
 import { EventMarks } from "./event-marks";
 import "./playback-controls.css";

@@ -17,7 +17,7 @@ import {
   startMs,
 } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
-import { Silhouette } from "../../ui/parts";
+import { Silhouette } from "../../ui/silhouette";
 import type { RecordingName } from "../../ui/route";
 import { recordingsLink } from "../../ui/route";
 import type { Row } from "./recordings-of-sites";

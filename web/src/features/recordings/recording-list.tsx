@@ -7,7 +7,7 @@ import { r } from "../../i18n/recordings";
 import type { Notice } from "../../mesh/control";
 import { fleetRobots } from "../../mesh/known-robots";
 import { Action, askRecorder } from "../../mesh/recorder";
-import { NoticeLine } from "../../ui/parts";
+import { NoticeLine } from "../../ui/notice-line";
 import type { RecordingName } from "../../ui/route";
 import { Card } from "./recording-card";
 import type { Row, SiteAnswer } from "./recordings-of-sites";

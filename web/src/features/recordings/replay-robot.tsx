@@ -11,7 +11,7 @@ import { useOfMoment } from "../../mesh/replay-moment";
 import type { RobotName } from "../../mesh/robot-name";
 import { ageOf, isStale, useTopic } from "../../mesh/topics";
 import { SceneView } from "../../scene/scene-view";
-import { Panel } from "../../ui/parts";
+import { Panel } from "../../ui/panel";
 import { ReplayTag } from "../../ui/replay-tag";
 import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
 import { recordingsLink } from "../../ui/route";

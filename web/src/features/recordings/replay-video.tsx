@@ -8,7 +8,7 @@ import type { Replay } from "../../mesh/replay";
 import type { OfMoment } from "../../mesh/replay-moment";
 import { useOfMoment } from "../../mesh/replay-moment";
 import { viewsOf } from "../../scene/scene-view";
-import { Panel } from "../../ui/parts";
+import { Panel } from "../../ui/panel";
 import { useLive } from "../../video/live-video";
 import { standing } from "../../video/requested-view";
 

@@ -9,7 +9,8 @@ import { t } from "../../i18n/texts";
 import type { Latest } from "../../mesh/topics";
 import { useAudit } from "../../mesh/topics";
 import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
-import { Choice, Panel } from "../../ui/parts";
+import { Choice } from "../../ui/choice";
+import { Panel } from "../../ui/panel";
 import { LinkFacts } from "./link-facts";
 
 const SHOWN = ["events", "requests", "link"] as const;

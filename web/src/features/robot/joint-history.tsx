@@ -11,7 +11,8 @@ import { t } from "../../i18n/texts";
 import { ageClock } from "../../mesh/age-clock";
 import { watch } from "../../mesh/connection";
 import { jointsTopic } from "../../scene/topic-selection";
-import { Panel, Toggle } from "../../ui/parts";
+import { Toggle } from "../../ui/choice";
+import { Panel } from "../../ui/panel";
 import { theme } from "../../ui/theme";
 
 const SPAN_S = 60;

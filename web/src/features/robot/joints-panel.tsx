@@ -17,7 +17,10 @@ import { whyNoMove } from "../../mesh/robot-state";
 import { ghostAt } from "../../scene/ghost";
 import { JointTrack } from "../../ui/joint-track";
 import { JointValue } from "../../ui/joint-value";
-import { Age, Choice, NoticeLine, Panel } from "../../ui/parts";
+import { Choice } from "../../ui/choice";
+import { NoticeLine } from "../../ui/notice-line";
+import { Panel } from "../../ui/panel";
+import { Age } from "../../ui/state";
 
 const REACHED = 0.002; // rad or m: half of what the page displays
 const ABANDONED_MS = 1500;

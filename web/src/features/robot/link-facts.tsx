@@ -6,7 +6,7 @@ import type { TextName } from "../../i18n/texts";
 import { t } from "../../i18n/texts";
 import type { Latest } from "../../mesh/topics";
 import { ageOf, isStale } from "../../mesh/topics";
-import { Unit } from "../../ui/parts";
+import { Unit } from "../../ui/unit";
 
 const HASH_SHOWN = 4; // bytes of the log's last hash: enough to compare by eye
 

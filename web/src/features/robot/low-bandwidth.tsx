@@ -3,7 +3,7 @@
 import { t } from "../../i18n/texts";
 import { isClockOff, useMesh } from "../../mesh/site-health";
 import { askReach, isRemote, REACHES, reachOf } from "../../scene/topic-selection";
-import { Choice } from "../../ui/parts";
+import { Choice } from "../../ui/choice";
 
 export function FarChoice({ robotKey }: { robotKey: string }) {
   if (!isRemote(robotKey)) return null;

@@ -1,7 +1,7 @@
 // The product and its licence.
 
 import { s } from "../../i18n/settings";
-import { Panel } from "../../ui/parts";
+import { Panel } from "../../ui/panel";
 
 export function About() {
   return (

@@ -3,7 +3,8 @@
 import { s } from "../../i18n/settings";
 import { language, switchLanguage } from "../../i18n/texts";
 import { setSound, sound } from "../../panels/alarm-sound";
-import { Choice, Panel } from "../../ui/parts";
+import { Choice } from "../../ui/choice";
+import { Panel } from "../../ui/panel";
 import { switchTheme, theme } from "../../ui/theme";
 import { Facts } from "./facts";
 

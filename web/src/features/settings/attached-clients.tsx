@@ -4,7 +4,7 @@ import { s } from "../../i18n/settings";
 import { presence } from "../../mesh/connection";
 import { OPERATOR } from "../../mesh/known-robots";
 import { robotNow } from "../../mesh/robot-snapshots";
-import { Panel } from "../../ui/parts";
+import { Panel } from "../../ui/panel";
 import { robotLink } from "../../ui/route";
 
 const WATCHERS = new Set(["monitor", "console", "foxglove", "ros2"]);

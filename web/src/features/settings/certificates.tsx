@@ -3,7 +3,7 @@
 import { ageText } from "../../i18n/format";
 import { s } from "../../i18n/settings";
 import { useMesh } from "../../mesh/site-health";
-import { Panel } from "../../ui/parts";
+import { Panel } from "../../ui/panel";
 import { Marked } from "./this-console";
 
 /** The name in a process's health message: see robomesh/session.py. */

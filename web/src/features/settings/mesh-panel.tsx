@@ -8,7 +8,7 @@ import { isMeshStale, useMesh } from "../../mesh/site-health";
 import type { Latest } from "../../mesh/topics";
 import { ageOf } from "../../mesh/topics";
 import { Services } from "../../panels/alive-services";
-import { Panel } from "../../ui/parts";
+import { Panel } from "../../ui/panel";
 import { Hops } from "./delay-chart";
 import { COLUMNS, SeenRow } from "./process-row";
 

@@ -6,7 +6,8 @@ import { s } from "../../i18n/settings";
 import { post } from "../../mesh/account";
 import type { Notice } from "../../mesh/control";
 import { refusalText } from "../../panels/change-password";
-import { NoticeLine, Panel } from "../../ui/parts";
+import { NoticeLine } from "../../ui/notice-line";
+import { Panel } from "../../ui/panel";
 
 const LOOK_EACH_MS = 5000;
 

@@ -4,7 +4,7 @@ import type { ToPage_Hello as Hello } from "../../gen/robomesh_pb";
 import { DASH } from "../../i18n/format";
 import { s } from "../../i18n/settings";
 import { lostAt } from "../../mesh/connection";
-import { Panel } from "../../ui/parts";
+import { Panel } from "../../ui/panel";
 import { Facts } from "./facts";
 
 const LOOPBACK = /^(localhost|127\.\d+\.\d+\.\d+|\[::1\])$/;

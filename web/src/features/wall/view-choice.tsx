@@ -2,7 +2,7 @@
 
 import { viewText } from "../../i18n/texts";
 import { w } from "../../i18n/wall";
-import { Toggle } from "../../ui/parts";
+import { Toggle } from "../../ui/choice";
 import type { ViewName } from "../../ui/route";
 
 export interface RobotViews {

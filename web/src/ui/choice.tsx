@@ -1,0 +1,30 @@
+// Buttons that choose one of several values, or switch one thing on and off.
+
+import type { ComponentChildren } from "preact";
+
+/** Buttons, one of which is chosen. */
+export function Choice<Value extends string>(props: {
+  label: string;
+  values: readonly Value[];
+  chosen: Value;
+  text: (value: Value) => string;
+  choose: (value: Value) => void;
+}) {
+  return (
+    <div class="choice" role="group" aria-label={props.label}>
+      {props.values.map((value) => (
+        <button key={value} aria-pressed={value === props.chosen} onClick={() => props.choose(value)}>
+          {props.text(value)}
+        </button>
+      ))}
+    </div>
+  );
+}
+
+export function Toggle(props: { on: boolean; set: (on: boolean) => void; children: ComponentChildren }) {
+  return (
+    <button class="toggle" aria-pressed={props.on} onClick={() => props.set(!props.on)}>
+      {props.children}
+    </button>
+  );
+}
