@@ -25,7 +25,7 @@ import { Outcomes, Toolbar } from "./toolbar";
 import { ViewsTab } from "./views-tab";
 import type { Tab } from "./selection";
 import { TABS, tab } from "./selection";
-import "./define.css";
+import "./styles";
 
 const draggedOver = signal(false);
 
