@@ -53,7 +53,7 @@ function NotLoaded() {
 
 // The robot's page needs three.js; the fleet's text must not wait for it.
 const Robot = onDemand(async () => (await import("../features/robot/robot-page")).Robot);
-const ReplayRobot = onDemand(async () => (await import("../features/recordings/replay-robot")).ReplayRobot);
+const ReplayRobot = onDemand(async () => (await import("../features/recordings/replay-robot-page")).ReplayRobot);
 const Program = onDemand(async () => (await import("../features/program/program-page")).Program);
 const Define = onDemand(async () => (await import("../features/define/define-page")).Define);
 const Wall = onDemand(async () => (await import("../features/wall/wall-page")).Wall);

@@ -9,17 +9,17 @@ import { CollisionsTab } from "./collisions-tab";
 import { Details } from "./part-details";
 import { DhTable } from "./dh-table";
 import { draft, keptFiles, leave, redo, undo } from "./draft";
-import { doneWithout, droppedFiles, goOnWithout, takeFiles, waitingUrdf } from "./dropped-files";
-import { FileButton } from "./file-button";
+import { droppedFiles, takeFiles } from "./dropped-files";
 import { keepOnly } from "./file-cache";
-import { ConstraintsTab, FramesTab } from "./lists-tabs";
+import { ConstraintsTab, FramesTab } from "./frames-and-constraints-tabs";
 import { loading, open } from "./open-robot";
 import { listRobots, save } from "./save-and-start";
 import { PositionsPanel } from "./positions-panel";
 import { ProblemsPanel } from "./problems-panel";
 import { RobotTab } from "./robot-tab";
 import { ScenePanel } from "./scene-panel";
-import { keepReading, missingFiles } from "./mesh-files";
+import { keepReading } from "./mesh-files";
+import { MissingFiles } from "./missing-files";
 import { Start } from "./new-robot";
 import { Outcomes, Toolbar } from "./toolbar";
 import { ViewsTab } from "./views-tab";
@@ -94,40 +94,6 @@ function Workbench() {
         </div>
       </section>
     </>
-  );
-}
-
-/** Missing files that others refer to, until they are added or skipped. */
-function MissingFiles() {
-  const waiting = waitingUrdf.value;
-  const missing = waiting
-    ? waiting.missing.map((name) => ({ of: waiting.file, name, path: name }))
-    : missingFiles().filter(({ path }) => !doneWithout.value.has(path));
-  if (missing.length === 0) return null;
-  const goOn = () => {
-    if (waiting) void goOnWithout();
-    else doneWithout.value = new Set([...doneWithout.value, ...missing.map(({ path }) => path)]);
-  };
-  return (
-    <section class="panel missing" aria-label={d("missing_title")} role="alert">
-      <div>
-        <h2>{d("missing_title")}</h2>
-        <ul>
-          {missing.map(({ of, name }) => (
-            <li key={`${of} ${name}`}>
-              <span class="dim">{d("missing_for", { file: of })}</span> <strong>{name}</strong>
-            </li>
-          ))}
-        </ul>
-        <p class="dim small">{d("missing_words")}</p>
-      </div>
-      <div class="missing-actions">
-        <FileButton label={d("choose_files")} take={(files) => void takeFiles(files)} />
-        <button class="quiet" onClick={goOn}>
-          {d("go_on_without")}
-        </button>
-      </div>
-    </section>
   );
 }
 

@@ -1,0 +1,39 @@
+// Missing files that other files refer to, until they are added or skipped.
+
+import { d } from "../../i18n/define";
+import { doneWithout, goOnWithout, takeFiles, waitingUrdf } from "./dropped-files";
+import { FileButton } from "./file-button";
+import { missingFiles } from "./mesh-files";
+
+export function MissingFiles() {
+  const waiting = waitingUrdf.value;
+  const missing = waiting
+    ? waiting.missing.map((name) => ({ of: waiting.file, name, path: name }))
+    : missingFiles().filter(({ path }) => !doneWithout.value.has(path));
+  if (missing.length === 0) return null;
+  const goOn = () => {
+    if (waiting) void goOnWithout();
+    else doneWithout.value = new Set([...doneWithout.value, ...missing.map(({ path }) => path)]);
+  };
+  return (
+    <section class="panel missing" aria-label={d("missing_title")} role="alert">
+      <div>
+        <h2>{d("missing_title")}</h2>
+        <ul>
+          {missing.map(({ of, name }) => (
+            <li key={`${of} ${name}`}>
+              <span class="dim">{d("missing_for", { file: of })}</span> <strong>{name}</strong>
+            </li>
+          ))}
+        </ul>
+        <p class="dim small">{d("missing_words")}</p>
+      </div>
+      <div class="missing-actions">
+        <FileButton label={d("choose_files")} take={(files) => void takeFiles(files)} />
+        <button class="quiet" onClick={goOn}>
+          {d("go_on_without")}
+        </button>
+      </div>
+    </section>
+  );
+}
