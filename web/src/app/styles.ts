@@ -12,6 +12,7 @@ import "../ui/panel.css";
 import "./stop.css";
 import "../features/fleet/fleet-page.css";
 import "../features/fleet/tile.css";
+import "../ui/silhouette.css";
 import "../features/robot/robot-page.css";
 import "../scene/scene-view.css";
 import "../video/picture.css";

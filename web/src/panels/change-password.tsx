@@ -5,6 +5,7 @@ import { a, refusedText } from "../i18n/account";
 import type { Me } from "../mesh/account";
 import { AccountError, me, post } from "../mesh/account";
 import { PasswordField } from "../ui/password-field";
+import "./account-form.css";
 
 export function ChangePassword({ close }: { close: () => void }) {
   const [old, setOld] = useState("");

@@ -2,6 +2,7 @@
 
 import { useId, useState } from "preact/hooks";
 import { a } from "../i18n/account";
+import "./password-field.css";
 
 export function PasswordField(props: {
   label: string;

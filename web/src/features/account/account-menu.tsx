@@ -5,7 +5,7 @@ import { a, roleText } from "../../i18n/account";
 import { me, onlyWatches, rests, signOut } from "../../mesh/account";
 import { hello } from "../../mesh/connection";
 import { ChangePassword } from "../../panels/change-password";
-import "../../ui/account.css";
+import "./account-menu.css";
 
 export function AccountMenu() {
   const menu = useRef<HTMLDetailsElement>(null);

@@ -6,7 +6,8 @@ import { switchLanguage, t } from "../../i18n/texts";
 import { AccountError, endedBy, me, signIn } from "../../mesh/account";
 import { PasswordField } from "../../ui/password-field";
 import { switchTheme, theme } from "../../ui/theme";
-import "../../ui/account.css";
+import "../../panels/account-form.css";
+import "./sign-in.css";
 
 export function SignIn() {
   const [name, setName] = useState("");

@@ -5,6 +5,7 @@ import { e } from "../../i18n/events";
 import { anyWatch, counts, followAlarms, silentSites } from "../../mesh/alarms";
 import { followSound } from "../../panels/alarm-sound";
 import { PriorityMark, priorityWord } from "../../ui/priority-mark";
+import "./alarm-badge.css";
 
 export function AlarmBadge() {
   useEffect(() => {

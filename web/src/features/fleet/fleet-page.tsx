@@ -17,7 +17,6 @@ import { Services } from "../../panels/alive-services";
 import { State } from "../../ui/state";
 import { Replays } from "./replays";
 import { Tile } from "./tile";
-import "./fleet.css";
 
 const STATES = ["any_state", "needs_look", "faulty", "with_alarm"] as const;
 const ORDERS = ["by_name", "by_urgency"] as const;

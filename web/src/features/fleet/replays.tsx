@@ -9,6 +9,7 @@ import { ageOf, isStale, useTopics } from "../../mesh/topics";
 import { ReplayTag } from "../../ui/replay-tag";
 import { recordingsLink, robotLink } from "../../ui/route";
 import "../../ui/replay.css";
+import "./replays.css";
 
 export function Replays() {
   const states = useTopics(ReplayStateSchema, "robomesh/*/*/replay");

@@ -6,7 +6,7 @@ import { me, onlyWatches, rests, unlock } from "../../mesh/account";
 import { hello } from "../../mesh/connection";
 import { refusalText } from "../change-password";
 import { PasswordField } from "../../ui/password-field";
-import "../../ui/account.css";
+import "../account-form.css";
 
 /** Return whether the signed-in account may not request control now. */
 export function mayNotCommand(): boolean {
