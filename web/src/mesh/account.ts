@@ -30,8 +30,8 @@ export class AccountError extends Error {
   }
 }
 
-const ACTIVE_EACH_MS = 60_000;
-const ANSWERED_WITHIN_MS = 10_000; // without it a page on a dead connection would wait and not reconnect
+const ACTIVE_INTERVAL_MS = 60_000;
+const ANSWER_TIMEOUT_MS = 10_000; // without it a page on a dead connection would wait and not reconnect
 
 /** Null: not known yet. */
 export const me = signal<Me | null>(null);
@@ -47,7 +47,7 @@ let connects: () => void = () => undefined;
 /** Ask the console which account is signed in; null: no answer. */
 export async function whoAmI(): Promise<Me | null> {
   try {
-    const answer = await fetch("/account/me", { cache: "no-store", signal: AbortSignal.timeout(ANSWERED_WITHIN_MS) });
+    const answer = await fetch("/account/me", { cache: "no-store", signal: AbortSignal.timeout(ANSWER_TIMEOUT_MS) });
     if (!answer.ok) return null;
     const identity = (await answer.json()) as Me;
     // A restarted console knows no sessions.
@@ -106,7 +106,7 @@ export function followPerson(connect: () => void): void {
   let reportedAt = 0;
   const touched = () => {
     const at = performance.now();
-    if (!me.value?.account || onlyWatches.value || at - reportedAt < ACTIVE_EACH_MS) return;
+    if (!me.value?.account || onlyWatches.value || at - reportedAt < ACTIVE_INTERVAL_MS) return;
     reportedAt = at;
     void post("active").catch(() => undefined);
   };

@@ -43,9 +43,9 @@ type Listener = (sample: Sample) => void;
 
 // The console waits as long for this page. A cut connection or a sleeping machine sends no notice.
 const QUIET_MS = 5000;
-const ANSWERED_WITHIN_MS = 15_000;
-const LOOK_EACH_MS = 1000;
-const PRESENCE_EACH_MS = 20;
+const ANSWER_TIMEOUT_MS = 15_000;
+const CHECK_INTERVAL_MS = 1000;
+const PRESENCE_INTERVAL_MS = 20;
 /** The console ended this page's session; the reason says why. */
 const SIGNED_OUT = 4401;
 
@@ -108,14 +108,14 @@ function connect(reconnect: () => void, ended: (why: string) => void): void {
   const look = () => {
     const at = performance.now();
     if (queriedAt > receivedAt) {
-      if (at - queriedAt < ANSWERED_WITHIN_MS) return;
+      if (at - queriedAt < ANSWER_TIMEOUT_MS) return;
       giveUp();
     } else if (at - receivedAt > QUIET_MS) {
       queriedAt = at;
       send({ case: "ask", value: { id: ++lastAsk, key: "" } }); // an invalid request is answered immediately
     }
   };
-  const looking = setInterval(look, LOOK_EACH_MS);
+  const looking = setInterval(look, CHECK_INTERVAL_MS);
   giveUp = () => {
     opened.close(); // close() waits for the peer's close frame
     end(0, "");
@@ -216,7 +216,7 @@ function receive(bytes: Uint8Array): void {
       lostAt.value = null;
       break;
     case "presence": {
-      if (changes.size === 0) setTimeout(settlePresence, PRESENCE_EACH_MS);
+      if (changes.size === 0) setTimeout(settlePresence, PRESENCE_INTERVAL_MS);
       changes.set(message.value.key, message.value.alive);
       break;
     }

@@ -42,7 +42,7 @@ export interface Held {
 
 const TTL_S = 2;
 const SLOW_TTL_S = 5; // the gateway's maximum
-const RENEW_EACH_MS = 650;
+const RENEW_INTERVAL_MS = 650;
 const SLOW_GAP_MS = 500;
 const SLOW_FOR_MS = 60_000; // after a long gap
 const OPERATOR = "robomesh.operator";
@@ -183,7 +183,7 @@ function hold(robotKey: string, who: string, answer: LeaseAnswer, requestedAt: n
     since: ms(answer.since),
     saidAt: ms(answer.now),
   };
-  renewIn(RENEW_EACH_MS);
+  renewIn(RENEW_INTERVAL_MS);
 }
 
 function renewIn(delayMs: number): void {

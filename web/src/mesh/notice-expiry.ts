@@ -6,7 +6,7 @@ import { newestMotion } from "./command";
 import type { Notice } from "./control";
 
 const REACHED = 0.002; // rad or m: half of what the page displays
-const BEGINS_WITHIN_MS = 1500;
+const START_TIMEOUT_MS = 1500;
 const TOLD_MS = { done: 8_000, refused: 30_000 };
 
 /** The known state of the operator's motion. */
@@ -48,7 +48,7 @@ export function useNoticeEnd(notice: Notice | null, tell: (notice: Notice | null
       tell({ kind: there ? "done" : "refused", text, ...warned });
     };
     // The state that reports it may still be on its way.
-    const timer = setTimeout(end, ran.current === notice ? 0 : BEGINS_WITHIN_MS);
+    const timer = setTimeout(end, ran.current === notice ? 0 : START_TIMEOUT_MS);
     return () => clearTimeout(timer);
   }, [notice, running, stopped, overtaken]);
 }

@@ -6,7 +6,7 @@ import { r } from "../i18n/recordings";
 import { AskError, ask } from "./connection";
 
 // Closing rewrites the file.
-const WITHIN_S = 20;
+const TIMEOUT_S = 20;
 
 /** Send a request to a robot's recorder.
  *
@@ -22,7 +22,7 @@ export async function askRecorder(
       RecorderRequestSchema,
       { action, ...values },
       RecordingSchema,
-      WITHIN_S,
+      TIMEOUT_S,
     );
   } catch (error) {
     throw error instanceof AskError && error.noAnswer ? new Error(r("record_no_answer")) : error;

@@ -7,8 +7,8 @@ import type { Replay } from "./replay";
 /** `coming`: the replay has just jumped, and data recorded there may be on its way. */
 export type OfMoment = "here" | "coming" | "absent";
 
-const COMES_WITHIN_MS = 2000;
-const LOOK_EACH_MS = 50;
+const ARRIVAL_MS = 2000;
+const CHECK_INTERVAL_MS = 50;
 /** Time for messages to arrive, during which a fast replay advances far [s]. */
 const ON_ITS_WAY_S = 0.5;
 
@@ -26,16 +26,16 @@ export function useOfMoment(replay: Replay | null, topic: string, holdsS: number
       const { playing, speed } = replay.state.peek();
       const within = holdsS + (playing ? ON_ITS_WAY_S * Math.max(1, speed) : 0);
       const here = source !== null && Math.abs(away(source) - offset) <= within * 1000;
-      const waiting = performance.now() - Math.max(opened, replay.movedAt) < COMES_WITHIN_MS;
+      const waiting = performance.now() - Math.max(opened, replay.movedAt) < ARRIVAL_MS;
       setState(here ? "here" : waiting || replay.seeking ? "coming" : "absent");
     };
     const stop = watch(`${replay.robotKey}/${topic}`, (sample) => {
       if (!sample.sourceTime) return;
       source = sample.sourceTime;
-      if (replay.steadyFor() > COMES_WITHIN_MS) offset = away(source); // during playback each arrives at its moment
+      if (replay.steadyFor() > ARRIVAL_MS) offset = away(source); // during playback each arrives at its moment
       look();
     });
-    const timer = setInterval(look, LOOK_EACH_MS);
+    const timer = setInterval(look, CHECK_INTERVAL_MS);
     return () => {
       stop();
       clearInterval(timer);

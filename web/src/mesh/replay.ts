@@ -10,8 +10,8 @@ import { ask, watch } from "./connection";
 import { isStale, now } from "./topics";
 
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 20, 50, 100] as const;
-const WITHIN_S = 5;
-const FIRST_WITHIN_S = 0.5;
+const TIMEOUT_S = 5;
+const FIRST_TIMEOUT_S = 0.5;
 const JUMP_S = 0.5; // a larger difference from the expected position is a jump
 
 /** Follow a replay until it is closed; times are in s from the recording's start. */
@@ -86,7 +86,7 @@ export class Replay {
 
   /** Report when its first joints were recorded [s]: a little after its start, where nothing is visible yet. */
   beginAt(firstS: number): void {
-    this.firstS = firstS < FIRST_WITHIN_S ? firstS : 0;
+    this.firstS = firstS < FIRST_TIMEOUT_S ? firstS : 0;
     if (!this.state.peek().playing && this.position() < this.firstS) this.seek(this.firstS);
   }
 
@@ -110,7 +110,7 @@ export class Replay {
   private async request(values: MessageInitShape<typeof ReplayRequestSchema>): Promise<boolean> {
     try {
       const key = `${this.robotKey}/replay/request`;
-      const state = await ask(key, ReplayRequestSchema, values, ReplayStateSchema, WITHIN_S);
+      const state = await ask(key, ReplayRequestSchema, values, ReplayStateSchema, TIMEOUT_S);
       this.take(state, performance.now());
       this.problem.value = "";
       return true;

@@ -12,7 +12,7 @@ import { watch } from "./connection";
 import { seeRobots } from "./known-robots";
 import type { Latest } from "./topics";
 
-const TAKEN_EACH_MS = 250;
+const UPDATE_INTERVAL_MS = 250;
 
 export interface RobotNow {
   controller: Signal<Latest<ControllerState> | undefined>;
@@ -63,7 +63,7 @@ function follow<S extends DescMessage>(
       }
     });
     waiting.clear();
-  }, TAKEN_EACH_MS);
+  }, UPDATE_INTERVAL_MS);
   return () => {
     clearInterval(timer);
     stop();

@@ -39,7 +39,7 @@ const MOVES = new Set([Activity.MOVING, Activity.HOMING]);
 const RESTS = new Set([Activity.IDLE, Activity.HOLDING, Activity.STOPPED, Activity.FAULT]);
 
 // The gateway waits as long before it reports this, then repeats it every 2 s.
-const HEEDED_WITHIN_MS = 2000;
+const STOP_RESPONSE_MS = 2000;
 const TOLD_AGAIN_MS = 3000;
 export const DISOBEYED = "stop.disobeyed";
 
@@ -52,7 +52,7 @@ export function before(state: ControllerState, stamp: Timestamp | undefined): nu
 export function disobeys(state: ControllerState | undefined, events: readonly Event[] = []): boolean {
   const stop = state?.stop;
   if (!state || !stop?.sent) return false;
-  if (MOVES.has(state.activity) && before(state, stop.since) > HEEDED_WITHIN_MS) return true;
+  if (MOVES.has(state.activity) && before(state, stop.since) > STOP_RESPONSE_MS) return true;
   // Any stop counts: a repeated request must not hide the event.
   return events.some(({ code, timestamp }) => code === DISOBEYED && before(state, timestamp) < TOLD_AGAIN_MS);
 }

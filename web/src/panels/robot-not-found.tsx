@@ -7,7 +7,7 @@ import { fleetRobots } from "../mesh/known-robots";
 import type { RobotName } from "../mesh/robot-name";
 import { robotLink } from "../ui/route";
 
-const SHOWS_WITHIN_MS = 4000;
+const SEARCH_MS = 4000;
 
 /** Return whether a live connection received nothing of a robot for some seconds; `known`: something was received. */
 export function useRobotNotFound(robotKey: string, known: boolean): boolean {
@@ -17,7 +17,7 @@ export function useRobotNotFound(robotKey: string, known: boolean): boolean {
   useEffect(() => {
     setWaited(false);
     if (there || !connected) return;
-    const timer = setTimeout(() => setWaited(true), SHOWS_WITHIN_MS);
+    const timer = setTimeout(() => setWaited(true), SEARCH_MS);
     return () => clearTimeout(timer);
   }, [robotKey, there, connected]);
   return waited && !there;

@@ -21,7 +21,7 @@ export interface PictureKeys {
 }
 
 const ASK_S = 4;
-const LOOK_EACH_MS = 3000;
+const CHECK_INTERVAL_MS = 3000;
 
 /** Keys of the renderer's standard view. */
 export function standing(of: string): Wanted {
@@ -72,7 +72,7 @@ export function withView(
   if (isStanding(wanted)) takeStanding();
   else {
     void look();
-    timer = setInterval(() => quiet() && void look(), LOOK_EACH_MS);
+    timer = setInterval(() => quiet() && void look(), CHECK_INTERVAL_MS);
   }
   return () => {
     ended = true;

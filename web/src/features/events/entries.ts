@@ -11,7 +11,7 @@ import type { Sample } from "../../mesh/connection";
 import { watch } from "../../mesh/connection";
 
 export const MOST_KEPT = 5000;
-const TAKEN_EACH_MS = 250;
+const UPDATE_INTERVAL_MS = 250;
 
 interface Of {
   /** Unique among all entries. */
@@ -62,7 +62,7 @@ export function useEntries(): void {
     const timer = setInterval(() => {
       events.settle();
       audits.settle();
-    }, TAKEN_EACH_MS);
+    }, UPDATE_INTERVAL_MS);
     return () => {
       clearInterval(timer);
       for (const end of ends) end();

@@ -14,8 +14,8 @@ const LOOK_FROM = new THREE.Vector3(1.1, -1.7, 0.8).normalize();
 const MOST_AT_ONCE = 6;
 const COLUMNS = 3;
 const FEW = 6; // up to so many tiles are drawn at the display's rate
-const FEW_EACH_MS = 15;
-const MANY_EACH_MS = 90;
+const FEW_INTERVAL_MS = 15;
+const MANY_INTERVAL_MS = 90;
 const SLOW_BATCH_MS = 12; // a slower batch becomes smaller, and is followed by as long a pause
 const SCROLLED_MS = 150;
 const PAUSE_FACTOR = 3; // pause after a batch, in the times that it held up the page
@@ -135,7 +135,7 @@ class Pictures {
     this.request = this.tiles.size ? requestAnimationFrame(this.frame) : 0;
     const at = performance.now();
     if (!this.fence.isIdle(at) || at < this.nextAt) return;
-    const each = this.tiles.size <= FEW ? FEW_EACH_MS : MANY_EACH_MS;
+    const each = this.tiles.size <= FEW ? FEW_INTERVAL_MS : MANY_INTERVAL_MS;
     const due = [...this.tiles].filter((tile) => tile.dirty && tile.ready && at - tile.drawnAt >= each);
     if (due.length) this.draw(due.sort((a, b) => a.drawnAt - b.drawnAt).slice(0, this.atOnce), at);
   };

@@ -8,7 +8,7 @@ import { reasonOf } from "../../mesh/control";
 import { draft } from "./draft";
 
 const TYPING_ENDS_MS = 800;
-const WITHIN_S = 30;
+const TIMEOUT_S = 30;
 
 export interface Checked {
   text: string;
@@ -61,7 +61,7 @@ async function askNext(): Promise<void> {
     try {
       const key = inOwnName(`${latest.robotKey}/kinematics/check`);
       const request = { program: latest.text, path: true };
-      const answer = await ask(key, CheckRequestSchema, request, CheckAnswerSchema, WITHIN_S);
+      const answer = await ask(key, CheckRequestSchema, request, CheckAnswerSchema, TIMEOUT_S);
       if (wanted === latest) {
         checked.value = { text: latest.text, answer, at };
         checkFailed.value = "";

@@ -7,7 +7,7 @@ import { ask } from "../../mesh/connection";
 import { reasonOf } from "../../mesh/control";
 import { robotKey, toolAt } from "./program-robot";
 
-const WITHIN_S = 5;
+const TIMEOUT_S = 5;
 const FULL_POSE = 6; // a full pose can be reached with so many joints
 
 /** Joint positions [rad] or [m]; null: no pose is being taught. */
@@ -51,7 +51,7 @@ async function solve(): Promise<void> {
     try {
       const request = { pose: [...pose], task, near: [...near] };
       const key = `${robotKey.value}/kinematics/inverse`;
-      const answer = await ask(key, InverseRequestSchema, request, InverseAnswerSchema, WITHIN_S);
+      const answer = await ask(key, InverseRequestSchema, request, InverseAnswerSchema, TIMEOUT_S);
       found = answer.solutions[0]?.jointPositions;
       problem = answer.reason;
     } catch (error) {

@@ -9,10 +9,10 @@ import { AskError, ask, hello, presence } from "../../mesh/connection";
 import { Replay } from "../../mesh/replay";
 import type { RecordingName } from "../../ui/route";
 
-const WITHIN_S = 15; // the player first reads a long file
+const TIMEOUT_S = 15; // the player first reads a long file
 const COMES_WITHIN_MS = 1500; // presence arrives after the greeting
-const MOMENT_EACH_MS = 40;
-const FOLLOW_EACH_MS = 200;
+const MOMENT_INTERVAL_MS = 40;
+const FOLLOW_INTERVAL_MS = 200;
 const APART_S = 0.12; // a larger difference is corrected by a seek
 
 export interface Opened {
@@ -42,7 +42,7 @@ export function useOpened(name: RecordingName | null, paused = false): Opened {
       try {
         const request = { file: name.file, paused, session };
         const key = `robomesh/${name.site}/-/player/open`;
-        const state = await ask(key, PlayRequestSchema, request, ReplayStateSchema, WITHIN_S);
+        const state = await ask(key, PlayRequestSchema, request, ReplayStateSchema, TIMEOUT_S);
         made = new Replay(`robomesh/${name.site}/${state.robot}`, state);
         if (wanted) setReplay(made);
         else made.close();
@@ -71,7 +71,7 @@ export function useMoment(replay: Replay | null): Signal<number> {
     let updatedAt = 0;
     let request = requestAnimationFrame(function step(at) {
       request = requestAnimationFrame(step);
-      if (at - updatedAt < MOMENT_EACH_MS) return;
+      if (at - updatedAt < MOMENT_INTERVAL_MS) return;
       updatedAt = at;
       moment.value = replay.position();
     });
@@ -96,7 +96,7 @@ export function useFollowing(first: Replay | null, second: Replay | null, shift:
       }
       if (own.playing !== (playing && within)) (own.playing ? second.pause : second.play)();
     };
-    const timer = setInterval(follow, FOLLOW_EACH_MS);
+    const timer = setInterval(follow, FOLLOW_INTERVAL_MS);
     return () => clearInterval(timer);
   }, [first, second, shift]);
 }

@@ -22,7 +22,7 @@ import { r } from "../../i18n/recordings";
 import { AskError, ask, inOwnName, lostAt } from "../../mesh/connection";
 import type { RecordingName } from "../../ui/route";
 
-const WITHIN_S = 20;
+const TIMEOUT_S = 20;
 const MOST_EVENTS = 1000;
 
 /** An answer; null: not received yet. */
@@ -55,7 +55,7 @@ function reason(error: unknown): string {
 /** Return the facts of a recording. */
 export function useInfo(name: RecordingName | null): Asked<Recording> {
   return useAsked(
-    name && (() => ask(keyOf(name, "info"), RecordingQuerySchema, { file: name.file }, RecordingSchema, WITHIN_S)),
+    name && (() => ask(keyOf(name, "info"), RecordingQuerySchema, { file: name.file }, RecordingSchema, TIMEOUT_S)),
     [name?.site, name?.file],
   );
 }
@@ -85,7 +85,7 @@ export function useHappened(
                 RangeRequestSchema,
                 { file: name.file, topic, most: MOST_EVENTS },
                 RecordedMessagesSchema,
-                WITHIN_S,
+                TIMEOUT_S,
               ),
             ),
           );
@@ -135,7 +135,7 @@ export function useFirst(name: RecordingName | null, info: Recording | null): nu
               RangeRequestSchema,
               request,
               RecordedMessagesSchema,
-              WITHIN_S,
+              TIMEOUT_S,
             );
             const received = messages[0]?.received;
             return received ? (timestampMs(received) - startMs(info)) / 1000 : 0;
@@ -184,7 +184,7 @@ function askSeries(name: RecordingName, request: object): Promise<SeriesAnswer> 
     SeriesRequestSchema,
     { file: name.file, ...request },
     SeriesAnswerSchema,
-    WITHIN_S,
+    TIMEOUT_S,
   );
 }
 

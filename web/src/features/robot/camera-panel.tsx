@@ -23,7 +23,7 @@ const OWN = "own";
 /** A small picture of few bits, for slow links. */
 const FAR = "far";
 const OWN_SIZE = { width: 960, height: 540, fps: 30 };
-const LOOK_EACH_MS = 300;
+const CHECK_INTERVAL_MS = 300;
 
 export function Camera(props: {
   robotKey: string;
@@ -134,7 +134,7 @@ function useOwnView(on: boolean, sceneView: () => View | null): View | null {
         setView(next);
       }
       before = identity;
-    }, LOOK_EACH_MS);
+    }, CHECK_INTERVAL_MS);
     return () => clearInterval(timer);
   }, [on]);
   return view;

@@ -9,7 +9,7 @@ import { refusalText } from "../../panels/change-password";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
 
-const LOOK_EACH_MS = 5000;
+const REFRESH_INTERVAL_MS = 5000;
 
 interface Session {
   id: string;
@@ -31,7 +31,7 @@ export function Sessions() {
   useEffect(() => {
     const refresh = () => void look().catch(() => undefined); // the page shows separately that the console is gone
     refresh();
-    const timer = setInterval(refresh, LOOK_EACH_MS);
+    const timer = setInterval(refresh, REFRESH_INTERVAL_MS);
     return () => clearInterval(timer);
   }, []);
   const end = async ({ id }: Session) => {

@@ -5,7 +5,7 @@ import { fixed } from "../../i18n/format";
 import { t } from "../../i18n/texts";
 
 const LOW_PERCENT = 10;
-const SHOWS_WITHIN_MS = 500; // the new speed is published just after the answer
+const PUBLICATION_DELAY_MS = 500; // the new speed is published just after the answer
 
 /** A slider that sends on release or Enter; until then its value is marked as not sent. */
 export function Speed(props: {
@@ -28,7 +28,7 @@ export function Speed(props: {
     takeBack();
     if (unsent === null || !enabled) return;
     setSent(unsent);
-    void props.send(unsent).finally(() => setTimeout(() => setSent(null), SHOWS_WITHIN_MS));
+    void props.send(unsent).finally(() => setTimeout(() => setSent(null), PUBLICATION_DELAY_MS));
   };
   const low = percent !== undefined && percent < LOW_PERCENT;
   const hint =
