@@ -6,18 +6,18 @@ import { useEffect, useRef } from "preact/hooks";
 import { AccountMenu } from "../features/account/account-menu";
 import { SignIn } from "../features/account/sign-in";
 import { AlarmBadge } from "../features/events/alarm-badge";
-import { Fleet } from "../features/fleet/fleet-page";
+import { FleetPage } from "../features/fleet/fleet-page";
 import { a } from "../i18n/account";
 import { timeOfDay } from "../i18n/format";
 import { language, switchLanguage, t } from "../i18n/texts";
 import { mustSignIn } from "../mesh/account";
 import { hello, lostAt } from "../mesh/connection";
-import { held, release } from "../mesh/control";
+import { heldLease, release } from "../mesh/control";
 import { fleetRobots } from "../mesh/known-robots";
 import { canBe, isReplay } from "../mesh/robot-name";
 import { stop, stopNotice } from "../mesh/stop";
-import { NoticeLine } from "../ui/notice-line";
 import { RobotNotFound } from "../panels/robot-not-found";
+import { NoticeLine } from "../ui/notice-line";
 import { type Route, robotLink, robotOf, route } from "../ui/route";
 import { switchTheme, theme } from "../ui/theme";
 
@@ -52,14 +52,16 @@ function NotLoaded() {
 }
 
 // The robot's page needs three.js; the fleet's text must not wait for it.
-const Robot = onDemand(async () => (await import("../features/robot/robot-page")).Robot);
-const ReplayRobot = onDemand(async () => (await import("../features/recordings/replay-robot-page")).ReplayRobot);
-const Program = onDemand(async () => (await import("../features/program/program-page")).Program);
-const Define = onDemand(async () => (await import("../features/define/define-page")).Define);
-const Wall = onDemand(async () => (await import("../features/wall/wall-page")).Wall);
-const Recordings = onDemand(async () => (await import("../features/recordings/recordings-page")).Recordings);
-const Events = onDemand(async () => (await import("../features/events/events-page")).Events);
-const Settings = onDemand(async () => (await import("../features/settings/settings-page")).Settings);
+const RobotPage = onDemand(async () => (await import("../features/robot/robot-page")).RobotPage);
+const ReplayRobotPage = onDemand(
+  async () => (await import("../features/recordings/replay-robot-page")).ReplayRobotPage,
+);
+const ProgramPage = onDemand(async () => (await import("../features/program/program-page")).ProgramPage);
+const DefinePage = onDemand(async () => (await import("../features/define/define-page")).DefinePage);
+const WallPage = onDemand(async () => (await import("../features/wall/wall-page")).WallPage);
+const RecordingsPage = onDemand(async () => (await import("../features/recordings/recordings-page")).RecordingsPage);
+const EventsPage = onDemand(async () => (await import("../features/events/events-page")).EventsPage);
+const SettingsPage = onDemand(async () => (await import("../features/settings/settings-page")).SettingsPage);
 
 const PAGES = ["fleet", "wall", "recordings", "define", "events", "settings"] as const;
 export function App() {
@@ -124,24 +126,24 @@ function Page({ route, robotKey }: { route: Route; robotKey: string }) {
   switch (route.page) {
     case "robot":
       return isReplay(route.robot.robot) ? (
-        <ReplayRobot key={robotKey} {...route.robot} />
+        <ReplayRobotPage key={robotKey} {...route.robot} />
       ) : (
-        <Robot key={robotKey} {...route.robot} />
+        <RobotPage key={robotKey} {...route.robot} />
       );
     case "program":
-      return <Program shown={route.robot} />;
+      return <ProgramPage shown={route.robot} />;
     case "define":
-      return <Define name={route.name} />;
+      return <DefinePage name={route.name} />;
     case "wall":
-      return <Wall chosen={route.views} />;
+      return <WallPage chosen={route.views} />;
     case "recordings":
-      return <Recordings shown={route.recordings} />;
+      return <RecordingsPage shown={route.recordings} />;
     case "events":
-      return <Events />;
+      return <EventsPage />;
     case "settings":
-      return <Settings />;
+      return <SettingsPage />;
     case "fleet":
-      return <Fleet />;
+      return <FleetPage />;
   }
 }
 
@@ -213,7 +215,7 @@ function StopButton({ robots }: { robots: readonly string[] }) {
       >
         <span class="stop-shape" aria-hidden="true" />
         <span>{t(one ? "stop" : "stop_all")}</span>
-        {held.value && <kbd>{t("stop_space")}</kbd>}
+        {heldLease.value && <kbd>{t("stop_space")}</kbd>}
       </button>
     </div>
   );
@@ -226,7 +228,7 @@ function useStopKey(): void {
       target instanceof HTMLTextAreaElement ||
       (target instanceof HTMLInputElement && ["text", "search", "password"].includes(target.type));
     const onKey = (event: KeyboardEvent) => {
-      const mine = held.value;
+      const mine = heldLease.value;
       if (event.code !== "Space" || !mine || isTyping(event.target)) return;
       event.preventDefault(); // nor press the focused button
       event.stopPropagation();

@@ -2,7 +2,7 @@ import "@preact/signals";
 import { render } from "preact";
 import { isolateForeignTexts } from "../i18n/foreign-text";
 import { language } from "../i18n/texts";
-import { followPerson, signedOut, whoAmI } from "../mesh/account";
+import { reportActivity, signedOut, whoAmI } from "../mesh/account";
 import { keepConnected } from "../mesh/connection";
 import { followThisTab } from "../mesh/control";
 import { applyTheme } from "../ui/theme";
@@ -17,6 +17,6 @@ const maySee = async () => {
   const who = await whoAmI();
   return who && (!who.accounts || who.account !== "");
 };
-followPerson(keepConnected(maySee, signedOut));
+reportActivity(keepConnected(maySee, signedOut));
 const root = document.getElementById("app");
 if (root) render(<App />, root);

@@ -406,11 +406,11 @@ const TEXTS = {
 export type TextName = keyof typeof TEXTS;
 export type Language = "en" | "zh";
 
-const KEPT = "robomesh.language";
+const STORAGE_KEY = "robomesh.language";
 
 function initialLanguage(): Language {
-  const kept = localStorage.getItem(KEPT);
-  if (kept === "en" || kept === "zh") return kept;
+  const stored = localStorage.getItem(STORAGE_KEY);
+  if (stored === "en" || stored === "zh") return stored;
   return navigator.language.toLowerCase().startsWith("zh") ? "zh" : "en";
 }
 
@@ -418,7 +418,7 @@ export const language = signal<Language>(initialLanguage());
 
 export function switchLanguage(): void {
   language.value = language.value === "en" ? "zh" : "en";
-  localStorage.setItem(KEPT, language.value);
+  localStorage.setItem(STORAGE_KEY, language.value);
   document.documentElement.lang = language.value === "zh" ? "zh-Hans" : "en";
 }
 

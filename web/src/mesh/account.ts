@@ -39,8 +39,8 @@ export const me = signal<Me | null>(null);
 export const endedBy = signal("");
 export const mustSignIn = computed(() => !!me.value?.accounts && !me.value.account);
 /** Whether the account's role never permits control. */
-export const onlyWatches = computed(() => me.value?.role === "monitor");
-export const rests = computed(() => !!hello.value?.account && !hello.value.mayCommand && !onlyWatches.value);
+export const isMonitor = computed(() => me.value?.role === "monitor");
+export const commandSuspended = computed(() => !!hello.value?.account && !hello.value.mayCommand && !isMonitor.value);
 
 let connects: () => void = () => undefined;
 
@@ -101,12 +101,12 @@ export async function signOut(everywhere: boolean): Promise<void> {
 }
 
 /** Report activity to the console, at most once a minute: without it the right to command is suspended. */
-export function followPerson(connect: () => void): void {
+export function reportActivity(connect: () => void): void {
   connects = connect;
   let reportedAt = 0;
   const touched = () => {
     const at = performance.now();
-    if (!me.value?.account || onlyWatches.value || at - reportedAt < ACTIVE_INTERVAL_MS) return;
+    if (!me.value?.account || isMonitor.value || at - reportedAt < ACTIVE_INTERVAL_MS) return;
     reportedAt = at;
     void post("active").catch(() => undefined);
   };

@@ -7,7 +7,7 @@ import { reasonText } from "../i18n/reasons";
 import { t } from "../i18n/texts";
 import { ask } from "./connection";
 import type { Notice } from "./control";
-import { controlNotice, held, reasonOf } from "./control";
+import { controlNotice, heldLease, reasonOf } from "./control";
 
 /** Values of a command beyond its name. */
 export interface CommandValues {
@@ -40,7 +40,7 @@ export async function command(
   tell: (notice: Notice) => void = (notice) => (controlNotice.value = notice),
   positions = name === Command.MOVE_ABSOLUTE ? values.jointPositions : undefined,
 ): Promise<boolean> {
-  const mine = held.value;
+  const mine = heldLease.value;
   if (mine?.robotKey !== robotKey) {
     tell({ kind: "refused", text: t("not_sent", { text: t("take_first") }) });
     return false;

@@ -7,7 +7,7 @@ import type { Reason, ToPage_Hello } from "../gen/robomesh_pb";
 import { FromPageSchema, ToPageSchema } from "../gen/robomesh_pb";
 import { t } from "../i18n/texts";
 import { ageClock } from "./age-clock";
-import { lateness } from "./delay";
+import { sampleDelay } from "./delay";
 
 /** A received publication. Times are on this page's monotonic clock [ms]; ages on `ageClock`. */
 export interface Sample {
@@ -93,7 +93,7 @@ function connect(reconnect: () => void, ended: (why: string) => void): void {
   receivedAt = 0;
   const received = () => (receivedAt = performance.now());
   const end = (code: number, reason: string) => {
-    clearInterval(looking);
+    clearInterval(checkTimer);
     giveUp = () => undefined;
     opened.onopen = opened.onmessage = opened.onclose = null;
     socket = null;
@@ -105,7 +105,7 @@ function connect(reconnect: () => void, ended: (why: string) => void): void {
       ended(reason);
     } else reconnect();
   };
-  const look = () => {
+  const checkConnection = () => {
     const at = performance.now();
     if (queriedAt > receivedAt) {
       if (at - queriedAt < ANSWER_TIMEOUT_MS) return;
@@ -115,7 +115,7 @@ function connect(reconnect: () => void, ended: (why: string) => void): void {
       send({ case: "ask", value: { id: ++lastAsk, key: "" } }); // an invalid request is answered immediately
     }
   };
-  const looking = setInterval(look, CHECK_INTERVAL_MS);
+  const checkTimer = setInterval(checkConnection, CHECK_INTERVAL_MS);
   giveUp = () => {
     opened.close(); // close() waits for the peer's close frame
     end(0, "");
@@ -184,7 +184,7 @@ export async function ask<Q extends DescMessage, A extends DescMessage>(
     }
     // The server reports a timeout itself; this one is for a server that no longer answers.
     const timer = setTimeout(
-      () => settle(id)?.reject(new AskError(t("timed_out", { seconds: timeoutS }), true)),
+      () => takePending(id)?.reject(new AskError(t("timed_out", { seconds: timeoutS }), true)),
       timeoutS * 1000 + 1000,
     );
     const done = () => clearTimeout(timer);
@@ -196,7 +196,7 @@ export async function ask<Q extends DescMessage, A extends DescMessage>(
   return fromBinary(answerSchema, await answer);
 }
 
-function settle(id: bigint) {
+function takePending(id: bigint) {
   const waiting = pending.get(id);
   pending.delete(id);
   return waiting;
@@ -216,12 +216,12 @@ function receive(bytes: Uint8Array): void {
       lostAt.value = null;
       break;
     case "presence": {
-      if (changes.size === 0) setTimeout(settlePresence, PRESENCE_INTERVAL_MS);
+      if (changes.size === 0) setTimeout(applyPresenceChanges, PRESENCE_INTERVAL_MS);
       changes.set(message.value.key, message.value.alive);
       break;
     }
     case "answer": {
-      const waiting = settle(message.value.id);
+      const waiting = takePending(message.value.id);
       if (message.value.ok) waiting?.resolve(message.value.payload);
       else waiting?.reject(new AskError(message.value.error, message.value.noAnswer, message.value.refusal));
       break;
@@ -237,7 +237,8 @@ function receive(bytes: Uint8Array): void {
       if (repeated && before.newAt !== null) newAt = before.newAt;
       else if (live) {
         // The age that the console's server knows, or the delay on the whole path to here.
-        newAt = ageClock() - Math.max((ageS ?? 0) * 1000, lateness(key, header.publisher, header.sourceTime, arrived));
+        newAt =
+          ageClock() - Math.max((ageS ?? 0) * 1000, sampleDelay(key, header.publisher, header.sourceTime, arrived));
       }
       const sample = { key, payload, ...header, live, arrived, newAt, step };
       newest.set(key, sample);
@@ -250,7 +251,7 @@ function receive(bytes: Uint8Array): void {
 }
 
 /** Add presence changes in batches: a new page receives every process of the mesh. */
-function settlePresence(): void {
+function applyPresenceChanges(): void {
   const keys = new Set(presence.value);
   for (const [key, alive] of changes) {
     if (alive) keys.add(key);

@@ -25,7 +25,7 @@ export interface Notice {
 }
 
 /** The lease that this tab holds. */
-export interface Held {
+export interface HeldLease {
   robotKey: string;
   operator: string;
   lease: string;
@@ -51,20 +51,20 @@ const OPERATOR_NAME = /^[A-Za-z0-9][A-Za-z0-9_.-]*$/;
 /** The account's name, or without accounts the name that the operator gave. */
 export const operator = signal(localStorage.getItem(OPERATOR) ?? "");
 /** The lease that this tab holds; one robot at a time. */
-export const held = signal<Held | null>(null);
+export const heldLease = signal<HeldLease | null>(null);
 export const controlNotice = signal<Notice | null>(null);
 
 let renewing: ReturnType<typeof setTimeout> | undefined;
 let slowUntil = 0;
-let beatAt = performance.now();
+let timerRanAt = performance.now();
 /** Recent gaps in which this page's timers did not run, newest last. */
 let gaps: { ms: number; endedAt: number }[] = [];
 let beginning = false;
 let offeredTo = "";
 /** An ended lease, until the gateway has given the reason. */
-let ended: Held | null = null;
+let ended: HeldLease | null = null;
 /** The lease that was lost last, and the lease that replaced it. */
-let lost: { mine: Held; to: string } | null = null;
+let lost: { mine: HeldLease; to: string } | null = null;
 
 export function setOperator(name: string): void {
   operator.value = name;
@@ -72,7 +72,7 @@ export function setOperator(name: string): void {
 }
 
 export function holds(robotKey: string): boolean {
-  return held.value?.robotKey === robotKey;
+  return heldLease.value?.robotKey === robotKey;
 }
 
 export function reasonOf(error: unknown): string {
@@ -132,7 +132,7 @@ async function begin(robotKey: string, action: Action, reason = ""): Promise<voi
     const answer = await askLease(robotKey, who, action, { reason });
     hold(robotKey, who, answer, requestedAt);
     controlNotice.value = null;
-    if (document.hidden) await putAway();
+    if (document.hidden) await releaseHidden();
   } catch (error) {
     controlNotice.value = { kind: "refused", text: t("not_taken", { text: reasonOf(error) }) };
   }
@@ -140,14 +140,14 @@ async function begin(robotKey: string, action: Action, reason = ""): Promise<voi
 }
 
 /** Ask the operator in control for it; every page shows the request for half a minute. */
-export async function askFor(robotKey: string, holder: string, reason: string): Promise<void> {
+export async function requestControl(robotKey: string, holder: string, reason: string): Promise<void> {
   const who = ownName();
   if (who) await say(robotKey, who, Action.ASK, { reason }, t("asked", { name: holder }), "not_asked");
 }
 
 /** Offer control to another operator, or withdraw the offer. */
 export async function offer(to: string | null): Promise<void> {
-  const mine = held.value;
+  const mine = heldLease.value;
   if (!mine) return;
   offeredTo = to ?? "";
   const values = { lease: mine.lease, to: to ?? mine.operator };
@@ -173,7 +173,7 @@ async function say(
 
 function hold(robotKey: string, who: string, answer: LeaseAnswer, requestedAt: number): void {
   const ttlMs = ms(answer.until) - ms(answer.now) || ttlS() * 1000;
-  held.value = {
+  heldLease.value = {
     robotKey,
     operator: who,
     lease: answer.lease,
@@ -192,16 +192,16 @@ function renewIn(delayMs: number): void {
 }
 
 async function renew(): Promise<void> {
-  const mine = held.value;
+  const mine = heldLease.value;
   if (!mine) return;
   const requestedAt = performance.now();
   try {
     const answer = await askLease(mine.robotKey, mine.operator, Action.RENEW, { lease: mine.lease });
-    if (held.value?.lease !== mine.lease) return;
+    if (heldLease.value?.lease !== mine.lease) return;
     hold(mine.robotKey, mine.operator, { ...answer, lease: answer.lease || mine.lease }, requestedAt);
   } catch (error) {
-    if (held.value?.lease !== mine.lease) return;
-    const slow = requestedAt > mine.endsAt || stoodStill(mine.endsAt - mine.requestedAt);
+    if (heldLease.value?.lease !== mine.lease) return;
+    const slow = requestedAt > mine.endsAt || wasInactive(mine.endsAt - mine.requestedAt);
     const silent = error instanceof AskError && error.noAnswer;
     if (silent && performance.now() < mine.endsAt) renewIn(100);
     else if (slow) lose(t("lost_slow"), true);
@@ -213,21 +213,21 @@ async function renew(): Promise<void> {
 /** `known`: this page knows the reason and does not need the gateway's. */
 function lose(reason: string, known = false): void {
   clearTimeout(renewing);
-  ended = known ? null : held.value;
-  lost = held.value && { mine: held.value, to: "" };
-  held.value = null;
+  ended = known ? null : heldLease.value;
+  lost = heldLease.value && { mine: heldLease.value, to: "" };
+  heldLease.value = null;
   controlNotice.value = { kind: "lost", text: t("control_lost", { text: reason }) };
 }
 
 // Published with the release; a tab that is closed is hidden first.
-const putAway = () => release(t("released_hidden"), "window hidden or closed");
+const releaseHidden = () => release(t("released_hidden"), "window hidden or closed");
 
 /** Release control if this tab has it; every page shows `reason`. */
 export async function release(text: string = t("released"), reason = ""): Promise<void> {
-  const mine = held.value;
+  const mine = heldLease.value;
   if (!mine) return;
   clearTimeout(renewing);
-  held.value = null;
+  heldLease.value = null;
   controlNotice.value = { kind: "done", text };
   try {
     await askLease(mine.robotKey, mine.operator, Action.RELEASE, { lease: mine.lease, reason });
@@ -237,18 +237,18 @@ export async function release(text: string = t("released"), reason = ""): Promis
 }
 
 /** Compare the published lease with this tab's: a different one means that this tab's has ended. */
-export function seeLease(robotKey: string, lease: Lease): void {
-  seeLoss(robotKey, lease);
+export function handleLease(robotKey: string, lease: Lease): void {
+  handleLoss(robotKey, lease);
   endLoss(robotKey, lease);
 }
 
-function seeLoss(robotKey: string, lease: Lease): void {
-  const mine = held.value ?? ended;
+function handleLoss(robotKey: string, lease: Lease): void {
+  const mine = heldLease.value ?? ended;
   // Messages from before this lease began do not know it.
   if (mine?.robotKey !== robotKey || ms(lease.timestamp) <= mine.saidAt) return;
   if (isOf(mine, lease)) return;
-  if (held.value) {
-    const slow = stoodStill(mine.endsAt - mine.requestedAt);
+  if (heldLease.value) {
+    const slow = wasInactive(mine.endsAt - mine.requestedAt);
     lose(slow ? t("lost_slow") : "", slow);
     if (slow) return;
   }
@@ -273,7 +273,7 @@ function endLoss(robotKey: string, lease: Lease): void {
   if (controlNotice.value?.kind === "lost") controlNotice.value = null;
 }
 
-function isOf(mine: Held, lease: Lease): boolean {
+function isOf(mine: HeldLease, lease: Lease): boolean {
   return lease.holder === mine.operator && ms(lease.since) === mine.since;
 }
 
@@ -285,24 +285,24 @@ export function followThisTab(): void {
     if (greeting?.operator) operator.value = greeting.operator;
   });
   document.addEventListener("visibilitychange", () => {
-    if (document.hidden) void putAway();
+    if (document.hidden) void releaseHidden();
   });
   lostAt.subscribe((at) => {
-    if (at && held.value) lose(t("lost_connection"), true);
+    if (at && heldLease.value) lose(t("lost_connection"), true);
   });
   setInterval(() => {
     const now = performance.now();
-    if (now - beatAt > SLOW_GAP_MS) {
+    if (now - timerRanAt > SLOW_GAP_MS) {
       slowUntil = now + SLOW_FOR_MS;
-      gaps = [...gaps.filter((each) => now - each.endedAt < SLOW_TTL_S * 1000), { ms: now - beatAt, endedAt: now }];
+      gaps = [...gaps.filter((each) => now - each.endedAt < SLOW_TTL_S * 1000), { ms: now - timerRanAt, endedAt: now }];
     }
-    beatAt = now;
+    timerRanAt = now;
   }, 100);
 }
 
 /** Return whether this page was inactive for most of a lease's time just now, so that it caused the delay itself. */
-function stoodStill(leaseMs: number): boolean {
+function wasInactive(leaseMs: number): boolean {
   const now = performance.now();
   const recent = gaps.filter((each) => now - each.endedAt < leaseMs);
-  return recent.reduce((total, each) => total + each.ms, now - beatAt) > leaseMs / 2;
+  return recent.reduce((total, each) => total + each.ms, now - timerRanAt) > leaseMs / 2;
 }

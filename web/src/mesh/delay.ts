@@ -16,7 +16,7 @@ const MOST_GROWN_MS = 1000;
 const MOST_WAITED_MS = 10_000;
 
 /** Return a sample's delay [ms] beyond its publisher's fastest; `arrived` is on any monotonic clock. */
-export function lateness(key: string, publisher: bigint, sourceTime: number, arrived: number): number {
+export function sampleDelay(key: string, publisher: bigint, sourceTime: number, arrived: number): number {
   // Replays carry the recording's times, and some publishers give none.
   if (sourceTime === 0 || key.includes("/replay-")) return 0;
   const lag = arrived - sourceTime;

@@ -7,11 +7,11 @@ import { isReplay } from "./robot-name";
 /** In the place of a service's name: presence of the operator in control. */
 export const OPERATOR = "operator";
 
-const seen = signal<ReadonlySet<string>>(new Set());
+const publishing = signal<ReadonlySet<string>>(new Set());
 
 /** Keys `robomesh/<site>/<robot>`, sorted. */
 export const fleetRobots = computed<readonly string[]>(() => {
-  const keys = new Set(seen.value);
+  const keys = new Set(publishing.value);
   for (const key of presence.value) {
     const [root, site, robot, , service] = key.split("/");
     if (robot !== "-" && service !== OPERATOR) keys.add(`${root}/${site}/${robot}`);
@@ -20,7 +20,7 @@ export const fleetRobots = computed<readonly string[]>(() => {
 });
 
 /** Remember the robots in the keys of topics. */
-export function seeRobots(topicKeys: Iterable<string>): void {
+export function addKnownRobots(topicKeys: Iterable<string>): void {
   const robots = [...topicKeys].map((key) => key.split("/").slice(0, 3).join("/"));
-  if (robots.some((key) => !seen.value.has(key))) seen.value = new Set([...seen.value, ...robots]);
+  if (robots.some((key) => !publishing.value.has(key))) publishing.value = new Set([...publishing.value, ...robots]);
 }

@@ -7,7 +7,7 @@ import type { Notice } from "./control";
 
 const REACHED = 0.002; // rad or m: half of what the page displays
 const START_TIMEOUT_MS = 1500;
-const TOLD_MS = { done: 8_000, refused: 30_000 };
+const SHOWN_MS = { done: 8_000, refused: 30_000 };
 
 /** The known state of the operator's motion. */
 export interface Motion {
@@ -19,7 +19,7 @@ export interface Motion {
   positions: readonly (number | undefined)[];
 }
 
-export function useNoticeEnd(notice: Notice | null, tell: (notice: Notice | null) => void, motion: Motion): void {
+export function useNoticeExpiry(notice: Notice | null, tell: (notice: Notice | null) => void, motion: Motion): void {
   const ran = useRef<Notice | null>(null);
   const positions = useRef(motion.positions);
   positions.current = motion.positions;
@@ -30,7 +30,7 @@ export function useNoticeEnd(notice: Notice | null, tell: (notice: Notice | null
     const { target, warning } = notice;
     const warned = warning ? { warning } : {};
     if (!target) {
-      const timer = setTimeout(() => tell(null), TOLD_MS[warning ? "refused" : notice.kind]);
+      const timer = setTimeout(() => tell(null), SHOWN_MS[warning ? "refused" : notice.kind]);
       return () => clearTimeout(timer);
     }
     if (stopped) return tell(null);

@@ -22,7 +22,7 @@ export function useOfMoment(replay: Replay | null, topic: string, holdsS: number
     let source: number | null = null;
     let offset = 0; // recorder's clock to the publisher's [ms]
     const away = (from: number) => replay.recordedMs() - from;
-    const look = () => {
+    const update = () => {
       const { playing, speed } = replay.state.peek();
       const within = holdsS + (playing ? ON_ITS_WAY_S * Math.max(1, speed) : 0);
       const here = source !== null && Math.abs(away(source) - offset) <= within * 1000;
@@ -33,9 +33,9 @@ export function useOfMoment(replay: Replay | null, topic: string, holdsS: number
       if (!sample.sourceTime) return;
       source = sample.sourceTime;
       if (replay.steadyFor() > ARRIVAL_MS) offset = away(source); // during playback each arrives at its moment
-      look();
+      update();
     });
-    const timer = setInterval(look, CHECK_INTERVAL_MS);
+    const timer = setInterval(update, CHECK_INTERVAL_MS);
     return () => {
       stop();
       clearInterval(timer);

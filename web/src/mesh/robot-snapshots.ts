@@ -9,7 +9,7 @@ import type { ControllerState, Description, Lease } from "../gen/robomesh_pb";
 import { ControllerStateSchema, LeaseSchema } from "../gen/robomesh_pb";
 import type { Sample } from "./connection";
 import { watch } from "./connection";
-import { seeRobots } from "./known-robots";
+import { addKnownRobots } from "./known-robots";
 import type { Latest } from "./topics";
 
 const UPDATE_INTERVAL_MS = 250;
@@ -56,7 +56,7 @@ function follow<S extends DescMessage>(
   const timer = setInterval(() => {
     if (waiting.size === 0) return;
     batch(() => {
-      seeRobots(waiting.keys());
+      addKnownRobots(waiting.keys());
       for (const [key, sample] of waiting) {
         const robotKey = key.slice(0, key.lastIndexOf("/"));
         place(robotNow(robotKey)).value = { key, sample, message: fromBinary(schema, sample.payload) };

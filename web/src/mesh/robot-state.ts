@@ -36,15 +36,15 @@ const ACTIVITIES: Record<Activity, StateWord> = {
 };
 
 const MOVES = new Set([Activity.MOVING, Activity.HOMING]);
-const RESTS = new Set([Activity.IDLE, Activity.HOLDING, Activity.STOPPED, Activity.FAULT]);
+const NOT_MOVING = new Set([Activity.IDLE, Activity.HOLDING, Activity.STOPPED, Activity.FAULT]);
 
 // The gateway waits as long before it reports this, then repeats it every 2 s.
 const STOP_RESPONSE_MS = 2000;
-const TOLD_AGAIN_MS = 3000;
+const REPEAT_MS = 3000;
 export const DISOBEYED = "stop.disobeyed";
 
 /** Return how long before a controller's report an event was [ms], by the gateway's clock. */
-export function before(state: ControllerState, stamp: Timestamp | undefined): number {
+export function msBefore(state: ControllerState, stamp: Timestamp | undefined): number {
   return state.timestamp && stamp ? timestampMs(state.timestamp) - timestampMs(stamp) : 0;
 }
 
@@ -52,9 +52,9 @@ export function before(state: ControllerState, stamp: Timestamp | undefined): nu
 export function disobeys(state: ControllerState | undefined, events: readonly Event[] = []): boolean {
   const stop = state?.stop;
   if (!state || !stop?.sent) return false;
-  if (MOVES.has(state.activity) && before(state, stop.since) > STOP_RESPONSE_MS) return true;
+  if (MOVES.has(state.activity) && msBefore(state, stop.since) > STOP_RESPONSE_MS) return true;
   // Any stop counts: a repeated request must not hide the event.
-  return events.some(({ code, timestamp }) => code === DISOBEYED && before(state, timestamp) < TOLD_AGAIN_MS);
+  return events.some(({ code, timestamp }) => code === DISOBEYED && msBefore(state, timestamp) < REPEAT_MS);
 }
 
 /** Describe a latched stop: by whom, since when, and the arm's known state. A requested stop is not a stopped arm. */
@@ -64,7 +64,7 @@ export function stopText({ stop, activity }: ControllerState, disobeyed = false)
     ? "stop_unsent_by"
     : disobeyed || MOVES.has(activity)
       ? "stop_moving_by"
-      : RESTS.has(activity)
+      : NOT_MOVING.has(activity)
         ? "stopped_by"
         : "stop_sent_by";
   return t(text, { by: stop.by || "–", time: stampTime(stop.since) });
@@ -79,7 +79,7 @@ export function stateWord(controller: Latest<ControllerState> | undefined, event
   if (fault) return { word: "state_fault", level: "alarm" };
   if (stop && !stop.sent) return { word: "state_stop_unsent", level: "alarm" };
   if (stop && MOVES.has(activity)) return { word: "state_stopping", level: "alarm" };
-  if (stop) return { word: RESTS.has(activity) ? "state_stopped" : "state_stop_sent", level: "alarm" };
+  if (stop) return { word: NOT_MOVING.has(activity) ? "state_stopped" : "state_stop_sent", level: "alarm" };
   if (link === Link.DOWN) return { word: "state_no_link", level: "alarm" };
   if (link === Link.SILENT) return { word: "state_silent", level: "warning" };
   return ACTIVITIES[activity] ?? { word: "state_unknown", level: "warning" };

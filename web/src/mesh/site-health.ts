@@ -15,12 +15,12 @@ export function useMesh(): ReadonlyMap<string, Latest<MeshState>> {
 }
 
 /** Return the age [s] of a process's last health message, including the report's own age. */
-export function seenAge(seen: Seen, latest: Latest<MeshState>): number {
+export function reportAge(seen: Seen, latest: Latest<MeshState>): number {
   return seen.ageS + (ageOf(latest) ?? 0);
 }
 
 export function isSilent(seen: Seen, latest: Latest<MeshState>): boolean {
-  return isStale("health/*", seenAge(seen, latest));
+  return isStale("health/*", reportAge(seen, latest));
 }
 
 /** Return whether a clock's offset exceeds the uncertainty of its measurement. */

@@ -3,20 +3,20 @@
 import { effect, signal } from "@preact/signals";
 import { anyWatch, nameOf, unacknowledged } from "../mesh/alarms";
 
-const KEPT = "robomesh.alarm-sound";
+const STORAGE_KEY = "robomesh.alarm-sound";
 const TONES_HZ = [880, 660];
 const TONE_S = 0.16;
 
-export const sound = signal(localStorage.getItem(KEPT) === "on");
+export const sound = signal(localStorage.getItem(STORAGE_KEY) === "on");
 
 export function setSound(on: boolean): void {
   sound.value = on;
-  localStorage.setItem(KEPT, on ? "on" : "off");
+  localStorage.setItem(STORAGE_KEY, on ? "on" : "off");
   if (on) play(); // demonstrates the tone; browsers need a click before they play it
 }
 
 /** Play the tone for each alarm that is new from now on. */
-export function followSound(): () => void {
+export function startSound(): () => void {
   let known: ReadonlySet<string> | null = null;
   return effect(() => {
     const names = new Set(unacknowledged.value.map(nameOf));

@@ -5,7 +5,7 @@ import { presence } from "../mesh/connection";
 import { OPERATOR } from "../mesh/known-robots";
 
 /** `of`: `robomesh/<site>/<robot>`. */
-export function Services({ of: key }: { of: string }) {
+export function AliveServices({ of: key }: { of: string }) {
   const names = new Map<string, number>();
   for (const token of presence.value) {
     if (!token.startsWith(`${key}/alive/`)) continue;

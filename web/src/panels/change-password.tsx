@@ -8,23 +8,23 @@ import { PasswordField } from "../ui/password-field";
 import "./account-form.css";
 
 export function ChangePassword({ close }: { close: () => void }) {
-  const [old, setOld] = useState("");
-  const [fresh, setFresh] = useState("");
-  const [again, setAgain] = useState("");
-  const [told, setTold] = useState<{ done: boolean; text: string } | null>(null);
+  const [oldPassword, setOldPassword] = useState("");
+  const [newPassword, setNewPassword] = useState("");
+  const [repeated, setRepeated] = useState("");
+  const [outcome, setOutcome] = useState<{ done: boolean; text: string } | null>(null);
   const form = useRef<HTMLFormElement>(null);
   // Pass Escape to the sheet, and focus the first field.
   useEffect(() => form.current?.querySelector<HTMLInputElement>("input:not([hidden])")?.focus(), []);
   const send = async () => {
-    if (fresh !== again) {
-      setTold({ done: false, text: a("differ") });
+    if (newPassword !== repeated) {
+      setOutcome({ done: false, text: a("differ") });
       return;
     }
     try {
-      me.value = await post<Me>("password", { password: old, new: fresh });
-      setTold({ done: true, text: a("changed") });
+      me.value = await post<Me>("password", { password: oldPassword, new: newPassword });
+      setOutcome({ done: true, text: a("changed") });
     } catch (error) {
-      setTold({ done: false, text: a("not_changed", { text: refusalText(error) }) });
+      setOutcome({ done: false, text: a("not_changed", { text: refusalText(error) }) });
     }
   };
   return (
@@ -38,17 +38,23 @@ export function ChangePassword({ close }: { close: () => void }) {
     >
       {/* For password managers: the account's name. */}
       <input type="text" name="username" autocomplete="username" value={me.value?.account} readOnly hidden />
-      <PasswordField label={a("old_password")} kind="current-password" value={old} set={setOld} />
-      <PasswordField label={a("new_password")} kind="new-password" value={fresh} set={setFresh} hint={a("new_hint")} />
-      <PasswordField label={a("new_again")} kind="new-password" value={again} set={setAgain} />
-      <p class={told && !told.done ? "sign-in-problem" : ""} role="status">
-        {told?.text ?? "\u00a0"}
+      <PasswordField label={a("old_password")} kind="current-password" value={oldPassword} set={setOldPassword} />
+      <PasswordField
+        label={a("new_password")}
+        kind="new-password"
+        value={newPassword}
+        set={setNewPassword}
+        hint={a("new_hint")}
+      />
+      <PasswordField label={a("new_again")} kind="new-password" value={repeated} set={setRepeated} />
+      <p class={outcome && !outcome.done ? "sign-in-problem" : ""} role="status">
+        {outcome?.text ?? "\u00a0"}
       </p>
       <div class="account-row">
         <button type="button" class="action" onClick={close}>
-          {a(told?.done ? "close" : "cancel")}
+          {a(outcome?.done ? "close" : "cancel")}
         </button>
-        {!told?.done && (
+        {!outcome?.done && (
           <button type="submit" class="action primary">
             {a("change")}
           </button>

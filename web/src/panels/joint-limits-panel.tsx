@@ -16,7 +16,7 @@ const FULL_SINGULARITY = 0.25;
 const LOW_LIMIT = 0.02; // of the range
 const LOW_SINGULARITY = 0.02;
 
-export function JointLimits(props: {
+export function JointLimitsPanel(props: {
   robotKey: string;
   state: KinematicState | undefined;
   description: Description | undefined;

@@ -6,11 +6,11 @@ import type { ControllerState, Event } from "../gen/robomesh_pb";
 import { Event_Severity as Severity } from "../gen/robomesh_pb";
 import { stampFull, stampTime } from "../i18n/format";
 import { t } from "../i18n/texts";
-import { before, DISOBEYED, disobeys } from "../mesh/robot-state";
+import { DISOBEYED, disobeys, msBefore } from "../mesh/robot-state";
 
 const SHOWN_MS = 600_000; // unless it is dismissed before
 
-export function Alarm({ state, events }: { state: ControllerState | undefined; events: readonly Event[] }) {
+export function RobotAlarm({ state, events }: { state: ControllerState | undefined; events: readonly Event[] }) {
   const [dismissed, setDismissed] = useState(0);
   if (disobeys(state, events)) {
     return (
@@ -22,7 +22,7 @@ export function Alarm({ state, events }: { state: ControllerState | undefined; e
   }
   const event = events.find(({ severity }) => severity === Severity.CRITICAL);
   const at = event?.timestamp ? timestampMs(event.timestamp) : 0;
-  if (!event || at <= dismissed || (state && before(state, event.timestamp) > SHOWN_MS)) return null;
+  if (!event || at <= dismissed || (state && msBefore(state, event.timestamp) > SHOWN_MS)) return null;
   const time = stampTime(event.timestamp);
   return (
     <div class="alarm-band past" role="alert">

@@ -5,10 +5,10 @@ import { fixed, rollPitchYaw, toDegrees } from "../i18n/format";
 import { t } from "../i18n/texts";
 import type { Latest } from "../mesh/topics";
 import { ageOf, isStale } from "../mesh/topics";
-import { JointLimits } from "./joint-limits-panel";
 import { Panel } from "../ui/panel";
 import { Age } from "../ui/state";
 import { Unit } from "../ui/unit";
+import { JointLimitsPanel } from "./joint-limits-panel";
 
 export function ToolPanel(props: {
   robotKey: string;
@@ -39,7 +39,7 @@ export function ToolPanel(props: {
         <NumberRow label={t("tool_speed")} text={fixed(speed, 1)} unit="mm/s" />
         <NumberRow label={t("manipulability")} text={fixed(state?.manipulability, 4)} unit="" />
       </dl>
-      <JointLimits robotKey={props.robotKey} state={state} description={props.description} stale={stale} />
+      <JointLimitsPanel robotKey={props.robotKey} state={state} description={props.description} stale={stale} />
     </Panel>
   );
 }

@@ -6,7 +6,7 @@ import { FrameTransformsSchema } from "../gen/foxglove/FrameTransforms_pb";
 import type { Description } from "../gen/robomesh_pb";
 import { FramePlayer } from "./frame-player";
 import type { Kind } from "./models";
-import { colourGhost, dressed, ghostOf, loadModel, paint } from "./models";
+import { colourGhost, ghostOf, loadModel, paint, withMaterials } from "./models";
 import { palette } from "./surroundings";
 
 const SAME_PLACE = 2e-3; // m, or an element of a rotation matrix
@@ -49,7 +49,7 @@ export class Arm {
   }
 
   private addLink(frame: string, model: THREE.Group, colour: string, made?: (ghost: THREE.Group) => void): void {
-    const group = dressed(model, colour);
+    const group = withMaterials(model, colour);
     group.visible = false; // until its frame arrives
     this.links.set(frame, group);
     this.scene.add(group);

@@ -13,7 +13,7 @@ interface Keyed {
 }
 
 const BEHIND_MS = 60;
-const KEPT = 12;
+const MAX_FRAMES = 12;
 const GAP_MS = 1000; // of source time at this page's rate
 
 /** Frames on arrival, placements when drawn. */
@@ -35,7 +35,7 @@ export class FramePlayer {
     // A replay was paused: its frames are later from now on.
     if (early - this.skew > GAP_MS) this.skew = early;
     this.frames.push({ time: sourceTime, poses: inSite(message) });
-    if (this.frames.length > KEPT) this.frames.shift();
+    if (this.frames.length > MAX_FRAMES) this.frames.shift();
     // Forget slowly, which compensates for drifting clocks.
     this.skew = Math.min(this.skew + 0.05, early);
     this.settled = false;
@@ -79,12 +79,12 @@ export class FramePlayer {
   at(time: number): ReadonlyMap<string, THREE.Matrix4> | null {
     const newest = this.frames.at(-1);
     if (!newest || this.settled) return null;
-    const wanted = (time - this.skew - BEHIND_MS) * this.rate;
-    const after = this.frames.find((frame) => frame.time >= wanted) ?? newest;
+    const displayTime = (time - this.skew - BEHIND_MS) * this.rate;
+    const after = this.frames.find((frame) => frame.time >= displayTime) ?? newest;
     const before = this.frames[this.frames.indexOf(after) - 1] ?? after;
-    this.shownTime = Math.min(wanted, newest.time);
+    this.shownTime = Math.min(displayTime, newest.time);
     const span = after.time - before.time;
-    const share = span > 0 ? THREE.MathUtils.clamp((wanted - before.time) / span, 0, 1) : 1;
+    const share = span > 0 ? THREE.MathUtils.clamp((displayTime - before.time) / span, 0, 1) : 1;
     this.settled = after === newest && share === 1;
     for (const [name, end] of after.poses) {
       const start = before.poses.get(name) ?? end;

@@ -61,7 +61,7 @@ async function fetched(url: string, failed: (why: string) => void): Promise<Arra
 }
 
 /** Return a group with a model in the page's materials; the caller sets its matrix. */
-export function dressed(model: THREE.Group, colour: string): THREE.Group {
+export function withMaterials(model: THREE.Group, colour: string): THREE.Group {
   model.traverse((part) => {
     if (!(part instanceof THREE.Mesh)) return;
     part.castShadow = true;
@@ -86,8 +86,8 @@ export function dressed(model: THREE.Group, colour: string): THREE.Group {
 }
 
 /** Return a fixture's model with edges; without a colour it gets one that contrasts with the floor. */
-export function dressedFixture(model: THREE.Group, colour: string): THREE.Group {
-  const group = dressed(model, colour);
+export function withEdges(model: THREE.Group, colour: string): THREE.Group {
+  const group = withMaterials(model, colour);
   const parts: THREE.Mesh[] = [];
   group.traverse((part) => part instanceof THREE.Mesh && parts.push(part));
   for (const part of parts) {

@@ -10,8 +10,9 @@ import type { Failed } from "./arm";
 import { Arm, loadOrSay, meshUrl } from "./arm";
 import type { Nearest } from "./lines";
 import { Gap, Path, Trail } from "./lines";
-import { colourEdges, dressedFixture, paint } from "./models";
+import { colourEdges, paint, withEdges } from "./models";
 import { lights, palette, surround } from "./surroundings";
+import { Viewpoint } from "./viewpoint";
 import {
   countFrame,
   disposeScene,
@@ -22,7 +23,6 @@ import {
   observeSize,
   toneMap,
 } from "./webgl";
-import { Viewpoint } from "./viewpoint";
 
 const SLOW_FRAME_MS = 50; // a slower frame holds up the rest of the page
 // The first frame, and the first after the page was hidden, are slow on every machine.
@@ -151,7 +151,7 @@ export class RobotScene {
           (why) => failed(name, why),
         );
         if (!model) return;
-        const group = dressedFixture(model, color);
+        const group = withEdges(model, color);
         if (fixtureToSite.length === 16) group.matrix.fromArray(fixtureToSite).transpose();
         this.fixtures.set(name, group);
         this.scene.add(group);

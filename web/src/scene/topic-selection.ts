@@ -10,10 +10,10 @@ import { hello } from "../mesh/connection";
 import { isReplay } from "../mesh/robot-name";
 import type { Forward } from "./forward-kinematics";
 
-export const REACHES = ["slow", "all"] as const;
-export type Reach = (typeof REACHES)[number];
+export const TOPIC_SELECTIONS = ["slow", "all"] as const;
+export type TopicSelection = (typeof TOPIC_SELECTIONS)[number];
 
-const requested = signal<ReadonlyMap<string, Reach>>(new Map());
+const requested = signal<ReadonlyMap<string, TopicSelection>>(new Map());
 
 /** Return whether the robot is at another site than this console. */
 export function isRemote(robotKey: string): boolean {
@@ -21,22 +21,22 @@ export function isRemote(robotKey: string): boolean {
   return hello.value !== null && hello.value.site !== site && !isReplay(robot);
 }
 
-export function reachOf(robotKey: string): Reach {
+export function topicSelection(robotKey: string): TopicSelection {
   return requested.value.get(robotKey) ?? (isRemote(robotKey) ? "slow" : "all");
 }
 
-export function askReach(robotKey: string, reach: Reach): void {
+export function selectTopics(robotKey: string, reach: TopicSelection): void {
   requested.value = new Map(requested.value).set(robotKey, reach);
 }
 
 /** Return the topic of the robot's joint states, whole or thinned. */
 export function jointsTopic(robotKey: string): "joints" | "joints/slow" {
-  return reachOf(robotKey) === "slow" ? "joints/slow" : "joints";
+  return topicSelection(robotKey) === "slow" ? "joints/slow" : "joints";
 }
 
 /** Return the topic that supplies the 3-D view's placements. */
 export function framesTopic(robotKey: string): "frames" | "joints/slow" {
-  return reachOf(robotKey) === "slow" ? "joints/slow" : "frames";
+  return topicSelection(robotKey) === "slow" ? "joints/slow" : "frames";
 }
 
 /** Convert JointStates to FrameTransforms payloads: over a slow link the page computes placements. */

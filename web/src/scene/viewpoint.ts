@@ -6,7 +6,7 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 const FIELD_OF_VIEW = 32; // degrees, upright
 
 /** Position and direction of a camera, in metres. */
-export interface Look {
+export interface CameraPose {
   eye: THREE.Vector3;
   target: THREE.Vector3;
   up: THREE.Vector3;
@@ -61,7 +61,7 @@ export class Viewpoint {
     return (this.orthographic.top - this.orthographic.bottom) / this.orthographic.zoom;
   }
 
-  look({ eye, target, up, flat }: Look): void {
+  look({ eye, target, up, flat }: CameraPose): void {
     this.camera = flat ? this.orthographic : this.perspective;
     this.camera.up.copy(up);
     this.camera.position.copy(eye);
@@ -77,7 +77,7 @@ export class Viewpoint {
   }
 
   /** Return the current look; the zoom of an orthographic camera becomes the distance of its eye. */
-  now(): Look {
+  now(): CameraPose {
     const { target } = this.controls;
     const away = this.camera.position.clone().sub(target).divideScalar(this.camera.zoom);
     return {

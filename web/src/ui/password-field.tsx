@@ -14,7 +14,7 @@ export function PasswordField(props: {
   const id = useId();
   const [shown, setShown] = useState(false);
   const [caps, setCaps] = useState(false);
-  const look = (event: KeyboardEvent) => setCaps(event.getModifierState?.("CapsLock") ?? false);
+  const updateCaps = (event: KeyboardEvent) => setCaps(event.getModifierState?.("CapsLock") ?? false);
   return (
     <div class="field">
       <label for={id}>
@@ -33,8 +33,8 @@ export function PasswordField(props: {
           required
           value={props.value}
           onInput={(event) => props.set(event.currentTarget.value)}
-          onKeyDown={look}
-          onKeyUp={look}
+          onKeyDown={updateCaps}
+          onKeyUp={updateCaps}
         />
         <button type="button" class="quiet" aria-pressed={shown} onClick={() => setShown(!shown)}>
           {a(shown ? "hide" : "show")}

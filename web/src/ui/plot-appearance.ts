@@ -1,12 +1,12 @@
 // Axes of every plot, in the colours of the theme.
 
-export interface PlotLook {
+export interface PlotAppearance {
   /** Return a colour of the theme by its name. */
   colour: (name: string) => string;
   axis: { stroke: string; grid: { stroke: string; width: number }; ticks: { show: boolean }; font: string };
 }
 
-export function plotLook(): PlotLook {
+export function plotAppearance(): PlotAppearance {
   const style = getComputedStyle(document.documentElement);
   const colour = (name: string) => style.getPropertyValue(name).trim();
   return {

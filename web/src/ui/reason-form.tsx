@@ -4,7 +4,7 @@ import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../i18n/texts";
 
-export function Reason(props: {
+export function ReasonForm(props: {
   title: string;
   text: string;
   does: string;

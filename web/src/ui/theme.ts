@@ -3,11 +3,11 @@
 import { signal } from "@preact/signals";
 
 export type Theme = "dark" | "light";
-const KEPT = "robomesh.theme";
+const STORAGE_KEY = "robomesh.theme";
 
 function initial(): Theme {
-  const kept = localStorage.getItem(KEPT);
-  if (kept === "dark" || kept === "light") return kept;
+  const stored = localStorage.getItem(STORAGE_KEY);
+  if (stored === "dark" || stored === "light") return stored;
   return matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark";
 }
 
@@ -19,6 +19,6 @@ export function applyTheme(): void {
 
 export function switchTheme(): void {
   theme.value = theme.value === "dark" ? "light" : "dark";
-  localStorage.setItem(KEPT, theme.value);
+  localStorage.setItem(STORAGE_KEY, theme.value);
   applyTheme();
 }

@@ -7,8 +7,8 @@ import { CompressedImageSchema } from "../gen/foxglove/CompressedImage_pb";
 import { t } from "../i18n/texts";
 import { watch } from "../mesh/connection";
 import { isStale, now } from "../mesh/topics";
-import type { Wanted } from "./requested-view";
-import { isStanding, withView } from "./requested-view";
+import type { RequestedView } from "./requested-view";
+import { isStandardView, withView } from "./requested-view";
 import { decodesVideo, playVideo } from "./video-canvas";
 
 const QUIET_MS = 4000;
@@ -33,7 +33,7 @@ export interface Live {
 }
 
 /** Show the live picture of a view; null: none for now. */
-export function useLive(robotKey: string, wanted: Wanted | null, label: string): Live {
+export function useLive(robotKey: string, wanted: RequestedView | null, label: string): Live {
   const canvas = useRef<HTMLCanvasElement>(null);
   const image = useRef<HTMLImageElement>(null);
   const [video, setVideo] = useState(decodesVideo);
@@ -59,7 +59,7 @@ export function useLive(robotKey: string, wanted: Wanted | null, label: string):
       setStep(reduced);
     };
     // Stills need many times the bytes of video: limit their size and rate.
-    const request = video || !isStanding(wanted) ? wanted : { ...wanted, ...REDUCED_STILL, fps: STILL_FPS };
+    const request = video || !isStandardView(wanted) ? wanted : { ...wanted, ...REDUCED_STILL, fps: STILL_FPS };
     return withView(
       robotKey,
       request,

@@ -5,7 +5,7 @@ import { ViewAnswerSchema, ViewRequestSchema } from "../gen/robomesh_pb";
 import { ask, inOwnName } from "../mesh/connection";
 
 /** The wanted picture; a width of 0: the renderer's standard size. */
-export interface Wanted {
+export interface RequestedView {
   /** The camera of the view of this name, or `view`. */
   of: string;
   view?: View;
@@ -20,16 +20,16 @@ export interface PictureKeys {
   image: string;
 }
 
-const ASK_S = 4;
+const TIMEOUT_S = 4;
 const CHECK_INTERVAL_MS = 3000;
 
 /** Keys of the renderer's standard view. */
-export function standing(of: string): Wanted {
+export function standardView(of: string): RequestedView {
   return { of, width: 0, height: 0, fps: 0 };
 }
 
 /** Return whether it is the standard view. */
-export function isStanding(wanted: Wanted): boolean {
+export function isStandardView(wanted: RequestedView): boolean {
   return wanted.width === 0 && wanted.fps === 0 && !wanted.view;
 }
 
@@ -40,7 +40,7 @@ export function isStanding(wanted: Wanted): boolean {
  * @param refused Called with the reason why there are none. */
 export function withView(
   robotKey: string,
-  wanted: Wanted,
+  wanted: RequestedView,
   attach: (keys: PictureKeys) => () => void,
   quiet: () => boolean,
   refused: (text: string) => void,
@@ -54,25 +54,25 @@ export function withView(
     attached = video;
     detach = attach({ video: `${robotKey}/${video}`, image: `${robotKey}/${image}` });
   };
-  const takeStanding = () => take(`video/${wanted.of}`, `image/${wanted.of}`);
-  const look = async () => {
+  const takeStandardView = () => take(`video/${wanted.of}`, `image/${wanted.of}`);
+  const requestView = async () => {
     const { of, view, width, height, fps } = wanted;
     const request = view ? { view, width, height, fps } : { of, width, height, fps };
     try {
       const key = inOwnName(`${robotKey}/views`);
-      const answer = await ask(key, ViewRequestSchema, request, ViewAnswerSchema, ASK_S);
+      const answer = await ask(key, ViewRequestSchema, request, ViewAnswerSchema, TIMEOUT_S);
       take(answer.topic, answer.image);
     } catch (error) {
       if (ended) return;
       refused(error instanceof Error ? error.message : String(error));
-      if (!view && !attached) takeStanding(); // a larger picture than wanted is better than none
+      if (!view && !attached) takeStandardView(); // a larger picture than wanted is better than none
     }
   };
   let timer: ReturnType<typeof setInterval> | undefined;
-  if (isStanding(wanted)) takeStanding();
+  if (isStandardView(wanted)) takeStandardView();
   else {
-    void look();
-    timer = setInterval(() => quiet() && void look(), CHECK_INTERVAL_MS);
+    void requestView();
+    timer = setInterval(() => quiet() && void requestView(), CHECK_INTERVAL_MS);
   }
   return () => {
     ended = true;

@@ -2,7 +2,7 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { a, roleText } from "../../i18n/account";
-import { me, onlyWatches, rests, signOut } from "../../mesh/account";
+import { commandSuspended, isMonitor, me, signOut } from "../../mesh/account";
 import { hello } from "../../mesh/connection";
 import { ChangePassword } from "../../panels/change-password";
 import "./account-menu.css";
@@ -39,7 +39,7 @@ export function AccountMenu() {
               <strong>{account}</strong> <span class="dim">{roleText(role)}</span>
             </p>
             <p class="dim">
-              {onlyWatches.value ? a("may_watch") : rests.value ? a("rests") : a("may_command", { operator })}
+              {isMonitor.value ? a("may_watch") : commandSuspended.value ? a("rests") : a("may_command", { operator })}
             </p>
             <button class="action" onClick={() => setChanging(true)}>
               {a("change_password")}

@@ -5,13 +5,13 @@ import { d } from "../../i18n/define";
 import { bodies } from "./description";
 import type { Draft } from "./draft";
 import { draft, identity } from "./draft";
-import type { Checked, Problem } from "./server-requests";
-import { check, Refused } from "./server-requests";
 import { shapeOf } from "./mesh-files";
 import { positions } from "./selection";
+import type { Checked, Problem } from "./server-requests";
+import { check, RefusedError } from "./server-requests";
 
-const AFTER_MS = 200;
-const AGAIN_MS = 1500;
+const CHECK_DELAY_MS = 200;
+const RETRY_MS = 1500;
 // A link's shape beyond these sizes probably has the wrong unit [m].
 const LARGEST_M = 10;
 const SMALLEST_M = 0.001;
@@ -20,21 +20,21 @@ export const checked = signal<Checked | null>(null);
 /** Whether the current draft's answer is pending. */
 export const checking = signal(false);
 /** Why it could not be checked; "" when it could. */
-export const checkFailed = signal("");
+export const checkError = signal("");
 
 /** Invalid texts of number fields, by path; the draft keeps the last valid number. */
-export const unread = signal<ReadonlyMap<string, string>>(new Map());
+export const invalidNumbers = signal<ReadonlyMap<string, string>>(new Map());
 
 /** Return a field's path in the format of a problem's. */
-export function placeOf(path: string): (string | number)[] {
+export function parsePath(path: string): (string | number)[] {
   return path.split("/").map((step) => (/^\d+$/.test(step) ? Number(step) : step));
 }
 
 /** Record an invalid number; null: it is valid. */
-export function noNumber(path: string, text: string | null): void {
-  if (text === (unread.peek().get(path) ?? null)) return;
-  const others = [...unread.peek()].filter(([other]) => other !== path);
-  unread.value = new Map(text === null ? others : [...others, [path, text]]);
+export function setInvalidNumber(path: string, text: string | null): void {
+  if (text === (invalidNumbers.peek().get(path) ?? null)) return;
+  const others = [...invalidNumbers.peek()].filter(([other]) => other !== path);
+  invalidNumbers.value = new Map(text === null ? others : [...others, [path, text]]);
 }
 
 // In another draft, or after links change, a path names another field.
@@ -42,21 +42,21 @@ const fields = computed(
   () => `${identity.value.id} ${draft.value?.description.joint.map(({ name }) => name).join(" ") ?? ""}`,
 );
 effect(() => {
-  if (fields.value) unread.value = new Map();
+  if (fields.value) invalidNumbers.value = new Map();
 });
 
 /** Problems: from the server's check, unreadable shapes, and invalid numbers. */
 export const problems = computed<readonly Problem[]>(() => {
-  const typed = [...unread.value].map(([path, text]) => ({
-    path: placeOf(path),
+  const typed = [...invalidNumbers.value].map(([path, text]) => ({
+    path: parsePath(path),
     text: d("wrong_number", { text: text.trim() || " " }),
   }));
   const problems = [...typed, ...(checked.value?.problems ?? [])];
   const places = new Set(problems.map(({ path }) => path.join("/")));
-  return [...problems, ...oddShapes().filter(({ path }) => !places.has(path.join("/")))];
+  return [...problems, ...shapeProblems().filter(({ path }) => !places.has(path.join("/")))];
 });
 
-function oddShapes(): Problem[] {
+function shapeProblems(): Problem[] {
   const now = draft.value;
   if (!now) return [];
   return bodies(now.description).flatMap(({ mesh, mesh_scale: scale }, index) => {
@@ -82,46 +82,46 @@ export const readingShapes = computed(() => {
 });
 
 let timer = 0;
-let asking: AbortController | null = null;
+let request: AbortController | null = null;
 
 /** Check each change of the draft and of the joints until the returned function is called. */
-export function keepChecking(): () => void {
+export function startChecking(): () => void {
   const end = effect(() => {
     const now = draft.value;
     const joints = positions.value;
     clearTimeout(timer);
     if (!now) {
-      asking?.abort(); // its answer is of a closed draft
+      request?.abort(); // its answer is of a closed draft
       checked.value = null;
       return;
     }
     checking.value = true;
-    timer = setTimeout(() => void ask(now, joints), AFTER_MS);
+    timer = setTimeout(() => void ask(now, joints), CHECK_DELAY_MS);
   });
   return () => {
     end();
     clearTimeout(timer);
-    asking?.abort();
+    request?.abort();
     checked.value = null;
   };
 }
 
 async function ask(of: Draft, joints: readonly number[]): Promise<void> {
-  asking?.abort();
-  const own = (asking = new AbortController());
+  request?.abort();
+  const own = (request = new AbortController());
   try {
     const answer = await check(of, joints, own.signal);
     if (own.signal.aborted) return;
     checked.value = answer;
-    checkFailed.value = "";
+    checkError.value = "";
   } catch (error) {
     if (own.signal.aborted) return;
     checked.value = null;
-    checkFailed.value = error instanceof Error ? error.message : String(error);
+    checkError.value = error instanceof Error ? error.message : String(error);
     // Retry: the console may come back without any typing.
-    if (error instanceof Refused && (error.status === 0 || error.status >= 500)) {
+    if (error instanceof RefusedError && (error.status === 0 || error.status >= 500)) {
       clearTimeout(timer);
-      timer = setTimeout(() => void ask(of, joints), AGAIN_MS);
+      timer = setTimeout(() => void ask(of, joints), RETRY_MS);
     }
   }
   checking.value = false;

@@ -47,7 +47,7 @@ export const planning = computed(() => working.value === identity.value.id);
 /** Whether the plan is of the current draft. */
 export const isPlanned = computed(() => plan.value?.subject === subject.value);
 /** Why there is no plan; "" unless it failed. */
-export const planFailed = computed(() => (failure.value?.subject === subject.value ? failure.value.text : ""));
+export const planError = computed(() => (failure.value?.subject === subject.value ? failure.value.text : ""));
 
 function subjectOf({ description, files }: Draft): string {
   const unseen = { name: "", title: "", provenance: "", frame: [], view: {}, collision: { ignore: [] } };
@@ -89,11 +89,11 @@ export function isTouching({ kind }: PairRow): boolean {
 }
 
 /** Compute the plan of each change of the draft until the returned function is called. */
-export function keepPlanning(): () => void {
+export function startPlanning(): () => void {
   let timer = 0;
   const end = effect(() => {
     clearTimeout(timer);
-    if (!subject.value || planning.value || isPlanned.value || planFailed.value) return;
+    if (!subject.value || planning.value || isPlanned.value || planError.value) return;
     timer = setTimeout(() => void work(), plan.peek()?.id === identity.value.id ? AFTER_MS : 0);
   });
   return () => {

@@ -8,17 +8,17 @@ import {
   isPlanned,
   isSame,
   isTouching,
-  keepPlanning,
   pairRows,
   planAgain,
-  planFailed,
+  planError,
   planning,
+  startPlanning,
 } from "./collision-plan";
-import { draft, edit, seal } from "./draft";
+import { draft, editDraft, endUndoStep } from "./draft";
 import { ProblemWords } from "./fields";
 import type { PairKind } from "./server-requests";
 
-const WAYS: Readonly<Partial<Record<PairKind, DefineText>>> = {
+const KIND_TEXTS: Readonly<Partial<Record<PairKind, DefineText>>> = {
   collision_meshes: "way_collision_meshes",
   visual_meshes: "way_visual_meshes",
   false_contacts: "way_collision_meshes",
@@ -38,15 +38,15 @@ const REASONS: Readonly<Record<PairKind, DefineText | null>> = {
 };
 
 function setIgnored(links: readonly [string, string], ignored: boolean): void {
-  seal();
-  edit(({ description }) => {
+  endUndoStep();
+  editDraft(({ description }) => {
     const others = description.collision.ignore.filter((pair) => !isSame(pair, links));
     description.collision.ignore = ignored ? [...others, [...links]] : others;
   });
 }
 
 export function CollisionsTab() {
-  useEffect(keepPlanning, []);
+  useEffect(startPlanning, []);
   const now = draft.value;
   if (!now) return null;
   const rows = pairRows.value;
@@ -80,12 +80,12 @@ export function CollisionsTab() {
 
 /** A summary of the plan, or why there is none yet. */
 function PlanState({ rows }: { rows: readonly PairRow[] }) {
-  if (planFailed.value) {
+  if (planError.value) {
     return (
       <div class="plan-state" role="alert">
         <p class="problem-word">
           <span class="shape warning" aria-hidden="true" />
-          {d("plan_failed", { text: planFailed.value })}
+          {d("plan_failed", { text: planError.value })}
         </p>
         <button class="quiet" onClick={planAgain}>
           {d("plan_again")}
@@ -139,7 +139,7 @@ function Row({ row, place }: { row: PairRow; place: number }) {
         {first} – {second}
       </td>
       <td>
-        <span class="way">{d(isIgnored ? "way_ignored" : (WAYS[kind] ?? "way_hulls"))}</span>
+        <span class="way">{d(isIgnored ? "way_ignored" : (KIND_TEXTS[kind] ?? "way_hulls"))}</span>
         {reason && <span class="dim"> {d(reason, formatted)}</span>}
       </td>
     </tr>

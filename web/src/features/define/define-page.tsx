@@ -3,44 +3,44 @@
 import { signal } from "@preact/signals";
 import { useEffect, useLayoutEffect } from "preact/hooks";
 import { d } from "../../i18n/define";
-import { Chain } from "./kinematic-chain";
-import { keepChecking } from "./checks";
+import { startChecking } from "./checks";
 import { CollisionsTab } from "./collisions-tab";
-import { Details } from "./part-details";
 import { DhTable } from "./dh-table";
-import { draft, keptFiles, leave, redo, undo } from "./draft";
+import { closeDraft, draft, redo, storedFiles, undo } from "./draft";
 import { droppedFiles, takeFiles } from "./dropped-files";
-import { keepOnly } from "./file-cache";
+import { deleteOtherFiles } from "./file-cache";
 import { ConstraintsTab, FramesTab } from "./frames-and-constraints-tabs";
-import { loading, open } from "./open-robot";
-import { listRobots, save } from "./save-and-start";
+import { KinematicChain } from "./kinematic-chain";
+import { startReading } from "./mesh-files";
+import { MissingFiles } from "./missing-files";
+import { NewRobot } from "./new-robot";
+import { loading, openRobot } from "./open-robot";
+import { PartDetails } from "./part-details";
 import { PositionsPanel } from "./positions-panel";
 import { ProblemsPanel } from "./problems-panel";
 import { RobotTab } from "./robot-tab";
+import { listRobots, save } from "./save-and-start";
 import { ScenePanel } from "./scene-panel";
-import { keepReading } from "./mesh-files";
-import { MissingFiles } from "./missing-files";
-import { Start } from "./new-robot";
-import { Outcomes, Toolbar } from "./toolbar";
-import { ViewsTab } from "./views-tab";
 import type { Tab } from "./selection";
 import { TABS, tab } from "./selection";
+import { Outcomes, Toolbar } from "./toolbar";
+import { ViewsTab } from "./views-tab";
 import "./styles";
 
 const draggedOver = signal(false);
 
-export function Define({ name }: { name: string }) {
+export function DefinePage({ name }: { name: string }) {
   useEffect(() => {
-    void keepOnly(keptFiles());
-    const ends = [keepChecking(), keepReading()];
+    void deleteOtherFiles(storedFiles());
+    const ends = [startChecking(), startReading()];
     void listRobots();
     return () => {
       for (const end of ends) end();
-      leave();
+      closeDraft();
     };
   }, []);
   // Open the draft before files can be dropped: they belong to it.
-  useLayoutEffect(() => void open(name), [name]);
+  useLayoutEffect(() => void openRobot(name), [name]);
   useKeys();
   useDrop();
   return (
@@ -50,15 +50,15 @@ export function Define({ name }: { name: string }) {
         <Outcomes />
         <MissingFiles />
       </div>
-      {draft.value ? <Workbench /> : loading.value ? <p class="dim define-loading">{loading.value}</p> : <Start />}
+      {draft.value ? <DraftPanels /> : loading.value ? <p class="dim define-loading">{loading.value}</p> : <NewRobot />}
       {draggedOver.value && <div class="drop-veil">{d("dropped")}</div>}
     </div>
   );
 }
 
-function Workbench() {
+function DraftPanels() {
   const tabs: Record<Tab, () => preact.ComponentChild> = {
-    details: () => <Details />,
+    details: () => <PartDetails />,
     robot: () => <RobotTab />,
     frames: () => <FramesTab />,
     constraints: () => <ConstraintsTab />,
@@ -68,7 +68,7 @@ function Workbench() {
   return (
     <>
       <div class="define-left">
-        <Chain />
+        <KinematicChain />
         <ProblemsPanel />
       </div>
       <ScenePanel />

@@ -7,6 +7,7 @@ import { toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
 import type { DhRow } from "../../scene/forward-kinematics";
 import { makeGizmo } from "../../scene/gizmo";
 import { lights, palette, surround } from "../../scene/surroundings";
+import { Viewpoint } from "../../scene/viewpoint";
 import {
   countFrame,
   disposeScene,
@@ -16,9 +17,8 @@ import {
   observeSize,
   toneMap,
 } from "../../scene/webgl";
-import { Viewpoint } from "../../scene/viewpoint";
-import { glb } from "./server-requests";
 import { Skeleton } from "./dh-skeleton";
+import { glb } from "./server-requests";
 
 const CREASE_ANGLE = 0.6; // rad: sharper edges stay sharp
 const PAINT = "paint"; // the material that takes a link's colour

@@ -3,9 +3,9 @@
 import { d } from "../../i18n/define";
 import { problemsAt } from "./checks";
 import { angleUnit, jointUnit } from "./description";
-import { draft, edit } from "./draft";
+import { draft, editDraft } from "./draft";
 import { NumberField } from "./fields";
-import { choose, chosen } from "./selection";
+import { choosePart, chosenPart } from "./selection";
 
 const COLUMNS = ["a", "alpha", "d", "theta"] as const;
 const HEADS = { a: "a", alpha: "α", d: "d", theta: "θ" };
@@ -30,9 +30,9 @@ export function DhTable() {
       </thead>
       <tbody>
         {joints.map((joint, index) => (
-          <tr key={index} class={chosen.value === index ? "chosen" : ""}>
+          <tr key={index} class={chosenPart.value === index ? "chosen" : ""}>
             <th scope="row">
-              <button class="row-name" onClick={() => choose(index)}>
+              <button class="row-name" onClick={() => choosePart(index)}>
                 {joint.name || "–"}
                 {problemsAt(`joint/${index}`).length > 0 && <span class="shape warning" aria-hidden="true" />}
               </button>
@@ -51,9 +51,9 @@ export function DhTable() {
                     label={d("field_of", { field: HEADS[column], name: joint.name })}
                     value={joint[column]}
                     step={unitOf(column) === "m" || unitOf(column) === "rad" ? 0.01 : 1}
-                    onFocus={() => (chosen.value = index)}
+                    onFocus={() => (chosenPart.value = index)}
                     set={(value) =>
-                      edit(({ description }) => {
+                      editDraft(({ description }) => {
                         const row = description.joint[index];
                         if (row) row[column] = value;
                       }, `joint/${index}/${column}`)

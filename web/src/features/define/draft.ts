@@ -24,26 +24,26 @@ export interface Identity {
   revision: string;
 }
 
-interface Kept {
+interface StoredDraft {
   draft: Draft;
   identity: Identity;
   /** Last change, ms since the Unix epoch. */
   at: number;
 }
 
-const KEPT = "robomesh.define.draft/";
-const NEW = `${KEPT}new/`; // no robot's name contains a slash
+const STORAGE_PREFIX = "robomesh.define.draft/";
+const NEW_PREFIX = `${STORAGE_PREFIX}new/`; // no robot's name contains a slash
 /** Key in the tab's storage: the id of its new draft. */
-const OF_THIS_TAB = "robomesh.define.new";
-const MOST_STEPS = 500;
+const TAB_DRAFT_KEY = "robomesh.define.new";
+const MAX_UNDO_STEPS = 500;
 
 export const draft = signal<Draft | null>(null);
 export const identity = signal<Identity>(newIdentity());
 const past = signal<readonly Draft[]>([]);
 const future = signal<readonly Draft[]>([]);
 /** When the draft that a reload restored was last changed; null: none was restored. */
-export const broughtBack = signal<number | null>(null);
-let together = "";
+export const restoredFrom = signal<number | null>(null);
+let undoGroup = "";
 
 export const canUndo = computed(() => past.value.length > 0);
 export const canRedo = computed(() => future.value.length > 0);
@@ -64,21 +64,21 @@ function textOf(of: Draft): string {
 }
 
 /** Change the draft: one undo step, or part of the previous step if `as` is the same. */
-export function edit(change: (draft: Draft) => void, as = ""): void {
+export function editDraft(change: (draft: Draft) => void, as = ""): void {
   const before = draft.value;
   if (!before) return;
   const after = structuredClone(before);
   change(after);
   if (textOf(after) === textOf(before)) return;
-  if (!as || as !== together) past.value = [...past.value, before].slice(-MOST_STEPS);
-  together = as;
+  if (!as || as !== undoGroup) past.value = [...past.value, before].slice(-MAX_UNDO_STEPS);
+  undoGroup = as;
   future.value = [];
   draft.value = after;
 }
 
 /** End an undo step: a field lost the focus, a drag ended. */
-export function seal(): void {
-  together = "";
+export function endUndoStep(): void {
+  undoGroup = "";
 }
 
 export function undo(): void {
@@ -93,7 +93,7 @@ function step(from: typeof past, to: typeof past): void {
   const before = draft.value;
   const after = from.value.at(-1);
   if (!before || !after) return;
-  seal();
+  endUndoStep();
   from.value = from.value.slice(0, -1);
   to.value = [...to.value, before];
   draft.value = after;
@@ -104,9 +104,9 @@ function step(from: typeof past, to: typeof past): void {
  * @param owner The robot that it belongs to; "": a new one.
  * @param origin Where that robot is saved; a new one's draft is unsaved from the start.
  * @param revision The robot's revision, from the site. */
-export function begin(with_: Draft, owner = "", origin: "library" | "site" | null = null, revision = ""): void {
+export function openDraft(with_: Draft, owner = "", origin: "library" | "site" | null = null, revision = ""): void {
   const fresh = newIdentity();
-  show(with_, {
+  replaceDraft(with_, {
     // Files that were dropped before belong to this draft.
     id: draft.value ? fresh.id : identity.value.id,
     owner,
@@ -116,65 +116,65 @@ export function begin(with_: Draft, owner = "", origin: "library" | "site" | nul
   });
 }
 
-function show(shown: Draft, of: Identity, at: number | null = null): void {
+function replaceDraft(shown: Draft, of: Identity, at: number | null = null): void {
   batch(() => {
-    seal();
+    endUndoStep();
     past.value = [];
     future.value = [];
-    broughtBack.value = at;
+    restoredFrom.value = at;
     identity.value = of;
     draft.value = shown;
   });
 }
 
 /** Mark a draft as saved under a name; if it is still open, it now belongs to that robot. */
-export function savedAs(as: Draft, of: Identity, name: string, revision: string): void {
+export function markSaved(as: Draft, of: Identity, name: string, revision: string): void {
   const key = keyOf(of);
-  const kept = keptAt(key);
+  const kept = storedAt(key);
   if (isOpen(of) || (kept && textOf(kept.draft) === textOf(as))) localStorage.removeItem(key);
-  if (isOpen(of)) broughtBack.value = null;
+  if (isOpen(of)) restoredFrom.value = null;
   if (isOpen(of)) identity.value = { id: of.id, owner: name, siteName: name, saved: textOf(as), revision };
 }
 
 /** Close the draft and delete it. */
-export function discard(): void {
+export function deleteDraft(): void {
   localStorage.removeItem(keyOf(identity.value));
-  leave();
+  closeDraft();
 }
 
 /** Close the draft, which stays kept. */
-export function leave(): void {
+export function closeDraft(): void {
   batch(() => {
     draft.value = null;
-    broughtBack.value = null;
+    restoredFrom.value = null;
     identity.value = newIdentity();
   });
 }
 
 /** Close the draft for a new one: it stays in the list, but a reload does not restore it. */
-export function putAside(): void {
-  sessionStorage.removeItem(OF_THIS_TAB);
-  leave();
+export function startNewDraft(): void {
+  sessionStorage.removeItem(TAB_DRAFT_KEY);
+  closeDraft();
 }
 
 /** Restore an unsaved draft; false: there is none.
  *
  * @param owner The robot that it belongs to; "": a new one.
  * @param id Which new one; by default this tab's. */
-export function bringBack(owner: string, id = sessionStorage.getItem(OF_THIS_TAB) ?? ""): boolean {
-  const kept = keptAt(keyOf({ owner, id }));
-  if (kept) show(kept.draft, kept.identity, kept.at);
+export function restoreDraft(owner: string, id = sessionStorage.getItem(TAB_DRAFT_KEY) ?? ""): boolean {
+  const kept = storedAt(keyOf({ owner, id }));
+  if (kept) replaceDraft(kept.draft, kept.identity, kept.at);
   return kept !== null;
 }
 
 /** Return whether a robot has an unsaved draft. */
-export function hasKept(owner: string): boolean {
-  return keptAt(keyOf({ owner, id: "" })) !== null;
+export function hasStoredDraft(owner: string): boolean {
+  return storedAt(keyOf({ owner, id: "" })) !== null;
 }
 
 /** Unsaved new drafts of every tab, the last changed first. */
 export function newDrafts(): { id: string; name: string; at: number }[] {
-  const kept = keys(NEW).flatMap((key) => keptAt(key) ?? []);
+  const kept = keys(NEW_PREFIX).flatMap((key) => storedAt(key) ?? []);
   return kept
     .map(({ draft: { description }, identity: { id }, at }) => ({
       id,
@@ -185,8 +185,8 @@ export function newDrafts(): { id: string; name: string; at: number }[] {
 }
 
 /** Return the SHA-256 of every file in any kept draft. */
-export function keptFiles(): Set<string> {
-  return new Set(keys(KEPT).flatMap((key) => Object.values(keptAt(key)?.draft.files ?? {})));
+export function storedFiles(): Set<string> {
+  return new Set(keys(STORAGE_PREFIX).flatMap((key) => Object.values(storedAt(key)?.draft.files ?? {})));
 }
 
 function keys(start: string): string[] {
@@ -194,12 +194,12 @@ function keys(start: string): string[] {
 }
 
 function keyOf({ owner, id }: Pick<Identity, "owner" | "id">): string {
-  return owner ? KEPT + owner : NEW + id;
+  return owner ? STORAGE_PREFIX + owner : NEW_PREFIX + id;
 }
 
-function keptAt(key: string): Kept | null {
+function storedAt(key: string): StoredDraft | null {
   try {
-    const kept = JSON.parse(localStorage.getItem(key) ?? "null") as Kept | null;
+    const kept = JSON.parse(localStorage.getItem(key) ?? "null") as StoredDraft | null;
     return kept?.identity && Array.isArray(kept.draft.description.joint) ? kept : null;
   } catch {
     return null; // written by another version, or by hand
@@ -207,7 +207,7 @@ function keptAt(key: string): Kept | null {
 }
 
 /** The browser's message if the draft could not be kept; "" if it was. */
-export const keepingFailed = signal("");
+export const storageError = signal("");
 
 effect(() => {
   const now = draft.value;
@@ -218,18 +218,18 @@ effect(() => {
     localStorage.removeItem(key);
     return;
   }
-  const kept: Kept = { draft: now, identity: of, at: Date.now() };
-  const before = keptAt(key);
+  const kept: StoredDraft = { draft: now, identity: of, at: Date.now() };
+  const before = storedAt(key);
   if (before && JSON.stringify({ ...before, at: 0 }) === JSON.stringify({ ...kept, at: 0 })) return; // restored
   try {
     localStorage.setItem(key, JSON.stringify(kept));
-    keepingFailed.value = "";
+    storageError.value = "";
   } catch (error) {
-    keepingFailed.value = String(error);
+    storageError.value = String(error);
   }
 });
 
 effect(() => {
   const { owner, id } = identity.value;
-  if (draft.value && !owner) sessionStorage.setItem(OF_THIS_TAB, id);
+  if (draft.value && !owner) sessionStorage.setItem(TAB_DRAFT_KEY, id);
 });

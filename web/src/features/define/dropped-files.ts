@@ -5,13 +5,13 @@ import { d } from "../../i18n/define";
 import type { Body, Description } from "./description";
 import { complete, empty, radians, tidy } from "./description";
 import type { Draft, Identity } from "./draft";
-import { begin, draft, edit, identity, isOpen } from "./draft";
+import { draft, editDraft, identity, isOpen, openDraft } from "./draft";
 import { freshName, insertJoint, nameFromFile } from "./edits";
-import { keep } from "./file-cache";
+import { cacheFile } from "./file-cache";
+import { missingFiles, readShape, resolvePath, setShape } from "./mesh-files";
+import { choosePart, resetSelection } from "./selection";
 import type { MeshInfo } from "./server-requests";
 import { importRobot, mesh, unzip, upload } from "./server-requests";
-import { beside, missingFiles, readShape, setShape } from "./mesh-files";
-import { choose, resetWorkbench } from "./selection";
 
 /** File types that may be meshes; the server decides which it can read. */
 const SHAPE = /\.(wrl|wrz|vrml|3ds|stl|obj|ply|off|dae|glb|gltf|dxf|ste?p|ige?s)(\.gz)?$/i;
@@ -33,45 +33,45 @@ export const reading = signal("");
 /** The outcome of the last files. */
 export const fileNotices = signal<readonly Notice[]>([]);
 /** Paths of missing files that the user skipped. */
-export const doneWithout = signal<ReadonlySet<string>>(new Set());
+export const skippedFiles = signal<ReadonlySet<string>>(new Set());
 /** A URDF that waits for files. */
 export const waitingUrdf = signal<{ file: string; files: Record<string, string>; missing: string[] } | null>(null);
 
 let last: Promise<void> = Promise.resolve();
 /** The page or draft that the files were dropped on. */
-let place: Identity | null = null;
+let target: Identity | null = null;
 
 /** Read files after earlier ones, unless their page or draft was closed. */
-function inTurn(read: () => Promise<void>): Promise<void> {
+function enqueue(read: () => Promise<void>): Promise<void> {
   const own = identity.value;
   last = last.then(async () => {
-    place = own;
-    if (isLeft()) return;
+    target = own;
+    if (isClosed()) return;
     fileNotices.value = [];
     try {
       await read();
     } catch (error) {
-      notice("refused", d("failed", { text: words(error) }));
+      notice("refused", d("failed", { text: errorText(error) }));
     }
     reading.value = "";
   });
   return last;
 }
 
-function isLeft(): boolean {
-  return place !== null && !isOpen(place);
+function isClosed(): boolean {
+  return target !== null && !isOpen(target);
 }
 
-function words(error: unknown): string {
+function errorText(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
 function notice(kind: Notice["kind"], text: string): void {
-  if (!isLeft()) fileNotices.value = [...fileNotices.value, { kind, text }];
+  if (!isClosed()) fileNotices.value = [...fileNotices.value, { kind, text }];
 }
 
 function refuse(name: string, error: unknown): void {
-  notice("refused", d("file_refused", { name, text: words(error) }));
+  notice("refused", d("file_refused", { name, text: errorText(error) }));
 }
 
 /** Return every file of a drop, including those in folders. */
@@ -100,11 +100,11 @@ async function filesOf(entry: FileSystemEntry): Promise<Dropped[]> {
 async function sendAll(dropped: readonly Dropped[]): Promise<Map<string, string>> {
   const sent = new Map<string, string>();
   for (const [index, { path, file }] of dropped.entries()) {
-    if (isLeft()) break;
+    if (isClosed()) break;
     reading.value = d("reading", { name: file.name, number: index + 1, count: dropped.length });
     try {
       const { sha } = await upload(file.name, file);
-      await keep(sha, file);
+      await cacheFile(sha, file);
       if (!/\.zip$/i.test(path)) sent.set(path, sha);
       else for (const [inside, its] of Object.entries(await unzip(file.name, sha))) sent.set(inside, its);
     } catch (error) {
@@ -118,7 +118,7 @@ async function sendAll(dropped: readonly Dropped[]): Promise<Map<string, string>
  *
  * @param asRobot A VRML file is a robot, as in OpenHRP, not a link. */
 export function takeFiles(dropped: readonly Dropped[] | Promise<readonly Dropped[]>, asRobot = false): Promise<void> {
-  return inTurn(async () => take(await dropped, asRobot));
+  return enqueue(async () => take(await dropped, asRobot));
 }
 
 async function take(dropped: readonly Dropped[], asRobot: boolean): Promise<void> {
@@ -130,7 +130,7 @@ async function take(dropped: readonly Dropped[], asRobot: boolean): Promise<void
     one.path.localeCompare(other.path, "en", { numeric: true, sensitivity: "base" }),
   );
   const sent = await sendAll(sorted);
-  if (isLeft()) return;
+  if (isClosed()) return;
   const paths = [...sent.keys()];
   const robotFile =
     paths.find((path) => /(^|\/)robot\.toml$/.test(path)) ??
@@ -144,10 +144,10 @@ async function take(dropped: readonly Dropped[], asRobot: boolean): Promise<void
 
 async function takeShapes(sent: Map<string, string>): Promise<void> {
   const missing = missingFiles();
-  const held = draft.value?.files ?? {};
+  const draftFiles = draft.value?.files ?? {};
   const added: Record<string, string> = {};
   const changed: string[] = [];
-  const fresh: string[] = [];
+  const newPaths: string[] = [];
   for (const [path, sha] of sent) {
     const name = path.split("/").at(-1) ?? path;
     const wanted = missing.filter((each) => baseName(each.path) === baseName(name));
@@ -157,26 +157,26 @@ async function takeShapes(sent: Map<string, string>): Promise<void> {
       changed.push(each.of);
     }
     if (wanted.length > 0) continue;
-    if (held[own] === undefined && SHAPE.test(name)) fresh.push(own);
+    if (draftFiles[own] === undefined && SHAPE.test(name)) newPaths.push(own);
     added[own] = sha;
   }
-  const { infos, parts } = await readLinks(fresh, { ...held, ...added });
-  if (isLeft()) return;
+  const { infos, parts } = await readLinks(newPaths, { ...draftFiles, ...added });
+  if (isClosed()) return;
   if (!draft.value) {
     if (infos.size === 0) {
       if (fileNotices.value.length === 0) notice("refused", d("none_to_read"));
       return;
     }
-    begin({ description: empty(), files: {} });
-    resetWorkbench();
+    openDraft({ description: empty(), files: {} });
+    resetSelection();
   }
-  for (const path of fresh) if (!infos.has(path) && !parts.has(path)) delete added[path];
+  for (const path of newPaths) if (!infos.has(path) && !parts.has(path)) delete added[path];
   const links = draft.value?.description.joint.length ?? 0;
-  edit((now) => {
+  editDraft((now) => {
     Object.assign(now.files, added); // it may have changed while these were read
     for (const [path, info] of infos) addLink(now.description, path, info);
   });
-  if ((draft.value?.description.joint.length ?? 0) > links) choose(links);
+  if ((draft.value?.description.joint.length ?? 0) > links) choosePart(links);
   const files = draft.value?.files ?? {};
   await Promise.all(changed.map((path) => readShape(path, files)));
   const whole =
@@ -189,15 +189,15 @@ async function readLinks(paths: readonly string[], files: Readonly<Record<string
   const infos = new Map<string, MeshInfo>();
   const parts = new Set<string>();
   for (const [index, path] of paths.entries()) {
-    if (isLeft()) break;
+    if (isClosed()) break;
     reading.value = d("reading", { name: path, number: index + 1, count: paths.length });
     try {
       // Read it alone first: the other files that it then lacks are its parts.
-      const alone = Object.fromEntries(
+      const withoutOthers = Object.fromEntries(
         Object.entries(files).filter(([name]) => name === path || !paths.includes(name)),
       );
-      let info = await mesh(path, alone);
-      const own = info.missing.map((name) => beside(path, name)).filter((name) => paths.includes(name));
+      let info = await mesh(path, withoutOthers);
+      const own = info.missing.map((name) => resolvePath(path, name)).filter((name) => paths.includes(name));
       for (const part of own) parts.add(part);
       if (own.length > 0) info = await mesh(path, files);
       infos.set(path, info);
@@ -234,7 +234,7 @@ function shapeBody(of: Description, body: Body, path: string, info: MeshInfo): v
 
 /** Give a link the chosen file, with the files of its folder. */
 export function takeShapeFor(dropped: readonly Dropped[], find: (of: Description) => Body | undefined): Promise<void> {
-  return inTurn(async () => {
+  return enqueue(async () => {
     const sent = [...(await sendAll(dropped))].map(([path, sha]): [string, string] => [`${MESH_FOLDER}/${path}`, sha]);
     const added = Object.fromEntries(sent);
     const { infos } = await readLinks(
@@ -242,8 +242,8 @@ export function takeShapeFor(dropped: readonly Dropped[], find: (of: Description
       { ...draft.value?.files, ...added },
     );
     const [first] = infos;
-    if (!first || isLeft()) return;
-    edit((now) => {
+    if (!first || isClosed()) return;
+    editDraft((now) => {
       Object.assign(now.files, added);
       const body = find(now.description);
       if (body) shapeBody(now.description, body, ...first);
@@ -252,9 +252,9 @@ export function takeShapeFor(dropped: readonly Dropped[], find: (of: Description
 }
 
 /** Open the waiting URDF without its missing files. */
-export function goOnWithout(): Promise<void> {
+export function continueWithoutMissing(): Promise<void> {
   const waiting = waitingUrdf.value;
-  return inTurn(async () => {
+  return enqueue(async () => {
     if (waiting) await readUrdf(waiting.file, waiting.files, true);
   });
 }
@@ -271,7 +271,7 @@ async function readUrdf(file: string, files: Record<string, string>, without = f
       files = placed;
       answer = await importRobot(file, files);
     }
-    if (isLeft()) return;
+    if (isClosed()) return;
     if (answer.missing.length > 0 && !without) {
       waitingUrdf.value = { file, files, missing: answer.missing };
       return;
@@ -279,8 +279,8 @@ async function readUrdf(file: string, files: Record<string, string>, without = f
     waitingUrdf.value = null;
     if (draft.value) throw new Error(d("urdf_twice")); // another draft has been opened
     const made: Draft = { description: complete(answer.description), files: answer.files };
-    resetWorkbench();
-    begin(made);
+    resetSelection();
+    openDraft(made);
     for (const text of answer.notes) notice("done", text);
   } catch (error) {
     refuse(file, error);
@@ -293,7 +293,7 @@ function placedWhereMissing(file: string, files: Readonly<Record<string, string>
   for (const address of missing) {
     const sha = byName.get(baseName(address));
     const [, inPackage] = /^(?:package|model):\/\/(.*)$/.exec(address) ?? [];
-    const path = inPackage ?? beside(file, address.replace(/^file:(\/\/)?/, ""));
+    const path = inPackage ?? resolvePath(file, address.replace(/^file:(\/\/)?/, ""));
     if (sha && files[path] !== sha) placed[path] = sha;
   }
   return Object.keys(placed).length > 0 ? { ...files, ...placed } : null;

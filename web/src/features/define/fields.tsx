@@ -3,9 +3,9 @@
 import type { ComponentChildren } from "preact";
 import { useId, useState } from "preact/hooks";
 import { d } from "../../i18n/define";
-import { noNumber, problemsAt, unread } from "./checks";
+import { invalidNumbers, problemsAt, setInvalidNumber } from "./checks";
 import type { Pose, Triple } from "./description";
-import { seal } from "./draft";
+import { endUndoStep } from "./draft";
 
 interface Place {
   /** Its path in the description, as in the server's problems: "joint/2/limits/0". */
@@ -32,10 +32,10 @@ export function NumberField(
 ) {
   const id = useId();
   const [being, setBeing] = useState<string | null>(null);
-  const typed = unread.value.get(props.path) ?? being;
+  const typed = invalidNumbers.value.get(props.path) ?? being;
   const setTyped = (text: string | null) => {
     setBeing(text);
-    noNumber(props.path, text !== null && readNumber(text) === null ? text : null);
+    setInvalidNumber(props.path, text !== null && readNumber(text) === null ? text : null);
   };
   const read = typed === null ? props.value : readNumber(typed);
   // Keep the typed text while it has the value; an undo shows the value again.
@@ -51,7 +51,7 @@ export function NumberField(
       props.set(Math.round((props.value + by) * 1e6) / 1e6);
     } else if (event.key === "Escape" || (event.key === "Enter" && read !== null)) {
       setTyped(null);
-      seal();
+      endUndoStep();
     }
   };
   return (
@@ -75,7 +75,7 @@ export function NumberField(
           }}
           onBlur={() => {
             if (read !== null) setTyped(null);
-            seal();
+            endUndoStep();
           }}
           onKeyDown={onKey}
         />
@@ -105,8 +105,8 @@ export function TextField(
           aria-invalid={problems.length > 0}
           title={problems[0]?.text ?? ""}
           onInput={(event) => props.set(event.currentTarget.value)}
-          onBlur={seal}
-          onKeyDown={(event) => event.key === "Enter" && seal()}
+          onBlur={endUndoStep}
+          onKeyDown={(event) => event.key === "Enter" && endUndoStep()}
         />
       </span>
       {props.hint && <span class="hint">{props.hint}</span>}

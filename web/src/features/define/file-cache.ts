@@ -3,7 +3,7 @@
 const DATABASE = "robomesh.define";
 const STORE = "files";
 
-function opened(): Promise<IDBDatabase> {
+function openDatabase(): Promise<IDBDatabase> {
   return new Promise((resolve, reject) => {
     const request = indexedDB.open(DATABASE, 1);
     request.onupgradeneeded = () => request.result.createObjectStore(STORE);
@@ -12,8 +12,8 @@ function opened(): Promise<IDBDatabase> {
   });
 }
 
-async function within<T>(mode: IDBTransactionMode, work: (store: IDBObjectStore) => IDBRequest<T>): Promise<T> {
-  const database = await opened();
+async function inTransaction<T>(mode: IDBTransactionMode, work: (store: IDBObjectStore) => IDBRequest<T>): Promise<T> {
+  const database = await openDatabase();
   try {
     return await new Promise<T>((resolve, reject) => {
       const request = work(database.transaction(STORE, mode).objectStore(STORE));
@@ -26,18 +26,18 @@ async function within<T>(mode: IDBTransactionMode, work: (store: IDBObjectStore)
 }
 
 /** Keep a file, unless the browser has no space or is in private mode. */
-export async function keep(sha: string, bytes: Blob): Promise<void> {
-  await within("readwrite", (store) => store.put(bytes, sha)).catch(() => undefined);
+export async function cacheFile(sha: string, bytes: Blob): Promise<void> {
+  await inTransaction("readwrite", (store) => store.put(bytes, sha)).catch(() => undefined);
 }
 
-export async function keptFile(sha: string): Promise<Blob | undefined> {
-  return within("readonly", (store) => store.get(sha) as IDBRequest<Blob | undefined>).catch(() => undefined);
+export async function cachedFile(sha: string): Promise<Blob | undefined> {
+  return inTransaction("readonly", (store) => store.get(sha) as IDBRequest<Blob | undefined>).catch(() => undefined);
 }
 
 /** Delete every file that is no longer needed. */
-export async function keepOnly(wanted: ReadonlySet<string>): Promise<void> {
-  const keys = await within("readonly", (store) => store.getAllKeys()).catch(() => []);
+export async function deleteOtherFiles(wanted: ReadonlySet<string>): Promise<void> {
+  const keys = await inTransaction("readonly", (store) => store.getAllKeys()).catch(() => []);
   for (const key of keys) {
-    if (!wanted.has(String(key))) await within("readwrite", (store) => store.delete(key)).catch(() => undefined);
+    if (!wanted.has(String(key))) await inTransaction("readwrite", (store) => store.delete(key)).catch(() => undefined);
   }
 }

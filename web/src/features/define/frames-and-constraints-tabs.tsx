@@ -3,7 +3,7 @@
 import { d } from "../../i18n/define";
 import type { Constraint, NamedFrame, Range } from "./description";
 import { angleUnit, jointUnit, linkNames } from "./description";
-import { draft, edit, seal } from "./draft";
+import { draft, editDraft, endUndoStep } from "./draft";
 import { freshName } from "./edits";
 import { NumberField, PoseFields, ProblemWords, Section, SelectField, TextField } from "./fields";
 
@@ -13,7 +13,7 @@ function RemoveButton({ name, remove }: { name: string; remove: () => void }) {
       class="quiet"
       aria-label={d("remove_what", { name })}
       onClick={() => {
-        seal();
+        endUndoStep();
         remove();
       }}
     >
@@ -28,12 +28,12 @@ export function FramesTab() {
   const { frame: frames, units } = now.description;
   const links = linkNames(now.description);
   const set = (index: number, field: string, change: (frame: NamedFrame) => void) =>
-    edit(({ description }) => {
+    editDraft(({ description }) => {
       const own = description.frame[index];
       if (own) change(own);
     }, `frame/${index}/${field}`);
   const add = () =>
-    edit(({ description }) => {
+    editDraft(({ description }) => {
       const name = freshName("frame", [...links, "tool", ...frames.map((frame) => frame.name)]);
       description.frame.push({ name, link: links.at(-1) ?? "base", xyz: [0, 0, 0], rpy: [0, 0, 0] });
     });
@@ -52,7 +52,7 @@ export function FramesTab() {
           end={
             <RemoveButton
               name={frame.name}
-              remove={() => edit(({ description }) => void description.frame.splice(index, 1))}
+              remove={() => editDraft(({ description }) => void description.frame.splice(index, 1))}
             />
           }
         >
@@ -92,12 +92,12 @@ export function ConstraintsTab() {
   if (!now) return null;
   const { constraint: constraints, joint: joints, units } = now.description;
   const set = (index: number, field: string, change: (constraint: Constraint) => void) =>
-    edit(({ description }) => {
+    editDraft(({ description }) => {
       const own = description.constraint[index];
       if (own) change(own);
     }, `constraint/${index}/${field}`);
   const add = () =>
-    edit(({ description }) => {
+    editDraft(({ description }) => {
       const named = description.joint.filter((joint) => joint.type === "rotary").slice(1, 3);
       const joined = Object.fromEntries(named.map((joint) => [joint.name, 1]));
       description.constraint.push({
@@ -139,7 +139,7 @@ export function ConstraintsTab() {
             end={
               <RemoveButton
                 name={title}
-                remove={() => edit(({ description }) => void description.constraint.splice(index, 1))}
+                remove={() => editDraft(({ description }) => void description.constraint.splice(index, 1))}
               />
             }
           >

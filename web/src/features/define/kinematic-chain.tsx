@@ -6,35 +6,35 @@ import { d } from "../../i18n/define";
 import { problemsAt } from "./checks";
 import type { Joint } from "./description";
 import { linkName } from "./description";
-import { draft, edit } from "./draft";
+import { draft, editDraft } from "./draft";
 import { insertJoint, moveJoint, removeJoint } from "./edits";
 import type { Part } from "./selection";
-import { choose, chosen } from "./selection";
+import { choosePart, chosenPart } from "./selection";
 
 function add(at: number): void {
-  edit((now) => void insertJoint(now.description, at));
-  choose(at);
+  editDraft((now) => void insertJoint(now.description, at));
+  choosePart(at);
 }
 
 function move(from: number, to: number, count: number): void {
   if (to < 0 || to >= count || to === from) return;
-  edit((now) => moveJoint(now.description, from, to));
-  choose(to);
+  editDraft((now) => moveJoint(now.description, from, to));
+  choosePart(to);
 }
 
 function remove(at: number, count: number): void {
-  edit((now) => removeJoint(now.description, at));
-  choose(count > 1 ? Math.min(at, count - 2) : "base");
+  editDraft((now) => removeJoint(now.description, at));
+  choosePart(count > 1 ? Math.min(at, count - 2) : "base");
 }
 
-export function Chain() {
+export function KinematicChain() {
   const [dragged, setDragged] = useState<number | null>(null);
   const [over, setOver] = useState<number | null>(null);
   const now = draft.value;
   if (!now) return null;
   const { joint: joints, base } = now.description;
   const count = joints.length;
-  const selected = typeof chosen.value === "number" ? chosen.value : null;
+  const selected = typeof chosenPart.value === "number" ? chosenPart.value : null;
   const end = () => {
     setDragged(null);
     setOver(null);
@@ -171,8 +171,8 @@ function RowButton(props: {
     <button
       class="chain-row"
       data-part={String(props.part)}
-      aria-current={chosen.value === props.part}
-      onClick={() => choose(props.part)}
+      aria-current={chosenPart.value === props.part}
+      onClick={() => choosePart(props.part)}
     >
       <span class="chain-mark" aria-hidden="true">
         {props.mark}

@@ -37,7 +37,7 @@ export async function readShape(path: string, files: Readonly<Record<string, str
 }
 
 /** Request the contents of every mesh file of the draft until the returned function is called. */
-export function keepReading(): () => void {
+export function startReading(): () => void {
   return effect(() => {
     const now = draft.value;
     if (!now) return;
@@ -67,7 +67,7 @@ export function missingFiles(): MissingFile[] {
     const shape = shapeOf(of, now.files);
     if (typeof shape !== "object" || !("info" in shape)) continue;
     for (const name of shape.info.missing) {
-      const path = beside(of, name);
+      const path = resolvePath(of, name);
       if (!now.files[path]) found.set(path, { of, name, path });
     }
   }
@@ -75,7 +75,7 @@ export function missingFiles(): MissingFile[] {
 }
 
 /** Resolve a name in a file to a path. */
-export function beside(file: string, name: string): string {
+export function resolvePath(file: string, name: string): string {
   const steps = file.split("/").slice(0, -1);
   for (const step of name.replaceAll("\\", "/").split("/")) {
     if (step === "..") steps.pop();

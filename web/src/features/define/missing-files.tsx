@@ -1,7 +1,7 @@
 // Missing files that other files refer to, until they are added or skipped.
 
 import { d } from "../../i18n/define";
-import { doneWithout, goOnWithout, takeFiles, waitingUrdf } from "./dropped-files";
+import { continueWithoutMissing, skippedFiles, takeFiles, waitingUrdf } from "./dropped-files";
 import { FileButton } from "./file-button";
 import { missingFiles } from "./mesh-files";
 
@@ -9,11 +9,11 @@ export function MissingFiles() {
   const waiting = waitingUrdf.value;
   const missing = waiting
     ? waiting.missing.map((name) => ({ of: waiting.file, name, path: name }))
-    : missingFiles().filter(({ path }) => !doneWithout.value.has(path));
+    : missingFiles().filter(({ path }) => !skippedFiles.value.has(path));
   if (missing.length === 0) return null;
-  const goOn = () => {
-    if (waiting) void goOnWithout();
-    else doneWithout.value = new Set([...doneWithout.value, ...missing.map(({ path }) => path)]);
+  const continueWithout = () => {
+    if (waiting) void continueWithoutMissing();
+    else skippedFiles.value = new Set([...skippedFiles.value, ...missing.map(({ path }) => path)]);
   };
   return (
     <section class="panel missing" aria-label={d("missing_title")} role="alert">
@@ -30,7 +30,7 @@ export function MissingFiles() {
       </div>
       <div class="missing-actions">
         <FileButton label={d("choose_files")} take={(files) => void takeFiles(files)} />
-        <button class="quiet" onClick={goOn}>
+        <button class="quiet" onClick={continueWithout}>
           {d("go_on_without")}
         </button>
       </div>

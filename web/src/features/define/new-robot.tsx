@@ -4,23 +4,23 @@ import { useEffect } from "preact/hooks";
 import { d } from "../../i18n/define";
 import { timeOfDay } from "../../i18n/format";
 import { empty } from "./description";
-import { begin, bringBack, hasKept, newDrafts } from "./draft";
+import { hasStoredDraft, newDrafts, openDraft, restoreDraft } from "./draft";
 import { reading, takeFiles } from "./dropped-files";
 import { insertJoint } from "./edits";
 import { FileButton } from "./file-button";
-import { known, listRobots } from "./save-and-start";
-import { resetWorkbench } from "./selection";
+import { knownRobots, listRobots } from "./save-and-start";
+import { resetSelection } from "./selection";
 
 function startEmpty(): void {
   const description = empty();
   insertJoint(description, 0);
-  resetWorkbench();
-  begin({ description, files: {} });
+  resetSelection();
+  openDraft({ description, files: {} });
 }
 
-export function Start() {
+export function NewRobot() {
   useEffect(() => void listRobots(), []);
-  const robots = known.value?.robots;
+  const robots = knownRobots.value?.robots;
   return (
     <div class="start">
       <div class="start-head">
@@ -28,7 +28,7 @@ export function Start() {
         <p class="dim">{d("start_words")}</p>
         {newDrafts().map(({ id, name, at }) => (
           <p key={id} class="start-draft">
-            <button class="action" onClick={() => bringBack("", id)}>
+            <button class="action" onClick={() => restoreDraft("", id)}>
               {d("continue_draft", { name, time: timeOfDay(at) })}
             </button>
           </p>
@@ -70,7 +70,7 @@ export function Start() {
                     d(`origin_${origin}`),
                     joints === 1 ? d("joint_one") : d("joints_count", { count: joints }),
                     ...(running ? [d("running")] : []),
-                    ...(hasKept(name) ? [d("unsaved_draft")] : []),
+                    ...(hasStoredDraft(name) ? [d("unsaved_draft")] : []),
                   ].join(" · ")}
                 </span>
               </a>

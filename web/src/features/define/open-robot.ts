@@ -3,35 +3,35 @@
 import { signal } from "@preact/signals";
 import { d } from "../../i18n/define";
 import { complete } from "./description";
-import { begin, bringBack, discard, identity, isOpen, leave } from "./draft";
+import { closeDraft, deleteDraft, identity, isOpen, openDraft, restoreDraft } from "./draft";
 import { fileNotices, waitingUrdf } from "./dropped-files";
-import { known, listRobots, outcome } from "./save-and-start";
+import { knownRobots, listRobots, outcome } from "./save-and-start";
+import { resetSelection } from "./selection";
 import { robot } from "./server-requests";
-import { resetWorkbench } from "./selection";
 
 /** What is being opened; "": nothing. */
 export const loading = signal("");
 
 /** Open a robot, or its unsaved draft; "": a new one's. */
-export async function open(name: string): Promise<void> {
-  leave();
-  resetWorkbench();
+export async function openRobot(name: string): Promise<void> {
+  closeDraft();
+  resetSelection();
   outcome.value = null;
   fileNotices.value = [];
   waitingUrdf.value = null;
   loading.value = "";
-  if (bringBack(name) || !name) return;
+  if (restoreDraft(name) || !name) return;
   const place = identity.value;
   loading.value = d("loading");
   try {
     await listRobots();
-    const origin = known.value?.robots.find((each) => each.name === name)?.origin ?? "site";
+    const origin = knownRobots.value?.robots.find((each) => each.name === name)?.origin ?? "site";
     const { description, files, notes, revision } = await robot(name);
     if (!isOpen(place)) return;
     const read = complete(description);
     // Library robots are read-only: a draft of one is another robot.
     if (origin === "library") read.name = `${name}-copy`;
-    begin({ description: read, files }, name, origin, revision);
+    openDraft({ description: read, files }, name, origin, revision);
     fileNotices.value = notes.map((text) => ({ kind: "done", text }));
   } catch (error) {
     if (!isOpen(place)) return;
@@ -45,6 +45,6 @@ export async function open(name: string): Promise<void> {
 /** Discard the draft: reload the saved robot; a new one is deleted. */
 export function discardDraft(): void {
   const { owner } = identity.value;
-  discard();
-  void open(owner);
+  deleteDraft();
+  void openRobot(owner);
 }

@@ -2,22 +2,22 @@
 
 import { d } from "../../i18n/define";
 import { Choice } from "../../ui/choice";
-import { fileName } from "./kinematic-chain";
 import type { Body, Description, Joint, Range } from "./description";
 import { angleUnit, jointUnit } from "./description";
-import { draft, edit, seal } from "./draft";
+import { draft, editDraft, endUndoStep } from "./draft";
 import { takeShapeFor } from "./dropped-files";
 import { renameJoint, renameLink, setType } from "./edits";
 import { NumberField, PoseFields, ProblemWords, Section, TextField } from "./fields";
 import { FileButton } from "./file-button";
+import { fileName } from "./kinematic-chain";
 import { shapeOf } from "./mesh-files";
-import { chosen, chosenBody, chosenJoint, chosenLinkName } from "./selection";
+import { chosenBody, chosenJoint, chosenLinkName, chosenPart } from "./selection";
 
 const MOTION = ["max_speed", "max_acceleration", "max_jerk"] as const;
 const PER_SECOND = { max_speed: "/s", max_acceleration: "/s²", max_jerk: "/s³" };
 const SCALES: Record<string, number> = { mm: 0.001, cm: 0.01, m: 1, inch: 0.0254 };
 
-export function Details() {
+export function PartDetails() {
   const now = draft.value;
   if (!now) return null;
   const { description } = now;
@@ -25,9 +25,9 @@ export function Details() {
   const body = chosenBody(description);
   return (
     <>
-      {joint && <JointDetails joint={joint} index={chosen.value as number} description={description} />}
+      {joint && <JointDetails joint={joint} index={chosenPart.value as number} description={description} />}
       {body && <BodyDetails body={body} description={description} />}
-      {chosen.value === "tool" && <ToolDetails description={description} />}
+      {chosenPart.value === "tool" && <ToolDetails description={description} />}
     </>
   );
 }
@@ -36,7 +36,7 @@ function JointDetails({ joint, index, description }: { joint: Joint; index: numb
   const path = `joint/${index}`;
   const unit = jointUnit(joint.type, description.units);
   const set = (field: string, change: (joint: Joint) => void) =>
-    edit((now) => {
+    editDraft((now) => {
       const own = now.description.joint[index];
       if (own) change(own);
     }, `${path}/${field}`);
@@ -65,8 +65,8 @@ function JointDetails({ joint, index, description }: { joint: Joint; index: numb
           chosen={joint.type}
           text={(type) => d(type)}
           choose={(type) => {
-            seal();
-            if (type !== joint.type) edit((now) => setType(now.description, index, type));
+            endUndoStep();
+            if (type !== joint.type) editDraft((now) => setType(now.description, index, type));
           }}
         />
       }
@@ -76,7 +76,7 @@ function JointDetails({ joint, index, description }: { joint: Joint; index: numb
           path={`${path}/name`}
           label={d("joint_name")}
           value={joint.name}
-          set={(name) => edit((now) => renameJoint(now.description, index, name), `${path}/name`)}
+          set={(name) => editDraft((now) => renameJoint(now.description, index, name), `${path}/name`)}
         />
         <NumberField
           path={`${path}/home`}
@@ -109,14 +109,14 @@ function JointDetails({ joint, index, description }: { joint: Joint; index: numb
 }
 
 function BodyDetails({ body, description }: { body: Body; description: Description }) {
-  const part = chosen.value;
+  const part = chosenPart.value;
   const path = part === "base" ? "base" : `joint/${part}/link`;
   const joint = chosenJoint(description);
   const name = chosenLinkName(description);
   const find = (of: Description) =>
     part === "base" ? of.base : typeof part === "number" ? of.joint[part]?.link : undefined;
   const set = (field: string, change: (body: Body) => void) =>
-    edit((now) => {
+    editDraft((now) => {
       const own = find(now.description);
       if (own) change(own);
     }, `${path}/${field}`);
@@ -129,7 +129,7 @@ function BodyDetails({ body, description }: { body: Body; description: Descripti
             label={d("link_name")}
             value={joint.link.name}
             placeholder={joint.name}
-            set={(value) => edit((now) => renameLink(now.description, part as number, value), `${path}/name`)}
+            set={(value) => editDraft((now) => renameLink(now.description, part as number, value), `${path}/name`)}
           />
         )}
         <Colour path={path} body={body} set={set} />
@@ -152,7 +152,7 @@ function BodyDetails({ body, description }: { body: Body; description: Descripti
           <button
             class="quiet"
             onClick={() => {
-              seal();
+              endUndoStep();
               set("mesh", (own) => void (own.mesh = own.collision_mesh = ""));
             }}
           >
@@ -183,7 +183,7 @@ function BodyDetails({ body, description }: { body: Body; description: Descripti
             pose={description.base.pose}
             length={description.units.length}
             angle={angleUnit(description.units)}
-            set={(change, field) => edit((now) => change(now.description.base.pose), `base/pose/${field}`)}
+            set={(change, field) => editDraft((now) => change(now.description.base.pose), `base/pose/${field}`)}
           />
         </>
       )}
@@ -205,7 +205,7 @@ function Colour({ path, body, set }: { path: string; body: Body; set: SetBody })
           aria-label={d("colour_choose")}
           value={/^#[0-9a-f]{6}$/i.test(body.color) ? body.color : "#8a8f94"}
           onInput={(event) => set("color", (own) => void (own.color = event.currentTarget.value))}
-          onChange={seal}
+          onChange={endUndoStep}
         />
         <span class="colour-word">{body.color || <span class="dim">{d("colour_own")}</span>}</span>
         {body.color && (
@@ -214,7 +214,7 @@ function Colour({ path, body, set }: { path: string; body: Body; set: SetBody })
             aria-label={d("colour_own")}
             title={d("colour_own")}
             onClick={() => {
-              seal();
+              endUndoStep();
               set("color", (own) => void (own.color = ""));
             }}
           >
@@ -247,7 +247,7 @@ function MeshDetails({ path, body, set }: { path: string; body: Body; set: SetBo
           chosen={named}
           text={(unit) => (unit === "inch" ? d("inch") : unit)}
           choose={(unit) => {
-            seal();
+            endUndoStep();
             set("mesh_scale", (own) => void (own.mesh_scale = SCALES[unit] ?? own.mesh_scale));
           }}
         />
@@ -268,7 +268,7 @@ function MeshDetails({ path, body, set }: { path: string; body: Body; set: SetBo
             <button
               class="quiet"
               onClick={() => {
-                seal();
+                endUndoStep();
                 set("mesh_scale", (own) => void (own.mesh_scale = info.scale));
               }}
             >
@@ -296,7 +296,7 @@ function ToolDetails({ description }: { description: Description }) {
         pose={description.tool}
         length={description.units.length}
         angle={angleUnit(description.units)}
-        set={(change, field) => edit((now) => change(now.description.tool), `tool/${field}`)}
+        set={(change, field) => editDraft((now) => change(now.description.tool), `tool/${field}`)}
       />
       <ProblemWords path="tool" />
     </Section>

@@ -3,18 +3,18 @@
 import { Matrix4 } from "three";
 import { d } from "../../i18n/define";
 import { Unit } from "../../ui/unit";
-import { checked, checkFailed, checking } from "./checks";
+import { checkError, checked, checking } from "./checks";
 import type { Joint, Units } from "./description";
 import { jointUnit } from "./description";
-import { draft, edit } from "./draft";
+import { draft, editDraft } from "./draft";
 import { NumberField, numberText } from "./fields";
 import { poseOf } from "./placements";
-import { positionOf, slid } from "./selection";
+import { positionOf, sliderPositions } from "./selection";
 
 const SI_TO_SHOWN: Units = { length: "mm", angle: "deg" };
 
 function slide(joint: Joint, position: number): void {
-  slid.value = new Map([...slid.value, [joint.name, position]]);
+  sliderPositions.value = new Map([...sliderPositions.value, [joint.name, position]]);
 }
 
 export function PositionsPanel() {
@@ -30,14 +30,14 @@ export function PositionsPanel() {
             class="quiet"
             disabled={joints.length === 0}
             onClick={() =>
-              edit(({ description }) => {
+              editDraft(({ description }) => {
                 for (const joint of description.joint) joint.home = positionOf(joint);
               })
             }
           >
             {d("home_from")}
           </button>
-          <button class="quiet" disabled={joints.length === 0} onClick={() => (slid.value = new Map())}>
+          <button class="quiet" disabled={joints.length === 0} onClick={() => (sliderPositions.value = new Map())}>
             {d("to_home")}
           </button>
         </div>
@@ -109,7 +109,7 @@ function ToolAt() {
     <div class="tool-line">
       <h3>{d("tool")}</h3>
       <dl
-        class={`tool-at ${checking.value || checkFailed.value ? "waiting" : ""}`}
+        class={`tool-at ${checking.value || checkError.value ? "waiting" : ""}`}
         aria-label={d("tool_at")}
         data-tool={tool ? JSON.stringify(tool) : ""}
         data-checking={checking.value}

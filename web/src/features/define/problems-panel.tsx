@@ -1,8 +1,8 @@
 // The draft's problems in the server's words; a click opens the field.
 
 import { d } from "../../i18n/define";
-import { checked, checkFailed, checking, problems, readingShapes } from "./checks";
-import { goTo } from "./selection";
+import { checkError, checked, checking, problems, readingShapes } from "./checks";
+import { openField } from "./selection";
 
 export function ProblemsPanel() {
   const found = problems.value;
@@ -19,10 +19,10 @@ export function ProblemsPanel() {
         </div>
       </div>
       <div class="check-list">
-        {checkFailed.value && <p class="problem-word">{d("check_failed", { text: checkFailed.value })}</p>}
+        {checkError.value && <p class="problem-word">{d("check_failed", { text: checkError.value })}</p>}
         {checked.value && !readingShapes.value && found.length === 0 && <p class="dim small">{d("no_problems")}</p>}
         {found.map(({ path, text }) => (
-          <button key={`${path.join("/")} ${text}`} class="problem" onClick={() => goTo(path)}>
+          <button key={`${path.join("/")} ${text}`} class="problem" onClick={() => openField(path)}>
             <span class="shape warning" aria-hidden="true" />
             <span>{text}</span>
           </button>

@@ -2,7 +2,7 @@
 
 import { d } from "../../i18n/define";
 import type { Units } from "./description";
-import { draft, edit, seal } from "./draft";
+import { draft, editDraft, endUndoStep } from "./draft";
 import { setUnits } from "./edits";
 import { ProblemWords, Section, SelectField, TextField } from "./fields";
 
@@ -17,14 +17,14 @@ export function RobotTab() {
         label={d(key)}
         value={value}
         hint={hint}
-        set={(typed) => edit(({ description }) => void (description[key] = typed), key)}
+        set={(typed) => editDraft(({ description }) => void (description[key] = typed), key)}
       />
       <ProblemWords path={key} />
     </>
   );
   const inUnits = (changed: Partial<Units>) => {
-    seal();
-    edit(({ description }) => setUnits(description, { ...description.units, ...changed }));
+    endUndoStep();
+    editDraft(({ description }) => setUnits(description, { ...description.units, ...changed }));
   };
   return (
     <>

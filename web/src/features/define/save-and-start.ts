@@ -2,11 +2,11 @@
 
 import { signal } from "@preact/signals";
 import { d } from "../../i18n/define";
-import { checked, placeOf, unread } from "./checks";
-import { draft, identity, isOpen, isUnsaved, savedAs } from "./draft";
+import { checked, invalidNumbers, parsePath } from "./checks";
+import { draft, identity, isOpen, isUnsaved, markSaved } from "./draft";
+import { openField } from "./selection";
 import type { Robots } from "./server-requests";
 import * as server from "./server-requests";
-import { goTo } from "./selection";
 
 export type Outcome =
   | { kind: "done" | "refused"; text: string }
@@ -17,28 +17,28 @@ export type Outcome =
 export const outcome = signal<Outcome | null>(null);
 /** The action in progress; "": none. */
 export const busy = signal("");
-export const known = signal<Robots | null>(null);
+export const knownRobots = signal<Robots | null>(null);
 
 export async function listRobots(): Promise<void> {
   try {
-    known.value = await server.robots();
+    knownRobots.value = await server.robots();
   } catch (error) {
-    outcome.value = { kind: "refused", text: d("failed", { text: words(error) }) };
+    outcome.value = { kind: "refused", text: d("failed", { text: errorText(error) }) };
   }
 }
 
-function words(error: unknown): string {
+function errorText(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
-async function doing<T>(what: string, work: () => Promise<T>): Promise<T | undefined> {
+async function perform<T>(what: string, work: () => Promise<T>): Promise<T | undefined> {
   if (busy.value) return undefined;
   busy.value = what;
   outcome.value = null;
   try {
     return await work();
   } catch (error) {
-    outcome.value = { kind: "refused", text: d("failed", { text: words(error) }) };
+    outcome.value = { kind: "refused", text: d("failed", { text: errorText(error) }) };
     return undefined;
   } finally {
     busy.value = "";
@@ -54,23 +54,23 @@ export async function save(thenStart: boolean, over = ""): Promise<boolean> {
   const of = identity.value;
   if (!now) return false;
   const { name } = now.description;
-  const [typed] = unread.value.keys();
+  const [typed] = invalidNumbers.value.keys();
   if (typed !== undefined) {
     outcome.value = { kind: "refused", text: d("mend_first") };
-    goTo(placeOf(typed));
+    openField(parsePath(typed));
     return false;
   }
-  if (over !== name && known.value?.robots.some((robot) => robot.name === name && robot.running)) {
+  if (over !== name && knownRobots.value?.robots.some((robot) => robot.name === name && robot.running)) {
     outcome.value = { kind: "exists", text: d("exists_running", { name }), name, thenStart };
     return false;
   }
   // No question is needed while the site's copy is the one opened here.
   const revision = of.siteName === name ? of.revision : "";
-  const done = await doing(d("saving"), async () => {
+  const done = await perform(d("saving"), async () => {
     try {
       return await server.save(now, revision, over !== "" && over === name);
     } catch (error) {
-      if (!(error instanceof server.Refused) || !isOpen(of)) throw error;
+      if (!(error instanceof server.RefusedError) || !isOpen(of)) throw error;
       if (error.status === 409) {
         const text = error.isChanged
           ? d("exists_changed", { name })
@@ -81,12 +81,12 @@ export async function save(thenStart: boolean, over = ""): Promise<boolean> {
       if (error.problems.length === 0) throw error;
       checked.value = { tool: null, links: {}, ...checked.value, problems: error.problems };
       outcome.value = { kind: "refused", text: d("mend_first") };
-      goTo(error.problems[0]?.path ?? []);
+      openField(error.problems[0]?.path ?? []);
       return undefined;
     }
   });
   if (!done) return false;
-  savedAs(now, of, done.name, done.revision);
+  markSaved(now, of, done.name, done.revision);
   if (isOpen(of)) history.replaceState(null, "", `#/define/${encodeURIComponent(done.name)}`);
   outcome.value = { kind: "done", text: d("saved", { name: done.name, folder: done.folder }) };
   await listRobots();
@@ -97,7 +97,7 @@ export async function save(thenStart: boolean, over = ""): Promise<boolean> {
 export async function download(): Promise<void> {
   const now = draft.value;
   if (!now) return;
-  const archive = await doing(d("download"), () => server.zip(now));
+  const archive = await perform(d("download"), () => server.zip(now));
   if (!archive) return;
   const link = document.createElement("a");
   link.href = URL.createObjectURL(archive);
@@ -112,19 +112,19 @@ export async function start(): Promise<void> {
     await save(true);
     return;
   }
-  const started = await doing(d("starting"), () => server.start(siteName));
+  const started = await perform(d("starting"), () => server.start(siteName));
   if (started) outcome.value = { kind: "started", ...started };
   await listRobots();
 }
 
 export async function stop(): Promise<void> {
   const name = identity.value.siteName;
-  if (await doing(d("stop_simulated"), () => server.stop(name))) {
+  if (await perform(d("stop_simulated"), () => server.stop(name))) {
     outcome.value = { kind: "done", text: d("stopped", { name }) };
   }
   await listRobots();
 }
 
 export function isRunning(): boolean {
-  return known.value?.robots.some(({ name, running }) => running && name === identity.value.siteName) ?? false;
+  return knownRobots.value?.robots.some(({ name, running }) => running && name === identity.value.siteName) ?? false;
 }

@@ -6,24 +6,24 @@ import { Matrix4 } from "three";
 import { d } from "../../i18n/define";
 import { t, viewText } from "../../i18n/texts";
 import { linkPlacements } from "../../scene/forward-kinematics";
-import type { Look } from "../../scene/viewpoint";
+import type { CameraPose } from "../../scene/viewpoint";
 import { Choice, Toggle } from "../../ui/choice";
 import { theme } from "../../ui/theme";
+import type { Dragging, Picture, Shown } from "./define-scene";
+import { DefineScene } from "./define-scene";
 import type { Pose } from "./description";
 import { bodies, linkNames } from "./description";
 import type { Draft } from "./draft";
-import { draft, edit, seal } from "./draft";
-import { poseMatrix, poseOf, rowAt } from "./placements";
-import type { Dragging, Picture, Shown } from "./define-scene";
-import { DefineScene } from "./define-scene";
+import { draft, editDraft, endUndoStep } from "./draft";
 import { readShape, shapeOf } from "./mesh-files";
-import { lookOf, sizeOf, USUAL_VIEWS } from "./views";
-import { choose, chosen, chosenBody, positions } from "./selection";
+import { poseMatrix, poseOf, rowAt } from "./placements";
+import { choosePart, chosenBody, chosenPart, positions } from "./selection";
+import { cameraOf, sizeOf, USUAL_VIEWS } from "./views";
 
 /** The scene's camera, for the views tab; null: there is no scene. */
-export const cameraNow = signal<(() => Look) | null>(null);
+export const currentCamera = signal<(() => CameraPose) | null>(null);
 /** The requested view; a new object requests it again. */
-export const lookFrom = signal<{ name: string }>({ name: "free" });
+export const requestedView = signal<{ name: string }>({ name: "free" });
 
 function pictureOf(now: Draft): Picture {
   const { description } = now;
@@ -38,7 +38,7 @@ function pictureOf(now: Draft): Picture {
     widest = Math.max(widest, ...max.map((value, axis) => (value - (min[axis] ?? 0)) * body.mesh_scale));
     return { glb, scale: body.mesh_scale, pose: poseMatrix(body.mesh_pose, description.units), color: body.color };
   });
-  const part = chosen.value;
+  const part = chosenPart.value;
   const start = poseMatrix(description.base.pose, description.units);
   const placements = linkPlacements(start, rows);
   const links = linkNames(description);
@@ -75,9 +75,9 @@ export function ScenePanel() {
     const retried = new Set<string>();
     try {
       made = new DefineScene(canvas.current, {
-        pick: (link) => choose(link === 0 ? "base" : link - 1),
+        pick: (link) => choosePart(link === 0 ? "base" : link - 1),
         drag: (pose) => placeChosen(poseOf(pose, draft.value?.description.units ?? { length: "mm", angle: "deg" })),
-        dragged: seal,
+        dragged: endUndoStep,
         failed: (glb, text) => {
           setProblem(text);
           if (!text || retried.has(glb)) return;
@@ -91,9 +91,9 @@ export function ScenePanel() {
       return;
     }
     scene.current = made;
-    cameraNow.value = () => made.view.now();
+    currentCamera.value = () => made.view.now();
     return () => {
-      cameraNow.value = null;
+      currentCamera.value = null;
       made.dispose();
       scene.current = null;
     };
@@ -106,12 +106,13 @@ export function ScenePanel() {
   useEffect(() => scene.current?.showShapes(shapesShown), [shapesShown]);
   useEffect(() => scene.current?.drag(dragging), [dragging]);
   useEffect(() => {
-    if (now && picture) scene.current?.view.look(lookOf(lookFrom.value.name, now.description, picture.size));
-  }, [lookFrom.value]);
+    if (now && picture) scene.current?.view.look(cameraOf(requestedView.value.name, now.description, picture.size));
+  }, [requestedView.value]);
   // Until the user moves the camera, it keeps the whole arm in the picture.
   useEffect(() => {
     const view = scene.current?.view;
-    if (view && !view.touched && now && picture) view.look(lookOf(lookFrom.value.name, now.description, picture.size));
+    if (view && !view.touched && now && picture)
+      view.look(cameraOf(requestedView.value.name, now.description, picture.size));
   }, [picture?.size]);
 
   const onKey = (event: KeyboardEvent) => {
@@ -139,9 +140,9 @@ export function ScenePanel() {
         <Choice
           label={t("view")}
           values={views}
-          chosen={lookFrom.value.name}
+          chosen={requestedView.value.name}
           text={viewText}
-          choose={(name) => (lookFrom.value = { name })}
+          choose={(name) => (requestedView.value = { name })}
         />
         <div class="scene-toggles">
           <Toggle on={rows} set={setRows}>
@@ -182,8 +183,8 @@ function canPlace({ chosen: part, shapes }: Picture): boolean {
 
 /** Apply a drag of the gizmo: one undo step until it ends. */
 function placeChosen(pose: Pose): void {
-  edit((now) => {
-    if (chosen.value === "tool") now.description.tool = pose;
+  editDraft((now) => {
+    if (chosenPart.value === "tool") now.description.tool = pose;
     else {
       const body = chosenBody(now.description);
       if (body) body.mesh_pose = pose;

@@ -10,40 +10,40 @@ export type Part = "base" | "tool" | number;
 export const TABS = ["details", "robot", "frames", "constraints", "collisions", "views"] as const;
 export type Tab = (typeof TABS)[number];
 
-export const chosen = signal<Part>("base");
+export const chosenPart = signal<Part>("base");
 export const tab = signal<Tab>("details");
 /** Slider positions by joint name, in the description's units; missing joints are at home. */
-export const slid = signal<ReadonlyMap<string, number>>(new Map());
+export const sliderPositions = signal<ReadonlyMap<string, number>>(new Map());
 
-export function choose(part: Part): void {
-  chosen.value = part;
+export function choosePart(part: Part): void {
+  chosenPart.value = part;
   tab.value = "details";
 }
 
 /** Reset for another robot. */
-export function resetWorkbench(): void {
-  chosen.value = "base";
+export function resetSelection(): void {
+  chosenPart.value = "base";
   tab.value = "details";
-  slid.value = new Map();
+  sliderPositions.value = new Map();
 }
 
 /** The chosen joint; undefined: none. */
 export function chosenJoint(of: Description): Joint | undefined {
-  return typeof chosen.value === "number" ? of.joint[chosen.value] : undefined;
+  return typeof chosenPart.value === "number" ? of.joint[chosenPart.value] : undefined;
 }
 
 /** The chosen link's appearance; undefined: the tool is chosen. */
 export function chosenBody(of: Description): Body | undefined {
-  return chosen.value === "base" ? of.base : chosenJoint(of)?.link;
+  return chosenPart.value === "base" ? of.base : chosenJoint(of)?.link;
 }
 
 export function chosenLinkName(of: Description): string {
   const joint = chosenJoint(of);
-  return joint ? linkName(joint) : String(chosen.value);
+  return joint ? linkName(joint) : String(chosenPart.value);
 }
 
 export function positionOf(joint: Joint): number {
-  const position = slid.value.get(joint.name) ?? joint.home;
+  const position = sliderPositions.value.get(joint.name) ?? joint.home;
   return Math.max(joint.limits[0], Math.min(joint.limits[1], position));
 }
 
@@ -51,7 +51,7 @@ export function positionOf(joint: Joint): number {
 export const positions = computed<readonly number[]>(() => draft.value?.description.joint.map(positionOf) ?? []);
 
 /** Open a problem's part and tab, and focus the nearest field. */
-export function goTo(path: readonly (string | number)[]): void {
+export function openField(path: readonly (string | number)[]): void {
   const [first, second] = path;
   const tabs: Record<string, Tab> = {
     frame: "frames",
@@ -60,9 +60,9 @@ export function goTo(path: readonly (string | number)[]): void {
     view: "views",
   };
   if (first === "joint" && typeof second === "number") {
-    choose(Math.min(second, (draft.value?.description.joint.length ?? 1) - 1));
+    choosePart(Math.min(second, (draft.value?.description.joint.length ?? 1) - 1));
   } else if (first === "base" || first === "tool") {
-    choose(first);
+    choosePart(first);
   } else {
     tab.value = tabs[String(first)] ?? "robot";
   }

@@ -5,7 +5,7 @@ import type { GivenDescription } from "./description";
 import { concise } from "./description";
 import type { Draft } from "./draft";
 import { identity } from "./draft";
-import { keptFile } from "./file-cache";
+import { cachedFile } from "./file-cache";
 
 export interface Problem {
   path: (string | number)[];
@@ -26,14 +26,14 @@ export interface Robots {
   folder: string;
 }
 
-export interface Loaded {
+export interface LoadedRobot {
   description: GivenDescription;
   files: Record<string, string>;
   notes: string[];
 }
 
 /** A robot at the site. */
-export interface Opened extends Loaded {
+export interface SiteRobot extends LoadedRobot {
   /** Revision of its folder; each change creates a new one. */
   revision: string;
 }
@@ -82,7 +82,7 @@ export interface Pair {
 }
 
 /** A request that was refused or not answered; the text is for the user. */
-export class Refused extends Error {
+export class RefusedError extends Error {
   constructor(
     readonly status: number,
     text: string,
@@ -100,7 +100,7 @@ async function send(path: string, init?: RequestInit): Promise<Response> {
     answer = await fetch(`/define${path}`, init);
   } catch (error) {
     if (init?.signal?.aborted) throw error;
-    throw new Refused(0, t("not_connected"));
+    throw new RefusedError(0, t("not_connected"));
   }
   if (answer.ok) return answer;
   const text = await answer.text();
@@ -115,7 +115,7 @@ async function send(path: string, init?: RequestInit): Promise<Response> {
   } catch {
     // it is already text
   }
-  throw new Refused(answer.status, words || `HTTP ${answer.status}`, problems, changed);
+  throw new RefusedError(answer.status, words || `HTTP ${answer.status}`, problems, changed);
 }
 
 function post(path: string, body: unknown, signal?: AbortSignal): Promise<Response> {
@@ -139,7 +139,7 @@ async function withFiles(files: Readonly<Record<string, string>>, asked: () => P
   try {
     return await asked();
   } catch (error) {
-    if (!(error instanceof Refused) || error.status !== FORGOTTEN) throw error;
+    if (!(error instanceof RefusedError) || error.status !== FORGOTTEN) throw error;
     // Opening a saved robot restores its own files.
     const { owner } = identity.value;
     let sent = owner
@@ -149,7 +149,7 @@ async function withFiles(files: Readonly<Record<string, string>>, asked: () => P
         )
       : 0;
     for (const [path, sha] of Object.entries(files)) {
-      const bytes = await keptFile(sha);
+      const bytes = await cachedFile(sha);
       if (bytes) sent += Number((await upload(path, bytes)).sha === sha);
     }
     if (!sent) throw error;
@@ -159,7 +159,7 @@ async function withFiles(files: Readonly<Record<string, string>>, asked: () => P
 
 export const robots = () => json<Robots>(send("/robots"));
 
-export const robot = (name: string) => json<Opened>(send(`/robots/${encodeURIComponent(name)}`));
+export const robot = (name: string) => json<SiteRobot>(send(`/robots/${encodeURIComponent(name)}`));
 
 export function upload(name: string, bytes: Blob): Promise<{ sha: string; size: number }> {
   return json(send(`/files?name=${encodeURIComponent(name)}`, { method: "POST", body: bytes }));
@@ -190,7 +190,7 @@ export function collisions(of: Draft): Promise<{ pairs: Pair[] }> {
 export function importRobot(
   file: string,
   files: Readonly<Record<string, string>>,
-): Promise<Loaded & { missing: string[] }> {
+): Promise<LoadedRobot & { missing: string[] }> {
   return json(post("/import", { file, files }));
 }
 

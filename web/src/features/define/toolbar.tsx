@@ -6,27 +6,27 @@ import { timeOfDay } from "../../i18n/format";
 import { t } from "../../i18n/texts";
 import { robotLink } from "../../ui/route";
 import {
-  broughtBack,
   canRedo,
   canUndo,
   draft,
   identity,
   isUnsaved,
-  keepingFailed,
-  putAside,
   redo,
+  restoredFrom,
+  startNewDraft,
+  storageError,
   undo,
 } from "./draft";
 import { fileNotices, reading } from "./dropped-files";
 import { discardDraft } from "./open-robot";
-import { busy, download, isRunning, known, outcome, save, start, stop } from "./save-and-start";
+import { busy, download, isRunning, knownRobots, outcome, save, start, stop } from "./save-and-start";
 
 export function Toolbar() {
   const now = draft.value;
   if (!now) return null;
   const { name, title } = now.description;
   const { siteName } = identity.value;
-  const canStart = known.value?.can_start ?? false;
+  const canStart = knownRobots.value?.can_start ?? false;
   const state = isUnsaved.value ? (siteName ? "unsaved" : "not_yet_saved") : siteName ? "all_saved" : "no_changes";
   const running = isRunning();
   return (
@@ -47,7 +47,7 @@ export function Toolbar() {
       </div>
       <div class="toolbar-group">
         {/* biome-ignore lint/a11y/useValidAnchor: it navigates; the click clears the draft first. */}
-        <a class="action" href="#/define" onClick={putAside}>
+        <a class="action" href="#/define" onClick={startNewDraft}>
           {d("new")}
         </a>
         <button class="action" disabled={busy.value !== ""} onClick={() => void download()}>
@@ -86,9 +86,9 @@ export function Outcomes() {
   const done = outcome.value;
   return (
     <div class="outcomes">
-      {broughtBack.value !== null && draft.value && (
+      {restoredFrom.value !== null && draft.value && (
         <div class="outcome" role="status">
-          <span>{sure ? d("discard_sure") : d("brought_back", { time: timeOfDay(broughtBack.value) })}</span>
+          <span>{sure ? d("discard_sure") : d("brought_back", { time: timeOfDay(restoredFrom.value) })}</span>
           {sure ? (
             <>
               <button class="action small-action" onClick={discardDraft}>
@@ -103,14 +103,14 @@ export function Outcomes() {
               <button class="quiet" onClick={() => setSure(true)}>
                 {d("discard")}
               </button>
-              <button class="quiet" onClick={() => (broughtBack.value = null)}>
+              <button class="quiet" onClick={() => (restoredFrom.value = null)}>
                 {d("keep")}
               </button>
             </>
           )}
         </div>
       )}
-      {keepingFailed.value && <p class="outcome refused">{d("not_kept", { text: keepingFailed.value })}</p>}
+      {storageError.value && <p class="outcome refused">{d("not_kept", { text: storageError.value })}</p>}
       {done?.kind === "exists" && (
         <div class="outcome" role="alertdialog" aria-label={d("save_over")}>
           <span class="shape warning" aria-hidden="true" />

@@ -4,15 +4,15 @@ import { useState } from "preact/hooks";
 import { d } from "../../i18n/define";
 import { viewText } from "../../i18n/texts";
 import type { View } from "./description";
-import { draft, edit, seal } from "./draft";
+import { draft, editDraft, endUndoStep } from "./draft";
 import { ProblemWords, SelectField, TextField } from "./fields";
-import { cameraNow, lookFrom } from "./scene-panel";
+import { currentCamera, requestedView } from "./scene-panel";
 import { USUAL_VIEWS, viewOf } from "./views";
 
 function setFromCamera(name: string): void {
-  const look = cameraNow.value?.();
-  seal();
-  if (look) edit(({ description }) => void (description.view[name] = viewOf(look, description)));
+  const look = currentCamera.value?.();
+  endUndoStep();
+  if (look) editDraft(({ description }) => void (description.view[name] = viewOf(look, description)));
 }
 
 export function ViewsTab() {
@@ -32,10 +32,10 @@ export function ViewsTab() {
               <strong>{viewText(name)}</strong>
               <span class="dim small">{d(given[name] ? "view_own" : "view_auto")}</span>
             </span>
-            <button class="quiet" onClick={() => (lookFrom.value = { name })}>
+            <button class="quiet" onClick={() => (requestedView.value = { name })}>
               {d("view_look")}
             </button>
-            <button class="quiet" disabled={!cameraNow.value} onClick={() => setFromCamera(name)}>
+            <button class="quiet" disabled={!currentCamera.value} onClick={() => setFromCamera(name)}>
               {d("view_set")}
             </button>
             {given[name] && (
@@ -48,19 +48,19 @@ export function ViewsTab() {
                   values={["orthographic", "perspective"] as const}
                   text={(projection: View["projection"]) => d(projection)}
                   set={(projection) => {
-                    seal();
-                    edit(({ description }) => {
+                    endUndoStep();
+                    editDraft(({ description }) => {
                       const view = description.view[name];
                       if (view) view.projection = projection;
                     });
-                    lookFrom.value = { name };
+                    requestedView.value = { name };
                   }}
                 />
                 <button
                   class="quiet"
                   onClick={() => {
-                    seal();
-                    edit(({ description }) => void delete description.view[name]);
+                    endUndoStep();
+                    editDraft(({ description }) => void delete description.view[name]);
                   }}
                 >
                   {d((USUAL_VIEWS as readonly string[]).includes(name) ? "view_reset" : "remove")}
@@ -74,7 +74,7 @@ export function ViewsTab() {
         <TextField path="view" label={d("view_new")} value={fresh} set={setFresh} />
         <button
           class="action small-action"
-          disabled={!usable || !cameraNow.value}
+          disabled={!usable || !currentCamera.value}
           onClick={() => {
             setFromCamera(fresh);
             setFresh("");

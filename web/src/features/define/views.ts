@@ -1,7 +1,7 @@
 // A description's cameras: its own, and top, front and left derived from the arm's reach.
 
 import { Vector3 } from "three";
-import type { Look } from "../../scene/viewpoint";
+import type { CameraPose } from "../../scene/viewpoint";
 import type { Description, Triple, View } from "./description";
 import { metres, tidy } from "./description";
 import { reach } from "./placements";
@@ -16,7 +16,7 @@ export function sizeOf(description: Description, shapes = 0): number {
 }
 
 /** Return the camera of a named view; of the free one if the description does not have it. */
-export function lookOf(name: string, description: Description, size: number): Look {
+export function cameraOf(name: string, description: Description, size: number): CameraPose {
   const one = metres(description.units);
   const given = description.view[name];
   if (given) {
@@ -40,7 +40,7 @@ export function lookOf(name: string, description: Description, size: number): Lo
 }
 
 /** Return a camera as a view of the description, rounded. */
-export function viewOf({ eye, target, up, flat }: Look, description: Description): View {
+export function viewOf({ eye, target, up, flat }: CameraPose, description: Description): View {
   const one = metres(description.units);
   const point = (at: Vector3) => at.toArray().map((value) => tidy(Math.round(value * 1e4) / 1e4 / one)) as Triple;
   return {

@@ -3,13 +3,13 @@
 import { useEffect } from "preact/hooks";
 import { e } from "../../i18n/events";
 import { anyWatch, counts, followAlarms, silentSites } from "../../mesh/alarms";
-import { followSound } from "../../panels/alarm-sound";
+import { startSound } from "../../panels/alarm-sound";
 import { PriorityMark, priorityWord } from "../../ui/priority-mark";
 import "./alarm-badge.css";
 
 export function AlarmBadge() {
   useEffect(() => {
-    const ends = [followAlarms(), followSound()];
+    const ends = [followAlarms(), startSound()];
     return () => {
       for (const end of ends) end();
     };

@@ -27,7 +27,7 @@ import { Choice, Toggle } from "../../ui/choice";
 import { NoticeLine } from "../../ui/notice-line";
 import { Select } from "../../ui/select";
 import { AlarmLine } from "./alarm-line";
-import { Shelve } from "./shelve-form";
+import { ShelveForm } from "./shelve-form";
 
 const SHOWN = ["all", "unacknowledged", "shelved"] as const;
 type Shown = (typeof SHOWN)[number];
@@ -55,13 +55,13 @@ export function AlarmPanel() {
   const [notice, setNotice] = useState<Notice | null>(null);
 
   const all = alarms.value;
-  const wanted = text.trim().toLowerCase();
+  const searchText = text.trim().toLowerCase();
   const listed = all.filter(
     (alarm) =>
       passes(alarm, shown) &&
       alarm.priority >= LEAST[least] &&
       (!site || alarm.site === site) &&
-      `${alarm.text} ${alarm.code} ${alarm.site} ${alarm.robot} ${alarm.source}`.toLowerCase().includes(wanted),
+      `${alarm.text} ${alarm.code} ${alarm.site} ${alarm.robot} ${alarm.source}`.toLowerCase().includes(searchText),
   );
   const drawn = listed.slice(0, MOST_SHOWN);
   const chosen = drawn.filter((alarm) => selected.has(nameOf(alarm)));
@@ -144,7 +144,7 @@ export function AlarmPanel() {
         )}
       </div>
       {shelving && (
-        <Shelve
+        <ShelveForm
           alarms={shelving}
           close={() => setShelving(null)}
           done={(reason, shelveS) => void run(shelving, Action.SHELVE, { reason, shelveS })}

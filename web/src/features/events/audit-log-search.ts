@@ -7,7 +7,7 @@ import { reasonOf } from "../../mesh/control";
 import type { AuditLine } from "./entries";
 import { auditLines } from "./entries";
 
-export const MOST_ASKED = 40;
+export const MAX_ROBOTS = 40;
 const AT_ONCE = 6;
 const TIMEOUT_S = 10;
 const MOST_OF_ONE = 1000;
@@ -18,7 +18,7 @@ export interface Found {
 }
 
 /** Request entries of the last `sinceS` seconds; infinite: all. */
-export async function findInLogs(robotKeys: readonly string[], sinceS: number): Promise<Found> {
+export async function searchAuditLogs(robotKeys: readonly string[], sinceS: number): Promise<Found> {
   const found: Found = { entries: [], failed: [] };
   const left = [...robotKeys];
   const since = Number.isFinite(sinceS) ? { since: timestampFromMs(Date.now() - sinceS * 1000) } : {};

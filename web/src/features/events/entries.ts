@@ -10,7 +10,7 @@ import { AuditEntrySchema, AuditListSchema, EventListSchema, EventSchema } from 
 import type { Sample } from "../../mesh/connection";
 import { watch } from "../../mesh/connection";
 
-export const MOST_KEPT = 5000;
+export const MAX_ENTRIES = 5000;
 const UPDATE_INTERVAL_MS = 250;
 
 interface Of {
@@ -42,7 +42,7 @@ export class Entries<E extends Of> {
     if (this.waiting.length === 0) return;
     // Two nearly sorted runs: the sort is quick, and stable.
     const merged = [...this.waiting.reverse(), ...this.newest.value].sort((a, b) => b.ms - a.ms);
-    for (const { id } of merged.splice(MOST_KEPT)) this.known.delete(id);
+    for (const { id } of merged.splice(MAX_ENTRIES)) this.known.delete(id);
     this.waiting = [];
     this.newest.value = merged;
   }

@@ -4,7 +4,7 @@ import { AlarmPanel } from "./alarm-panel";
 import { Journal } from "./journal";
 import "./events-page.css";
 
-export function Events() {
+export function EventsPage() {
   return (
     <div class="events-page">
       <AlarmPanel />

@@ -10,14 +10,14 @@ import { count, stampFull } from "../../i18n/format";
 import { t } from "../../i18n/texts";
 import type { Notice } from "../../mesh/control";
 import { fleetRobots } from "../../mesh/known-robots";
-import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
 import { Choice, Toggle } from "../../ui/choice";
+import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
 import { NoticeLine } from "../../ui/notice-line";
 import { Select } from "../../ui/select";
 import { Filters, SiteSelect } from "./alarm-panel";
-import { findInLogs, MOST_ASKED } from "./audit-log-search";
+import { MAX_ROBOTS, searchAuditLogs } from "./audit-log-search";
 import type { AuditLine, EventEntry } from "./entries";
-import { audits, events, MOST_KEPT, useEntries } from "./entries";
+import { audits, events, MAX_ENTRIES, useEntries } from "./entries";
 import { VirtualList } from "./virtual-list";
 
 const KINDS = ["events", "requests"] as const;
@@ -35,18 +35,18 @@ export function Journal() {
   const [site, setSite] = useState("");
   const [robot, setRobot] = useState("");
   const [text, setText] = useState("");
-  const [held, setHeld] = useState<readonly Entry[] | null>(null);
+  const [pausedEntries, setPausedEntries] = useState<readonly Entry[] | null>(null);
   const [open, setOpen] = useState<Entry | null>(null);
   const [notice, setNotice] = useState<Notice | null>(null);
   const lineHeight = useLineHeight();
   useEffect(() => {
-    setHeld(null);
+    setPausedEntries(null);
     setOpen(null);
   }, [kind]);
 
   const newest: readonly Entry[] = kind === "events" ? events.newest.value : audits.newest.value;
-  const all = held ?? newest;
-  const wanted = text.trim().toLowerCase();
+  const all = pausedEntries ?? newest;
+  const searchText = text.trim().toLowerCase();
   const from = Date.now() - SINCE_S[since] * 1000;
   const listed = all.filter(
     (entry) =>
@@ -56,7 +56,7 @@ export function Journal() {
       ("event" in entry
         ? entry.event.severity >= LEAST[least]
         : WHAT[outcome] === null || entry.audit.outcome === WHAT[outcome]) &&
-      (!wanted || wordsOf(entry).toLowerCase().includes(wanted)),
+      (!searchText || wordsOf(entry).toLowerCase().includes(searchText)),
   );
   const robots = fleetRobots.value.filter((key) => !site || key.split("/")[1] === site);
   const sites = [
@@ -66,12 +66,12 @@ export function Journal() {
 
   const search = async () => {
     const keys = robots.filter((key) => !robot || key.split("/")[2] === robot);
-    if (keys.length > MOST_ASKED) {
-      setNotice({ kind: "refused", text: e("older_many", { count: keys.length, most: MOST_ASKED }) });
+    if (keys.length > MAX_ROBOTS) {
+      setNotice({ kind: "refused", text: e("older_many", { count: keys.length, most: MAX_ROBOTS }) });
       return;
     }
     setNotice({ kind: "busy", text: e("older_busy", { count: keys.length }) });
-    const found = await findInLogs(keys, SINCE_S[since]);
+    const found = await searchAuditLogs(keys, SINCE_S[since]);
     audits.take(found.entries);
     audits.settle();
     const failed = found.failed.map((each) => e("older_failed", each)).join(" ");
@@ -92,8 +92,8 @@ export function Journal() {
         />
         <span class="panel-end">
           <span class="dim small">{e("shown_of", { shown: count(listed.length), all: count(all.length) })}</span>
-          <Toggle on={held !== null} set={(on) => setHeld(on ? newest : null)}>
-            {held ? e("go_on", { count: Math.max(0, newest.length - held.length) }) : e("pause")}
+          <Toggle on={pausedEntries !== null} set={(on) => setPausedEntries(on ? newest : null)}>
+            {pausedEntries ? e("go_on", { count: Math.max(0, newest.length - pausedEntries.length) }) : e("pause")}
           </Toggle>
         </span>
       </div>
@@ -137,7 +137,7 @@ export function Journal() {
         />
       )}
       {open && <Details entry={open} close={() => setOpen(null)} />}
-      {all.length >= MOST_KEPT && <p class="footnote dim">{e("oldest_left_out", { count: count(MOST_KEPT) })}</p>}
+      {all.length >= MAX_ENTRIES && <p class="footnote dim">{e("oldest_left_out", { count: count(MAX_ENTRIES) })}</p>}
     </section>
   );
 }

@@ -3,13 +3,13 @@
 import { useState } from "preact/hooks";
 import { e } from "../../i18n/events";
 import type { Alarm } from "../../mesh/alarms";
-import { Reason } from "../../ui/reason-form";
 import { Choice } from "../../ui/choice";
+import { ReasonForm } from "../../ui/reason-form";
 
 const TIMES = { minutes_15: 900, hour: 3600, hours_8: 28_800, day: 86_400 } as const;
 type Time = keyof typeof TIMES;
 
-export function Shelve(props: {
+export function ShelveForm(props: {
   alarms: readonly Alarm[];
   close: () => void;
   done: (reason: string, shelveS: number) => void;
@@ -17,7 +17,7 @@ export function Shelve(props: {
   const [time, setTime] = useState<Time>("hour");
   const [first, ...others] = props.alarms;
   return (
-    <Reason
+    <ReasonForm
       required
       title={e("shelve_do")}
       text={
@@ -28,6 +28,6 @@ export function Shelve(props: {
       done={(reason) => props.done(reason, TIMES[time])}
     >
       <Choice label={e("shelve_for")} values={Object.keys(TIMES) as Time[]} chosen={time} text={e} choose={setTime} />
-    </Reason>
+    </ReasonForm>
   );
 }

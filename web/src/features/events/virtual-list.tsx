@@ -14,20 +14,20 @@ export function VirtualList<Item>(props: {
 }) {
   const { items, lineHeight } = props;
   const place = useRef<HTMLDivElement>(null);
-  const [seen, setSeen] = useState({ top: 0, height: 400 });
-  const look = () => {
+  const [scrolled, setScrolled] = useState({ top: 0, height: 400 });
+  const updateWindow = () => {
     const element = place.current;
-    if (element) setSeen({ top: element.scrollTop, height: element.clientHeight });
+    if (element) setScrolled({ top: element.scrollTop, height: element.clientHeight });
   };
   useEffect(() => {
-    const observer = new ResizeObserver(look);
+    const observer = new ResizeObserver(updateWindow);
     if (place.current) observer.observe(place.current);
     return () => observer.disconnect();
   }, []);
-  const first = Math.max(0, Math.min(items.length, Math.floor(seen.top / lineHeight)) - OVER);
-  const last = Math.min(items.length, Math.ceil((seen.top + seen.height) / lineHeight) + OVER);
+  const first = Math.max(0, Math.min(items.length, Math.floor(scrolled.top / lineHeight)) - OVER);
+  const last = Math.min(items.length, Math.ceil((scrolled.top + scrolled.height) / lineHeight) + OVER);
   return (
-    <div ref={place} class="virtual-list" tabIndex={0} role="group" aria-label={props.label} onScroll={look}>
+    <div ref={place} class="virtual-list" tabIndex={0} role="group" aria-label={props.label} onScroll={updateWindow}>
       <ol style={{ height: `${items.length * lineHeight}px` }}>
         {items.slice(first, last).map((item, i) => (
           <li

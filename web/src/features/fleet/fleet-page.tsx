@@ -11,12 +11,12 @@ import { fleetRobots } from "../../mesh/known-robots";
 import { robotNow, useFleetNow } from "../../mesh/robot-snapshots";
 import type { Level, StateWord } from "../../mesh/robot-state";
 import { stateWord } from "../../mesh/robot-state";
-import { isClockOff, isMeshStale, isSilent, seenAge, useMesh } from "../../mesh/site-health";
+import { isClockOff, isMeshStale, isSilent, reportAge, useMesh } from "../../mesh/site-health";
 import { ageOf, now } from "../../mesh/topics";
-import { Services } from "../../panels/alive-services";
+import { AliveServices } from "../../panels/alive-services";
 import { State } from "../../ui/state";
-import { Replays } from "./replays";
-import { Tile } from "./tile";
+import { RunningReplays } from "./replays";
+import { RobotTile } from "./tile";
 
 const STATES = ["any_state", "needs_look", "faulty", "with_alarm"] as const;
 const ORDERS = ["by_name", "by_urgency"] as const;
@@ -28,7 +28,7 @@ const site = signal("");
 const state = signal<(typeof STATES)[number]>("any_state");
 const order = signal<(typeof ORDERS)[number]>("by_name");
 
-export function Fleet() {
+export function FleetPage() {
   useFleetNow();
   // Once a second: tiles that move more often are unreadable.
   const second = useComputed(() => Math.floor(now.value / 1000));
@@ -60,12 +60,12 @@ export function Fleet() {
           <SiteHead site={name} robots={keys.length} />
           <div class={`tiles ${size}`}>
             {keys.map((key) => (
-              <Tile key={key} robotKey={key} />
+              <RobotTile key={key} robotKey={key} />
             ))}
           </div>
         </section>
       ))}
-      <Replays />
+      <RunningReplays />
     </div>
   );
 }
@@ -75,7 +75,7 @@ function count(robots: number): string {
 }
 
 function chosen(robots: readonly string[], states: ReadonlyMap<string, StateWord>): string[] {
-  const wanted = text.value.trim().toLowerCase();
+  const searchText = text.value.trim().toLowerCase();
   const alarmed = (key: string) => alarmsOf.value.get(key)?.length ?? 0;
   const level = (key: string) => states.get(key)?.level ?? "warning";
   const passes = {
@@ -85,7 +85,7 @@ function chosen(robots: readonly string[], states: ReadonlyMap<string, StateWord
     with_alarm: (key: string) => alarmed(key) > 0,
   }[state.value];
   const some = robots.filter(
-    (key) => key.toLowerCase().includes(wanted) && (!site.value || key.split("/")[1] === site.value) && passes(key),
+    (key) => key.toLowerCase().includes(searchText) && (!site.value || key.split("/")[1] === site.value) && passes(key),
   );
   if (order.value === "by_name") return some;
   const worst = (key: string) => Math.max(0, ...(alarmsOf.value.get(key) ?? []).map(({ priority }) => priority));
@@ -218,7 +218,7 @@ function SiteHead({ site: name, robots }: { site: string; robots: number }) {
         </span>
       ))}
       {!latest ? (
-        <Services of={`robomesh/${name}/-`} />
+        <AliveServices of={`robomesh/${name}/-`} />
       ) : isMeshStale(latest) ? (
         <span class="age">{f("health_stale", { age: ageText(ageOf(latest) ?? 0) })}</span>
       ) : (
@@ -243,7 +243,7 @@ function siteProblems(latest: NonNullable<ReturnType<ReturnType<typeof useMesh>[
     ...(silent.length > 1
       ? [f("services_silent", { count: silent.length })]
       : first
-        ? [f("service_silent", { name: first.service, age: ageText(seenAge(first, latest)) })]
+        ? [f("service_silent", { name: first.service, age: ageText(reportAge(first, latest)) })]
         : []),
     ...[...off].map(([host, seconds]) => f("clock_off", { host, seconds: seconds.toFixed(1) })),
     ...(versions.length > 1 ? [f("versions_differ", { versions: versions.join(", ") })] : []),

@@ -11,7 +11,7 @@ import { recordingsLink, robotLink } from "../../ui/route";
 import "../../ui/replay.css";
 import "./replays.css";
 
-export function Replays() {
+export function RunningReplays() {
   const states = useTopics(ReplayStateSchema, "robomesh/*/*/replay");
   const shown = [...states.values()].filter((latest) => !isStale("replay", ageOf(latest)));
   if (shown.length === 0) return null;

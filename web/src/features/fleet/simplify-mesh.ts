@@ -10,7 +10,7 @@ const CREASE_ANGLE = 0.7; // rad: sharper edges stay sharp
 /** Simplify the meshes below a group to at most `MOST_TRIANGLES` together, with normals.
  *
  * Vertices in one cell of a grid merge; degenerate triangles are removed; the grid grows until few are left. */
-export function coarsen(group: THREE.Object3D): void {
+export function simplifyMeshes(group: THREE.Object3D): void {
   const meshes: THREE.Mesh[] = [];
   group.traverse((part) => part instanceof THREE.Mesh && meshes.push(part));
   const size = new THREE.Box3().setFromObject(group).getSize(new THREE.Vector3()).length();

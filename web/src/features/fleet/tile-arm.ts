@@ -6,15 +6,15 @@ import { meshUrl } from "../../scene/arm";
 import type { Forward } from "../../scene/forward-kinematics";
 import { forwardOf } from "../../scene/forward-kinematics";
 import { loadModel } from "../../scene/models";
-import { coarsen } from "./simplify-mesh";
+import { simplifyMeshes } from "./simplify-mesh";
 
 const STALE = new THREE.MeshLambertMaterial({ color: "#7d8387", transparent: true, opacity: 0.45 });
 const PLAIN = "#8a8f94";
-const REACHES = 1.32; // times the arm's size at home
+const BOUNDS_FACTOR = 1.32; // times the arm's size at home
 
-const rigs = new Map<string, Rig>();
+const arms = new Map<string, TileArm>();
 
-export class Rig {
+export class TileArm {
   readonly group = new THREE.Group();
   /** All of its links are loaded. */
   complete = false;
@@ -41,13 +41,13 @@ export class Rig {
         );
         const group = new THREE.Group();
         group.matrixAutoUpdate = false;
-        if (model) group.add(dressed(model, color));
+        if (model) group.add(withTileMaterial(model, color));
         this.links.set(name, group);
         this.group.add(group);
       }),
     ).then(
       () => {
-        coarsen(this.group);
+        simplifyMeshes(this.group);
         this.group.traverse(
           (part) => part instanceof THREE.Mesh && this.own.set(part, part.material as THREE.Material),
         );
@@ -55,10 +55,10 @@ export class Rig {
         this.pose(joints.map((joint) => joint.home));
         new THREE.Box3().setFromObject(this.group).getBoundingSphere(this.bounds);
         this.bounds.center.set(0, 0, this.bounds.center.z * 1.3);
-        this.bounds.radius *= REACHES;
+        this.bounds.radius *= BOUNDS_FACTOR;
         loaded();
       },
-      () => rigs.delete(rigName(description)),
+      () => arms.delete(rigName(description)),
     ); // the next tile that needs it tries again
   }
 
@@ -81,10 +81,10 @@ export class Rig {
 }
 
 /** Return the rig of a description, shared by all robots of a model. */
-export function rigOf(prefix: string, description: Description, loaded: () => void): Rig {
+export function tileArmOf(prefix: string, description: Description, loaded: () => void): TileArm {
   const name = rigName(description);
-  const rig = rigs.get(name) ?? new Rig(prefix, description, loaded);
-  rigs.set(name, rig);
+  const rig = arms.get(name) ?? new TileArm(prefix, description, loaded);
+  arms.set(name, rig);
   return rig;
 }
 
@@ -94,7 +94,7 @@ function rigName({ urdf, links }: Description): string {
 }
 
 /** Apply the cheapest lit material: a tile is small. */
-function dressed(model: THREE.Group, colour: string): THREE.Group {
+function withTileMaterial(model: THREE.Group, colour: string): THREE.Group {
   model.traverse((part) => {
     if (!(part instanceof THREE.Mesh)) return;
     const own = part.material instanceof THREE.MeshStandardMaterial ? part.material : null;

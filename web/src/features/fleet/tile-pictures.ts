@@ -7,10 +7,10 @@ import { floorOf } from "../../mesh/clearance";
 import { palette } from "../../scene/surroundings";
 import { countFrame, drawsInSoftware, FrameFence, makeRenderer } from "../../scene/webgl";
 import { theme } from "../../ui/theme";
-import { type Rig, rigOf } from "./tile-arm";
+import { type TileArm, tileArmOf } from "./tile-arm";
 
 const FIELD_OF_VIEW = 28; // degrees, upright
-const LOOK_FROM = new THREE.Vector3(1.1, -1.7, 0.8).normalize();
+const CAMERA_DIRECTION = new THREE.Vector3(1.1, -1.7, 0.8).normalize();
 const MOST_AT_ONCE = 6;
 const COLUMNS = 3;
 const FEW = 6; // up to so many tiles are drawn at the display's rate
@@ -32,7 +32,7 @@ export class TilePicture {
 
   constructor(
     readonly canvas: HTMLCanvasElement,
-    readonly rig: Rig,
+    readonly rig: TileArm,
     private readonly smooth: boolean,
     readonly floor: THREE.Matrix4 | null,
   ) {}
@@ -120,7 +120,7 @@ class Pictures {
   }
 
   add(canvas: HTMLCanvasElement, prefix: string, description: Description): TilePicture {
-    const rig = rigOf(prefix, description, () => this.drawAll());
+    const rig = tileArmOf(prefix, description, () => this.drawAll());
     const tile = new TilePicture(canvas, rig, !this.software, floorInBase(description));
     this.tiles.add(tile);
     this.request ||= requestAnimationFrame(this.frame);
@@ -194,7 +194,7 @@ class Pictures {
   private look({ rig: { bounds }, floor }: TilePicture, aspect: number): void {
     const distance = bounds.radius / Math.sin(THREE.MathUtils.degToRad(FIELD_OF_VIEW / 2));
     this.camera.aspect = aspect;
-    this.camera.position.copy(bounds.center).addScaledVector(LOOK_FROM, distance);
+    this.camera.position.copy(bounds.center).addScaledVector(CAMERA_DIRECTION, distance);
     this.camera.lookAt(bounds.center);
     this.camera.updateProjectionMatrix();
     this.floor.visible = floor !== null;

@@ -13,27 +13,27 @@ import { hello, watch } from "../../mesh/connection";
 import { robotNow } from "../../mesh/robot-snapshots";
 import { problemOf, stateWord } from "../../mesh/robot-state";
 import { ageOf, isStale, now, staleAfter, useTopic } from "../../mesh/topics";
-import { Services } from "../../panels/alive-services";
+import { AliveServices } from "../../panels/alive-services";
+import { PriorityMark } from "../../ui/priority-mark";
+import { robotLink } from "../../ui/route";
 import { Silhouette } from "../../ui/silhouette";
 import { State } from "../../ui/state";
 import { Tag } from "../../ui/tag";
-import { PriorityMark } from "../../ui/priority-mark";
-import { robotLink } from "../../ui/route";
 import { useVisible } from "./visibility";
 
-export function Tile({ robotKey }: { robotKey: string }) {
+export function RobotTile({ robotKey }: { robotKey: string }) {
   const place = useRef<HTMLAnchorElement>(null);
   const visible = useVisible(place);
   const [, site = "", robot = ""] = robotKey.split("/");
   const level = visible ? stateWord(robotNow(robotKey).controller.value).level : "";
   return (
     <a ref={place} class={`tile ${level}`} href={robotLink(site, robot)} data-robot={robotKey}>
-      {visible ? <Shown robotKey={robotKey} site={site} robot={robot} /> : <Unseen robot={robot} />}
+      {visible ? <Shown robotKey={robotKey} site={site} robot={robot} /> : <InvisibleTile robot={robot} />}
     </a>
   );
 }
 
-function Unseen({ robot }: { robot: string }) {
+function InvisibleTile({ robot }: { robot: string }) {
   return (
     <>
       <div class="tile-picture">
@@ -100,7 +100,7 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
               {problem}
             </p>
           ) : (
-            <Services of={robotKey} />
+            <AliveServices of={robotKey} />
           )}
           {alarms.length > 0 && (
             <span class="tile-alarms" title={f("alarm_count", { count: alarms.length })}>

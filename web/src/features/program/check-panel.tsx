@@ -6,13 +6,13 @@ import { p } from "../../i18n/program";
 import { reasonText } from "../../i18n/reasons";
 import { t } from "../../i18n/texts";
 import { Panel } from "../../ui/panel";
-import { checked, checkFailed, checking, checkNow, errorsOf, isCurrent } from "./program-check";
 import { draft, goToLine } from "./draft";
-import type { Group } from "./violation-groups";
-import { grouped } from "./violation-groups";
 import { distanceText, seconds } from "./number-format";
+import { checkError, checked, checking, checkNow, errorsOf, isCurrent } from "./program-check";
+import { clickedViolation, showMoment } from "./scene-overlay";
+import type { ViolationGroup } from "./violation-groups";
+import { groupViolations } from "./violation-groups";
 import { kindText, severityOf } from "./violation-severity";
-import { chosen, showMoment } from "./scene-overlay";
 import "./check-panel.css";
 
 export function CheckPanel({ moved }: { moved: boolean }) {
@@ -31,7 +31,7 @@ export function CheckPanel({ moved }: { moved: boolean }) {
       <Verdict moved={moved} />
       {violations.length > 0 && (
         <ol class={`violations ${isCurrent() ? "" : "old"}`} aria-label={p("violations")}>
-          {grouped(violations, checked.value?.text ?? "").map((group, index) => (
+          {groupViolations(violations, checked.value?.text ?? "").map((group, index) => (
             <li key={index}>
               <Row group={group} />
             </li>
@@ -46,11 +46,11 @@ export function CheckPanel({ moved }: { moved: boolean }) {
 function Verdict({ moved }: { moved: boolean }) {
   const answer = checked.value?.answer;
   const busy = checking.value || (checked.value !== null && !isCurrent());
-  if (checkFailed.value && !checking.value) {
+  if (checkError.value && !checking.value) {
     return (
       <p class="verdict warning" role="alert">
         <span class="shape warning" aria-hidden="true" />
-        <span>{p("check_failed", { text: checkFailed.value })}</span>
+        <span>{p("check_failed", { text: checkError.value })}</span>
       </p>
     );
   }
@@ -110,14 +110,14 @@ function Notes({ answer }: { answer: CheckAnswer }) {
   );
 }
 
-function Row({ group: { worst, first, last, fromS, untilS } }: { group: Group }) {
+function Row({ group: { worst, first, last, fromS, untilS } }: { group: ViolationGroup }) {
   const { line, timeS, kind, pair, text, distance } = worst;
-  const current = chosen.value === worst;
+  const current = clickedViolation.value === worst;
   const level = severityOf(worst);
   const known = kindText(kind);
   const isText = kind === "program";
   const show = () => {
-    chosen.value = worst;
+    clickedViolation.value = worst;
     if (!isText) showMoment(timeS);
     if (line > 0) goToLine(line);
   };

@@ -38,13 +38,13 @@ function indexAt(of: CheckAnswer_Path, time: number): number {
 }
 
 /** Return the program's line at a moment. */
-export const lineNow = computed(() => {
+export const lineAtMoment = computed(() => {
   const of = path.value;
   return of && moment.value !== null ? (of.lines[indexAt(of, moment.value)] ?? null) : null;
 });
 
 /** Clearance at the moment [m]; null: no surroundings, or no moment. */
-export const clearanceNow = computed(() => {
+export const clearanceAtMoment = computed(() => {
   const of = path.value;
   if (!of || moment.value === null || of.clearances.length === 0) return null;
   const clearance = of.clearances[indexAt(of, moment.value)] ?? Infinity;
@@ -52,7 +52,7 @@ export const clearanceNow = computed(() => {
 });
 
 /** Links and fixtures in violations at the moment. */
-export const redNow = computed<ReadonlySet<string>>(() => {
+export const violatingLinks = computed<ReadonlySet<string>>(() => {
   const time = moment.value;
   const violations = checked.value?.answer.violations ?? [];
   if (time === null) return new Set();

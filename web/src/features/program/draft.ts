@@ -16,7 +16,7 @@ interface Step {
   cursor: number;
 }
 
-const KEPT = "robomesh.program/";
+const STORAGE_PREFIX = "robomesh.program/";
 const FIRST_NAME = "program";
 export const FILE_ENDING = ".prog";
 const MOST_STEPS = 200;
@@ -25,7 +25,7 @@ export const LINE_PX = 20;
 
 export const draft = signal<Draft | null>(null);
 /** The browser's message if it could not keep the draft; "" if it did. */
-export const keepingFailed = signal("");
+export const storageError = signal("");
 const past = signal<readonly Step[]>([]);
 const future = signal<readonly Step[]>([]);
 export const canUndo = computed(() => past.value.length > 0);
@@ -35,16 +35,16 @@ let field: HTMLTextAreaElement | null = null;
 let typedAt = 0;
 
 /** Open a robot's draft; false: it had none, and gets an empty one. */
-export function open(robotKey: string): boolean {
-  const kept = keptOf(robotKey);
+export function openDraft(robotKey: string): boolean {
+  const kept = storedDraft(robotKey);
   draft.value = kept ?? { robotKey, name: FIRST_NAME, text: "" };
   past.value = future.value = [];
   return kept !== null;
 }
 
-function keptOf(robotKey: string): Draft | null {
+function storedDraft(robotKey: string): Draft | null {
   try {
-    const { name, text } = JSON.parse(localStorage.getItem(KEPT + robotKey) ?? "null") as Partial<Draft>;
+    const { name, text } = JSON.parse(localStorage.getItem(STORAGE_PREFIX + robotKey) ?? "null") as Partial<Draft>;
     return typeof name === "string" && typeof text === "string" ? { robotKey, name, text } : null;
   } catch {
     return null; // none, or edited by hand
@@ -56,10 +56,10 @@ effect(() => {
   // An empty draft is not kept: the example is for robots without a draft.
   if (!now?.text) return;
   try {
-    localStorage.setItem(KEPT + now.robotKey, JSON.stringify({ name: now.name, text: now.text }));
-    keepingFailed.value = "";
+    localStorage.setItem(STORAGE_PREFIX + now.robotKey, JSON.stringify({ name: now.name, text: now.text }));
+    storageError.value = "";
   } catch (error) {
-    keepingFailed.value = String(error);
+    storageError.value = String(error);
   }
 });
 
@@ -81,7 +81,7 @@ export function rename(name: string): void {
 }
 
 /** Start with a text: no undo, cursor unchanged. */
-export function begin(text: string): void {
+export function startDraft(text: string): void {
   if (field) field.value = text;
   if (draft.value) draft.value = { ...draft.value, text };
 }

@@ -4,12 +4,12 @@ import { Component } from "preact";
 import { useLayoutEffect, useRef } from "preact/hooks";
 import { p } from "../../i18n/program";
 import { Panel } from "../../ui/panel";
+import { lineAtMoment } from "./checked-motion";
+import { download, draft, insert, LINE_PX, redo, setField, storageError, typed, undo } from "./draft";
 import { checked, isCurrent } from "./program-check";
-import { download, draft, insert, keepingFailed, LINE_PX, redo, setField, typed, undo } from "./draft";
-import { lineNow } from "./checked-motion";
+import { coloured } from "./program-text";
 import { runningLine } from "./running-program";
 import { severityOf } from "./violation-severity";
-import { coloured } from "./program-text";
 import "./editor.css";
 
 type Mark = "shown" | "warning" | "alarm" | "running";
@@ -77,7 +77,7 @@ export function Editor() {
           />
         </div>
       </div>
-      {keepingFailed.value && <p class="notice refused">{p("not_kept", { text: keepingFailed.value })}</p>}
+      {storageError.value && <p class="notice refused">{p("not_kept", { text: storageError.value })}</p>}
     </Panel>
   );
 }
@@ -86,7 +86,7 @@ export function Editor() {
 function marksOf(lines: readonly string[]): ReadonlyMap<number, Mark> {
   const marks = new Map<number, Mark>();
   const running = runningLine(lines);
-  if (running === null && lineNow.value !== null) marks.set(lineNow.value, "shown");
+  if (running === null && lineAtMoment.value !== null) marks.set(lineAtMoment.value, "shown");
   for (const violation of isCurrent() ? (checked.value?.answer.violations ?? []) : []) {
     if (marks.get(violation.line) !== "alarm") marks.set(violation.line, severityOf(violation));
   }

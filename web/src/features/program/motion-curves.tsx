@@ -5,17 +5,17 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { jointUnit } from "../../i18n/format";
 import { p } from "../../i18n/program";
-import { plotLook } from "../../ui/plot-appearance";
+import { plotAppearance } from "../../ui/plot-appearance";
 import { theme } from "../../ui/theme";
 import { moment, path } from "./checked-motion";
-import { showMoment } from "./scene-overlay";
 import { description } from "./program-robot";
+import { showMoment } from "./scene-overlay";
 
 const CURVES = ["--curve-1", "--curve-2", "--curve-3", "--curve-4", "--curve-5", "--curve-6", "--curve-7"];
 const MOST_POINTS = 2000; // more than there are pixels
 const CLEARANCE = "clearance";
 
-export function Curves() {
+export function MotionCurves() {
   const place = useRef<HTMLDivElement>(null);
   const plot = useRef<uPlot | null>(null);
   const of = path.value;
@@ -25,7 +25,7 @@ export function Curves() {
   useEffect(() => {
     const element = place.current;
     if (!element || !of || joints.length === 0) return;
-    const { axis, colour } = plotLook();
+    const { axis, colour } = plotAppearance();
     const unitOf = (i: number) => (joints[i] ? jointUnit(joints[i]).unit : "");
     const units = [...new Set(joints.map((_, i) => unitOf(i)))].sort().reverse();
     const text = (unit: string) => (_: uPlot, splits: number[]) =>

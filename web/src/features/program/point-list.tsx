@@ -3,14 +3,14 @@
 import { useState } from "preact/hooks";
 import type { Words } from "../../i18n/program";
 import { p } from "../../i18n/program";
-import { aim, aimAtPose, poseOf } from "./taught-pose";
 import { draft, goToLine, replace } from "./draft";
-import { teach } from "./scene-overlay";
 import { description, livePositions } from "./program-robot";
 import type { Point } from "./program-text";
 import { isName, jointsOf, pointsOf, renamed, usesOf, withoutLine } from "./program-text";
+import { teach } from "./scene-overlay";
+import { poseOf, taughtPositions, teachPose } from "./taught-pose";
 
-export function Points({ tell }: { tell: (words: Words) => void }) {
+export function PointList({ tell }: { tell: (words: Words) => void }) {
   const text = draft.value?.text ?? "";
   const points = pointsOf(text);
   const [naming, setNaming] = useState<string | null>(null);
@@ -83,7 +83,7 @@ function goTo(point: Point, tell: (words: Words) => void): void {
     else tell(() => p("point_wrong", { name: point.name, count: joints.length }));
     return;
   }
-  const from = aim.value ?? livePositions.value ?? joints.map((joint) => joint.home);
+  const from = taughtPositions.value ?? livePositions.value ?? joints.map((joint) => joint.home);
   teach(from);
-  aimAtPose(poseOf(point.numbers));
+  teachPose(poseOf(point.numbers));
 }

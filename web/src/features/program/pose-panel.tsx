@@ -4,25 +4,25 @@ import { useEffect, useState } from "preact/hooks";
 import { DASH, fixed } from "../../i18n/format";
 import { p } from "../../i18n/program";
 import { Choice } from "../../ui/choice";
-import { aimAtPose, aimPose, poseNumbers, poseOf, settle } from "./taught-pose";
+import { dropRequestedPose, poseNumbers, poseOf, taughtPose, teachPose } from "./taught-pose";
 import { gizmoMode } from "./teach-gizmo";
 
 const GIZMO = ["translate", "rotate"] as const;
 const AXES = ["x", "y", "z"] as const;
 const ANGLES = ["roll", "pitch", "yaw"] as const;
 
-export function Pose() {
-  const pose = aimPose.value;
+export function PosePanel() {
+  const pose = taughtPose.value;
   const numbers = pose ? poseNumbers(pose) : [];
   useEffect(() => {
     gizmoMode.value = "translate";
     return () => {
       gizmoMode.value = "off";
-      settle();
+      dropRequestedPose();
     };
   }, []);
   const set = (index: number, value: number) =>
-    pose && aimAtPose(poseOf(numbers.map((each, i) => (i === index ? value : each))));
+    pose && teachPose(poseOf(numbers.map((each, i) => (i === index ? value : each))));
   return (
     <>
       <div class="gizmo-row">

@@ -20,12 +20,12 @@ export interface Checked {
 export const checked = signal<Checked | null>(null);
 export const checking = signal(false);
 /** Why there is no check; "" when there is. */
-export const checkFailed = signal("");
+export const checkError = signal("");
 
-let wanted: { robotKey: string; text: string } | null = null;
+let newestRequest: { robotKey: string; text: string } | null = null;
 
 /** Check after each pause in typing, until the returned function is called. */
-export function keepChecking(): () => void {
+export function startChecking(): () => void {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let last: string | undefined;
   const end = effect(() => {
@@ -38,41 +38,41 @@ export function keepChecking(): () => void {
   return () => {
     end();
     clearTimeout(timer);
-    wanted = checked.value = null;
-    checkFailed.value = "";
+    newestRequest = checked.value = null;
+    checkError.value = "";
   };
 }
 
 export function checkNow(): void {
   const now = draft.value;
   if (!now?.text.trim()) {
-    wanted = checked.value = null;
+    newestRequest = checked.value = null;
     return;
   }
-  wanted = { robotKey: now.robotKey, text: now.text };
+  newestRequest = { robotKey: now.robotKey, text: now.text };
   if (!checking.value) void askNext();
 }
 
 async function askNext(): Promise<void> {
   checking.value = true;
-  while (wanted) {
-    const latest: { robotKey: string; text: string } = wanted;
+  while (newestRequest) {
+    const latest: { robotKey: string; text: string } = newestRequest;
     const at = Date.now();
     try {
       const key = inOwnName(`${latest.robotKey}/kinematics/check`);
       const request = { program: latest.text, path: true };
       const answer = await ask(key, CheckRequestSchema, request, CheckAnswerSchema, TIMEOUT_S);
-      if (wanted === latest) {
+      if (newestRequest === latest) {
         checked.value = { text: latest.text, answer, at };
-        checkFailed.value = "";
+        checkError.value = "";
       }
     } catch (error) {
-      if (wanted === latest) {
+      if (newestRequest === latest) {
         checked.value = null;
-        checkFailed.value = reasonOf(error);
+        checkError.value = reasonOf(error);
       }
     }
-    if (wanted === latest) wanted = null;
+    if (newestRequest === latest) newestRequest = null;
   }
   checking.value = false;
 }

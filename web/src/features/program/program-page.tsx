@@ -6,31 +6,31 @@ import { ControllerStateSchema, DescriptionSchema, LeaseSchema, ProgramStateSche
 import type { Words } from "../../i18n/program";
 import { noWords, p } from "../../i18n/program";
 import { t } from "../../i18n/texts";
-import { seeLease } from "../../mesh/control";
+import { handleLease } from "../../mesh/control";
 import { fleetRobots } from "../../mesh/known-robots";
 import type { RobotName } from "../../mesh/robot-name";
 import { disobeys, stateWord, stoppedByItself } from "../../mesh/robot-state";
 import { ageOf, isStale, jointsAge, useEvents, useTopic } from "../../mesh/topics";
+import { ControlPanel } from "../../panels/control/control-panel";
+import { RobotAlarm } from "../../panels/robot-alarm";
+import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
 import type { Stage } from "../../scene/robot-scene";
 import { SceneView } from "../../scene/scene-view";
-import { ControlPanel } from "../../panels/control/control-panel";
+import { programLink, robotLink } from "../../ui/route";
 import { State } from "../../ui/state";
 import { Tag } from "../../ui/tag";
-import { Alarm } from "../../panels/robot-alarm";
-import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
-import { programLink, robotLink } from "../../ui/route";
-import { keepChecking } from "./program-check";
 import { CheckPanel } from "./check-panel";
-import { begin, draft, open } from "./draft";
-import { Editor } from "./editor";
-import { addGizmo } from "./teach-gizmo";
 import { path } from "./checked-motion";
+import { draft, openDraft, startDraft } from "./draft";
+import { Editor } from "./editor";
+import { startChecking } from "./program-check";
+import { description as described, livePositions, robotKey } from "./program-robot";
+import { example } from "./program-text";
 import { RunPanel } from "./run-panel";
 import { isRunning, program } from "./running-program";
-import { keepShowing } from "./scene-overlay";
-import { description as described, livePositions, robotKey } from "./program-robot";
-import { Teach } from "./teach-panel";
-import { example } from "./program-text";
+import { startOverlay } from "./scene-overlay";
+import { addGizmo } from "./teach-gizmo";
+import { TeachPanel } from "./teach-panel";
 import { Timeline } from "./timeline";
 import { Toolbar } from "./toolbar";
 import "./program-page.css";
@@ -39,8 +39,8 @@ const MOVED = 0.005; // rad or m: a larger distance from the check's start makes
 const TOLD_MS = 8000;
 
 /** The page of a robot's program; without a robot, the choice of one. */
-export function Program({ shown }: { shown: RobotName | null }) {
-  return shown ? <Workbench key={`${shown.site}/${shown.robot}`} {...shown} /> : <Choose />;
+export function ProgramPage({ shown }: { shown: RobotName | null }) {
+  return shown ? <ProgramOfRobot key={`${shown.site}/${shown.robot}`} {...shown} /> : <Choose />;
 }
 
 function Choose() {
@@ -64,7 +64,7 @@ function Choose() {
   );
 }
 
-function Workbench({ site, robot }: RobotName) {
+function ProgramOfRobot({ site, robot }: RobotName) {
   const key = `robomesh/${site}/${robot}`;
   const controller = useTopic(ControllerStateSchema, `${key}/controller`);
   const lease = useTopic(LeaseSchema, `${key}/lease`);
@@ -72,7 +72,7 @@ function Workbench({ site, robot }: RobotName) {
   const joints = useTopic(JointStatesSchema, `${key}/joints`);
   const running = useTopic(ProgramStateSchema, `${key}/program`);
   const events = useEvents(key);
-  const [told, tell] = useOutcome();
+  const [outcome, setOutcome] = useOutcome();
   const [stage, setStage] = useState<Stage | null>(null);
   useEffect(() => (stage ? addGizmo(stage) : undefined), [stage]);
   const age = jointsAge(joints, controller);
@@ -84,14 +84,14 @@ function Workbench({ site, robot }: RobotName) {
   const positions = rows.map((joint) => byName.get(joint.name));
   const known = !stale && rows.length > 0 && positions.every((each) => each !== undefined);
 
-  const there = Boolean(controller ?? description ?? lease);
+  const isKnownRobot = Boolean(controller ?? description ?? lease);
   // Close the first of two robots before opening the second: effects after painting might run in reverse order.
   // An unknown robot has no draft.
   useLayoutEffect(() => {
-    if (!there) return;
+    if (!isKnownRobot) return;
     robotKey.value = key;
-    const isKept = open(key);
-    const ends = [keepChecking(), keepShowing()];
+    const isKept = openDraft(key);
+    const ends = [startChecking(), startOverlay()];
     setEmpty(!isKept);
     return () => {
       for (const end of ends) end();
@@ -100,7 +100,7 @@ function Workbench({ site, robot }: RobotName) {
       livePositions.value = null;
       program.value = null;
     };
-  }, [key, there]);
+  }, [key, isKnownRobot]);
   const [empty, setEmpty] = useState(false);
   useEffect(() => void (described.value = description?.message), [description]);
   useEffect(() => void (livePositions.value = known ? (positions as number[]) : null), [joints, known]);
@@ -111,13 +111,13 @@ function Workbench({ site, robot }: RobotName) {
   useEffect(() => {
     if (!empty || rows.length === 0 || !description) return;
     setEmpty(false);
-    if (!draft.value?.text) begin(example(description.message, p("example_comment")));
+    if (!draft.value?.text) startDraft(example(description.message, p("example_comment")));
   }, [empty, description]);
   useEffect(() => {
-    if (lease) seeLease(key, lease.message);
+    if (lease) handleLease(key, lease.message);
   }, [key, lease]);
 
-  if (useRobotNotFound(key, there)) return <RobotNotFound site={site} robot={robot} />;
+  if (useRobotNotFound(key, isKnownRobot)) return <RobotNotFound site={site} robot={robot} />;
   const motion = {
     running: lease?.message.motion === true,
     stopped: state?.stop !== undefined || stoppedByItself(state),
@@ -125,7 +125,7 @@ function Workbench({ site, robot }: RobotName) {
   };
   return (
     <>
-      <Alarm state={state} events={events} />
+      <RobotAlarm state={state} events={events} />
       <div class="program">
         <div class="headline">
           <h1>{p("program_of", { robot })}</h1>
@@ -135,11 +135,11 @@ function Workbench({ site, robot }: RobotName) {
             {p("to_robot")}
           </a>
           <span class="dim small told" role="status">
-            {told()}
+            {outcome()}
           </span>
         </div>
         <div class="program-left">
-          <Toolbar tell={tell} />
+          <Toolbar tell={setOutcome} />
           <Editor />
           <CheckPanel moved={!isRunning() && hasMoved(positions)} />
         </div>
@@ -165,7 +165,7 @@ function Workbench({ site, robot }: RobotName) {
             disobeyed={disobeys(state, events)}
           />
           <RunPanel robotKey={key} controller={state} />
-          <Teach />
+          <TeachPanel />
         </div>
       </div>
     </>

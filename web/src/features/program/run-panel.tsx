@@ -12,18 +12,19 @@ import { holds, ms } from "../../mesh/control";
 import { whyNoMotion } from "../../mesh/robot-state";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
-import { checked, errorsOf, isCurrent } from "./program-check";
 import type { Draft } from "./draft";
 import { draft } from "./draft";
+import { checked, errorsOf, isCurrent } from "./program-check";
 import { program } from "./running-program";
 import { hideMoment } from "./scene-overlay";
 import "./run-panel.css";
 
 export function RunPanel(props: { robotKey: string; controller: ControllerState | undefined }) {
   const { robotKey } = props;
-  const [told, setTold] = useState<{ notice: Notice; of: Draft | null } | null>(null);
+  const [shownNotice, setShownNotice] = useState<{ notice: Notice; of: Draft | null } | null>(null);
   // A run of another text or name does not apply.
-  const notice = told && (told.notice.kind === "busy" || told.of === draft.value) ? told.notice : null;
+  const notice =
+    shownNotice && (shownNotice.notice.kind === "busy" || shownNotice.of === draft.value) ? shownNotice.notice : null;
   const state = program.value;
   const running = state?.outcome === Outcome.RUNNING;
   const why = whyNotRun(robotKey, props.controller, running);
@@ -34,8 +35,8 @@ export function RunPanel(props: { robotKey: string; controller: ControllerState 
     const values = { program: of?.text ?? "", programName: name };
     void command(robotKey, Command.RUN_PROGRAM, name, values, (notice) => {
       // Once it runs, its progress is shown instead.
-      if (notice.kind === "done" && !notice.warning) setTold(null);
-      else setTold({ notice: notice.kind === "busy" ? { ...notice, text: p("asking_run") } : notice, of });
+      if (notice.kind === "done" && !notice.warning) setShownNotice(null);
+      else setShownNotice({ notice: notice.kind === "busy" ? { ...notice, text: p("asking_run") } : notice, of });
     });
   };
   const busy = notice?.kind === "busy";

@@ -3,41 +3,41 @@
 import { effect, signal } from "@preact/signals";
 import type { CheckAnswer_Violation } from "../../gen/robomesh_pb";
 import { ghostAt, redLinks, toolPath } from "../../scene/ghost";
-import { aim, aimAt } from "./taught-pose";
+import { duration, moment, path, playing, positionsAt, violatingLinks } from "./checked-motion";
 import { checked } from "./program-check";
-import { duration, moment, path, playing, positionsAt, redNow } from "./checked-motion";
 import { robotKey } from "./program-robot";
+import { taughtPositions, teachPositions } from "./taught-pose";
 
 /** The last violation that was clicked. */
-export const chosen = signal<CheckAnswer_Violation | null>(null);
+export const clickedViolation = signal<CheckAnswer_Violation | null>(null);
 
 /** Show the checked motion at a moment [s]. */
 export function showMoment(time: number): void {
-  aimAt(null);
+  teachPositions(null);
   moment.value = Math.min(duration.value, Math.max(0, time));
 }
 
 /** Show the pose being taught at joint positions [rad] or [m]; null: none. */
 export function teach(positions: readonly number[] | null): void {
   hideMoment();
-  aimAt(positions);
+  teachPositions(positions);
 }
 
 export function hideMoment(): void {
   playing.value = false;
   moment.value = null;
-  chosen.value = null;
+  clickedViolation.value = null;
 }
 
 /** Update the view until the returned function is called. */
-export function keepShowing(): () => void {
+export function startOverlay(): () => void {
   const ends = [
     effect(() => {
       const of = path.value;
       const at = moment.value;
-      ghostAt(robotKey.value, aim.value ?? (of && at !== null ? positionsAt(of, at) : null));
+      ghostAt(robotKey.value, taughtPositions.value ?? (of && at !== null ? positionsAt(of, at) : null));
     }),
-    effect(() => void (redLinks.value = redNow.value)),
+    effect(() => void (redLinks.value = violatingLinks.value)),
     effect(() => {
       const points = path.value?.toolPositions ?? [];
       const count = Math.floor(points.length / 3);
@@ -47,7 +47,7 @@ export function keepShowing(): () => void {
     // After a new check keep the moment if it exists; the clicked violation belonged to the old check.
     effect(() => {
       void checked.value;
-      chosen.value = null;
+      clickedViolation.value = null;
       const at = moment.peek();
       if (!path.value) hideMoment();
       else if (at !== null) moment.value = Math.min(at, duration.value);

@@ -11,40 +11,42 @@ const TIMEOUT_S = 5;
 const FULL_POSE = 6; // a full pose can be reached with so many joints
 
 /** Joint positions [rad] or [m]; null: no pose is being taught. */
-export const aim = signal<readonly number[] | null>(null);
+export const taughtPositions = signal<readonly number[] | null>(null);
 /** Why the wanted pose cannot be reached; "" when it can. */
-export const aimProblem = signal("");
-const wantedPose = signal<readonly number[] | null>(null);
+export const taughtProblem = signal("");
+const requestedPose = signal<readonly number[] | null>(null);
 /** The tool in the base frame, 16 by rows: the wanted pose, or the joints' pose; null: not known. */
-export const aimPose = computed(() => wantedPose.value ?? (aim.value && toolAt.value(aim.value)));
+export const taughtPose = computed(
+  () => requestedPose.value ?? (taughtPositions.value && toolAt.value(taughtPositions.value)),
+);
 
 let solving = false;
 
 /** Aim at joint positions; null ends it. */
-export function aimAt(positions: readonly number[] | null): void {
-  aim.value = positions;
-  wantedPose.value = null;
-  aimProblem.value = "";
+export function teachPositions(positions: readonly number[] | null): void {
+  taughtPositions.value = positions;
+  requestedPose.value = null;
+  taughtProblem.value = "";
 }
 
 /** Aim at a pose of the tool, with the joint positions nearest to the current ones. */
-export function aimAtPose(pose: readonly number[]): void {
-  wantedPose.value = pose;
+export function teachPose(pose: readonly number[]): void {
+  requestedPose.value = pose;
   if (!solving) void solve();
 }
 
 /** Drop the wanted pose: the tool is at the joints' pose. */
-export function settle(): void {
-  wantedPose.value = null;
-  aimProblem.value = "";
+export function dropRequestedPose(): void {
+  requestedPose.value = null;
+  taughtProblem.value = "";
 }
 
 /** Send one request at a time, the newest next. */
 async function solve(): Promise<void> {
   solving = true;
-  let pose = wantedPose.value;
+  let pose = requestedPose.value;
   while (pose) {
-    const near = aim.value ?? [];
+    const near = taughtPositions.value ?? [];
     const task = near.length < FULL_POSE ? Task.POSITION_AND_AXIS_5D : Task.POSE_6D;
     let found: readonly number[] | undefined;
     let problem = "";
@@ -57,11 +59,11 @@ async function solve(): Promise<void> {
     } catch (error) {
       problem = reasonOf(error);
     }
-    if (wantedPose.value) {
-      if (found) aim.value = found;
-      aimProblem.value = found ? "" : problem;
+    if (requestedPose.value) {
+      if (found) taughtPositions.value = found;
+      taughtProblem.value = found ? "" : problem;
     }
-    pose = wantedPose.value === pose ? null : wantedPose.value;
+    pose = requestedPose.value === pose ? null : requestedPose.value;
   }
   solving = false;
 }

@@ -4,7 +4,7 @@ import { effect, signal } from "@preact/signals";
 import { Group, Matrix4, Object3D } from "three";
 import { makeGizmo } from "../../scene/gizmo";
 import type { Stage } from "../../scene/robot-scene";
-import { aimAtPose, aimPose } from "./taught-pose";
+import { taughtPose, teachPose } from "./taught-pose";
 
 /** What dragging does; off: hidden. */
 export const gizmoMode = signal<"off" | "translate" | "rotate">("off");
@@ -32,10 +32,10 @@ export function addGizmo(stage: Stage): () => void {
   });
   controls.addEventListener("objectChange", () => {
     tool.updateMatrix();
-    aimAtPose(tool.matrix.clone().transpose().elements);
+    teachPose(tool.matrix.clone().transpose().elements);
   });
   const end = effect(() => {
-    const pose = aimPose.value;
+    const pose = taughtPose.value;
     const mode = gizmoMode.value;
     if (!pose || mode === "off") controls.detach();
     else {

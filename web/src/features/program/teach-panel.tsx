@@ -4,29 +4,29 @@ import { useState } from "preact/hooks";
 import { jointText, jointUnit } from "../../i18n/format";
 import type { Words } from "../../i18n/program";
 import { noWords, p } from "../../i18n/program";
+import { Choice } from "../../ui/choice";
 import { JointTrack } from "../../ui/joint-track";
 import { JointValue } from "../../ui/joint-value";
-import { Choice } from "../../ui/choice";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
-import { aim, aimProblem } from "./taught-pose";
 import { cursorLine, draft, replace } from "./draft";
-import { Points } from "./point-list";
-import { Pose } from "./pose-panel";
-import { teach } from "./scene-overlay";
+import { PointList } from "./point-list";
+import { PosePanel } from "./pose-panel";
 import { description, livePositions } from "./program-robot";
 import type { Move } from "./program-text";
 import { freeName, jointsText, withPoint } from "./program-text";
+import { teach } from "./scene-overlay";
+import { taughtPositions, taughtProblem } from "./taught-pose";
 import "./teach-panel.css";
 
-const WAYS = ["joints", "pose"] as const;
+const METHODS = ["joints", "pose"] as const;
 const MOVES = ["move_joints", "move_line"] as const;
 const DEGREE = Math.PI / 180;
 
-export function Teach() {
-  const [way, setWay] = useState<(typeof WAYS)[number]>("joints");
+export function TeachPanel() {
+  const [method, setMethod] = useState<(typeof METHODS)[number]>("joints");
   const [move, setMove] = useState<Move>("move_joints");
-  const [told, setTold] = useState<{ words: Words }>({ words: noWords });
+  const [outcome, setOutcome] = useState<{ words: Words }>({ words: noWords });
   const joints = description.value?.joints ?? [];
   const live = livePositions.value;
   const add = (positions: readonly number[]) => {
@@ -34,10 +34,10 @@ export function Teach() {
     const name = freeName(text);
     const made = withPoint(text, name, jointsText(joints, positions), move, cursorLine());
     replace(made.text, made.line);
-    setTold({ words: () => p("added", { name }) });
+    setOutcome({ words: () => p("added", { name }) });
   };
-  const begin = () => live && teach(live);
-  const aimed = aim.value;
+  const startGhost = () => live && teach(live);
+  const taught = taughtPositions.value;
   return (
     <Panel
       name="teach"
@@ -53,34 +53,40 @@ export function Teach() {
         <button class="action" disabled={!live} onClick={() => live && add(live)}>
           {p("add_live")}
         </button>
-        {aimed ? (
+        {taught ? (
           <button class="action" onClick={() => teach(null)}>
             {p("end_ghost")}
           </button>
         ) : (
-          <button class="action" disabled={!live} onClick={begin}>
+          <button class="action" disabled={!live} onClick={startGhost}>
             {p("begin_ghost")}
           </button>
         )}
       </div>
-      {aimed && (
+      {taught && (
         <div class="aim">
           <div class="aim-head">
-            <Choice label={p("set_by")} values={WAYS} chosen={way} text={(each) => p(`by_${each}`)} choose={setWay} />
-            <button class="action primary" disabled={aimProblem.value !== ""} onClick={() => add(aimed)}>
+            <Choice
+              label={p("set_by")}
+              values={METHODS}
+              chosen={method}
+              text={(each) => p(`by_${each}`)}
+              choose={setMethod}
+            />
+            <button class="action primary" disabled={taughtProblem.value !== ""} onClick={() => add(taught)}>
               {p("add_ghost")}
             </button>
           </div>
-          {way === "joints" ? <Sliders positions={aimed} /> : <Pose />}
+          {method === "joints" ? <Sliders positions={taught} /> : <PosePanel />}
           <NoticeLine
-            notice={aimProblem.value ? { kind: "refused", text: aimProblem.value } : null}
+            notice={taughtProblem.value ? { kind: "refused", text: taughtProblem.value } : null}
             idle={p("moves_nothing")}
           />
         </div>
       )}
-      <Points tell={(words) => setTold({ words })} />
+      <PointList tell={(words) => setOutcome({ words })} />
       <p class="notice" role="status">
-        {told.words() || "\u00a0"}
+        {outcome.words() || "\u00a0"}
       </p>
     </Panel>
   );

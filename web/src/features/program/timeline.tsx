@@ -3,12 +3,12 @@
 import { useEffect } from "preact/hooks";
 import { p } from "../../i18n/program";
 import { Panel } from "../../ui/panel";
-import { checked } from "./program-check";
-import { Curves } from "./motion-curves";
-import { clearanceNow, duration, lineNow, moment, path, playing } from "./checked-motion";
+import { clearanceAtMoment, duration, lineAtMoment, moment, path, playing } from "./checked-motion";
+import { MotionCurves } from "./motion-curves";
 import { distanceText, seconds } from "./number-format";
-import { severityOf } from "./violation-severity";
+import { checked } from "./program-check";
 import { hideMoment, showMoment } from "./scene-overlay";
+import { severityOf } from "./violation-severity";
 import "./timeline.css";
 
 const STEP_S = 0.05;
@@ -25,8 +25,8 @@ export function Timeline() {
     showMoment(time === null || time >= duration.value ? 0 : time);
     playing.value = true;
   };
-  const line = lineNow.value;
-  const clearance = clearanceNow.value;
+  const line = lineAtMoment.value;
+  const clearance = clearanceAtMoment.value;
   const words =
     time === null
       ? p("scrub_hint")
@@ -72,7 +72,7 @@ export function Timeline() {
         </span>
       </div>
       <p class="scrub-words dim small">{any ? words : p("no_motion_yet")}</p>
-      <Curves />
+      <MotionCurves />
     </Panel>
   );
 }

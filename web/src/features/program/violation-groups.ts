@@ -2,7 +2,7 @@
 
 import type { CheckAnswer_Violation } from "../../gen/robomesh_pb";
 
-export interface Group {
+export interface ViolationGroup {
   /** The nearest violation, which the row describes and opens. */
   worst: CheckAnswer_Violation;
   first: number;
@@ -16,12 +16,12 @@ const MOVES = /^\s*(home|move_)/;
 /** Group violations in the order of their first ones. Lines are neighbours if no line between them moves the robot.
  *
  * Errors of the text share a row only if their texts are equal. */
-export function grouped(violations: readonly CheckAnswer_Violation[], text: string): readonly Group[] {
+export function groupViolations(violations: readonly CheckAnswer_Violation[], text: string): readonly ViolationGroup[] {
   const lines = text.split("\n");
   const none = (from: number, to: number) =>
     !lines.slice(from, Math.max(from, to - 1)).some((line) => MOVES.test(line));
-  const groups: Group[] = [];
-  const newest = new Map<string, Group>();
+  const groups: ViolationGroup[] = [];
+  const newest = new Map<string, ViolationGroup>();
   for (const each of violations) {
     const { kind, pair, refuses, line, timeS, untilS } = each;
     const cause = [kind, refuses, ...pair, kind === "program" ? each.text : ""].join("\n");

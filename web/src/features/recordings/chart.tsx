@@ -7,7 +7,7 @@ import "uplot/dist/uPlot.min.css";
 import type { SeriesAnswer_Series as Series } from "../../gen/robomesh_pb";
 import { DASH, fixed } from "../../i18n/format";
 import { momentText } from "../../i18n/recording-format";
-import { plotLook } from "../../ui/plot-appearance";
+import { plotAppearance } from "../../ui/plot-appearance";
 import { theme } from "../../ui/theme";
 import type { Window } from "./recorder-requests";
 import { commonOf, labelOf, shownUnit } from "./units";
@@ -40,7 +40,7 @@ export function Chart(props: {
   useEffect(() => {
     const element = place.current;
     if (!element || curves.length === 0) return;
-    const { axis, colour } = plotLook();
+    const { axis, colour } = plotAppearance();
     const cursor = document.createElement("div");
     cursor.className = "moment-line";
     const width = Math.max(1, shown.to - shown.from);

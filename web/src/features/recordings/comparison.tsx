@@ -5,24 +5,24 @@ import { momentText } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
 import type { RecordingName } from "../../ui/route";
 import { recordingsLink } from "../../ui/route";
-import type { Happened } from "./recorder-requests";
+import type { RecordedEvent } from "./recorder-requests";
 
 const SHOWN_TEXT = 60;
 
-export function Beside(props: {
+export function Comparison(props: {
   first: RecordingName;
   name: string;
   problem: string;
   /** The second's time less the first's [s]. */
   shift: number;
   setShift: (shift: number) => void;
-  events: readonly Happened[];
-  secondEvents: readonly Happened[];
+  events: readonly RecordedEvent[];
+  secondEvents: readonly RecordedEvent[];
   ghosted: boolean;
 }) {
   const { name, shift, setShift, events, secondEvents } = props;
   const align = (form: HTMLFormElement) => {
-    const at = (field: string, list: readonly Happened[]) => list[Number(new FormData(form).get(field))]?.at ?? 0;
+    const at = (field: string, list: readonly RecordedEvent[]) => list[Number(new FormData(form).get(field))]?.at ?? 0;
     setShift(at("second", secondEvents) - at("first", events));
   };
   const words =
@@ -59,7 +59,7 @@ export function Beside(props: {
   );
 }
 
-function Events({ name, label, events }: { name: string; label: string; events: readonly Happened[] }) {
+function Events({ name, label, events }: { name: string; label: string; events: readonly RecordedEvent[] }) {
   return (
     <select name={name} aria-label={label}>
       <option value="">{`${label}…`}</option>

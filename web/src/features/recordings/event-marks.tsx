@@ -11,13 +11,13 @@ import { r } from "../../i18n/recordings";
 import { t } from "../../i18n/texts";
 import { SEVERITIES } from "../../ui/event-mark";
 import { Panel } from "../../ui/panel";
-import type { Asked, Happened } from "./recorder-requests";
+import type { RecordedEvent, RequestState } from "./recorder-requests";
 import "./contents.css";
 
-const NONE: readonly Happened[] = [];
+const NONE: readonly RecordedEvent[] = [];
 const MOST_MARKS = 200; // more are indistinguishable; the gravest are shown
 
-function severityOf({ event }: Happened): [string, string] {
+function severityOf({ event }: RecordedEvent): [string, string] {
   const [word, level] = SEVERITIES[event.severity] ?? ["severity_info", "normal"];
   return [t(word), level];
 }
@@ -27,7 +27,7 @@ function sideOf(share: number): string {
   return share < 0.15 ? "early" : share > 0.85 ? "late" : "";
 }
 
-export function EventMarks(props: { events: readonly Happened[]; duration: number; seek: (to: number) => void }) {
+export function EventMarks(props: { events: readonly RecordedEvent[]; duration: number; seek: (to: number) => void }) {
   const { duration } = props;
   const shown = [...props.events]
     .sort((first, second) => second.event.severity - first.event.severity)
@@ -58,7 +58,7 @@ export function EventMarks(props: { events: readonly Happened[]; duration: numbe
 
 /** A list of events, the latest one marked. */
 export function EventList(props: {
-  asked: Asked<{ list: readonly Happened[]; cut: boolean }>;
+  asked: RequestState<{ list: readonly RecordedEvent[]; cut: boolean }>;
   moment: ReadonlySignal<number>;
   seek: (to: number) => void;
 }) {

@@ -10,19 +10,19 @@ import { Replay } from "../../mesh/replay";
 import type { RecordingName } from "../../ui/route";
 
 const TIMEOUT_S = 15; // the player first reads a long file
-const COMES_WITHIN_MS = 1500; // presence arrives after the greeting
+const PRESENCE_DELAY_MS = 1500; // presence arrives after the greeting
 const MOMENT_INTERVAL_MS = 40;
 const FOLLOW_INTERVAL_MS = 200;
-const APART_S = 0.12; // a larger difference is corrected by a seek
+const MAX_OFFSET_S = 0.12; // a larger difference is corrected by a seek
 
-export interface Opened {
+export interface OpenReplay {
   replay: Replay | null;
   problem: string;
   again: () => void;
 }
 
 /** Open a recording and follow its replay; null: none. */
-export function useOpened(name: RecordingName | null, paused = false): Opened {
+export function useOpenReplay(name: RecordingName | null, paused = false): OpenReplay {
   const [replay, setReplay] = useState<Replay | null>(null);
   const [problem, setProblem] = useState("");
   const [tries, setTries] = useState(0);
@@ -34,7 +34,7 @@ export function useOpened(name: RecordingName | null, paused = false): Opened {
     let wanted = true;
     let made: Replay | null = null;
     if (!there) {
-      const timer = setTimeout(() => setProblem(r("no_player", { site: name.site })), COMES_WITHIN_MS);
+      const timer = setTimeout(() => setProblem(r("no_player", { site: name.site })), PRESENCE_DELAY_MS);
       return () => clearTimeout(timer);
     }
     setProblem("");
@@ -64,7 +64,7 @@ export function useOpened(name: RecordingName | null, paused = false): Opened {
 }
 
 /** Return a replay's position, at the display's rate. */
-export function useMoment(replay: Replay | null): Signal<number> {
+export function usePosition(replay: Replay | null): Signal<number> {
   const moment = useSignal(0);
   useEffect(() => {
     if (!replay) return;
@@ -81,7 +81,7 @@ export function useMoment(replay: Replay | null): Signal<number> {
 }
 
 /** Keep a second replay `shift` s ahead of the first; beyond its ends it waits. */
-export function useFollowing(first: Replay | null, second: Replay | null, shift: number): void {
+export function useSynchronised(first: Replay | null, second: Replay | null, shift: number): void {
   useEffect(() => {
     if (!first || !second) return;
     const follow = () => {
@@ -90,7 +90,7 @@ export function useFollowing(first: Replay | null, second: Replay | null, shift:
       const wanted = first.position() + shift;
       const within = wanted >= 0 && wanted < own.durationS;
       if (own.speed !== speed) second.setSpeed(speed);
-      const near = APART_S * Math.max(1, playing ? speed : 0);
+      const near = MAX_OFFSET_S * Math.max(1, playing ? speed : 0);
       if (Math.abs(second.position() - Math.min(own.durationS, Math.max(0, wanted))) > (playing ? near : 1e-3)) {
         second.seek(wanted);
       }

@@ -6,18 +6,22 @@ import { useEffect } from "preact/hooks";
 import { fullTime } from "../../i18n/format";
 import { dateText, momentText } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
-import { held } from "../../mesh/control";
+import { heldLease } from "../../mesh/control";
 import type { Replay } from "../../mesh/replay";
 import { SPEEDS } from "../../mesh/replay";
 import { Toggle } from "../../ui/choice";
-import type { Happened } from "./recorder-requests";
 import { EventMarks } from "./event-marks";
+import type { RecordedEvent } from "./recorder-requests";
 import "./playback-controls.css";
 
 const STEP_S = 0.05;
 const LARGE = 10;
 
-export function Transport(props: { replay: Replay; moment: ReadonlySignal<number>; events: readonly Happened[] }) {
+export function PlaybackControls(props: {
+  replay: Replay;
+  moment: ReadonlySignal<number>;
+  events: readonly RecordedEvent[];
+}) {
   const { replay } = props;
   const { playing, speed, loop, durationS, start } = replay.state.value;
   const at = props.moment.value;
@@ -120,7 +124,7 @@ function useKeys(replay: Replay): void {
   useEffect(() => {
     const onKey = (event: KeyboardEvent) => {
       const target = event.target instanceof Element ? event.target : null;
-      if (held.peek() || event.ctrlKey || event.metaKey || event.altKey) return;
+      if (heldLease.peek() || event.ctrlKey || event.metaKey || event.altKey) return;
       if (target?.closest("input:not([type=range]), select, textarea")) return;
       const { playing, speed, durationS } = replay.state.peek();
       const step = STEP_S * (event.shiftKey ? LARGE : 1);

@@ -13,36 +13,36 @@ import { SceneView, viewsOf } from "../../scene/scene-view";
 import { ReplayTag } from "../../ui/replay-tag";
 import type { RecordingName } from "../../ui/route";
 import { recordingsLink } from "../../ui/route";
-import { useFirst, useHappened, useInfo } from "./recorder-requests";
-import { Beside } from "./comparison";
+import { Comparison } from "./comparison";
 import { Contents } from "./contents";
 import { EventList } from "./event-marks";
-import { useFollowing, useMoment, useOpened } from "./open-replay";
+import { useOpenReplay, usePosition, useSynchronised } from "./open-replay";
+import { PlaybackControls } from "./playback-controls";
 import { Plots } from "./plots";
+import { useFirstFrameTime, useInfo, useRecordedEvents } from "./recorder-requests";
 import { ReplayVideo } from "./replay-video";
 import { useSecondGhost } from "./second-ghost";
-import { Transport } from "./playback-controls";
 import "./player.css";
 
-const NOBODY = "robomesh/-/-"; // until the replay has its name
+const NO_ROBOT = "robomesh/-/-"; // until the replay has its name
 const NONE: readonly never[] = [];
 const noSeek = () => undefined;
 const FRAMES_HOLD_S = 1; // as for live frames
 
 export function Player({ first, second }: { first: RecordingName; second: RecordingName | null }) {
-  const opened = useOpened(first);
-  const other = useOpened(second, true);
+  const openReplay = useOpenReplay(first);
+  const other = useOpenReplay(second, true);
   const info = useInfo(first);
   const secondInfo = useInfo(second);
   const [shift, setShift] = useState(0);
-  const { replay } = opened;
-  useFollowing(replay, other.replay, shift);
-  const moment = useMoment(replay);
-  const happened = useHappened(first, info.value);
-  const secondHappened = useHappened(second, secondInfo.value);
-  const key = replay?.robotKey ?? NOBODY;
+  const { replay } = openReplay;
+  useSynchronised(replay, other.replay, shift);
+  const moment = usePosition(replay);
+  const recordedEvents = useRecordedEvents(first, info.value);
+  const secondEvents = useRecordedEvents(second, secondInfo.value);
+  const key = replay?.robotKey ?? NO_ROBOT;
   const description = useTopic(DescriptionSchema, `${key}/description`)?.message;
-  const firstS = useFirst(first, info.value);
+  const firstS = useFirstFrameTime(first, info.value);
   useEffect(() => replay?.beginAt(firstS), [replay, firstS]);
   const arm = useOfMoment(replay, "frames", FRAMES_HOLD_S);
   const otherArm = useOfMoment(other.replay, "joints", FRAMES_HOLD_S);
@@ -53,8 +53,8 @@ export function Player({ first, second }: { first: RecordingName; second: Record
   );
   const state = replay?.state.value;
   const gone = replay?.gone ?? false;
-  const trouble = opened.problem || (gone ? r("player_gone") : state?.text && r("closed", { text: state.text }));
-  const events = happened.value?.list ?? NONE;
+  const trouble = openReplay.problem || (gone ? r("player_gone") : state?.text && r("closed", { text: state.text }));
+  const events = recordedEvents.value?.list ?? NONE;
   const recorded = viewsIn(info.value);
   return (
     <div class={`player ${second ? "two" : ""}`} data-replay={key.split("/")[2]} data-playing={state?.playing ?? false}>
@@ -73,20 +73,20 @@ export function Player({ first, second }: { first: RecordingName; second: Record
           <p class="player-trouble" role="alert">
             <span class="shape warning" aria-hidden="true" />
             <span>{trouble}</span>
-            <button class="action" onClick={opened.again}>
+            <button class="action" onClick={openReplay.again}>
               {r("open_again")}
             </button>
           </p>
         )}
         {second && (
-          <Beside
+          <Comparison
             first={first}
             name={secondInfo.value?.name || second.file}
             problem={other.problem || secondInfo.problem}
             shift={shift}
             setShift={setShift}
             events={events}
-            secondEvents={secondHappened.value?.list ?? NONE}
+            secondEvents={secondEvents.value?.list ?? NONE}
             ghosted={ghosted}
           />
         )}
@@ -105,7 +105,7 @@ export function Player({ first, second }: { first: RecordingName; second: Record
         {other.replay && <SecondVideo replay={other.replay} arm={otherArm} info={secondInfo.value} />}
       </div>
       <div class="player-side">
-        <EventList asked={happened} moment={moment} seek={replay?.seek ?? noSeek} />
+        <EventList asked={recordedEvents} moment={moment} seek={replay?.seek ?? noSeek} />
         <Contents
           name={first}
           info={info.value}
@@ -122,10 +122,10 @@ export function Player({ first, second }: { first: RecordingName; second: Record
         seek={replay?.seek ?? noSeek}
       />
       {replay ? (
-        <Transport replay={replay} moment={moment} events={events} />
+        <PlaybackControls replay={replay} moment={moment} events={events} />
       ) : (
         <section class="transport waiting" aria-label={r("transport")}>
-          <p class="dim">{opened.problem ? "\u00a0" : r("opening")}</p>
+          <p class="dim">{openReplay.problem ? "\u00a0" : r("opening")}</p>
         </section>
       )}
     </div>

@@ -7,12 +7,12 @@ import { r } from "../../i18n/recordings";
 import { Toggle } from "../../ui/choice";
 import { Panel } from "../../ui/panel";
 import type { RecordingName } from "../../ui/route";
-import type { Window } from "./recorder-requests";
-import { useKnown, useSeries } from "./recorder-requests";
 import type { Curve } from "./chart";
 import { Chart } from "./chart";
+import type { Window } from "./recorder-requests";
+import { useSeries, useValueNames } from "./recorder-requests";
 import { savePicture } from "./save-picture";
-import { Values } from "./value-choice";
+import { ValueChoice } from "./value-choice";
 import "./plots.css";
 
 const POINTS = 1000;
@@ -21,7 +21,7 @@ const FIRST = /^joints\/.*\/position$/;
 const NARROWEST_S = 0.2;
 
 /** The second recording: its time is `shift` s more. */
-export interface Beside {
+export interface SecondRecording {
   name: RecordingName;
   info: Recording | null;
   shift: number;
@@ -31,12 +31,12 @@ export function Plots(props: {
   name: RecordingName;
   info: Recording | null;
   duration: number;
-  beside: Beside | null;
+  beside: SecondRecording | null;
   moment: ReadonlySignal<number>;
   seek: (to: number) => void;
 }) {
   const { name, info, duration, beside } = props;
-  const known = useKnown(name);
+  const known = useValueNames(name);
   const [chosen, setChosen] = useState<readonly string[] | null>(null);
   const [choosing, setChoosing] = useState(false);
   const [zoomed, setZoomed] = useState<Window | null>(null);
@@ -87,7 +87,7 @@ export function Plots(props: {
         </>
       }
     >
-      {choosing && known.value && <Values known={known.value} chosen={values} most={MOST} choose={setChosen} />}
+      {choosing && known.value && <ValueChoice known={known.value} chosen={values} most={MOST} choose={setChosen} />}
       <div class="charts" ref={charts}>
         {units.map(([unit, curves]) => (
           <Chart

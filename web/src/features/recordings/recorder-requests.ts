@@ -23,28 +23,28 @@ import { AskError, ask, inOwnName, lostAt } from "../../mesh/connection";
 import type { RecordingName } from "../../ui/route";
 
 const TIMEOUT_S = 20;
-const MOST_EVENTS = 1000;
+const MAX_EVENTS = 1000;
 
 /** An answer; null: not received yet. */
-export interface Asked<T> {
+export interface RequestState<T> {
   value: T | null;
   problem: string;
 }
 
 /** Send a request when its inputs change; the last answer is kept until the next. */
-function useAsked<T>(question: (() => Promise<T>) | null, depends: readonly unknown[]): Asked<T> {
-  const [asked, setAsked] = useState<Asked<T>>({ value: null, problem: "" });
+function useRequest<T>(question: (() => Promise<T>) | null, depends: readonly unknown[]): RequestState<T> {
+  const [state, setState] = useState<RequestState<T>>({ value: null, problem: "" });
   const connected = lostAt.value === null;
   useEffect(() => {
     if (!question || !connected) return;
     let wanted = true;
     question().then(
-      (value) => wanted && setAsked({ value, problem: "" }),
-      (error: unknown) => wanted && setAsked((before) => ({ ...before, problem: reason(error) })),
+      (value) => wanted && setState({ value, problem: "" }),
+      (error: unknown) => wanted && setState((before) => ({ ...before, problem: reason(error) })),
     );
     return () => void (wanted = false);
   }, [connected, ...depends]);
-  return asked;
+  return state;
 }
 
 function reason(error: unknown): string {
@@ -53,25 +53,25 @@ function reason(error: unknown): string {
 }
 
 /** Return the facts of a recording. */
-export function useInfo(name: RecordingName | null): Asked<Recording> {
-  return useAsked(
+export function useInfo(name: RecordingName | null): RequestState<Recording> {
+  return useRequest(
     name && (() => ask(keyOf(name, "info"), RecordingQuerySchema, { file: name.file }, RecordingSchema, TIMEOUT_S)),
     [name?.site, name?.file],
   );
 }
 
 /** An event with its time [s from the recording's start]. */
-export interface Happened {
+export interface RecordedEvent {
   at: number;
   event: Event;
 }
 
 /** Return the events of a recording, oldest first, of every service, and the audited requests. */
-export function useHappened(
+export function useRecordedEvents(
   name: RecordingName | null,
   info: Recording | null,
-): Asked<{ list: readonly Happened[]; cut: boolean }> {
-  return useAsked(
+): RequestState<{ list: readonly RecordedEvent[]; cut: boolean }> {
+  return useRequest(
     name && info
       ? async () => {
           const start = startMs(info);
@@ -83,7 +83,7 @@ export function useHappened(
               ask(
                 inOwnName(keyOf(name, "range")),
                 RangeRequestSchema,
-                { file: name.file, topic, most: MOST_EVENTS },
+                { file: name.file, topic, most: MAX_EVENTS },
                 RecordedMessagesSchema,
                 TIMEOUT_S,
               ),
@@ -122,9 +122,9 @@ function auditAsEvent(entry: AuditEntry): Event {
 }
 
 /** Return when a recording's first frames arrived [s from its start]; 0: it has none. */
-export function useFirst(name: RecordingName | null, info: Recording | null): number {
+export function useFirstFrameTime(name: RecordingName | null, info: Recording | null): number {
   return (
-    useAsked(
+    useRequest(
       name && info
         ? async () => {
             const topic = info.topics.find((each) => topicOf(each.topic) === "frames")?.topic;
@@ -147,8 +147,8 @@ export function useFirst(name: RecordingName | null, info: Recording | null): nu
 }
 
 /** Return the names of the numbers in a recording. */
-export function useKnown(name: RecordingName | null): Asked<readonly string[]> {
-  return useAsked(name && (async () => (await askSeries(name, {})).known), [name?.site, name?.file]);
+export function useValueNames(name: RecordingName | null): RequestState<readonly string[]> {
+  return useRequest(name && (async () => (await askSeries(name, {})).known), [name?.site, name?.file]);
 }
 
 /** A part of a recording [s from its start]. */
@@ -164,8 +164,8 @@ export function useSeries(
   values: readonly string[],
   window: Window,
   points: number,
-): Asked<readonly SeriesAnswer_Series[]> {
-  return useAsked(
+): RequestState<readonly SeriesAnswer_Series[]> {
+  return useRequest(
     name && info && values.length
       ? async () => {
           const start = startMs(info);

@@ -17,12 +17,16 @@ import {
   startMs,
 } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
-import { Silhouette } from "../../ui/silhouette";
 import type { RecordingName } from "../../ui/route";
 import { recordingsLink } from "../../ui/route";
+import { Silhouette } from "../../ui/silhouette";
 import type { Row } from "./recordings-of-sites";
 
-export function Card(props: { row: Row; sited: boolean; first: Signal<(RecordingName & { name: string }) | null> }) {
+export function RecordingCard(props: {
+  row: Row;
+  sited: boolean;
+  first: Signal<(RecordingName & { name: string }) | null>;
+}) {
   const { recording, site } = props.row;
   const { file, open } = recording;
   const name = recording.name || file;

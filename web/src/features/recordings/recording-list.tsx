@@ -9,9 +9,9 @@ import { fleetRobots } from "../../mesh/known-robots";
 import { Action, askRecorder } from "../../mesh/recorder";
 import { NoticeLine } from "../../ui/notice-line";
 import type { RecordingName } from "../../ui/route";
-import { Card } from "./recording-card";
+import { RecordingCard } from "./recording-card";
 import type { Row, SiteAnswer } from "./recordings-of-sites";
-import { useListed } from "./recordings-of-sites";
+import { useRecordings } from "./recordings-of-sites";
 import "./recording-list.css";
 
 const HOUR_MS = 3_600_000;
@@ -27,8 +27,8 @@ const span = signal<Span>("any_time");
 /** The first of two to compare; null: none is chosen. */
 const first = signal<(RecordingName & { name: string }) | null>(null);
 
-export function List() {
-  const { rows, sites, waiting } = useListed();
+export function RecordingList() {
+  const { rows, sites, waiting } = useRecordings();
   const robots = [...new Set(rows.map(({ recording }) => recording.robot))].sort();
   const shown = rows.filter(isWanted);
   useEffect(() => () => void (first.value = null), []);
@@ -84,7 +84,7 @@ export function List() {
       ) : (
         <ol class="recording-list" aria-label={r("recordings")}>
           {shown.map((row) => (
-            <Card key={`${row.site}/${row.recording.file}`} row={row} sited={sites.size > 1} first={first} />
+            <RecordingCard key={`${row.site}/${row.recording.file}`} row={row} sited={sites.size > 1} first={first} />
           ))}
         </ol>
       )}
@@ -94,12 +94,12 @@ export function List() {
 }
 
 function isWanted({ recording }: Row): boolean {
-  const wanted = search.value.trim().toLowerCase();
+  const searchText = search.value.trim().toLowerCase();
   const words = [recording.robot, recording.name, recording.file, recording.cause].join(" ").toLowerCase();
   return (
     (robot.value === EVERY || recording.robot === robot.value) &&
     Date.now() - startMs(recording) <= SPANS[span.value] &&
-    words.includes(wanted)
+    words.includes(searchText)
   );
 }
 

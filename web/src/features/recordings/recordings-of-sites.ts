@@ -10,8 +10,8 @@ import { r } from "../../i18n/recordings";
 import { AskError, ask, hello, lostAt, presence } from "../../mesh/connection";
 import { ageOf, isStale, useTopics } from "../../mesh/topics";
 
-const AGAIN_MS = 5000;
-const LIST_S = 10;
+const REFRESH_INTERVAL_MS = 5000;
+const TIMEOUT_S = 10;
 
 /** The last answer of a site's recorder. */
 export interface SiteAnswer {
@@ -30,11 +30,11 @@ function sitesOf(keys: ReadonlySet<string>, own: string): readonly string[] {
   return [...sites].sort();
 }
 
-async function look(site: string): Promise<void> {
+async function requestList(site: string): Promise<void> {
   let now: SiteAnswer;
   try {
     const key = `robomesh/${site}/-/recordings/list`;
-    now = { list: await ask(key, EmptySchema, {}, RecordingListSchema, LIST_S), problem: "" };
+    now = { list: await ask(key, EmptySchema, {}, RecordingListSchema, TIMEOUT_S), problem: "" };
   } catch (error) {
     const silent = error instanceof AskError && error.noAnswer;
     const text = error instanceof Error ? error.message : String(error);
@@ -50,7 +50,7 @@ export interface Row {
   recording: Recording;
 }
 
-export interface Listed {
+export interface RecordingsOfSites {
   sites: ReadonlyMap<string, SiteAnswer>;
   /** Newest first. */
   rows: readonly Row[];
@@ -59,7 +59,7 @@ export interface Listed {
 }
 
 /** Every recording of every site; open ones with their current state. */
-export function useListed(): Listed {
+export function useRecordings(): RecordingsOfSites {
   const live = useTopics(RecordingSchema, "robomesh/*/*/recording");
   const sites = sitesOf(presence.value, hello.value?.site ?? "");
   // A recording that started or ended changes the list.
@@ -67,9 +67,9 @@ export function useListed(): Listed {
   const connected = lostAt.value === null;
   useEffect(() => {
     if (!connected) return;
-    const lookAll = () => sites.forEach((site) => void look(site));
-    lookAll();
-    const timer = setInterval(() => document.hidden || lookAll(), AGAIN_MS);
+    const requestLists = () => sites.forEach((site) => void requestList(site));
+    requestLists();
+    const timer = setInterval(() => document.hidden || requestLists(), REFRESH_INTERVAL_MS);
     return () => clearInterval(timer);
   }, [sites.join(" "), changes, connected]);
   const rows = new Map<string, Row>();

@@ -2,12 +2,12 @@
 
 import "../../ui/replay.css";
 import type { RecordingName } from "../../ui/route";
-import { List } from "./recording-list";
 import { Player } from "./player";
+import { RecordingList } from "./recording-list";
 
-export function Recordings({ shown }: { shown: readonly RecordingName[] }) {
+export function RecordingsPage({ shown }: { shown: readonly RecordingName[] }) {
   const [first, second] = shown;
-  if (!first) return <List />;
+  if (!first) return <RecordingList />;
   const key = shown.map(({ site, file }) => `${site}/${file}`).join(" ");
   return <Player key={key} first={first} second={second ?? null} />;
 }

@@ -10,29 +10,29 @@ import { Replay } from "../../mesh/replay";
 import { useOfMoment } from "../../mesh/replay-moment";
 import type { RobotName } from "../../mesh/robot-name";
 import { ageOf, isStale, useTopic } from "../../mesh/topics";
+import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
+import { ToolPanel } from "../../panels/tool-panel";
 import { SceneView } from "../../scene/scene-view";
 import { Panel } from "../../ui/panel";
 import { ReplayTag } from "../../ui/replay-tag";
-import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
 import { recordingsLink } from "../../ui/route";
-import { ToolPanel } from "../../panels/tool-panel";
-import { useMoment } from "./open-replay";
+import { usePosition } from "./open-replay";
+import { PlaybackControls } from "./playback-controls";
 import { RecordedJoints } from "./recorded-joints";
 import { ReplayVideo } from "./replay-video";
-import { Transport } from "./playback-controls";
 import "../../ui/replay.css";
 import "./player.css";
 
 const NONE: readonly never[] = [];
 
-export function ReplayRobot({ site, robot }: RobotName) {
+export function ReplayRobotPage({ site, robot }: RobotName) {
   const key = `robomesh/${site}/${robot}`;
   const latest = useTopic(ReplayStateSchema, `${key}/replay`);
   const description = useTopic(DescriptionSchema, `${key}/description`)?.message;
   const joints = useTopic(JointStatesSchema, `${key}/joints`)?.message;
   const kinematics = useTopic(KinematicStateSchema, `${key}/kinematics`);
   const replay = useReplay(key, latest?.message);
-  const moment = useMoment(replay);
+  const moment = usePosition(replay);
   const arm = useOfMoment(replay, "frames", 1);
   const gone = latest !== undefined && isStale("replay", ageOf(latest));
   if (useRobotNotFound(key, Boolean(latest ?? description))) return <RobotNotFound site={site} robot={robot} />;
@@ -78,7 +78,7 @@ export function ReplayRobot({ site, robot }: RobotName) {
         </Panel>
         <ToolPanel robotKey={key} kinematics={kinematics} description={description} />
       </div>
-      {replay && <Transport replay={replay} moment={moment} events={NONE} />}
+      {replay && <PlaybackControls replay={replay} moment={moment} events={NONE} />}
     </div>
   );
 }

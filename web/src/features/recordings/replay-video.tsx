@@ -10,7 +10,7 @@ import { useOfMoment } from "../../mesh/replay-moment";
 import { viewsOf } from "../../scene/scene-view";
 import { Panel } from "../../ui/panel";
 import { useLive } from "../../video/live-video";
-import { standing } from "../../video/requested-view";
+import { standardView } from "../../video/requested-view";
 
 const PICTURE_HOLDS_S = 2; // a busy renderer delivers fewer frames than requested
 
@@ -29,7 +29,7 @@ export function ReplayVideo(props: {
   const shown = names.includes(view) ? view : (names[0] ?? "");
   const live = useLive(
     replay?.robotKey ?? "robomesh/-/-",
-    replay && shown ? standing(shown) : null,
+    replay && shown ? standardView(shown) : null,
     `${props.title}: ${viewName(shown)}`,
   );
   const filmed = recorded.includes(shown);

@@ -14,7 +14,7 @@ const GROUPS: Partial<Record<string, RecordingsText>> = {
 const rank = (topic: string) => Object.keys(GROUPS).indexOf(topic) + 1 || 99;
 const topicOfValue = (value: string) => value.split("/")[0] ?? "";
 
-export function Values(props: {
+export function ValueChoice(props: {
   known: readonly string[];
   chosen: readonly string[];
   most: number;
@@ -22,8 +22,8 @@ export function Values(props: {
 }) {
   const { known, chosen, most } = props;
   const [filter, setFilter] = useState("");
-  const wanted = filter.trim().toLowerCase();
-  const shown = known.filter((value) => value.toLowerCase().includes(wanted));
+  const searchText = filter.trim().toLowerCase();
+  const shown = known.filter((value) => value.toLowerCase().includes(searchText));
   const full = chosen.length >= most;
   const turn = (value: string) =>
     props.choose(chosen.includes(value) ? chosen.filter((each) => each !== value) : [...chosen, value]);

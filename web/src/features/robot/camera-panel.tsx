@@ -5,12 +5,12 @@ import type { Description, View } from "../../gen/robomesh_pb";
 import { clock } from "../../i18n/format";
 import { t, viewText } from "../../i18n/texts";
 import { viewsOf } from "../../scene/scene-view";
-import { isRemote, reachOf } from "../../scene/topic-selection";
+import { isRemote, topicSelection } from "../../scene/topic-selection";
 import { Panel } from "../../ui/panel";
 import { Age } from "../../ui/state";
 import { useLive } from "../../video/live-video";
-import type { Wanted } from "../../video/requested-view";
-import { standing } from "../../video/requested-view";
+import type { RequestedView } from "../../video/requested-view";
+import { standardView } from "../../video/requested-view";
 import { saveBlob, saveStill, useRecording } from "./export";
 
 /** Place of the video: next to the 3-D view, in its corner, or instead of it. */
@@ -18,14 +18,14 @@ export type VideoPlace = "beside" | "inset" | "large";
 const PLACES: readonly VideoPlace[] = ["beside", "inset", "large"];
 
 /** The renderer's view of every robot, which follows the arm. */
-const CLOSE = "close";
-const OWN = "own";
+const CLOSE_VIEW = "close";
+const OWN_VIEW = "own";
 /** A small picture of few bits, for slow links. */
-const FAR = "far";
+const SLOW_LINK_VIEW = "far";
 const OWN_SIZE = { width: 960, height: 540, fps: 30 };
 const CHECK_INTERVAL_MS = 300;
 
-export function Camera(props: {
+export function CameraPanel(props: {
   robotKey: string;
   description: Description | undefined;
   place: VideoPlace;
@@ -34,22 +34,28 @@ export function Camera(props: {
   sceneView: () => View | null;
 }) {
   const { robotKey, description } = props;
-  const isSlow = reachOf(robotKey) === "slow";
+  const isSlow = topicSelection(robotKey) === "slow";
   const [chosen, setView] = useState("");
-  const view = chosen || (isSlow ? FAR : "front");
+  const view = chosen || (isSlow ? SLOW_LINK_VIEW : "front");
   const names = [
-    ...new Set([...viewsOf(description).map((each) => each.name), CLOSE, ...(isRemote(robotKey) ? [FAR] : []), OWN]),
+    ...new Set([
+      ...viewsOf(description).map((each) => each.name),
+      CLOSE_VIEW,
+      ...(isRemote(robotKey) ? [SLOW_LINK_VIEW] : []),
+      OWN_VIEW,
+    ]),
   ];
   const shown = names.includes(view) ? view : (names[0] ?? "free");
-  const own = useOwnView(shown === OWN, props.sceneView);
-  const wanted: Wanted | null = shown !== OWN ? standing(shown) : own && { of: OWN, view: own, ...OWN_SIZE };
-  const live = useLive(robotKey, wanted, viewText(shown));
+  const own = useOwnView(shown === OWN_VIEW, props.sceneView);
+  const requested: RequestedView | null =
+    shown !== OWN_VIEW ? standardView(shown) : own && { of: OWN_VIEW, view: own, ...OWN_SIZE };
+  const live = useLive(robotKey, requested, viewText(shown));
   const picture = useRef<HTMLDivElement>(null);
   const [, site = "", robot = ""] = robotKey.split("/");
   const name = `${robot}-${shown}`;
   const recording = useRecording(`/video/${site}/${robot}/${shown}.mp4`, `${name}.mp4`);
   const [problem, setProblem] = useState("");
-  const keep = () =>
+  const savePicture = () =>
     saveStill(live.place.current).then(
       (blob) => (setProblem(""), saveBlob(blob, `${name}.png`)),
       (error: Error) => setProblem(t("record_failed", { text: error.message })),
@@ -93,10 +99,10 @@ export function Camera(props: {
         {live.picture}
         {!live.any && <p class="picture-word dim">{t("camera_waiting", { view: viewText(shown) })}</p>}
         <div class="picture-tools">
-          <button class="quiet" disabled={!live.any} onClick={() => void keep()}>
+          <button class="quiet" disabled={!live.any} onClick={() => void savePicture()}>
             {t("save_still")}
           </button>
-          {shown !== OWN && (
+          {shown !== OWN_VIEW && (
             <button class="quiet" aria-pressed={recording.on} disabled={!live.any} onClick={recording.toggle}>
               {recording.on ? t("recording_video", { time: clock(recording.seconds) }) : t("record_video")}
             </button>
@@ -118,14 +124,14 @@ function toggleFull(element: HTMLElement | null): Promise<void> | undefined {
 /** Return the 3-D view's camera once it is at rest: each new camera is a new stream of the renderer. */
 function useOwnView(on: boolean, sceneView: () => View | null): View | null {
   const [view, setView] = useState<View | null>(null);
-  const look = useRef(sceneView);
-  look.current = sceneView;
+  const sceneCamera = useRef(sceneView);
+  sceneCamera.current = sceneView;
   useEffect(() => {
     if (!on) return;
     let before = "";
     let settled = "";
     const timer = setInterval(() => {
-      const next = look.current();
+      const next = sceneCamera.current();
       const identity = next
         ? [next.eye, next.target].flatMap((p) => [p?.x, p?.y, p?.z].map((v) => v?.toFixed(3))).join()
         : "";

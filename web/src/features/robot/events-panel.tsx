@@ -8,8 +8,8 @@ import { count, stampFull, stampTime } from "../../i18n/format";
 import { t } from "../../i18n/texts";
 import type { Latest } from "../../mesh/topics";
 import { useAudit } from "../../mesh/topics";
-import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
 import { Choice } from "../../ui/choice";
+import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
 import { Panel } from "../../ui/panel";
 import { LinkFacts } from "./link-facts";
 

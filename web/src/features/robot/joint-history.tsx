@@ -20,7 +20,7 @@ const STEP_MS = 100; // finer than a pixel
 const CLOCK_SET_MS = 5000;
 const CURVES = ["--curve-1", "--curve-2", "--curve-3", "--curve-4", "--curve-5", "--curve-6", "--curve-7"];
 
-export function History({ robotKey, description }: { robotKey: string; description: Description | undefined }) {
+export function JointHistory({ robotKey, description }: { robotKey: string; description: Description | undefined }) {
   const place = useRef<HTMLDivElement>(null);
   const [paused, setPaused] = useState(false);
   const [any, setAny] = useState(false);

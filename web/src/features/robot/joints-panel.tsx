@@ -6,18 +6,18 @@ import type { ControllerState, Description, Description_Joint } from "../../gen/
 import { ControllerState_Activity as Activity } from "../../gen/robomesh_pb";
 import { fixed, jointText, jointUnit } from "../../i18n/format";
 import { t } from "../../i18n/texts";
-import { onlyWatches } from "../../mesh/account";
+import { isMonitor } from "../../mesh/account";
 import { Command, command } from "../../mesh/command";
 import type { Notice } from "../../mesh/control";
 import { controlNotice, holds } from "../../mesh/control";
 import { useSteps } from "../../mesh/joint-steps";
 import type { Motion } from "../../mesh/notice-expiry";
-import { useNoticeEnd } from "../../mesh/notice-expiry";
+import { useNoticeExpiry } from "../../mesh/notice-expiry";
 import { whyNoMove } from "../../mesh/robot-state";
 import { ghostAt } from "../../scene/ghost";
+import { Choice } from "../../ui/choice";
 import { JointTrack } from "../../ui/joint-track";
 import { JointValue } from "../../ui/joint-value";
-import { Choice } from "../../ui/choice";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
 import { Age } from "../../ui/state";
@@ -47,7 +47,7 @@ export function JointsPanel(props: {
   const mine = holds(robotKey);
   const why = whyNoMove(props.controller);
   const enabled = mine && !stale && !why;
-  useNoticeEnd(notice, setNotice, props.motion);
+  useNoticeExpiry(notice, setNotice, props.motion);
 
   // Show a target until it is reached or abandoned.
   const resting = props.controller?.activity !== Activity.MOVING && props.controller?.activity !== Activity.HOLDING;
@@ -107,7 +107,7 @@ export function JointsPanel(props: {
         ? t("joint_hint")
         : mine
           ? why
-          : onlyWatches.value
+          : isMonitor.value
             ? ""
             : t("joint_hint_take");
   return (
@@ -117,7 +117,7 @@ export function JointsPanel(props: {
       end={
         <>
           {props.age === undefined ? <span class="dim">{t("no_data")}</span> : <Age stale={stale} age={props.age} />}
-          {onlyWatches.value || (
+          {isMonitor.value || (
             <>
               <span class="step-label dim">{t("step")}</span>
               <Choice label={t("step")} values={STEPS} chosen={size} text={(each) => each} choose={setSize} />
@@ -135,7 +135,7 @@ export function JointsPanel(props: {
           const beyond = position !== undefined && (position < joint.lower || position > joint.upper);
           const refused = steps.refused?.index === index ? Math.sign(steps.refused.offset) : 0;
           const stepBy = (sign: 1 | -1) =>
-            onlyWatches.value ? (
+            isMonitor.value ? (
               <span />
             ) : (
               <StepButton

@@ -2,20 +2,20 @@
 
 import { t } from "../../i18n/texts";
 import { isClockOff, useMesh } from "../../mesh/site-health";
-import { askReach, isRemote, REACHES, reachOf } from "../../scene/topic-selection";
+import { isRemote, selectTopics, TOPIC_SELECTIONS, topicSelection } from "../../scene/topic-selection";
 import { Choice } from "../../ui/choice";
 
-export function FarChoice({ robotKey }: { robotKey: string }) {
+export function TopicChoice({ robotKey }: { robotKey: string }) {
   if (!isRemote(robotKey)) return null;
   return (
     <span class="far-choice" title={t("far_hint")}>
       <span class="dim">{t("far_link")}</span>
       <Choice
         label={t("far_link")}
-        values={REACHES}
-        chosen={reachOf(robotKey)}
+        values={TOPIC_SELECTIONS}
+        chosen={topicSelection(robotKey)}
         text={(reach) => t(`far_${reach}`)}
-        choose={(reach) => askReach(robotKey, reach)}
+        choose={(reach) => selectTopics(robotKey, reach)}
       />
     </span>
   );

@@ -17,32 +17,32 @@ import {
 import { reasonsText, reasonText } from "../../i18n/reasons";
 import type { TextName } from "../../i18n/texts";
 import { t } from "../../i18n/texts";
-import { seeLease } from "../../mesh/control";
+import { handleLease } from "../../mesh/control";
 import type { RobotName } from "../../mesh/robot-name";
 import { disobeys, stateWord, stoppedByItself, stopText } from "../../mesh/robot-state";
 import type { Latest } from "../../mesh/topics";
 import { ageOf, isStale, jointsAge, useEvents, useTopic } from "../../mesh/topics";
+import { ControlPanel } from "../../panels/control/control-panel";
+import { RobotAlarm } from "../../panels/robot-alarm";
+import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
+import { ToolPanel } from "../../panels/tool-panel";
 import type { Stage } from "../../scene/robot-scene";
 import { SceneView } from "../../scene/scene-view";
 import { jointsTopic } from "../../scene/topic-selection";
-import { ControlPanel } from "../../panels/control/control-panel";
+import { programLink } from "../../ui/route";
 import { State } from "../../ui/state";
 import { Tag } from "../../ui/tag";
-import { Alarm } from "../../panels/robot-alarm";
-import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
-import { programLink } from "../../ui/route";
-import { ToolPanel } from "../../panels/tool-panel";
 import type { VideoPlace } from "./camera-panel";
-import { Camera } from "./camera-panel";
+import { CameraPanel } from "./camera-panel";
 import { EventsPanel } from "./events-panel";
-import { History } from "./joint-history";
+import { JointHistory } from "./joint-history";
 import { JointsPanel } from "./joints-panel";
-import { ClockHint, FarChoice } from "./low-bandwidth";
+import { ClockHint, TopicChoice } from "./low-bandwidth";
 import { isShown, ProgramLine } from "./program-line";
 import { RecordButton, RecordPanel } from "./record-panel";
 
 /** The page of a live robot; a replay has its own page, without commands. */
-export function Robot({ site, robot }: RobotName) {
+export function RobotPage({ site, robot }: RobotName) {
   const key = `robomesh/${site}/${robot}`;
   const controller = useTopic(ControllerStateSchema, `${key}/controller`);
   const lease = useTopic(LeaseSchema, `${key}/lease`);
@@ -56,7 +56,7 @@ export function Robot({ site, robot }: RobotName) {
   const lost = useLostAt(stale, joints !== undefined);
   const holder = lease && !isStale("lease", ageOf(lease)) ? lease.message.holder : null;
   useEffect(() => {
-    if (lease) seeLease(key, lease.message);
+    if (lease) handleLease(key, lease.message);
   }, [key, lease]);
   const [videoPlace, setVideoPlace] = useState<VideoPlace>("beside");
   const stage = useRef<Stage | null>(null);
@@ -71,7 +71,7 @@ export function Robot({ site, robot }: RobotName) {
     return <RobotNotFound site={site} robot={robot} />;
   return (
     <>
-      <Alarm state={state} events={events} />
+      <RobotAlarm state={state} events={events} />
       <div class={`robot video-${videoPlace}`}>
         <Headline
           site={site}
@@ -111,14 +111,14 @@ export function Robot({ site, robot }: RobotName) {
           <ToolPanel robotKey={key} kinematics={kinematics} description={description?.message} />
           <EventsPanel robotKey={key} events={events} controller={controller} />
         </div>
-        <Camera
+        <CameraPanel
           robotKey={key}
           description={description?.message}
           place={videoPlace}
           setPlace={setVideoPlace}
           sceneView={() => stage.current?.view() ?? null}
         />
-        <History robotKey={key} description={description?.message} />
+        <JointHistory robotKey={key} description={description?.message} />
       </div>
     </>
   );
@@ -174,7 +174,7 @@ function Headline(props: {
       </a>
       <RecordButton robotKey={`robomesh/${props.site}/${props.name}`} />
       {description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
-      <FarChoice robotKey={`robomesh/${props.site}/${props.name}`} />
+      <TopicChoice robotKey={`robomesh/${props.site}/${props.name}`} />
       <ClockHint site={props.site} />
       {trouble && (
         <span class={`trouble ${state.level}`} lang={trouble === problem ? "en" : undefined}>

@@ -70,7 +70,7 @@ export function Accounts() {
 
 function Row({ account, change }: { account: Account; change: Change }) {
   const { name, role, disabled } = account;
-  const [open, setOpen] = useState<"password" | "remove" | null>(null);
+  const [openForm, setOpen] = useState<"password" | "remove" | null>(null);
   const own = name === me.value?.account; // prevents locking oneself out
   const run = (action: string, values?: { role?: Role; password?: string }) =>
     void change(action, name, values).then(
@@ -98,9 +98,9 @@ function Row({ account, change }: { account: Account; change: Change }) {
       </td>
       <td>{fullTime(Date.parse(account.created))}</td>
       <td class="account-actions">
-        {own ? null : open === "password" ? (
+        {own ? null : openForm === "password" ? (
           <Password of={name} set={(password) => run("password", { password })} close={() => setOpen(null)} />
-        ) : open === "remove" ? (
+        ) : openForm === "remove" ? (
           <>
             <span>{s("remove_sure", { name })}</span>
             <button class="action" onClick={() => run("remove")}>

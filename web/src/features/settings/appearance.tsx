@@ -10,7 +10,7 @@ import { Facts } from "./facts";
 
 const LANGUAGES = { en: "English", zh: "中文" } as const;
 
-export function Look() {
+export function Appearance() {
   return (
     <Panel name="look" title={s("look")}>
       <Facts

@@ -9,7 +9,7 @@ import { robotLink } from "../../ui/route";
 
 const WATCHERS = new Set(["monitor", "console", "foxglove", "ros2"]);
 
-export function Presence() {
+export function AttachedClients() {
   const lines = [...presence.value].sort().flatMap((token) => {
     const [, site = "", robot = "", , service = "", id = ""] = token.split("/");
     if (service !== OPERATOR && !WATCHERS.has(service)) return [];

@@ -4,7 +4,7 @@ import type { MeshState_Hop as Hop } from "../../gen/robomesh_pb";
 import { s } from "../../i18n/settings";
 import { milliseconds } from "./process-row";
 
-export function Hops({ hops }: { hops: readonly Hop[] }) {
+export function DelayChart({ hops }: { hops: readonly Hop[] }) {
   const ways = [...Map.groupBy(hops, ({ key }) => key)];
   const longest = Math.max(...hops.map(({ p99S }) => p99S), 1e-6);
   const share = (seconds: number) => `${(100 * Math.max(0, seconds)) / longest}%`;

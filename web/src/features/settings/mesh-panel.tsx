@@ -7,10 +7,10 @@ import { presence } from "../../mesh/connection";
 import { isMeshStale, useMesh } from "../../mesh/site-health";
 import type { Latest } from "../../mesh/topics";
 import { ageOf } from "../../mesh/topics";
-import { Services } from "../../panels/alive-services";
+import { AliveServices } from "../../panels/alive-services";
 import { Panel } from "../../ui/panel";
-import { Hops } from "./delay-chart";
-import { COLUMNS, SeenRow } from "./process-row";
+import { DelayChart } from "./delay-chart";
+import { COLUMNS, ProcessRow } from "./process-row";
 
 const GONE_TOLD_MS = 900_000;
 
@@ -54,7 +54,7 @@ function PresentSite({ site }: { site: string }) {
   return (
     <div class="site-seen">
       <h3>{site}</h3>
-      <Services of={`robomesh/${site}/-`} />
+      <AliveServices of={`robomesh/${site}/-`} />
     </div>
   );
 }
@@ -83,7 +83,7 @@ function SiteTable({ site, latest }: { site: string; latest: Latest<MeshState> }
           </thead>
           <tbody>
             {remember(site, latest.message).map(({ seen, at }) => (
-              <SeenRow
+              <ProcessRow
                 key={nameOf(seen)}
                 of={site}
                 seen={seen}
@@ -94,7 +94,7 @@ function SiteTable({ site, latest }: { site: string; latest: Latest<MeshState> }
           </tbody>
         </table>
       </div>
-      {hops.length > 0 && <Hops hops={hops} />}
+      {hops.length > 0 && <DelayChart hops={hops} />}
     </div>
   );
 }

@@ -5,7 +5,7 @@ import type { MeshState, MeshState_Seen as Seen } from "../../gen/robomesh_pb";
 import { ageText, count, DASH, fixed, stampFull, timeOfDay } from "../../i18n/format";
 import { s } from "../../i18n/settings";
 import { hello } from "../../mesh/connection";
-import { isClockOff, isSilent, seenAge } from "../../mesh/site-health";
+import { isClockOff, isSilent, reportAge } from "../../mesh/site-health";
 import type { Latest } from "../../mesh/topics";
 import { Marked } from "./this-console";
 
@@ -26,7 +26,7 @@ const MIB = 1024 * 1024;
 const LOSS = 0.005; // the watch raises an alarm from here on
 const IN_STEP_S = 0.005; // smaller offsets do not matter
 
-export function SeenRow(props: { of: string; seen: Seen; latest: Latest<MeshState>; goneAt: number | null }) {
+export function ProcessRow(props: { of: string; seen: Seen; latest: Latest<MeshState>; goneAt: number | null }) {
   const { seen, latest, goneAt } = props;
   const silent = isSilent(seen, latest);
   const mine = hello.value?.version ?? "";
@@ -58,7 +58,7 @@ export function SeenRow(props: { of: string; seen: Seen; latest: Latest<MeshStat
         {goneAt !== null ? (
           <Marked wrong>{s("gone", { time: timeOfDay(goneAt) })}</Marked>
         ) : silent ? (
-          <Marked wrong>{s("silent", { age: ageText(seenAge(seen, latest)) })}</Marked>
+          <Marked wrong>{s("silent", { age: ageText(reportAge(seen, latest)) })}</Marked>
         ) : (
           s("fresh")
         )}

@@ -24,12 +24,12 @@ interface Session {
 export function Sessions() {
   const [sessions, setSessions] = useState<readonly Session[]>([]);
   const [notice, setNotice] = useState<Notice | null>(null);
-  const look = async () => {
+  const fetchSessions = async () => {
     const answer = await fetch("/account/sessions", { cache: "no-store" });
     if (answer.ok) setSessions(((await answer.json()) as { sessions: Session[] }).sessions);
   };
   useEffect(() => {
-    const refresh = () => void look().catch(() => undefined); // the page shows separately that the console is gone
+    const refresh = () => void fetchSessions().catch(() => undefined); // the page shows separately that the console is gone
     refresh();
     const timer = setInterval(refresh, REFRESH_INTERVAL_MS);
     return () => clearInterval(timer);
@@ -37,7 +37,7 @@ export function Sessions() {
   const end = async ({ id }: Session) => {
     try {
       await post("sessions", { end: id });
-      await look();
+      await fetchSessions();
       setNotice({ kind: "done", text: s("done") });
     } catch (error) {
       setNotice({ kind: "refused", text: s("not_done", { text: refusalText(error) }) });

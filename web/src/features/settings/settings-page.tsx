@@ -4,21 +4,21 @@ import { me } from "../../mesh/account";
 import { hello } from "../../mesh/connection";
 import { About } from "./about";
 import { Accounts } from "./accounts";
+import { Appearance } from "./appearance";
+import { AttachedClients } from "./attached-clients";
 import { Certificates } from "./certificates";
-import { Look } from "./appearance";
 import { MeshPanel } from "./mesh-panel";
-import { Presence } from "./attached-clients";
 import { Sessions } from "./sessions";
 import { ThisConsole } from "./this-console";
 import "./settings-page.css";
 
-export function Settings() {
+export function SettingsPage() {
   return (
     <div class="settings-page">
       <ThisConsole hello={hello.value} />
-      <Look />
+      <Appearance />
       <MeshPanel />
-      <Presence />
+      <AttachedClients />
       <Certificates />
       {me.value?.account && <Sessions />}
       {me.value?.role === "admin" && <Accounts />}

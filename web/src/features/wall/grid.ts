@@ -1,7 +1,7 @@
 // Layout of the wall: columns of pictures of about 16:9, and the stream size for a tile.
 
-import type { Wanted } from "../../video/requested-view";
-import { standing } from "../../video/requested-view";
+import type { RequestedView } from "../../video/requested-view";
+import { standardView } from "../../video/requested-view";
 
 const GAP = 8;
 /** Height of a tile's line of text [px]. */
@@ -38,9 +38,9 @@ const SHAPES = [WIDE, 4 / 3, 1, 3 / 4] as const;
 const ENOUGH = 1.2; // enlarge a picture so far before requesting the next size
 
 /** Return the picture to request for an area [px]: of its shape, and not larger than needed. */
-export function wantedFor(view: string, width: number, height: number): Wanted {
+export function requestFor(view: string, width: number, height: number): RequestedView {
   const away = (shape: number) => Math.abs(Math.log((shape * height) / width));
   const shape = [...SHAPES].sort((a, b) => away(a) - away(b))[0] ?? WIDE;
   const size = SIZES.find((each) => width <= each.width * ENOUGH) ?? (shape === WIDE ? null : SIZES[3]);
-  return size ? { of: view, ...size, height: 2 * Math.round(size.width / shape / 2) } : standing(view);
+  return size ? { of: view, ...size, height: 2 * Math.round(size.width / shape / 2) } : standardView(view);
 }

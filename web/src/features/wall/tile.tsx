@@ -7,12 +7,12 @@ import { w } from "../../i18n/wall";
 import { isReplay } from "../../mesh/robot-name";
 import { problemOf, stateWord } from "../../mesh/robot-state";
 import type { Latest } from "../../mesh/topics";
-import { Age, State } from "../../ui/state";
-import { Tag } from "../../ui/tag";
 import type { ViewName } from "../../ui/route";
 import { robotLink } from "../../ui/route";
+import { Age, State } from "../../ui/state";
+import { Tag } from "../../ui/tag";
 import { useLive } from "../../video/live-video";
-import { wantedFor } from "./grid";
+import { requestFor } from "./grid";
 
 export function WallTile(props: {
   shown: ViewName;
@@ -24,37 +24,39 @@ export function WallTile(props: {
   const { shown, controller, description } = props;
   const place = useRef<HTMLElement>(null);
   const pictured = useRef<HTMLDivElement>(null);
-  const [seen, setSeen] = useState(false);
+  const [visible, setVisible] = useState(false);
   const [{ width, height }, setSize] = useState({ width: 0, height: 0 });
   useEffect(() => {
     const tile = place.current;
     if (!tile || !pictured.current) return;
     let onScreen = false;
-    const look = () => setSeen(onScreen && document.visibilityState === "visible");
-    const entering = new IntersectionObserver(([entry]) => ((onScreen = entry?.isIntersecting ?? false), look()));
+    const updateVisible = () => setVisible(onScreen && document.visibilityState === "visible");
+    const entering = new IntersectionObserver(
+      ([entry]) => ((onScreen = entry?.isIntersecting ?? false), updateVisible()),
+    );
     const sizing = new ResizeObserver(([entry]) => {
       const box = entry?.contentRect;
       if (box) setSize({ width: Math.round(box.width), height: Math.round(box.height) });
     });
     entering.observe(tile);
     sizing.observe(pictured.current);
-    document.addEventListener("visibilitychange", look);
+    document.addEventListener("visibilitychange", updateVisible);
     return () => {
       entering.disconnect();
       sizing.disconnect();
-      document.removeEventListener("visibilitychange", look);
+      document.removeEventListener("visibilitychange", updateVisible);
     };
   }, []);
   const robotKey = `robomesh/${shown.site}/${shown.robot}`;
   const view = viewText(shown.view);
   const label = `${shown.robot}, ${view}`;
-  const watched = seen && width > 0 && height > 0 && props.known;
-  const live = useLive(robotKey, watched ? wantedFor(shown.view, width, height) : null, label);
+  const watched = visible && width > 0 && height > 0 && props.known;
+  const live = useLive(robotKey, watched ? requestFor(shown.view, width, height) : null, label);
   const state = stateWord(controller);
   const problem = state.level === "normal" ? "" : problemOf(controller?.message);
   const word = !props.known
     ? w("gone")
-    : !seen && live.any
+    : !visible && live.any
       ? w("hidden")
       : live.any
         ? ""

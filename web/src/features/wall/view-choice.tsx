@@ -11,7 +11,7 @@ export interface RobotViews {
   views: readonly string[];
 }
 
-export function Choose(props: {
+export function ViewChoice(props: {
   robots: readonly RobotViews[];
   shown: readonly ViewName[];
   show: (shown: readonly ViewName[]) => void;

@@ -5,14 +5,14 @@ import type { Description } from "../../gen/robomesh_pb";
 import { ControllerStateSchema, DescriptionSchema } from "../../gen/robomesh_pb";
 import { t } from "../../i18n/texts";
 import { w } from "../../i18n/wall";
-import { fleetRobots, seeRobots } from "../../mesh/known-robots";
+import { addKnownRobots, fleetRobots } from "../../mesh/known-robots";
 import { useTopics } from "../../mesh/topics";
 import type { ViewName } from "../../ui/route";
 import { robotLink, wallLink } from "../../ui/route";
-import type { RobotViews } from "./view-choice";
-import { Choose } from "./view-choice";
 import { columnsFor } from "./grid";
 import { WallTile } from "./tile";
+import type { RobotViews } from "./view-choice";
+import { ViewChoice } from "./view-choice";
 import "./wall-page.css";
 
 /** The renderer's view of every robot, which follows the arm. */
@@ -22,10 +22,10 @@ function viewNames(description: Description | undefined): readonly string[] {
   return [...new Set([CLOSE, "free", ...(description?.views ?? []).map((view) => view.name)])];
 }
 
-export function Wall({ chosen }: { chosen: readonly ViewName[] }) {
+export function WallPage({ chosen }: { chosen: readonly ViewName[] }) {
   const controllers = useTopics(ControllerStateSchema, "robomesh/*/*/controller");
   const descriptions = useTopics(DescriptionSchema, "robomesh/*/*/description");
-  useEffect(() => seeRobots([...controllers.keys(), ...descriptions.keys()]));
+  useEffect(() => addKnownRobots([...controllers.keys(), ...descriptions.keys()]));
   const [choosing, setChoosing] = useState(false);
   // Includes replays, unlike the fleet.
   const described = [...descriptions.keys()].map((key) => key.replace(/\/[^/]+$/, ""));
@@ -83,7 +83,7 @@ export function Wall({ chosen }: { chosen: readonly ViewName[] }) {
           </button>
         </span>
       </div>
-      {choosing && <Choose robots={robots} shown={shown} show={show} />}
+      {choosing && <ViewChoice robots={robots} shown={shown} show={show} />}
       {shown.length === 0 && <p class="empty">{w("no_robots")}</p>}
       <div ref={grid} class="wall-grid" style={{ "--columns": columns, "--rows": Math.ceil(shown.length / columns) }}>
         {shown.map((one, i) => {

@@ -3,12 +3,12 @@
 import type { ControllerState, Description, Lease } from "../../gen/robomesh_pb";
 import { ControllerState_Activity as Activity, ControllerState_Known as Known } from "../../gen/robomesh_pb";
 import { t } from "../../i18n/texts";
-import { onlyWatches } from "../../mesh/account";
+import { isMonitor } from "../../mesh/account";
 import type { CommandValues } from "../../mesh/command";
 import { Command, command } from "../../mesh/command";
 import { controlNotice, holds } from "../../mesh/control";
 import type { Motion } from "../../mesh/notice-expiry";
-import { useNoticeEnd } from "../../mesh/notice-expiry";
+import { useNoticeExpiry } from "../../mesh/notice-expiry";
 import { stoppedByItself, whyNoMotion } from "../../mesh/robot-state";
 import type { Latest } from "../../mesh/topics";
 import { NoticeLine } from "../../ui/notice-line";
@@ -43,7 +43,7 @@ export function ControlPanel(props: {
       {},
       props.description?.joints.map((joint) => joint.home),
     );
-  useNoticeEnd(controlNotice.value, (notice) => (controlNotice.value = notice), props.motion);
+  useNoticeExpiry(controlNotice.value, (notice) => (controlNotice.value = notice), props.motion);
   const holding = state?.activity === Activity.HOLDING;
   const tracing = state?.trace === Known.YES;
   return (
@@ -53,7 +53,7 @@ export function ControlPanel(props: {
       end={<Holder robotKey={robotKey} holder={holder} lease={props.lease} />}
     >
       <WhoControls robotKey={robotKey} holder={holder} lease={props.lease} readOnly={state?.readOnly ?? false} />
-      {onlyWatches.value || (
+      {isMonitor.value || (
         <div class="command-row">
           <button class="action" disabled={!canMove} title={mine ? why : ""} onClick={home}>
             {t("home")}
@@ -80,7 +80,7 @@ export function ControlPanel(props: {
       {state && (state.stop || stoppedByItself(state)) ? (
         <Stopped state={state} mine={mine} disobeyed={props.disobeyed} send={send} />
       ) : (
-        onlyWatches.value || (
+        isMonitor.value || (
           <Speed
             percent={state?.speedPercent}
             enabled={canSend}

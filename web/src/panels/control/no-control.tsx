@@ -2,21 +2,21 @@
 
 import { useState } from "preact/hooks";
 import { a } from "../../i18n/account";
-import { me, onlyWatches, rests, unlock } from "../../mesh/account";
+import { commandSuspended, isMonitor, me, unlock } from "../../mesh/account";
 import { hello } from "../../mesh/connection";
-import { refusalText } from "../change-password";
 import { PasswordField } from "../../ui/password-field";
+import { refusalText } from "../change-password";
 import "../account-form.css";
 
 /** Return whether the signed-in account may not request control now. */
 export function mayNotCommand(): boolean {
-  return onlyWatches.value || rests.value || (!!hello.value?.account && !hello.value.mayCommand);
+  return isMonitor.value || commandSuspended.value || (!!hello.value?.account && !hello.value.mayCommand);
 }
 
 export function NoControl() {
   const [password, setPassword] = useState("");
   const [problem, setProblem] = useState("");
-  if (onlyWatches.value) return <p class="no-control">{a("monitor_only", { account: me.value?.account ?? "" })}</p>;
+  if (isMonitor.value) return <p class="no-control">{a("monitor_only", { account: me.value?.account ?? "" })}</p>;
   const send = async () => {
     try {
       await unlock(password);

@@ -8,18 +8,18 @@ import { t } from "../../i18n/texts";
 import { hello } from "../../mesh/connection";
 import {
   accept,
-  askFor,
   holds,
   ms,
   offer,
   operator,
   ownName,
   release,
+  requestControl,
   setOperator,
   take,
   takeOver,
 } from "../../mesh/control";
-import { Reason } from "../../ui/reason-form";
+import { ReasonForm } from "../../ui/reason-form";
 import { mayNotCommand, NoControl } from "./no-control";
 
 const MOST_ASKERS_SHOWN = 3;
@@ -69,7 +69,7 @@ export function WhoControls(props: {
   if (mayNotCommand() && !mine) return <NoControl />;
   return (
     <>
-      {props.holder && lease && <Wishes mine={mine} robotKey={robotKey} lease={lease} />}
+      {props.holder && lease && <ControlRequests mine={mine} robotKey={robotKey} lease={lease} />}
       <div class="take-row">
         <label class="operator">
           <span class="dim">{t("operator")}</span>
@@ -109,16 +109,16 @@ export function WhoControls(props: {
         )}
       </div>
       {sheet === "ask" && other && (
-        <Reason
+        <ReasonForm
           title={t("ask_from", { name: other })}
           text={t("ask_says", { name: other })}
           does={t("ask")}
           close={() => setSheet(null)}
-          done={(reason) => void askFor(robotKey, other, reason)}
+          done={(reason) => void requestControl(robotKey, other, reason)}
         />
       )}
       {sheet === "take" && other && (
-        <Reason
+        <ReasonForm
           required
           title={t("take_from", { name: other })}
           text={t(lease?.motion ? "take_says_moving" : "take_says", { name: other })}
@@ -132,7 +132,7 @@ export function WhoControls(props: {
 }
 
 /** Requests and offers of control: every page shows them, the operators concerned can answer. */
-function Wishes({ mine, robotKey, lease }: { mine: boolean; robotKey: string; lease: Lease }) {
+function ControlRequests({ mine, robotKey, lease }: { mine: boolean; robotKey: string; lease: Lease }) {
   const me = operator.value.trim();
   const { holder, offeredTo } = lease;
   const [declined, setDeclined] = useState<readonly string[]>([]);
@@ -151,7 +151,7 @@ function Wishes({ mine, robotKey, lease }: { mine: boolean; robotKey: string; le
   return (
     <div role="status">
       {offeredTo && !(toMe && declined.includes("offer")) && (
-        <Wish
+        <ControlRequest
           strong={toMe || mine}
           text={t(toMe ? "offers_you" : mine ? "offer_open" : "offers", { holder, name: offeredTo })}
         >
@@ -170,10 +170,10 @@ function Wishes({ mine, robotKey, lease }: { mine: boolean; robotKey: string; le
               {t("withdraw")}
             </button>
           )}
-        </Wish>
+        </ControlRequest>
       )}
       {shown.map((asker) => (
-        <Wish
+        <ControlRequest
           key={idOf(asker)}
           strong={mine}
           text={t(asker.operator === me ? "you_ask" : "asks", { name: asker.operator, holder, age: age(asker) })}
@@ -189,14 +189,14 @@ function Wishes({ mine, robotKey, lease }: { mine: boolean; robotKey: string; le
               </button>
             </>
           )}
-        </Wish>
+        </ControlRequest>
       ))}
-      {asking.length > shown.length && <Wish text={t("more_ask", { count: asking.length - shown.length })} />}
+      {asking.length > shown.length && <ControlRequest text={t("more_ask", { count: asking.length - shown.length })} />}
     </div>
   );
 }
 
-function Wish(props: { strong?: boolean; text: string; reason?: string; children?: ComponentChildren }) {
+function ControlRequest(props: { strong?: boolean; text: string; reason?: string; children?: ComponentChildren }) {
   return (
     <div class={`wish ${props.strong ? "strong" : ""}`}>
       <p>{props.reason ? t("with_reason", { text: props.text, reason: props.reason }) : props.text}</p>
