@@ -280,7 +280,7 @@ def test_a_file_that_another_refers_to_is_asked_for_by_name(open_page):
     page = open_page("#/define", drawn=False)
     outer = b'#VRML V2.0 utf8\nInline { url "part.wrl" }\nShape { geometry Box { } }\n'
     drop(page, ("outer.wrl", outer))
-    missing = page.locator(".missing")
+    missing = page.locator(".missing-files")
     expect(missing).to_contain_text("meshes/outer.wrl refers to part.wrl")
     drop(page, ("part.wrl", b"#VRML V2.0 utf8\nShape { geometry Sphere { } }\n"))
     expect(missing).to_have_count(0)
@@ -301,7 +301,7 @@ def test_a_urdf_and_its_shapes_become_rows(open_page, tmp_path):
     shapes = link_meshes(description, cache=tmp_path)
     page = open_page("#/define")
     drop(page, ("pt500.urdf", to_urdf(description).encode()))
-    expect(page.locator(".missing")).to_contain_text("meshes/column.glb")
+    expect(page.locator(".missing-files")).to_contain_text("meshes/column.glb")
     drop(page, *((f"{link}.glb", glb) for link, glb in shapes.items()))
     expect(page.locator(".dh-table tbody tr")).to_have_count(5)
     expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "6")

@@ -16,7 +16,7 @@ export function MissingFiles() {
     else skippedFiles.value = new Set([...skippedFiles.value, ...missing.map(({ path }) => path)]);
   };
   return (
-    <section class="panel missing" aria-label={d("missing_title")} role="alert">
+    <section class="panel missing-files" aria-label={d("missing_title")} role="alert">
       <div>
         <h2>{d("missing_title")}</h2>
         <ul>
