@@ -36,7 +36,7 @@ import { Toolbar } from "./toolbar";
 import "./program-page.css";
 
 const MOVED = 0.005; // rad or m: a larger distance from the check's start makes the check outdated
-const TOLD_MS = 8000;
+const SHOWN_MS = 8000;
 
 /** The page of a robot's program; without a robot, the choice of one. */
 export function ProgramPage({ shown }: { shown: RobotName | null }) {
@@ -179,10 +179,10 @@ function hasMoved(positions: readonly (number | undefined)[]): boolean {
 }
 
 function useOutcome(): [Words, (words: Words) => void] {
-  const [told, setTold] = useState<{ words: Words }>({ words: noWords });
+  const [shown, setShown] = useState<{ words: Words }>({ words: noWords });
   useEffect(() => {
-    const timer = setTimeout(() => setTold({ words: noWords }), TOLD_MS);
+    const timer = setTimeout(() => setShown({ words: noWords }), SHOWN_MS);
     return () => clearTimeout(timer);
-  }, [told]);
-  return [told.words, (words) => setTold({ words })];
+  }, [shown]);
+  return [shown.words, (words) => setShown({ words })];
 }
