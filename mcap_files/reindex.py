@@ -1,21 +1,16 @@
 """Rewriting of one or several consecutive closed recordings: 1 MiB zstd chunks, an index, verified, renamed.
 
-`python -m mcap_files.reindex` is a separate process, so that the recorder never waits for it. It reads jobs,
-`{"target": "...", "sources": ["..."], "about": {...}}` on a line; it prints its progress, a number from 0 to
-1 on a line, and then `done` or `failed` with the reason.
+`python -m mcap_files.reindex` is a worker process, so that the recorder never waits for it. It reports its
+progress, a number from 0 to 1.
 """
 
 import contextlib
-import json
 import os
-import queue
-import sys
-import threading
 import zlib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
@@ -26,11 +21,14 @@ from mcap_files.capture import is_being_written
 from mcap_files.channel_names import INDEXING, LOST
 from mcap_files.errors import CaptureError
 from mcap_files.indexed_writer import Copied, IndexedWriter
+from robomesh.worker import answer_all, report
 
 _STEP_BYTES = 8 << 20
 # Longest unreadable end of a file after a kill or a power cut; a longer one is damage.
 _MOST_TAIL_BYTES = 4 << 20
 Progress = Callable[[float], None]
+# Sources, target and metadata.
+_Question = tuple[Sequence[Path], Path, Mapping[str, str]]
 
 
 def index(path: Path, progress: Progress = lambda _: None) -> None:
@@ -271,35 +269,13 @@ def _check(path: Path, writer: IndexedWriter) -> None:
         raise CaptureError(f"{path}: differs from its sources, which were kept")
 
 
-def main() -> None:
-    """Do the recorder's jobs one after the other; exit when the recorder ends."""
-    jobs: queue.SimpleQueue[str] = queue.SimpleQueue()
+def _begin(_: None) -> Callable[[_Question], None]:
+    def answer(question: _Question) -> None:
+        sources, target, about = question
+        rewrite(sources, target, about=about, progress=report)
 
-    def read() -> None:
-        for line in sys.stdin:
-            jobs.put(line)
-        os._exit(0)  # the next start deletes the incomplete file
-
-    threading.Thread(target=read, daemon=True).start()
-    os.nice(10)
-    while True:
-        print(_do(json.loads(jobs.get())), flush=True)
-
-
-def _do(job: dict[str, Any]) -> str:
-    """Do a job and return its last line of output."""
-    sources = [Path(each) for each in job["sources"]]
-    try:
-        rewrite(
-            sources,
-            Path(job["target"]),
-            about=job.get("about"),
-            progress=lambda part: print(f"{part:.3f}", flush=True),
-        )
-    except (CaptureError, OSError) as error:
-        return f"failed {error}"
-    return "done"
+    return answer
 
 
 if __name__ == "__main__":
-    main()
+    answer_all(_begin)

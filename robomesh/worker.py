@@ -1,31 +1,44 @@
-"""A worker process for long computations: one question at a time, killed on timeout.
+"""Worker processes for long computations and untrusted files: one question at a time, killed on timeout.
 
-The process runs a module that calls `answer_all`. Both ends exchange pickles over its standard input and
-output, so no other process can reach it. A worker that hangs is killed; the next question starts a new one.
+The process runs a module that calls `answer_all`. Messages pass over its standard input and output, so no
+other process can reach it: a length (uint64, little-endian), then a body. A question is a pickle; an answer
+is a kind and a value, as a pickle or, from an untrusted worker, as JSON. The first question is the settings.
 """
 
 import asyncio
 import contextlib
 import ctypes
+import json
 import os
 import pickle
 import resource
 import signal
 import struct
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, BinaryIO
 
 from robomesh.errors import BusError
+from robomesh.memory_limit import MEMORY_BYTES, limit_memory
 
 _START_S = 60.0
 _LENGTH = struct.Struct("<Q")
-_MEMORY_BYTES = 6 * 1024**3
+_MOST_UNTRUSTED_BYTES = 64 * 1024**2
 _PR_SET_PDEATHSIG = 1
+# Kinds of answers.
+_ANSWER, _ERROR, _REPORT = "answer", "error", "report"
 
 
 class WorkerError(BusError):
-    """No answer: timeout, or the process crashed while handling the question."""
+    """No answer: timeout, or the process did not start or crashed while handling the question."""
+
+
+class WorkerTimeoutError(WorkerError):
+    """No answer in time; the process was killed."""
+
+
+class HandlerError(BusError):
+    """An error of an untrusted worker's handler; the text is that of its exception."""
 
 
 class Worker:
@@ -35,19 +48,32 @@ class Worker:
         module: Module for `python -m`; calls `answer_all`.
         settings: Argument of the module's `begin`; pickled.
         nice: Niceness of the process.
+        memory_bytes: Memory limit of the process.
+        untrusted: A file that it reads may take over the process. Its answers are JSON and limited in size,
+            because a pickle could run code in this process.
     """
 
-    def __init__(self, module: str, settings: object, *, nice: int = 0) -> None:
+    def __init__(
+        self,
+        module: str,
+        settings: object,
+        *,
+        nice: int = 0,
+        memory_bytes: int = MEMORY_BYTES,
+        untrusted: bool = False,
+    ) -> None:
         self._module = module
         self._settings = settings
         self._nice = nice
+        self._memory_bytes = memory_bytes
+        self._untrusted = untrusted
         self._turn = asyncio.Lock()
         self._process: asyncio.subprocess.Process | None = None
 
     @property
     def pid(self) -> int | None:
         """Process id; None: no process is running."""
-        return None if self._process is None else self._process.pid
+        return None if self._process is None or self._process.returncode is not None else self._process.pid
 
     async def start(self) -> None:
         """Start the process, so that the first question does not wait for its imports.
@@ -58,29 +84,41 @@ class Worker:
         async with self._turn:
             await self._started()
 
-    async def ask(self, question: object, *, timeout_s: float) -> Any:
+    async def ask(
+        self,
+        question: object,
+        *,
+        timeout_s: float | None,
+        on_report: Callable[[Any], None] = lambda _: None,
+    ) -> Any:
         """Return the answer to a question; raise the handler's exception.
 
         Args:
             timeout_s: Time for the answer [s]; includes the wait for other callers, but not the start of
-                the process.
+                the process. None: no limit.
+            on_report: Called with each value that the handler passes to `report`.
 
         Raises:
-            WorkerError: If no answer arrived in time, or the process crashed.
+            WorkerTimeoutError: If no answer arrived in time.
+            WorkerError: If the process did not start or crashed, or its answer is invalid.
+            HandlerError: If the handler of an untrusted worker raised an exception.
         """
+        deadline = asyncio.timeout(timeout_s)
+        clock = asyncio.get_running_loop().time
         try:
-            async with asyncio.timeout(timeout_s) as deadline:
-                async with self._turn:
-                    left_s = (deadline.when() or 0.0) - asyncio.get_running_loop().time()
-                    deadline.reschedule(None)
-                    process = await self._started()
-                    deadline.reschedule(asyncio.get_running_loop().time() + left_s)
-                    return await self._answer(process, question)
+            async with deadline, self._turn:
+                until, begun = deadline.when(), clock()
+                deadline.reschedule(None)
+                process = await self._started()
+                deadline.reschedule(None if until is None else until + clock() - begun)
+                return await self._answer(process, question, on_report)
         except TimeoutError:
-            raise WorkerError(f"no answer within {timeout_s:g} s") from None
+            if not deadline.expired():
+                raise  # an exception of the handler
+            raise WorkerTimeoutError(f"no answer within {timeout_s:g} s") from None
 
     async def close(self) -> None:
-        """End the process."""
+        """End the process and its children."""
         process = self._process
         if process is None:
             return
@@ -95,14 +133,15 @@ class Worker:
         if self._process is not None and self._process.returncode is None:
             return self._process
         try:
+            numbers = self._nice, os.getpid(), self._memory_bytes, int(self._untrusted)
             self._process = process = await asyncio.create_subprocess_exec(
                 sys.executable,
                 "-m",
                 self._module,
-                str(self._nice),
+                *map(str, numbers),
                 stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE,
-                start_new_session=True,  # Ctrl-C must reach only the parent, which then ends the worker
+                start_new_session=True,  # for `killpg`; Ctrl-C must reach only the parent
             )
         except OSError as error:
             raise WorkerError(f"{self._module} could not be started: {error.strerror}") from None
@@ -116,28 +155,48 @@ class Worker:
             raise
         except Exception as error:
             await self.close()
-            raise WorkerError(str(error)) from error
+            raise WorkerError(str(error) or type(error).__name__) from error
         return process
 
-    async def _answer(self, process: asyncio.subprocess.Process, question: object) -> Any:
+    async def _answer(
+        self,
+        process: asyncio.subprocess.Process,
+        question: object,
+        on_report: Callable[[Any], None] = lambda _: None,
+    ) -> Any:
         assert process.stdin is not None
         assert process.stdout is not None
         body = pickle.dumps(question)
         try:
             process.stdin.write(_LENGTH.pack(len(body)) + body)
             await process.stdin.drain()
-            (length,) = _LENGTH.unpack(await process.stdout.readexactly(_LENGTH.size))
-            raised, value = pickle.loads(await process.stdout.readexactly(length))
+            kind, value = await self._receive(process.stdout)
+            while kind == _REPORT:
+                on_report(value)
+                kind, value = await self._receive(process.stdout)
         except (asyncio.IncompleteReadError, ConnectionError):
             await self.close()
             raise WorkerError(f"{self._module} crashed (status {process.returncode})") from None
         except BaseException:
-            # The caller was cancelled; the next caller must not receive this answer.
+            # The caller was cancelled, or the answer is invalid; the next caller must not receive the rest.
             await self.close()
             raise
-        if raised:
-            raise value
+        if kind == _ERROR:
+            raise HandlerError(value) if self._untrusted else value
         return value
+
+    async def _receive(self, answers: asyncio.StreamReader) -> tuple[str, Any]:
+        (length,) = _LENGTH.unpack(await answers.readexactly(_LENGTH.size))
+        if self._untrusted and length > _MOST_UNTRUSTED_BYTES:
+            raise WorkerError(
+                f"{self._module}: its answer has {length} bytes: {_MOST_UNTRUSTED_BYTES} at most"
+            )
+        body = await answers.readexactly(length)
+        try:
+            kind, value = json.loads(body) if self._untrusted else pickle.loads(body)
+        except (ValueError, TypeError, RecursionError) as error:
+            raise WorkerError(f"{self._module}: its answer is invalid: {error}") from None
+        return kind, value
 
 
 def answer_all(begin: Callable[[Any], Callable[[Any], Any]]) -> None:
@@ -146,38 +205,66 @@ def answer_all(begin: Callable[[Any], Callable[[Any], Any]]) -> None:
     Args:
         begin: Takes the settings and returns the handler of questions; exceptions of both go to the caller.
     """
+    nice, parent, memory_bytes, untrusted = map(int, sys.argv[1:])
     # Also in the middle of a question: an open copy of the parent's log would hide that the parent ended.
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    os.nice(int(sys.argv[1]))
-    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
-    questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    if os.getppid() != parent:
+        return  # it ended before that call
+    os.nice(nice)
+    limit_memory(memory_bytes)
+    # Writing a dump of gigabytes would delay the restart.
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    global _answers
+    _answers = _Answers(os.fdopen(os.dup(1), "wb"), bool(untrusted))
     # Redirect the output of libraries, which is not an answer.
     os.dup2(2, 1)
     handler: Callable[[Any], Any] | None = None
-    for question in iter(lambda: _read(questions), None):
+    for question in _questions(os.fdopen(os.dup(0), "rb")):
         try:
             if handler is None:
                 handler = begin(question)
-                _write(answers, False, None)
+                _answers.send(_ANSWER, None)
             else:
-                _write(answers, False, handler(question))
+                _answers.send(_ANSWER, handler(question))
         except Exception as error:
-            _write(answers, True, error)
+            _answers.send(_ERROR, error)
 
 
-def _read(questions: BinaryIO) -> Any:
-    """Return the next question; None: the input is closed."""
-    head = questions.read(_LENGTH.size)
-    if len(head) < _LENGTH.size:
-        return None
-    return pickle.loads(questions.read(*_LENGTH.unpack(head)))
+def report(value: object) -> None:
+    """Send a value to the `on_report` of the caller, while a handler runs."""
+    assert _answers is not None, "`answer_all` calls the handlers"
+    _answers.send(_REPORT, value)
 
 
-def _write(answers: BinaryIO, raised: bool, value: object) -> None:
-    try:
-        body = pickle.dumps((raised, value))
-        pickle.loads(body)  # an exception with several arguments may fail to unpickle
-    except Exception:
-        body = pickle.dumps((True, RuntimeError(str(value))))
-    answers.write(_LENGTH.pack(len(body)) + body)
-    answers.flush()
+class _Answers:
+    """The worker's output."""
+
+    def __init__(self, stream: BinaryIO, as_json: bool) -> None:
+        self._stream = stream
+        self._as_json = as_json
+
+    def send(self, kind: str, value: object) -> None:
+        try:
+            body = self._encode(kind, value)
+        except Exception:
+            body = self._encode(_ERROR, RuntimeError(str(value)))
+        self._stream.write(_LENGTH.pack(len(body)) + body)
+        self._stream.flush()
+
+    def _encode(self, kind: str, value: object) -> bytes:
+        if self._as_json:
+            if kind == _ERROR:
+                value = str(value) or type(value).__name__
+            return json.dumps((kind, value)).encode()
+        body = pickle.dumps((kind, value))
+        if kind == _ERROR:
+            pickle.loads(body)  # an exception with several arguments may fail to unpickle
+        return body
+
+
+_answers: _Answers | None = None
+
+
+def _questions(stream: BinaryIO) -> Iterator[Any]:
+    while len(head := stream.read(_LENGTH.size)) == _LENGTH.size:
+        yield pickle.loads(stream.read(*_LENGTH.unpack(head)))

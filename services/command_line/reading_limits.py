@@ -1,24 +1,22 @@
 """Memory and time limits for commands that read files from strangers; the same as for Define's workers."""
 
 import os
-import resource
 import sys
 import threading
 from typing import NoReturn
 
-MOST_BYTES = 6 * 1024**3
+from robomesh.memory_limit import MEMORY_BYTES, limit_memory
+
 LONGEST_S = 180.0
 # These commands spend their time on the file that they read; others may run for days.
 _LIMITED = ("mesh", "robot")
 _LIMITED_IN_MEMORY = (*_LIMITED, "program", "fk", "ik")
 
 
-def limit(command: str, *, most_bytes: int = MOST_BYTES, longest_s: float = LONGEST_S) -> None:
+def limit(command: str, *, most_bytes: int = MEMORY_BYTES, longest_s: float = LONGEST_S) -> None:
     """Limit this process until its end, if its command reads files."""
     if command in _LIMITED_IN_MEMORY:
-        _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-        most = most_bytes if hard == resource.RLIM_INFINITY else min(most_bytes, hard)
-        resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
+        limit_memory(most_bytes)
     if command in _LIMITED:
         clock = threading.Timer(longest_s, _exit, (longest_s,))
         clock.daemon = True

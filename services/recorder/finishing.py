@@ -1,18 +1,18 @@
 """Queue that indexes closed files and recovers unfinished ones, one at a time, in a separate process."""
 
 import asyncio
-import json
 import logging
 import re
-import sys
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from mcap_files.errors import CaptureError
+from robomesh.worker import Worker, WorkerError
+
 log = logging.getLogger(__name__)
 
-_MODULE = "mcap_files.reindex"
 # Time without a job after which the process is stopped.
 _IDLE_S = 10.0
 _ERRNO = re.compile(r"^\[Errno \d+\] ")
@@ -38,6 +38,7 @@ class Finisher:
 
     def __init__(self) -> None:
         self._jobs: asyncio.Queue[Job] = asyncio.Queue()
+        self._worker = Worker("mcap_files.reindex", None, nice=10)
         # Progress of running and waiting jobs, by the target's name: 0 to 1.
         self.progress: dict[str, float] = {}
 
@@ -48,16 +49,14 @@ class Finisher:
 
     async def serve(self) -> None:
         """Run jobs until cancelled; a job that is cancelled leaves its files unchanged."""
-        while True:
-            job: Job | None = await self._jobs.get()
-            try:
-                async with _process() as process:
-                    while job is not None:
-                        self._end(job, await self._do(process, job))
-                        job = await self._next() if process.returncode is None else None
-            except OSError as error:
-                if job is not None:
-                    self._end(job, f"its process cannot be started: {error.strerror}")
+        try:
+            while True:
+                if (job := await self._next()) is None:
+                    await self._worker.close()
+                    job = await self._jobs.get()
+                self._end(job, await self._do(job))
+        finally:
+            await self._worker.close()
 
     async def _next(self) -> Job | None:
         with suppress(TimeoutError):
@@ -74,36 +73,18 @@ class Finisher:
         except Exception:
             log.exception("%s: the callback of its job failed", job.target)
 
-    async def _do(self, process: asyncio.subprocess.Process, job: Job) -> str | None:
+    async def _do(self, job: Job) -> str | None:
         """Run a job; return the problem as text, or None."""
-        assert process.stdin is not None
-        assert process.stdout is not None
-        sources = [str(each) for each in job.sources]
-        request = {"target": str(job.target), "sources": sources, "about": job.about}
-        with suppress(ConnectionError):
-            process.stdin.write(json.dumps(request).encode() + b"\n")
-            await process.stdin.drain()
+        name = job.target.name
+
+        def set_progress(part: float) -> None:
+            self.progress[name] = part
+
+        question = job.sources, job.target, job.about
         try:
-            async for line in process.stdout:
-                word, _, text = line.decode(errors="replace").strip().partition(" ")
-                if word == "done":
-                    return None
-                if word == "failed":
-                    return _ERRNO.sub("", text)
-                self.progress[job.target.name] = float(word)
-        except ValueError:  # its later output would be mistaken for the next job's
-            process.kill()
-            return f"its process sent an invalid line and ended with {await process.wait()}"
-        return f"its process ended with {await process.wait()}"
-
-
-@asynccontextmanager
-async def _process() -> AsyncIterator[asyncio.subprocess.Process]:
-    pipe = asyncio.subprocess.PIPE
-    process = await asyncio.create_subprocess_exec(sys.executable, "-m", _MODULE, stdin=pipe, stdout=pipe)
-    try:
-        yield process
-    finally:
-        if process.returncode is None:
-            process.kill()
-        await process.wait()
+            await self._worker.ask(question, timeout_s=None, on_report=set_progress)
+        except (CaptureError, OSError, WorkerError) as error:
+            return _ERRNO.sub("", str(error))
+        except Exception as error:
+            return repr(error)  # for example a damage that `rewrite` does not know; the queue continues
+        return None

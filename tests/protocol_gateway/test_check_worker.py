@@ -103,6 +103,23 @@ def test_a_query_is_not_started_after_its_timeout(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
+def test_a_worker_that_is_killed_while_idle_is_prepared_again_before_the_next_motion(tmp_path):
+    async def main():
+        checker = Checker({"arm": alone("arm", bar_arm(tmp_path))}, start_now=True)
+        async with running(checker):
+            await ready(checker, "arm")
+            first = checker.pid
+            os.kill(first, signal.SIGKILL)
+            async with asyncio.timeout(60):
+                while checker.pid in (first, None):
+                    await asyncio.sleep(0.02)
+            await ready(checker, "arm")
+            assert isinstance(await checker.motion(motion("arm")), Checked)
+
+    run(main(), timeout_s=90)
+
+
+@pytest.mark.slow
 def test_an_unexpected_error_is_reported_and_the_worker_goes_on(tmp_path):
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, np.nan]])
     faces = np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3]])

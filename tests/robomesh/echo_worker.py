@@ -4,7 +4,7 @@ import os
 import sys
 import time
 
-from robomesh.worker import answer_all
+from robomesh import worker
 
 
 class OfTwoArgumentsError(Exception):
@@ -22,6 +22,17 @@ def begin(settings):
                 raise ValueError(text)
             case ("fail twice", text):
                 raise OfTwoArgumentsError(text, text)
+            case "time out":
+                raise TimeoutError("the disk")
+            case ("allocate", size):
+                bytearray(size)
+            case ("report", values):
+                for value in values:
+                    worker.report(value)
+            case ("send", data):
+                worker._answers._stream.write(data)
+                worker._answers._stream.flush()
+                time.sleep(60.0)
             case "die":
                 os._exit(3)
             case ("say and sleep", seconds):
@@ -37,4 +48,4 @@ def begin(settings):
 
 
 if __name__ == "__main__":
-    answer_all(begin)
+    worker.answer_all(begin)

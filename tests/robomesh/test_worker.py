@@ -1,6 +1,9 @@
 import asyncio
 import contextlib
 import os
+import pickle
+import signal
+import struct
 import subprocess
 import sys
 from contextlib import asynccontextmanager
@@ -9,14 +12,14 @@ from subprocess import PIPE
 import psutil
 import pytest
 
-from robomesh.worker import Worker, WorkerError
+from robomesh.worker import HandlerError, Worker, WorkerError, WorkerTimeoutError
 
 CHILD = "tests.robomesh.echo_worker"
 
 
 @asynccontextmanager
-async def running(settings="settings"):
-    worker = Worker(CHILD, settings)
+async def running(settings="settings", **options):
+    worker = Worker(CHILD, settings, **options)
     try:
         yield worker
     finally:
@@ -35,6 +38,7 @@ def test_worker_answers_in_its_process_and_keeps_it():
             assert (settings, question) == ("settings", {"a": 1})
             assert pid not in (os.getpid(), None)
             assert (await worker.ask("print", timeout_s=30))[1] == pid == worker.pid
+            assert await worker.ask(None, timeout_s=30) == ("settings", pid, None)
 
     run(main())
 
@@ -71,7 +75,7 @@ def test_worker_is_killed_on_timeout_and_the_next_question_starts_another():
         async with running() as worker:
             await worker.start()
             pid = worker.pid
-            with pytest.raises(WorkerError, match="no answer within"):
+            with pytest.raises(WorkerTimeoutError, match="no answer within"):
                 await worker.ask(("sleep", 60), timeout_s=0.2)
             with pytest.raises(ProcessLookupError):
                 os.kill(pid, 0)
@@ -158,3 +162,117 @@ def test_worker_ends_with_its_parent_during_a_question():
         finally:
             with contextlib.suppress(psutil.NoSuchProcess):
                 worker.kill()
+
+
+@pytest.mark.slow
+def test_timeout_error_of_a_handler_is_raised_and_the_process_goes_on():
+    async def main():
+        async with running() as worker:
+            with pytest.raises(TimeoutError, match="the disk"):
+                await worker.ask("time out", timeout_s=30)
+            pid = worker.pid
+            with pytest.raises(TimeoutError, match="the disk"):
+                await worker.ask("time out", timeout_s=None)
+            assert worker.pid == pid
+
+    run(main())
+
+
+@pytest.mark.slow
+def test_worker_that_was_killed_while_idle_has_no_pid_and_is_restarted():
+    async def main():
+        async with running() as worker:
+            await worker.start()
+            os.kill(worker.pid, signal.SIGKILL)
+            async with asyncio.timeout(30):
+                while worker.pid is not None:
+                    await asyncio.sleep(0.01)
+            assert (await worker.ask("hello", timeout_s=30))[2] == "hello"
+
+    run(main())
+
+
+@pytest.mark.slow
+def test_worker_that_is_killed_during_a_question_crashes_and_is_restarted():
+    async def main():
+        async with running() as worker:
+            await worker.start()
+            asked = asyncio.create_task(worker.ask(("sleep", 60), timeout_s=60))
+            await asyncio.sleep(0)
+            os.kill(worker.pid, signal.SIGKILL)
+            with pytest.raises(WorkerError, match=r"crashed \(status -9\)"):
+                await asked
+            assert (await worker.ask("hello", timeout_s=30))[2] == "hello"
+
+    run(main())
+
+
+@pytest.mark.slow
+def test_memory_limit_of_a_worker_is_an_error_of_its_handler():
+    async def main():
+        async with running(memory_bytes=1 << 30) as worker:
+            pid = (await worker.ask(("allocate", 1 << 20), timeout_s=30))[1]
+            with pytest.raises(MemoryError):
+                await worker.ask(("allocate", 2 << 30), timeout_s=30)
+            assert (await worker.ask("hello", timeout_s=30))[1] == pid
+
+    run(main())
+
+
+@pytest.mark.slow
+def test_reports_of_a_handler_arrive_in_order_before_the_answer():
+    async def main():
+        async with running() as worker:
+            reports = []
+            question = "report", [0.25, 0.5, 1.0]
+            answer = await worker.ask(question, timeout_s=30, on_report=reports.append)
+            assert (answer[2], reports) == (question, [0.25, 0.5, 1.0])
+
+    run(main())
+
+
+@pytest.mark.slow
+def test_untrusted_worker_answers_in_json_and_its_errors_are_texts():
+    async def main():
+        async with running(untrusted=True) as worker:
+            assert (await worker.ask(("a", 1), timeout_s=30))[2] == ["a", 1]
+            with pytest.raises(HandlerError, match="no such pose"):
+                await worker.ask(("fail", "no such pose"), timeout_s=30)
+            with pytest.raises(HandlerError, match="NotJson"):
+                await worker.ask(NotJson(), timeout_s=30)
+            assert (await worker.ask("hello", timeout_s=30))[2] == "hello"
+
+    run(main())
+
+
+class NotJson:
+    pass
+
+
+class Exploit:
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return open, (self.path, "w")
+
+
+@pytest.mark.slow
+def test_untrusted_worker_cannot_run_code_in_its_parent_or_exhaust_its_memory(tmp_path):
+    exploit = pickle.dumps(("answer", Exploit(str(tmp_path / "written"))))
+    length = struct.Struct("<Q")
+
+    async def main():
+        async with running(untrusted=True) as worker:
+            for data, problem in (
+                (length.pack(len(exploit)) + exploit, "its answer is invalid"),
+                (length.pack(1 << 40), "1099511627776 bytes"),
+                (length.pack(4) + b"true", "its answer is invalid"),
+            ):
+                with pytest.raises(WorkerError, match=problem):
+                    await worker.ask(("send", data), timeout_s=30)
+                assert worker.pid is None
+            assert (await worker.ask("hello", timeout_s=30))[2] == "hello"
+
+    run(main())
+    assert list(tmp_path.iterdir()) == []

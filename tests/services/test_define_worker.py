@@ -17,7 +17,7 @@ from robots.urdf.write import to_urdf
 from services.console.accounts.sessions import SignedIn
 from services.console.define import routes, store
 from services.console.define.errors import RefusedRequest
-from services.console.define.worker_pool import Limits, Worker, Workers, Workshop
+from services.console.define.worker_pool import ConfinedWorker, Limits, Workers, Workshop
 from tests.conftest import run
 from tests.robots.test_step import step_box
 from tests.services.defining import defining
@@ -116,7 +116,9 @@ def test_no_worker_outlives_the_console(mesh, tmp_path):
         page.post("/mesh", {"file": "meshes/base.wrl", "files": page.draft()["files"]})
         both = workers()
         assert len(both) == 2
+        assert len(list((tmp_path / "store").glob("tmp-*"))) == 2
     assert not any(alive(pid) for pid in both)
+    assert not list((tmp_path / "store").glob("tmp*"))
 
 
 def test_too_large_a_file_is_refused_before_it_is_kept(mesh, tmp_path):
@@ -132,7 +134,7 @@ def test_an_abandoned_request_is_not_run(tmp_path):
     kept = store.open_store(tmp_path / "store")
 
     async def main():
-        worker = Worker(kept.folder, longest_s=5.0, memory_bytes=LIMITS.memory_bytes)
+        worker = ConfinedWorker(kept.folder, longest_s=5.0, memory_bytes=LIMITS.memory_bytes)
 
         async def nobody():
             return False
@@ -226,7 +228,7 @@ def test_askers_take_turns(tmp_path):
 
     async def main():
         begin = asyncio.Event()
-        workers = Workers(Worker(kept.folder, longest_s=5.0, memory_bytes=LIMITS.memory_bytes))
+        workers = Workers(ConfinedWorker(kept.folder, longest_s=5.0, memory_bytes=LIMITS.memory_bytes))
 
         async def ask(asker):
             async def wanted():

@@ -1,0 +1,100 @@
+"""Queue of the recorder's worker process: a killed worker loses one job only, and its files stay."""
+
+import asyncio
+import contextlib
+import os
+import signal
+
+import psutil
+import pytest
+
+from mcap_files.recover import State, state_of
+from services.recorder import finishing
+from services.recorder.finishing import Finisher, Job
+from tests.conftest import run
+from tests.mcap_files.test_capture import write
+
+pytestmark = pytest.mark.slow
+
+
+@contextlib.asynccontextmanager
+async def serving():
+    finisher = Finisher()
+    task = asyncio.create_task(finisher.serve())
+    try:
+        yield finisher
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+def submit(finisher, path):
+    """Submit a job; return the future of its problem."""
+    outcome = asyncio.get_running_loop().create_future()
+    finisher.submit(Job(path, (path,), done=outcome.set_result))
+    return outcome
+
+
+def worker_process():
+    """Return the worker process of this process, or None."""
+    children = psutil.Process().children()
+    return next((each for each in children if "mcap_files.reindex" in each.cmdline()), None)
+
+
+def test_job_of_a_killed_worker_fails_and_the_next_job_is_done(tmp_path):
+    first, second = tmp_path / "first.mcap", tmp_path / "second.mcap"
+    write(first, range(100))
+    write(second, range(100))
+    before = second.read_bytes()
+
+    async def main():
+        async with serving() as finisher:
+            assert await submit(finisher, first) is None
+            assert state_of(first) is State.INDEXED
+            worker = worker_process()
+            worker.send_signal(signal.SIGSTOP)
+            killed = submit(finisher, second)
+            while not finisher._worker._turn.locked():
+                await asyncio.sleep(0)
+            os.kill(worker.pid, signal.SIGKILL)
+            assert "crashed (status -9)" in await killed
+            assert second.read_bytes() == before
+            assert await submit(finisher, second) is None
+            assert finisher.progress == {}
+        assert worker_process() is None
+
+    run(main(), timeout_s=120)
+    assert state_of(second) is State.INDEXED
+
+
+def test_problem_of_a_job_is_a_text_and_the_worker_goes_on(tmp_path):
+    recording = tmp_path / "recording.mcap"
+    write(recording, range(100))
+    damaged = tmp_path / "damaged.mcap"
+    damaged.write_bytes(b"no recording")
+
+    async def main():
+        async with serving() as finisher:
+            assert "damaged.mcap: not a readable recording" in await submit(finisher, damaged)
+            first = worker_process()
+            assert "No such file" in await submit(finisher, tmp_path / "missing.mcap")
+            assert await submit(finisher, recording) is None
+            assert worker_process() == first
+
+    run(main(), timeout_s=120)
+
+
+def test_worker_of_an_idle_queue_is_ended_and_restarted(tmp_path, monkeypatch):
+    monkeypatch.setattr(finishing, "_IDLE_S", 0.01)
+    recording = tmp_path / "recording.mcap"
+    write(recording, range(100))
+
+    async def main():
+        async with serving() as finisher:
+            assert await submit(finisher, recording) is None
+            async with asyncio.timeout(60):
+                while worker_process() is not None:
+                    await asyncio.sleep(0.02)
+            assert await submit(finisher, recording) is None
+
+    run(main(), timeout_s=120)
