@@ -5,6 +5,9 @@ RecordingsError
 └── RecordingError          a file that is not a recording, or lacks a requested part
 """
 
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+
 
 class RecordingsError(Exception):
     """Base of the errors of recordings; the text is one line for people."""
@@ -15,4 +18,15 @@ class CaptureError(RecordingsError):
 
 
 class RecordingError(RecordingsError):
-    """A file that is not a recording, or lacks a requested part."""
+    """A file that is not a recording, or lacks a requested part.
+
+    Args:
+        reason: A reason from the table; a plain text has the code `recording.unreadable`.
+
+    Attributes:
+        reason: The code and its parameters.
+    """
+
+    def __init__(self, reason: Reason | str) -> None:
+        super().__init__(reason)
+        self.reason = codes.RECORDING_UNREADABLE(detail=reason) if isinstance(reason, str) else reason

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from mcap_files.channel_names import SUFFIX
 from mcap_files.errors import RecordingError
+from robomesh import reason_codes as codes
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.:+-]*")
 
@@ -16,8 +17,8 @@ def find_file(folder: Path, name: str) -> Path:
         RecordingError: If there is none, or the name could lead outside the folder.
     """
     if not _NAME.fullmatch(name) or not name.endswith(SUFFIX):
-        raise RecordingError(f"no recording {name!r}: use a file name from recordings/list")
+        raise RecordingError(codes.RECORDING_UNKNOWN(name=name))
     for path in (folder / name, *sorted(folder.glob(f"*/{name}"))):
         if path.is_file() and path.resolve().is_relative_to(folder.resolve()):
             return path
-    raise RecordingError(f"no recording {name!r} here: use a file name from recordings/list")
+    raise RecordingError(codes.RECORDING_UNKNOWN(name=name))

@@ -14,6 +14,7 @@ from mcap_protobuf.decoder import DecoderFactory
 from mcap_files.errors import RecordingError
 from mcap_files.layout import Attached, Block, layout_of
 from mcap_files.records import DAMAGE, MESSAGE, RECORD, unpack_chunk
+from robomesh import reason_codes as codes
 
 FOREVER_NS = (1 << 64) - 1
 # Messages that wait for sorting because their chunk overlaps the next one; above this limit the file's order
@@ -199,8 +200,9 @@ class RecordingFile:
         try:
             return self.layout.attachments[name]
         except KeyError:
-            there = ", ".join(self.layout.attachments) or "nothing"
-            raise RecordingError(f"{self.path.name}: no attachment {name!r}; it has {there}") from None
+            there = ", ".join(self.layout.attachments) or "none"
+            reason = codes.RECORDING_NO_ATTACHMENT(file=self.path.name, name=name, attachments=there)
+            raise RecordingError(reason) from None
 
     def attachment(self, name: str) -> bytes:
         """Return the bytes of an attachment.
@@ -216,7 +218,8 @@ class RecordingFile:
             return self.topics[topic]
         except KeyError:
             there = ", ".join(sorted(self.topics)) or "none"
-            raise RecordingError(f"{self.path.name}: no topic {topic!r}; it has {there}") from None
+            reason = codes.RECORDING_NO_TOPIC(file=self.path.name, topic=topic, topics=there)
+            raise RecordingError(reason) from None
 
     def _bytes(self, offset: int, length: int) -> bytes:
         try:

@@ -41,6 +41,12 @@ NOT_JSON = Code("request.not_json", "not JSON: {detail}")
 NOT_JSON_OBJECT = Code(
     "request.not_json_object", "the request is not a JSON object", "send an object with the request's fields"
 )
+NEEDS_TEXT = Code("request.needs_text", "the field '{field}' is missing or is not a text")
+NEEDS_OBJECT = Code("request.needs_object", "the field '{field}' is missing or is not an object")
+TOO_LARGE = Code("request.too_large", "the request is larger than {bytes} bytes")
+HALF_CHARACTER = Code("request.half_character", "the request contains an unpaired surrogate")
+NO_ANSWER = Code("request.no_answer", "{detail}")
+ABANDONED = Code("request.abandoned", "the client has disconnected")
 UNKNOWN_FIELD = Code("request.unknown_field", "{request} has no field '{field}'; it takes {fields}")
 NOT_FINITE = Code("request.not_finite", "{value} is not finite")
 KEY_TOO_LONG = Code("request.key_too_long", "the key has {count} characters", "at most {most} are allowed")
@@ -56,7 +62,82 @@ PASSWORD_AGAIN = Code(
 )
 SIGNED_OUT = Code("page.signed_out", "this page is no longer signed in", "sign in again")
 OWN_NAME_ONLY = Code("page.own_name_only", "{who} may send requests only as {own}, not as {name}")
+PAGE_TOO_MANY_PAGES = Code(
+    "page.too_many_pages", "this session already has {count} open pages", "close a page first"
+)
+PAGE_TEXT = Code("page.text", "this connection takes binary messages only")
+PAGE_NOT_A_MESSAGE = Code("page.not_a_message", "not a message of a page: {detail}")
+PAGE_READS_TOO_SLOWLY = Code(
+    "page.reads_too_slowly", "more than {bytes} bytes are waiting for a page that does not read"
+)
+PAGE_TOO_MANY_KEYS = Code("page.too_many_keys", "this page already watches {count} keys", "unwatch one first")
+PAGE_WATCH_WILDCARD = Code(
+    "page.watch_wildcard",
+    "'{key}' cannot be watched",
+    "name the view; '*' may replace the site and the robot only",
+)
+PAGE_WATCH_VIDEO = Code(
+    "page.watch_video", "'{key}' cannot be watched", "name the site and the robot of a video"
+)
+PAGE_WATCH_NO_RIGHT = Code(
+    "page.watch_no_right", "'{key}' cannot be watched: the console has no right to {topic}"
+)
+PAGE_CANNOT_WATCH = Code("page.cannot_watch", "'{key}' cannot be watched: {detail}")
 WORKER_GAVE_UP = Code("request.worker_gave_up", "aborted: {detail}")
+
+# ----------------------------------------------------------------------- HTTP
+
+HTTP_HOST = Code(
+    "http.host", "host '{host}' is not this console's", "use its address, or name it in the console's hosts"
+)
+HTTP_ORIGIN = Code("http.origin", "origin '{origin}' is not this page's: {host}")
+HTTP_OTHER_PAGE = Code("http.other_page", "the request comes from another page")
+HTTP_TWO_LENGTHS = Code(
+    "http.two_lengths", "the request has a content-length and a transfer-encoding", "send one of them"
+)
+HTTP_BODY = Code("http.body", "a {method} request has no body")
+HTTP_NO_PATH = Code("http.no_path", "there is no {path}")
+HTTP_METHOD = Code("http.method", "{path} does not take {method}")
+
+# ------------------------------------------------------------------- accounts
+
+ACCOUNT_SIGN_IN = Code("account.sign_in", "no account is signed in", "sign in first")
+ACCOUNT_WRONG = Code("account.wrong", "the account or the password is wrong")
+ACCOUNT_WAIT = Code("account.wait", "too many attempts", "try again in {seconds} s")
+ACCOUNT_BUSY = Code("account.busy", "too many passwords wait to be verified", "try again in a moment")
+ACCOUNT_NOT_ADMIN = Code("account.not_admin", "{account} is not an administrator")
+ACCOUNT_NO_SESSION = Code("account.no_session", "session '{session}' has ended")
+ACCOUNT_NAME = Code(
+    "account.name",
+    "account name '{name}' is invalid",
+    "use at most {most} lower-case letters, digits, '_' and '-', beginning with a letter or digit",
+)
+ACCOUNT_TAKEN = Code("account.taken", "there is an account {name} already")
+ACCOUNT_NONE = Code("account.no_account", "there is no account '{name}'", "there are {accounts}")
+ACCOUNT_LAST_ADMIN = Code(
+    "account.last_admin",
+    "{name} is the last administrator who can sign in",
+    "make another administrator first",
+)
+ACCOUNT_ROLE = Code("account.role", "role '{role}' is unknown", "there are {roles}")
+ACCOUNT_ACTION = Code("account.action", "action '{action}' is unknown", "there are {actions}")
+ACCOUNT_FAILED = Code("account.failed", "{detail}")
+PASSWORD_SHORT = Code(
+    "account.short",
+    "the password is too short",
+    "use at least {least} characters; a few words are good",
+)
+PASSWORD_LONG = Code("account.long", "the password is too long", "use at most {most} bytes")
+PASSWORD_CONTROL = Code(
+    "account.control", "the password contains a control character", "leave this character out"
+)
+PASSWORD_REPEATS = Code("account.repeats", "the password repeats a few characters", "a few words are good")
+PASSWORD_RUN = Code("account.run", "the password is a run of neighbouring characters", "a few words are good")
+PASSWORD_COMMON = Code(
+    "account.common",
+    "the password is easy to guess, because it is a common word or a name with digits",
+    "a few words are good",
+)
 
 # --------------------------------------------------------------------- leases
 
@@ -368,6 +449,11 @@ CHECK_START_UNKNOWN = Code("check.start_unknown", "the position of {robot} is un
 JOINT_COUNT_OF_FIELD = Code(
     "joints.count_of_field", "{field} has {count} values, but {robot} has {joints} joints ({names})"
 )
+MESH_CHANGED = Code(
+    "mesh.changed",
+    "{key} has SHA-256 {sha256}, not {wanted}, because the robot's description has changed",
+    "load the page again",
+)
 MESH_UNKNOWN = Code("mesh.unknown", "no mesh '{name}'; {robot} has {meshes}")
 
 # ------------------------------------------------------------------- recordings and replays
@@ -381,7 +467,18 @@ RECORDING_OPEN = Code("recording.open", "{robot} is already being recorded, as '
 RECORDING_NOT_OPEN = Code("recording.not_open", "{robot} is not being recorded")
 RECORDING_FAILED = Code("recording.failed", "{detail}")
 RECORDING_UNREADABLE = Code("recording.unreadable", "{detail}")
+RECORDING_UNKNOWN = Code(
+    "recording.unknown", "no recording '{name}' here", "use a file name from recordings/list"
+)
+RECORDING_NO_ATTACHMENT = Code(
+    "recording.no_attachment", "{file} has no attachment '{name}'", "there are {attachments}"
+)
+RECORDING_NO_TOPIC = Code("recording.no_topic", "{file} has no topic '{topic}'", "there are {topics}")
 RECORDING_NO_JOINTS = Code("recording.no_joints", "{file} contains no joint states")
+RECORDING_RANGE = Code("recording.range", "{range}: {file} has {bytes} bytes")
+RECORDING_TOO_MANY = Code(
+    "recording.too_many_downloads", "{count} recordings are being sent already", "try again soon"
+)
 RECORDER_BUSY = Code(
     "recorder.busy", "the recorder is busy: its recordings/{request} is not ready yet; try again"
 )
@@ -414,3 +511,85 @@ VIEW_UNKNOWN_OF = Code("view.unknown_of", "no view '{view}' of {robot}: there ar
 VIEW_NO_ROOM = Code("view.no_room", "no capacity: {detail}")
 VIEW_INVALID = Code("view.invalid", "{detail}")
 VIEW_NO_ANSWER = Code("view.no_answer", "the answer to {key}/views contains no view")
+VIEW_NO_RENDERER = Code(
+    "view.no_renderer",
+    "no renderer answers for {robot} ({detail})",
+    "check that its name is right and that its renderer runs",
+)
+VIEW_NO_PICTURE = Code("view.no_picture", "no picture of {view} arrived within {seconds:g} s")
+VIEW_NOT_A_PICTURE = Code("view.not_a_picture", "{key} is not a picture")
+VIEW_PICTURE_UNREADABLE = Code("view.picture_unreadable", "the newest picture cannot be read: {detail}")
+VIEW_NO_PNG = Code("view.no_png", "this console has no PyAV to make PNG", "request .jpg instead")
+VIEW_PARAMETER = Code("view.parameter", "the parameter '{name}' is unknown", "use width, height and fps")
+VIEW_NOT_A_NUMBER = Code("view.not_a_number", "{name}='{value}' is not a number")
+VIEW_NOT_PIXELS = Code("view.not_pixels", "{name}='{value}' is not a number of pixels")
+VIEW_TOO_MANY_STILLS = Code("view.too_many_stills", "{count} stills are being made", "try again in a moment")
+VIEW_TOO_MANY_STREAMS = Code(
+    "view.too_many_streams", "{count} video streams are open already", "close one first"
+)
+VIEW_TOO_MANY_STREAMS_OF = Code(
+    "view.too_many_streams_of", "{address} has {count} open video streams already", "close one first"
+)
+
+# --------------------------------------------------------------------- Define
+
+DEFINE_UNREADABLE = Code("define.unreadable", "{detail}")
+DEFINE_NO_ROBOT = Code("define.no_robot", "there is no robot '{name}' here")
+DEFINE_MODEL_GONE = Code("define.model_gone", "this mesh is no longer stored", "load the page again")
+DEFINE_FILE_GONE = Code("define.file_gone", "{files}: no longer stored", "drop the files on the page again")
+DEFINE_PATH = Code(
+    "define.path",
+    "'{path}' is not the path of a robot's file",
+    "use a path below the robot's folder, like meshes/base.wrl",
+)
+DEFINE_PATH_TOO_LONG = Code("define.path_too_long", "'{path}' is too long for a file name")
+DEFINE_FILES = Code("define.files", "`files` must give each path the SHA-256 of its file")
+DEFINE_FILE_NOT_GIVEN = Code("define.file_not_given", "'{file}' is not one of the given files")
+DEFINE_FILE_IS_FOLDER = Code("define.file_is_folder", "a file's name is another file's folder")
+DEFINE_FILE_TOO_LARGE = Code("define.file_too_large", "the file is larger than {megabytes:g} MB")
+DEFINE_TOO_MANY_FILES = Code("define.too_many_files", "{count} files: at most {most} are possible")
+DEFINE_FILES_TOO_LARGE = Code(
+    "define.files_too_large", "{count} files of {megabytes:.0f} MB: at most {most:.0f} MB are possible"
+)
+DEFINE_UPLOADS = Code("define.uploads", "{count} files are being sent already", "try again in a moment")
+DEFINE_NOT_ZIP = Code("define.not_zip", "the file is not a readable zip archive: {detail}")
+DEFINE_ZIP_TOO_LARGE = Code(
+    "define.zip_too_large",
+    "the archive contains {count} files of {megabytes:.0f} MB: at most {most} files and "
+    "{most_megabytes:.0f} MB are possible",
+)
+DEFINE_NOT_URDF = Code("define.not_urdf", "{file} is not a robot's URDF")
+DEFINE_JOINTS = Code("define.joints", "`joints` must have one finite number for each joint, {count} in total")
+DEFINE_PROBLEMS = Code(
+    "define.problems",
+    "the robot is not saved, because its description has problems ({count})",
+    "correct them first",
+)
+DEFINE_EXISTS = Code("define.exists", "there is a robot {name} in {folder} already")
+DEFINE_CHANGED = Code(
+    "define.changed",
+    "{name} in {folder} was changed after it was opened",
+    "a save over it loses these changes",
+)
+DEFINE_TOO_SLOW = Code("define.too_slow", "this took more than {seconds:g} s and was stopped")
+DEFINE_CRASHED = Code(
+    "define.crashed",
+    "this crashed the worker process twice: it may be damaged, or need too much memory ({detail})",
+)
+DEFINE_MEMORY = Code("define.memory", "reading it takes more than {gigabytes:g} GB of memory")
+DEFINE_NESTED = Code("define.nested", "it is nested too deeply to read")
+DEFINE_DISK = Code("define.disk", "the console cannot write to its disk: {detail}")
+DEFINE_SITE_HAS = Code(
+    "define.site_has", "the site {site} has a robot {name} already", "save yours under another name"
+)
+DEFINE_NO_SUPERVISOR = Code(
+    "define.no_supervisor",
+    "no supervisor runs here (robomesh up). Add this to the site file and restart the site's services:"
+    '\n\n[[robot]]\nname = "{name}"\nmodel = "{model}"\ncontroller = "simulated"',
+)
+DEFINE_RUNS = Code("define.runs", "{name} runs already", "it restarts whenever it is saved")
+DEFINE_IN_SITE_FILE = Code("define.in_site_file", "{name} is in the site file", "remove it there")
+DEFINE_NOT_STARTED = Code("define.not_started", "{name} was not started from the page")
+DEFINE_STARTED_UNREADABLE = Code(
+    "define.started_unreadable", "the list of started robots is invalid ({detail})", "repair or remove it"
+)

@@ -24,6 +24,8 @@ from math import isfinite
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 from robots.bounded_toml import read_toml
 from robots.description import DESCRIPTION_FILE
 from robots.description_text import description_text
@@ -86,7 +88,7 @@ def write_folder(
     if target.is_dir():
         target = target.resolve()  # replace the folder, not a symbolic link to it
     folder = target.parent
-    problems = [f"{path!r}: {reason}" for path in files if (reason := refused_path(path))]
+    problems = [str(reason) for path in files if (reason := refused_path(path))]
     if problems:
         raise DescriptionError(target, problems)
     try:
@@ -137,7 +139,7 @@ def zip_description(values: Mapping[str, Any], files: Mapping[str, bytes | Path]
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as zipped:
         for path, data in _content(values, files).items():
             if reason := refused_path(path):
-                raise DescriptionError(name, [f"{path!r}: {reason}"])
+                raise DescriptionError(name, [str(reason)])
             try:
                 data = data.read_bytes() if isinstance(data, Path) else data
             except OSError as error:
@@ -149,15 +151,15 @@ def zip_description(values: Mapping[str, Any], files: Mapping[str, bytes | Path]
     return archive.getvalue()
 
 
-def refused_path(path: str) -> str | None:
+def refused_path(path: str) -> Reason | None:
     """Return why a path is not that of a file in a robot's folder; None if it is valid."""
     parts = path.split("/")
     if not path or path.startswith("/") or "\\" in path or not path.isprintable():
-        return "must be a path below the robot's folder, like meshes/base.wrl"
+        return codes.DEFINE_PATH(path=path)
     if any(part in ("", ".", "..") for part in parts) or re.match(r"[A-Za-z]:", path):
-        return "must be a path below the robot's folder, like meshes/base.wrl"
+        return codes.DEFINE_PATH(path=path)
     if len(path.encode()) > 400 or any(len(part.encode()) > 200 for part in parts):
-        return "is too long for a file name"
+        return codes.DEFINE_PATH_TOO_LONG(path=path)
     return None
 
 

@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
 from starlette.requests import Request
@@ -21,6 +22,7 @@ from starlette.types import ASGIApp, Scope
 from starlette.websockets import WebSocket
 
 from robomesh import keys, topics
+from robomesh import reason_codes as codes
 from robomesh.keys import PresenceKey
 from robomesh.schemas.robomesh_pb2 import Event, ToPage
 from robomesh.session import Session
@@ -31,8 +33,9 @@ from services.console.accounts.routes import AccountRoutes
 from services.console.accounts.sessions import MOST_PAGES, SignedIn
 from services.console.define.routes import Define
 from services.console.define.settings import DefineSettings
-from services.console.errors import PageNotBuiltError
+from services.console.errors import PageNotBuiltError, RefusedRequest
 from services.console.http import png
+from services.console.http.error_responses import as_json, as_text
 from services.console.http.guard import Guard
 from services.console.http.listener import listening
 from services.console.http.meshes import MeshCache, mesh_response
@@ -178,7 +181,8 @@ class Hub:
         """Serve one browser's WebSocket."""
         user: SignedIn | None = websocket.scope.get("signed_in")
         if user is not None and len(user.pages) >= MOST_PAGES:
-            await websocket.close(SIGNED_OUT)
+            refused = RefusedRequest(403, codes.PAGE_TOO_MANY_PAGES(count=MOST_PAGES))
+            await websocket.send_denial_response(as_json(refused))
             return
         await websocket.accept()
         browser = Browser(
@@ -307,8 +311,25 @@ def application(hub: Hub) -> ASGIApp:
         compresslevel=5,
         exclude_content_types=(*DEFAULT_EXCLUDED_CONTENT_TYPES, MJPEG, "application/octet-stream"),
     )
-    app = Starlette(routes=routes, middleware=[packed])
+    refusals = {HTTPException: _refused_by_routing, Exception: _failed}
+    app = Starlette(routes=routes, middleware=[packed], exception_handlers=refusals)
     return app if hub.auth is None else AuthMiddleware(app, hub.auth.sessions, cookie)
+
+
+async def _refused_by_routing(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    path = request.url.path
+    if error.status_code == 405:
+        reason = codes.HTTP_METHOD(path=path, method=request.method)
+    else:
+        reason = codes.HTTP_NO_PATH(path=path)
+    answer = as_text(RefusedRequest(error.status_code, reason))
+    answer.headers.update(error.headers or {})
+    return answer
+
+
+async def _failed(request: Request, _: Exception) -> Response:
+    return as_text(RefusedRequest(500, codes.FAILED(request=request.url.path)))
 
 
 class PageFiles(StaticFiles):

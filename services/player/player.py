@@ -9,7 +9,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from mcap_files.errors import RecordingsError
+from mcap_files.errors import RecordingError
 from mcap_files.folder import find_file
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
@@ -107,8 +107,8 @@ class _Player:
             )
         except ReplayError as error:
             raise RefusedError(error.reason) from None
-        except RecordingsError as error:
-            raise RefusedError(codes.RECORDING_UNREADABLE(detail=error)) from None
+        except RecordingError as error:
+            raise RefusedError(error.reason) from None
         finally:
             self._opening -= 1
         self._replays[identity] = replay

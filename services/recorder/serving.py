@@ -149,7 +149,9 @@ class RecordingServer:
             worker, within_s = self._series_worker, _SERIES_WITHIN_S
         try:
             answer = await worker.ask(Question(name, request.SerializeToString()), timeout_s=within_s)
-        except (RecordingError, WorkerError, OSError) as error:
+        except RecordingError as error:
+            raise RefusedError(error.reason) from None
+        except (WorkerError, OSError) as error:
             raise RefusedError(codes.RECORDING_UNREADABLE(detail=error)) from None
         assert isinstance(answer, bytes)
         return answer

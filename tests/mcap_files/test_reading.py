@@ -75,12 +75,12 @@ def test_video_begins_at_the_previous_key_frame(file):
 
 def test_attachment_is_read_from_its_position(file):
     assert file.attachment("mesh/base") == b"glTF of the base"
-    with pytest.raises(RecordingError, match="no attachment 'x'; it has mesh/base"):
+    with pytest.raises(RecordingError, match="has no attachment 'x': there are mesh/base"):
         file.attachment("x")
 
 
 def test_error_of_a_missing_topic_lists_the_topics(file):
-    with pytest.raises(RecordingError, match=r"no topic 'x'; it has .*robomesh/site/arm/joints"):
+    with pytest.raises(RecordingError, match=r"has no topic 'x': there are .*robomesh/site/arm/joints"):
         next(file.messages(["x"]))
 
 

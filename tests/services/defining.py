@@ -15,6 +15,7 @@ from robomesh.session import SessionSettings, open_session
 from services.console.app import Settings, serve
 from services.console.define.settings import DefineSettings
 from services.site_file.site import Define, Robot, Site
+from tests.services.http_refusals import read_refusal
 
 
 @dataclass
@@ -29,6 +30,11 @@ class Answer:
     def json(self) -> Any:
         """The response's JSON."""
         return json.loads(self.body)
+
+    @property
+    def code(self) -> str:
+        """The code of a refusal."""
+        return read_refusal({"content-type": self.headers["Content-Type"]}, self.body).code
 
     @property
     def text(self) -> str:

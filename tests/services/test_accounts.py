@@ -60,8 +60,8 @@ ROW = 'name = "li"\nrole = "operator"\nhash = "$argon2id$x"\ncreated = 2026-11-2
         ("[account]\n" + ROW, r"\[\[account\]\] tables"),
         ('site = "s"\n', r"\[\[account\]\] tables"),
         (f"[[account]]\n{ROW}[[account]]\n{ROW}", "two accounts are named 'li'"),
-        ("[[account]]\n" + ROW.replace('"li"', '"li.shanghai"'), "'li.shanghai' cannot be used"),
-        ("[[account]]\n" + ROW.replace('"li"', '"' + "x" * 33 + '"'), "32 characters at most"),
+        ("[[account]]\n" + ROW.replace('"li"', '"li.shanghai"'), "account name 'li.shanghai' is invalid"),
+        ("[[account]]\n" + ROW.replace('"li"', '"' + "x" * 33 + '"'), "use at most 32 "),
         ("[[account]]\n" + ROW.replace("operator", "king"), "there are monitor, operator, admin"),
         ("[[account]]\n" + ROW.replace("$argon2id$x", "secret in clear"), "should be argon2id"),
         ("[[account]]\n" + ROW.replace("2026-11-21T08:00:00Z", '"today"'), "a time with its zone"),
@@ -82,16 +82,17 @@ def test_a_change_that_cannot_be_leaves_the_file_as_it_was(tmp_path):
     path = tmp_path / "accounts.toml"
     change_account(path, "add", "chen", role=AccountRole.ADMIN, hashed=hashed())
     before = path.read_text()
-    for action, name, values in (
-        ("add", "chen", {"hashed": hashed()}),
-        ("remove", "nobody", {}),
-        ("crown", "chen", {}),
-        ("remove", "chen", {"by_page": True}),
-        ("disable", "chen", {"by_page": True}),
-        ("role", "chen", {"by_page": True, "role": AccountRole.OPERATOR}),
+    for action, name, values, code in (
+        ("add", "chen", {"hashed": hashed()}, "account.taken"),
+        ("remove", "nobody", {}, "account.no_account"),
+        ("crown", "chen", {}, "account.action"),
+        ("remove", "chen", {"by_page": True}, "account.last_admin"),
+        ("disable", "chen", {"by_page": True}, "account.last_admin"),
+        ("role", "chen", {"by_page": True, "role": AccountRole.OPERATOR}, "account.last_admin"),
     ):
-        with pytest.raises(AccountsError):
+        with pytest.raises(AccountsError) as refused:
             change_account(path, action, name, **values)
+        assert refused.value.reason.code == code
     assert path.read_text() == before
 
 
@@ -112,27 +113,28 @@ def test_a_site_file_names_accounts_and_certificate_beside_itself(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "password",
+    ("password", "code"),
     [
-        "tiny pw",
-        "Password123",
-        "P@ssw0rd2026!",
-        "aaaaaaaaaaaaaa",
-        "abababababab",
-        "1234567890",
-        "qwertyuiop",
-        "98765432101",
-        "5829104736",
-        "shanghai2026",
-        "li!!!!!!!!!!2345",
-        "with\0control",
-        "four words and more " * 20,
+        ("tiny pw", "account.short"),
+        ("Password123", "account.common"),
+        ("P@ssw0rd2026!", "account.common"),
+        ("aaaaaaaaaaaaaa", "account.repeats"),
+        ("abababababab", "account.repeats"),
+        ("1234567890", "account.run"),
+        ("qwertyuiop", "account.run"),
+        ("98765432101", "account.common"),
+        ("5829104736", "account.common"),
+        ("shanghai2026", "account.common"),
+        ("li!!!!!!!!!!2345", "account.common"),
+        ("with\0control", "account.control"),
+        ("four words and more " * 20, "account.long"),
     ],
 )
-def test_passwords_that_are_tried_first_are_refused_without_being_repeated(password):
+def test_passwords_that_are_tried_first_are_refused_without_being_repeated(password, code):
     with pytest.raises(AccountsError) as refused:
         check_password(password, name="li", site="shanghai")
-    assert password not in str(refused.value)
+    assert refused.value.reason.code == code
+    assert password not in f"{refused.value} {refused.value.reason}"
 
 
 @pytest.mark.parametrize(
@@ -329,7 +331,7 @@ def test_accounts_are_kept_from_the_command_line_with_passwords_from_standard_in
         (("add", site, "wang"), "short\n", "too short"),
         (("add", site, "wang"), "shanghai2026\n", "easy to guess"),
         (("add", site, "wang"), "", "no password on standard input"),
-        (("add", site, "Wang Li"), PASSWORD, "cannot be used"),
+        (("add", site, "Wang Li"), PASSWORD, "is invalid"),
         (("add", site, "wang", "--role", "king"), PASSWORD, "there are monitor, operator, admin"),
         (("passwd", site, "wang"), PASSWORD, "no account 'wang'"),
         (("list", tmp_path / "nowhere.toml"), "", "no such file"),

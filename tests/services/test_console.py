@@ -21,6 +21,7 @@ from services.console.errors import PageNotBuiltError
 from services.console.websocket import shared_subscriptions
 from services.errors import ListenError
 from tests.conftest import put_unheard, run
+from tests.services.http_refusals import read_refusal
 
 KEY_FRAME = b"\0\0\0\1\x67\x42\xc0\x1f\0\0\0\1\x65\x88"
 DELTA = b"\0\0\0\1\x41\x9a\x01"
@@ -306,11 +307,17 @@ def test_presence_is_sent_on_connect_and_on_each_change(mesh, page):
 def test_a_page_with_invalid_messages_is_closed_with_a_reason(mesh, page):
     async def main():
         async with console(mesh, page) as (address, _):
-            for message, words in (
-                (schema.FromPage(watch={"key": "robomesh/**"}).SerializeToString(), "robomesh/**"),
+            for message, words, code in (
+                (
+                    schema.FromPage(watch={"key": "robomesh/**"}).SerializeToString(),
+                    "robomesh/**",
+                    "page.cannot_watch",
+                ),
                 # A closing frame counts bytes, not characters.
-                (schema.FromPage(watch={"key": "é" * 150}).SerializeToString(), "ééé"),
-                (b"\xff\xff\xff", ""),
+                (schema.FromPage(watch={"key": "é" * 150}).SerializeToString(), "ééé", "page.cannot_watch"),
+                (schema.FromPage(watch={"key": "x" * 201}).SerializeToString(), "", "request.key_too_long"),
+                (b"\xff\xff\xff", "", "page.not_a_message"),
+                ("text", "binary", "page.text"),
             ):
                 async with browse(address) as browser:
                     await browser.socket.send(message)
@@ -318,6 +325,8 @@ def test_a_page_with_invalid_messages_is_closed_with_a_reason(mesh, page):
                         await browser.until(lambda: False)
                     assert closed.value.rcvd.code == 1008
                     assert words in closed.value.rcvd.reason
+                    told = next(each.answer for each in browser.other if each.HasField("answer"))
+                    assert (told.id, told.ok, told.refusal.code) == (0, False, code)
 
     run(main())
 
@@ -325,12 +334,31 @@ def test_a_page_with_invalid_messages_is_closed_with_a_reason(mesh, page):
 def test_other_origins_and_hosts_are_refused(mesh, page):
     async def main():
         async with console(mesh, page) as (address, _):
-            with pytest.raises(InvalidStatus):
+            with pytest.raises(InvalidStatus, match="403") as refused:
                 async with connect(f"ws://{address}/mesh", origin="http://evil.example", compression=None):
                     pass
-            status, _, body = await get(address, "/", Host="evil.example")
+            answer = refused.value.response
+            assert read_refusal(answer.headers, answer.body).code == "http.origin"
+            assert answer.headers["x-content-type-options"] == "nosniff"
+            status, headers, body = await get(address, "/", Host="evil.example")
             assert status == 421
-            assert b"evil.example" in body
+            reason = read_refusal(headers, body)
+            assert (reason.code, reason.values) == ("http.host", {"host": "evil.example"})
+
+
+def test_unknown_paths_and_methods_are_refused_with_codes(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, _):
+            status, headers, body = await get(address, "/nothing/here")
+            assert (status, read_refusal(headers, body).code) == (404, "http.no_path")
+            own = {"Origin": f"http://{address}", "Content-Length": "0"}
+            status, headers, body = await get(address, "/health", method="POST", **own)
+            reason = read_refusal(headers, body)
+            assert (status, reason.code, reason.values) == (
+                405,
+                "http.method",
+                {"path": "/health", "method": "POST"},
+            )
 
     run(main())
 

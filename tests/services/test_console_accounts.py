@@ -11,6 +11,7 @@ from services.console.accounts.auth_middleware import SIGNED_OUT
 from services.console.accounts.auth_service import change_account
 from services.console.accounts.file import AccountRole
 from tests.conftest import run
+from tests.services.http_refusals import read_refusal
 from tests.services.signing_in import PASSWORD, Client, guarded
 from tests.services.test_console import console, page
 
@@ -38,6 +39,11 @@ def owner(other):
 
 def lease(action=ACTION.ACQUIRE):
     return schema.LeaseRequest(action=action).SerializeToString()
+
+
+def code_of(answer):
+    """Return the code of a refused request."""
+    return answer[2]["refusal"]["code"]
 
 
 async def hello(browser):
@@ -83,11 +89,14 @@ def test_without_a_session_only_the_page_itself_and_the_sign_in_are_open(mesh, p
                 "/account/accounts",
                 "/anything",
             ):
-                status, _, body = await client.get(path)
+                status, headers, body = await client.get(path)
                 assert (status, json.loads(body)["error"]) == (401, "sign_in"), path
-            with pytest.raises(InvalidStatus, match="403"):
+                assert read_refusal(headers, body).code == "account.sign_in", path
+            with pytest.raises(InvalidStatus, match="403") as refused:
                 async with client.browse():
                     pass
+            answer = refused.value.response
+            assert read_refusal(answer.headers, answer.body).code == "account.sign_in"
             assert (await client.post("/define/save"))[0] == 401
 
     run(main())
@@ -138,8 +147,10 @@ def test_a_monitor_sees_everything_and_asks_for_nothing_but_a_stop_in_its_own_na
                 assert (await browser.ask(9, "robomesh/s/r/stop", forged)).ok
                 assert [(what, message.by) for what, _, message in asked] == [("stop", "zhao.s")]
             for path in ("/define/save", "/define/start", "/define/stop"):
-                status, _, told = await client.post(path, {"description": {}, "files": {}, "name": "r"})
-                assert (status, told) == (403, "zhao is a monitor: this needs an operator"), path
+                refused = await client.post(path, {"description": {}, "files": {}, "name": "r"})
+                assert (refused[0], code_of(refused)) == (403, "page.needs_operator"), path
+                what = path.removeprefix("/")
+                assert refused[2]["text"] == f"zhao is a monitor: {what} needs an operator"
 
     run(main())
 
@@ -327,9 +338,10 @@ def test_a_new_password_of_ones_own_keeps_this_session_and_ends_the_others(mesh,
             new = "four arms in a hall"
             refused = await client.post("/account/password", {"password": "a wrong one", "new": new})
             assert (refused[0], refused[2]["error"]) == (401, "wrong")
+            assert code_of(refused) == "account.wrong"
             short = await client.post("/account/password", {"password": PASSWORD, "new": "short"})
-            assert short[0] == 422
-            assert "too short" in short[2]["text"]
+            assert (short[0], short[2]["error"], code_of(short)) == (422, "short", "account.short")
+            assert short[2]["refusal"]["values"] == {"least": "10"}
             done = await client.post("/account/password", {"password": PASSWORD, "new": new})
             assert done[0] == 200, done[2]
             assert (await client.get("/account/sessions"))[0] == 200
@@ -348,8 +360,9 @@ def test_only_an_administrator_changes_accounts(mesh, page, tmp_path):
                 {"action": "role", "name": "li", "role": "admin"},
                 {"action": "remove", "name": "zhao"},
             ):
-                status, _, told = await li.post("/account/accounts", asked)
-                assert (status, told["error"]) == (403, "not_admin")
+                refused = await li.post("/account/accounts", asked)
+                assert (refused[0], refused[2]["error"]) == (403, "not_admin")
+                assert code_of(refused) == "account.not_admin"
             assert (await li.get("/account/accounts"))[0] == 403
             await client.sign_in("chen")
             add = {"action": "add", "name": "wang", "role": "operator", "password": PASSWORD}
@@ -358,8 +371,18 @@ def test_only_an_administrator_changes_accounts(mesh, page, tmp_path):
             assert "wang" in [each["name"] for each in told["accounts"]]
             assert "argon2" not in json.dumps(told)
             assert (await Client(client.address).sign_in("wang"))[0] == 200
-            status, _, told = await client.post("/account/accounts", {"action": "remove", "name": "chen"})
-            assert (status, "last administrator" in told["text"]) == (422, True)
+            for asked, word, code in (
+                ({"action": "remove", "name": "chen"}, "last_admin", "account.last_admin"),
+                ({"action": "remove", "name": "nobody"}, "no_account", "account.no_account"),
+                (add, "taken", "account.taken"),
+                ({**add, "name": "Wang!"}, "name", "account.name"),
+                ({**add, "role": "king"}, "refused", "account.role"),
+                ({"action": "crown", "name": "wang"}, "refused", "account.action"),
+            ):
+                refused = await client.post("/account/accounts", asked)
+                assert (refused[0], refused[2]["error"], code_of(refused)) == (422, word, code)
+            gone = await client.post("/account/sessions", {"end": "none"})
+            assert (gone[0], gone[2]["error"], code_of(gone)) == (404, "no_session", "account.no_session")
             # The list ends another account's session, too.
             _, _, body = await client.get("/account/sessions")
             of_li = next(each["id"] for each in json.loads(body)["sessions"] if each["account"] == "li")

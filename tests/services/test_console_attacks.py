@@ -216,20 +216,21 @@ def test_requests_that_are_too_large_or_of_two_minds_are_refused(mesh, page, tmp
 def test_invalid_json_is_refused_with_a_sentence(mesh, page, tmp_path):
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, _, _):
-            for body, status in (
-                (b"", 400),
-                (b"{", 400),
-                (b"[" * 10_000, 400),
-                (b"[]", 400),
-                (b"\xff\xfe", 400),
-                (b'{"name": 1, "password": "x"}', 422),
-                (b'{"name": "li"}', 422),
-                (b'{"name": "li", "password": {"$ne": ""}}', 422),
-                (b'{"name": "li", "password": "\\ud800"}', 401),
-                (json.dumps({"name": "li" * 4000, "password": "x"}).encode(), 401),
+            for body, status, word, code in (
+                (b"", 400, "not_json", "request.not_json"),
+                (b"{", 400, "not_json", "request.not_json"),
+                (b"[" * 10_000, 400, "not_json", "request.not_json"),
+                (b"[]", 400, "not_json", "request.not_json_object"),
+                (b"\xff\xfe", 400, "not_json", "request.not_json"),
+                (b'{"name": 1, "password": "x"}', 422, "missing", "request.needs_text"),
+                (b'{"name": "li"}', 422, "missing", "request.needs_text"),
+                (b'{"name": "li", "password": {"$ne": ""}}', 422, "missing", "request.needs_text"),
+                (b'{"name": "li", "password": "\\ud800"}', 401, "wrong", "account.wrong"),
+                (json.dumps({"name": "li" * 4000, "password": "x"}).encode(), 401, "wrong", "account.wrong"),
             ):
                 got, _, answer = await client.post("/account/sign-in", body)
-                assert (got, isinstance(answer["text"], str)) == (status, True), body[:40]
+                assert (got, answer["error"], answer["refusal"]["code"]) == (status, word, code), body[:40]
+                assert answer["text"] == answer["refusal"]["text"]
 
     run(main())
 

@@ -7,6 +7,7 @@ from robomesh.errors import BusyError, NoAnswerError, QuotaError, RefusedError
 from services.console.http import meshes
 from services.console.http.meshes import MeshCache, mesh_response
 from tests.conftest import run
+from tests.services.http_refusals import read_refusal
 
 
 class Owner:
@@ -35,3 +36,5 @@ def test_a_busy_service_is_retried_and_a_missing_mesh_is_not(monkeypatch, error,
     answer = run(mesh_response(request, Owner(error), MeshCache()))
     assert (answer.status_code, answer.headers.get("retry-after")) == (status, again)
     assert answer.body.decode() == str(error)
+    code = "request.no_answer" if status == 504 else "other"
+    assert read_refusal(answer.headers, answer.body).code == code

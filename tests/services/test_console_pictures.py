@@ -21,6 +21,7 @@ from services.console.http.streaming import Streamed
 from services.console.websocket.framing import SampleBatch
 from services.console.websocket.send_queues import NewestQueue
 from tests.conftest import run
+from tests.services.http_refusals import read_refusal
 from tests.services.test_console import console, get, page  # noqa: F401
 
 WIDTH, HEIGHT = 160, 90
@@ -221,27 +222,28 @@ def test_a_still_is_the_newest_picture_as_jpeg_or_png(mesh, page):  # noqa: F811
 
 
 @pytest.mark.parametrize(
-    ("path", "status", "words"),
+    ("path", "status", "code", "words"),
     [
-        ("image/s/r/back.jpg", 404, "no view 'back'; there are front"),
-        ("video/s/r/back.mjpeg", 404, "no view 'back'; there are front"),
-        ("video/s/r/back.mp4", 404, "no view 'back'; there are front"),
-        ("image/s/r/front.jpg?width=2000&height=1000", 400, "up to 1920 are possible"),
-        ("image/s/r/front.jpg?width=wide", 400, "width='wide' is not a number of pixels"),
-        ("image/s/r/front.jpg?width=1920", 503, "no capacity: 1 requested views exist"),
-        ("image/s/r/front.jpg?width=640", 429, "li has had its views"),
-        ("video/s/r/front.mp4?fps=fast", 400, "fps='fast' is not a number"),
-        ("video/s/r/front.mp4?quality=5", 400, "width, height and fps"),
-        ("image/S!/r/front.jpg", 404, "S!"),
+        ("image/s/r/back.jpg", 404, "view.unknown", "no view 'back'; there are front"),
+        ("video/s/r/back.mjpeg", 404, "view.unknown", "no view 'back'; there are front"),
+        ("video/s/r/back.mp4", 404, "view.unknown", "no view 'back'; there are front"),
+        ("image/s/r/front.jpg?width=2000&height=1000", 400, "view.invalid", "up to 1920 are possible"),
+        ("image/s/r/front.jpg?width=wide", 400, "view.not_pixels", "width='wide' is not a number of pixels"),
+        ("image/s/r/front.jpg?width=1920", 503, "view.no_room", "no capacity: 1 requested views exist"),
+        ("image/s/r/front.jpg?width=640", 429, "other", "li has had its views"),
+        ("video/s/r/front.mp4?fps=fast", 400, "view.not_a_number", "fps='fast' is not a number"),
+        ("video/s/r/front.mp4?quality=5", 400, "view.parameter", "width, height and fps"),
+        ("image/S!/r/front.jpg", 404, "request.invalid", "S!"),
     ],
 )
-def test_a_missing_picture_is_refused_with_a_sentence(mesh, page, path, status, words):  # noqa: F811
+def test_a_missing_picture_is_refused_with_code_and_sentence(mesh, page, path, status, code, words):  # noqa: F811
     async def main():
         async with rendered(mesh, page) as (address, *_):
             answered, headers, body = await get(address, f"/{path}")
             assert answered == status
             assert headers.get("retry-after") == ("31" if status == 429 else None)
             assert words in body.decode()
+            assert read_refusal(headers, body).code == code
 
     run(main())
 
@@ -251,8 +253,10 @@ def test_without_a_renderer_the_answer_says_so(mesh, page, monkeypatch):  # noqa
 
     async def main():
         async with console(mesh, page) as (address, _):
-            status, _, body = await get(address, "/image/s/r/front.jpg")
+            status, headers, body = await get(address, "/image/s/r/front.jpg")
             assert status == 503
+            reason = read_refusal(headers, body)
+            assert (reason.code, reason.values["robot"]) == ("view.no_renderer", "s/r")
             assert "no renderer answers for s/r" in body.decode()
 
     run(main())
@@ -265,9 +269,10 @@ def test_more_streams_than_there_is_room_for_are_refused_and_room_comes_back(mes
     async def main():
         async with rendered(mesh, page) as (address, images, *_):
             _, _, (_, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=100)
-            status, _, body = await get(address, "/video/s/r/front.mjpeg")
+            status, headers, body = await get(address, "/video/s/r/front.mjpeg")
             assert status == 503
-            assert "close one first" in body.decode()
+            whose = "_of" if most == "_MOST_OF_ONE" else ""
+            assert read_refusal(headers, body).code == f"view.too_many_streams{whose}"
             writer.close()
             await unwatched(images)
             head, _, (_, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=100)

@@ -19,7 +19,8 @@ def test_too_many_attempts_wait_for_a_stated_time(mesh, page, tmp_path):
             told = [await client.sign_in("li", "not the password") for _ in range(4)]
             assert [status for status, _, _ in told] == [401, 401, 401, 429]
             _, headers, answer = told[-1]
-            assert answer["error"] == "wait"
+            assert (answer["error"], answer["refusal"]["code"]) == ("wait", "account.wait")
+            assert answer["refusal"]["values"] == {"seconds": str(answer["seconds"])}
             assert int(headers["retry-after"]) == answer["seconds"] >= 1
             # The right password has to wait, too: otherwise the wait would reveal it.
             assert (await client.sign_in("li"))[0] == 429
@@ -49,7 +50,9 @@ def test_an_unverified_attempt_is_not_a_failure(mesh, page, tmp_path):
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, _, _):
             with patch.object(sign_in_queue, "MOST_OF_NAME", 0):
-                assert {(await client.sign_in("li"))[0] for _ in range(12)} == {503}
+                refused = [await client.sign_in("li") for _ in range(12)]
+                assert {status for status, _, _ in refused} == {503}
+                assert {each["refusal"]["code"] for _, _, each in refused} == {"account.busy"}
             assert (await client.sign_in("li"))[0] == 200
 
     run(main())

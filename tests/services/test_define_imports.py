@@ -72,7 +72,7 @@ def test_a_step_file_is_converted_in_the_confined_worker(page):
 def test_a_broken_step_file_is_reported(page):
     answer = converted(page, "part.step", b"ISO-10303-21;\nHEADER;\nnonsense")
     assert answer.status == 422
-    assert answer.text.startswith("part.step: cannot be read as STEP")
+    assert answer.json["text"].startswith("part.step: cannot be read as STEP")
 
 
 @pytest.mark.slow
@@ -294,22 +294,26 @@ def test_a_downloaded_zip_opens_as_the_draft_that_it_was(page):
 
 
 @pytest.mark.parametrize(
-    ("content", "words"),
+    ("content", "code", "words"),
     [
-        (lambda: b"", "is not a readable zip archive"),
-        (lambda: b"PK\x03\x04 and no more", "is not a readable zip archive"),
-        (lambda: archive({"../up.wrl": b"x"}), "'../up.wrl': must be a path below"),
-        (lambda: archive({"/etc/x": b"x"}), "'/etc/x': must be a path below"),
-        (lambda: archive({f"{number}.wrl": b"" for number in range(2001)}), "2001 files"),
-        (lambda: archive({"bomb.wrl": bytes(501_000_000)}), "501 MB"),
+        (lambda: b"", "define.not_zip", "is not a readable zip archive"),
+        (lambda: b"PK\x03\x04 and no more", "define.not_zip", "is not a readable zip archive"),
+        (lambda: archive({"../up.wrl": b"x"}), "define.path", "'../up.wrl' is not the path"),
+        (lambda: archive({"/etc/x": b"x"}), "define.path", "'/etc/x' is not the path"),
+        (
+            lambda: archive({f"{number}.wrl": b"" for number in range(2001)}),
+            "define.zip_too_large",
+            "2001 files",
+        ),
+        (lambda: archive({"bomb.wrl": bytes(501_000_000)}), "define.zip_too_large", "501 MB"),
     ],
     ids=["empty", "cut", "up", "root", "many", "bomb"],
 )
 @pytest.mark.slow
-def test_a_wrong_zip_is_refused_in_words(page, content, words):
+def test_a_wrong_zip_is_refused_with_code_and_sentence(page, content, code, words):
     answer = unzipped(page, content())
-    assert answer.status == 422
-    assert words in answer.text
+    assert (answer.status, answer.code) == (422, code)
+    assert words in answer.json["text"]
 
 
 @pytest.mark.slow

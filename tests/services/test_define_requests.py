@@ -7,6 +7,7 @@ import shutil
 import socket
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
+from urllib.parse import unquote
 
 import pytest
 import zenoh
@@ -19,9 +20,9 @@ from robots.save_description import read_robot, write_folder
 from services.command_line.site import launch
 from services.command_line.site.services import Options
 from services.console.define import routes, store
-from services.console.define.errors import RefusedRequest
 from services.console.define.routes import Define
 from services.console.define.settings import DefineSettings
+from services.console.errors import RefusedRequest
 from services.site_file.site import Define as DefinePart
 from services.site_file.site import Site
 from tests.conftest import free_port, run
@@ -53,8 +54,7 @@ def page(tmp_path_factory):
 @pytest.mark.parametrize("origin", ["", "null", "http://evil.example", "http://127.0.0.1:1"])
 def test_a_request_from_another_page_is_refused(page, path, origin):
     answer = page.post(f"/{path}", {}, Origin=origin)
-    assert answer.status == 403
-    assert "is not this page's" in answer.text
+    assert (answer.status, answer.code) == (403, "http.origin")
 
 
 def test_a_foreign_host_name_is_refused(page):
@@ -74,7 +74,9 @@ def test_the_librarys_robots_can_be_opened(page):
 
 @pytest.mark.parametrize("name", ["none", "..", "%2e%2e", "..%2fpt500", ".git", "*"])
 def test_a_missing_robot_is_reported(page, name):
-    assert page.get(f"/robots/{name}").status == 404
+    answer = page.get(f"/robots/{name}")
+    code = "http.no_path" if "/" in unquote(name) else "define.no_robot"
+    assert (answer.status, answer.code) == (404, code)
 
 
 def test_a_file_is_kept_by_its_content(page):
@@ -85,9 +87,12 @@ def test_a_file_is_kept_by_its_content(page):
 @pytest.mark.parametrize("name", ["", "/etc/passwd", "../a.wrl", "a/../../b", "a%00b", "a%5cb"])
 @pytest.mark.slow
 def test_a_file_whose_name_leads_elsewhere_is_refused(page, name):
-    assert page.post(f"/files?name={name}", b"x").status == 422
+    answer = page.post(f"/files?name={name}", b"x")
+    assert (answer.status, answer.code) == (422, "define.path")
     sha = page.upload(b"x")
-    assert page.post("/mesh", {"file": name, "files": {name: sha}}).status == 422
+    name = unquote(name)
+    answer = page.post("/mesh", {"file": name, "files": {name: sha}})
+    assert (answer.status, answer.code) == (422, "define.path")
 
 
 @pytest.mark.slow
@@ -109,8 +114,8 @@ def test_an_inlined_file_is_found_beside_the_other(page):
 @pytest.mark.slow
 def test_a_broken_mesh_is_reported_without_the_servers_folders(page):
     broken = page.post("/mesh", {"file": "a.wrl", "files": {"a.wrl": page.upload(TRIANGLE[:-9])}})
-    assert broken.status == 422
-    assert broken.text.startswith("a.wrl")
+    assert (broken.status, broken.code) == (422, "define.unreadable")
+    assert broken.json["text"].startswith("a.wrl")
     assert str(page.folder) not in broken.text
 
 
@@ -161,28 +166,32 @@ def test_problems_have_places_and_the_links_are_still_shown(page):
 @pytest.mark.slow
 def test_joints_of_another_robot_are_refused(page, joints):
     answer = page.post("/check", page.draft() | {"joints": joints})
-    assert answer.status == 422
-    assert "5 in total" in answer.text
+    assert (answer.status, answer.code) == (422, "define.joints")
+    assert answer.json["refusal"]["values"] == {"count": "5"}
 
 
 @pytest.mark.parametrize(
-    ("body", "status", "words"),
+    ("body", "status", "code", "words"),
     [
-        (b"{", 400, "not JSON"),
-        (b"[" * 100_000, 400, "not JSON"),
-        (b"[]", 400, "must be a JSON object"),
-        (b'{"description": 5}', 422, "description"),
-        (b'{"description": {}, "files": []}', 422, "files"),
-        (b'{"description": {}, "files": {"a.wrl": "../../x"}}', 410, "no longer stored"),
-        (b'{"description": {}, "files": {"a.wrl": "' + b"0" * 64 + b'"}}', 410, "a.wrl: no longer stored"),
-        (b" " * 4_000_001, 413, "larger than 4 MB"),
+        (b"{", 400, "request.not_json", "not JSON"),
+        (b"[" * 100_000, 400, "request.not_json", "not JSON"),
+        (b"[]", 400, "request.not_json_object", "is not a JSON object"),
+        (b'{"description": 5}', 422, "request.needs_object", "description"),
+        (b'{"description": {}, "files": []}', 422, "define.files", "files"),
+        (b'{"description": {}, "files": {"a.wrl": "../../x"}}', 410, "define.file_gone", "no longer stored"),
+        (
+            b'{"description": {}, "files": {"a.wrl": "' + b"0" * 64 + b'"}}',
+            410,
+            "define.file_gone",
+            "a.wrl: no longer stored",
+        ),
+        (b" " * 4_000_001, 413, "request.too_large", "larger than 4000000 bytes"),
     ],
 )
-def test_a_wrong_request_is_refused_in_words(page, body, status, words):
+def test_a_wrong_request_is_refused_with_code_and_sentence(page, body, status, code, words):
     answer = page.post("/check", body)
-    assert answer.status == status
-    assert words in answer.text
-    assert answer.headers["Content-Type"].startswith("text/plain")
+    assert (answer.status, answer.code) == (status, code)
+    assert words in answer.json["text"]
 
 
 @pytest.mark.slow
@@ -191,7 +200,7 @@ def test_a_draft_is_saved_replaced_on_request_and_opened(page):
     saved = page.post("/save", draft).json
     assert (saved["name"], saved["folder"]) == ("saved", f"{page.folder}/robots/saved")
     again = page.post("/save", draft)
-    assert again.status == 409
+    assert (again.status, again.code) == (409, "define.exists")
     assert (again.json["exists"], again.json["changed"]) == (True, False)
     draft["description"]["title"] = "Mine"
     assert page.post("/save", draft | {"overwrite": True}).status == 200
@@ -216,6 +225,7 @@ def test_saving_over_another_clients_change_needs_confirmation(page):
     other["description"]["title"] = "The other's"
     asked = page.post("/save", other)
     assert (asked.status, asked.json["exists"], asked.json["changed"]) == (409, True, True)
+    assert asked.code == "define.changed"
     assert load(page.folder / "robots" / "shared").title == "One's"
     # The client that saved last needs no confirmation.
     one["description"]["title"] = "One's again"
@@ -303,7 +313,8 @@ def test_a_draft_of_one_file_under_many_names_is_not_grown(page):
     files = {f"{number}.bin": sha for number in range(251)}
     answer = page.post("/check", {"description": {}, "files": files})
     assert answer.status == 413
-    assert answer.text == "251 files of 502 MB: 500 MB at most"
+    assert answer.json["text"] == "251 files of 502 MB: at most 500 MB are possible"
+    assert answer.code == "define.files_too_large"
 
 
 @pytest.mark.slow
@@ -313,6 +324,7 @@ def test_a_wrong_draft_is_not_saved_and_its_problems_come_with_their_places(page
     answer = page.post("/save", draft)
     assert answer.status == 422
     assert answer.json["problems"][0]["path"] == ["joint", 0, "home"]
+    assert answer.code == "define.problems"
     assert not (page.folder / "robots" / "wrong").exists()
 
 
@@ -336,7 +348,7 @@ def test_half_a_character_is_refused_in_words(page):
     draft = page.draft()
     draft["description"]["title"] = "\ud800"
     assert page.post("/save", draft).status == 422
-    assert "unpaired surrogate" in page.post("/zip", draft).text
+    assert page.post("/zip", draft).code == "request.half_character"
 
 
 @pytest.mark.slow
@@ -345,19 +357,19 @@ def test_starting_writes_the_file_that_the_supervisor_follows(page):
     assert page.post("/start", {"name": "runner"}).json == {"site": "s", "robot": "runner"}
     started = page.folder / "robots" / "started.toml"
     assert 'model = "runner/robot.toml"' in started.read_text()
-    assert page.post("/start", {"name": "runner"}).status == 409
+    assert page.post("/start", {"name": "runner"}).code == "define.runs"
     assert {row["name"] for row in page.get("/robots").json["robots"] if row["running"]} == {"runner"}
     assert page.post("/stop", {"name": "runner"}).status == 200
     assert "runner" not in started.read_text()
-    assert "was not started" in page.post("/stop", {"name": "runner"}).text
+    assert page.post("/stop", {"name": "runner"}).code == "define.not_started"
+    assert page.post("/stop", {"name": "arm"}).code == "define.in_site_file"
 
 
 @pytest.mark.slow
 def test_a_robot_of_the_sites_own_name_is_not_started(page):
     page.post("/save", page.draft(name="arm"))
     answer = page.post("/start", {"name": "arm"})
-    assert answer.status == 409
-    assert "has a robot arm already" in answer.text
+    assert (answer.status, answer.code) == (409, "define.site_has")
 
 
 @pytest.mark.slow
@@ -366,7 +378,7 @@ def test_a_robot_whose_mesh_cannot_be_read_is_not_started(page):
     (page.folder / "robots" / "torn" / "meshes" / "base.wrl").write_bytes(TRIANGLE[:-9])
     answer = page.post("/start", {"name": "torn"})
     assert answer.status == 422
-    assert answer.text.startswith("meshes/base.wrl")
+    assert answer.json["text"].startswith("meshes/base.wrl")
 
 
 def test_without_a_supervisor_the_refusal_has_the_lines_for_the_site_file(mesh, tmp_path):
@@ -374,8 +386,9 @@ def test_without_a_supervisor_the_refusal_has_the_lines_for_the_site_file(mesh, 
         assert page.get("/robots").json["can_start"] is False
         page.post("/save", page.draft(name="later"))
         answer = page.post("/start", {"name": "later"})
-    assert answer.status == 409
-    assert f'[[robot]]\nname = "later"\nmodel = "{tmp_path}/robots/later/robot.toml"' in answer.text
+    assert (answer.status, answer.code) == (409, "define.no_supervisor")
+    wanted = f'[[robot]]\nname = "later"\nmodel = "{tmp_path}/robots/later/robot.toml"'
+    assert wanted in answer.json["text"]
 
 
 def test_a_running_robot_of_the_pages_reads_its_own_folder_only(tmp_path, monkeypatch):

@@ -26,6 +26,7 @@ from services.recorder.serving import RecordingServer
 from tests.conftest import run
 from tests.recordings import START_NS, Written, joints, write_recording
 from tests.refusals import refused
+from tests.services.http_refusals import read_refusal
 
 BASE = "robomesh/site/-/recordings"
 JOINTS = "robomesh/site/arm/joints"
@@ -83,7 +84,7 @@ def test_list_info_and_range_over_the_mesh_with_their_refusals(mesh, folder):
             messages = await session.ask(f"{BASE}/range/li", request)
             with refused(codes.OVER_QUOTA, quota="recordings_mib_a_minute", most="0.0001"):
                 await session.ask(f"{BASE}/range/li", request)
-            with pytest.raises(RefusedError, match=r"no recording 'gone\.mcap' here"):
+            with refused(codes.RECORDING_UNKNOWN, name="gone.mcap"):
                 await session.ask(f"{BASE}/info", schema.RecordingQuery(file="gone.mcap"))
             request.start.FromNanoseconds(START_NS + 60_000_000_000)
             with pytest.raises(RefusedError, match=r"nothing from .* it goes from 2023-11-14"):
@@ -152,7 +153,7 @@ class _Direct:
             name = key.split("/recordings/")[1].removesuffix("/li")
             return getattr(self._answers, name)(request)
         except RecordingError as error:
-            raise RefusedError(str(error)) from None
+            raise RefusedError(error.reason) from None
 
 
 @dataclass
@@ -235,13 +236,20 @@ def test_a_file_can_be_fetched_whole_in_ranges_and_resumed(http, folder):
     assert http.get(url, headers={"If-None-Match": tag}).status_code == 304
     beyond = http.get(url, headers={"Range": "bytes=99999999-"})
     assert (beyond.status_code, beyond.headers["content-range"]) == (416, f"bytes */{len(whole)}")
+    reason = read_refusal(beyond.headers, beyond.content)
+    assert (reason.code, reason.values["bytes"]) == ("recording.range", str(len(whole)))
 
 
 def test_a_missing_file_or_attachment_is_404_with_a_sentence(http):
     gone = http.get("/recordings/site/gone.mcap")
     assert (gone.status_code, "no recording 'gone.mcap' here" in gone.text) == (404, True)
+    assert read_refusal(gone.headers, gone.content).code == "recording.unknown"
+    head = http.head("/recordings/site/gone.mcap")
+    assert (head.status_code, head.headers["content-type"]) == (404, gone.headers["content-type"])
     none = http.get("/recordings/site/trial.mcap/thumbnail.jpg")
     assert (none.status_code, "no attachment 'thumbnail.jpg'" in none.text) == (404, True)
+    reason = read_refusal(none.headers, none.content)
+    assert (reason.code, reason.values["file"]) == ("recording.no_attachment", "trial.mcap")
     assert http.get("/recordings/site/..%2Ftrial.mcap").status_code == 404
 
 
@@ -260,6 +268,8 @@ def test_http_errors_have_a_status_and_a_retry_after(folder, error, status, agai
     app = Starlette(routes=Recordings(SimpleNamespace(ask=refuse), lambda _: "li").routes())
     answer = _Http(app).get("/recordings/site/trial.mcap")
     assert (answer.status_code, answer.headers.get("retry-after"), answer.text) == (status, again, str(error))
+    code = "request.no_answer" if status == 504 else "other"
+    assert read_refusal(answer.headers, answer.content).code == code
 
 
 def test_values_as_csv_equal_the_files_numbers(http, folder, monkeypatch):

@@ -6,11 +6,14 @@ A request is cancelled when its session ends, however long it would take.
 import asyncio
 import time
 
-from starlette.responses import JSONResponse, PlainTextResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from robomesh import reason_codes as codes
 from services.console.accounts.rights import PASSWORD_AGAIN, lacks_right
+from services.console.accounts.routes import refused
 from services.console.accounts.sessions import Sessions, SignedIn
+from services.console.errors import RefusedRequest
+from services.console.http.error_responses import as_json
 
 # The page's files are public; its data is not.
 _OPEN = frozenset({"/", "/index.html", "/icon.svg", "/health", "/account/me", "/account/sign-in"})
@@ -45,16 +48,13 @@ class AuthMiddleware:
         found = self._find(scope)
         scope["signed_in"] = found
         if found is None and not is_open(scope["path"]):
-            if scope["type"] == "websocket":
-                await send({"type": "websocket.close", "code": SIGNED_OUT})
-            else:
-                refusal = {"error": "sign_in", "text": "sign in first"}
-                headers = {"Cache-Control": "no-store"}
-                await JSONResponse(refusal, status_code=401, headers=headers)(scope, receive, send)
+            status = 401 if scope["type"] == "http" else 403
+            await as_json(refused(status, codes.ACCOUNT_SIGN_IN()))(scope, receive, send)
         elif found is not None and scope["path"] in _NEEDS_OPERATOR and not found.may_command:
             account = found.account
-            reason = PASSWORD_AGAIN if account.may_command else lacks_right(account, "this")
-            await PlainTextResponse(reason.text, status_code=403)(scope, receive, send)
+            what = scope["path"].removeprefix("/")
+            reason = PASSWORD_AGAIN if account.may_command else lacks_right(account, what)
+            await as_json(RefusedRequest(403, reason))(scope, receive, send)
         elif found is None or scope["type"] == "websocket" or scope["path"].startswith("/account/"):
             await self._app(scope, receive, send)  # these end by themselves, with a reason
         else:

@@ -3,12 +3,14 @@
 import asyncio
 import contextlib
 import logging
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
+from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import Event
 from services.console.accounts.file import (
     Account,
@@ -22,29 +24,17 @@ from services.console.accounts.file import (
 from services.console.accounts.passwords import Verifier, check_password
 from services.console.accounts.sessions import Sessions, SignedIn
 from services.console.accounts.sign_in_attempts import SignInLimits, network
-from services.console.errors import AccountsError, SignInBusyError
-from services.errors import ServiceError
+from services.console.errors import AccountsError, SignInBusyError, SignInError
 
 log = logging.getLogger(__name__)
 
 _CHECK_EVERY_S = 0.5
 _MOST_OF_NAME = 64
+_ACTIONS = ("add", "role", "password", "disable", "enable", "remove")
 # Rate-limit events of refused sign-ins; the next event has the number of those left out.
 _REFUSAL_EVENT_EVERY_S = 1.0
 
 PublishEvent = Callable[[Event.Severity, str, str, Mapping[str, str]], None]
-
-
-class SignInError(ServiceError):
-    """A refused sign-in.
-
-    Attributes:
-        wait_s: Time until the next allowed attempt [s]; 0: the name or the password was wrong.
-    """
-
-    def __init__(self, text: str, wait_s: float = 0.0) -> None:
-        super().__init__(text)
-        self.wait_s = wait_s
 
 
 @dataclass
@@ -124,7 +114,6 @@ class AuthService:
 
         Raises:
             SignInError: If the sign-in is refused, with the time to wait.
-            SignInBusyError: If the queue is full.
         """
         account = await self._verify(name, password, address)
         if before is not None:
@@ -141,7 +130,7 @@ class AuthService:
         """Verify the password again, to restore the right to command; return a new token.
 
         Raises:
-            SignInError, SignInBusyError: Like `sign_in`.
+            SignInError: Like `sign_in`.
         """
         await self._verify(user.account.name, password, address, session=user.id)
         text = f"{user.account.name} entered the password again at {address}"
@@ -160,7 +149,7 @@ class AuthService:
         wait_s = self._limits.wait_s(name, address, now, known=known, session=session)
         if wait_s > 0:
             self._publish_refusal(name if known else "", address, f"has to wait {wait_s:.0f} s")
-            raise SignInError("too many tries", wait_s)
+            raise SignInError(codes.ACCOUNT_WAIT(seconds=math.ceil(wait_s)), wait_s)
         self._limits.begin(name, address, now, known=known, session=session)
         hashed = account.hash if account is not None and not account.disabled else None
         try:
@@ -171,7 +160,7 @@ class AuthService:
         # The file may have changed during verification.
         if not right or account is None or self.sessions.accounts.get(name) != account:
             self._publish_refusal(name if known else "", address, "name or password wrong")
-            raise SignInError("the name or the password is wrong")
+            raise SignInError(codes.ACCOUNT_WRONG())
         self._limits.succeed(name, address, session=session)
         return account
 
@@ -187,7 +176,7 @@ class AuthService:
         """Change a user's own password; every other session of the account ends.
 
         Raises:
-            SignInError, SignInBusyError: If the old password is not accepted.
+            SignInError: If the old password is not accepted.
             AccountsError: If the new one is unacceptable, or cannot be written.
         """
         await self._verify(user.account.name, old, address, session=user.id)
@@ -258,13 +247,13 @@ def change_account(
         account = accounts.get(name)
         if action == "add":
             if account is not None:
-                raise AccountsError(f"there is an account {name} already", "taken")
+                raise AccountsError(codes.ACCOUNT_TAKEN(name=name))
             role = role or AccountRole.MONITOR
             accounts[name] = Account(name=name, role=role, hash=hashed, created=_now())
             return
         if account is None:
             there_are = ", ".join(accounts) or "none"
-            raise AccountsError(f"there is no account {name!r}: there are {there_are}", "no_account")
+            raise AccountsError(codes.ACCOUNT_NONE(name=name, accounts=there_are))
         changes: dict[str, object]
         match action:
             case "role" if role is not None:
@@ -277,15 +266,12 @@ def change_account(
                 changes = {}
                 del accounts[name]
             case _:
-                raise AccountsError(
-                    f"action {action!r}: there are add, role, password, disable, enable, remove"
-                )
+                raise AccountsError(codes.ACCOUNT_ACTION(action=action, actions=", ".join(_ACTIONS)))
         if name in accounts:
             accounts[name] = Account(**{**vars(account), **changes})
         admins = [each for each in accounts.values() if each.role is AccountRole.ADMIN and not each.disabled]
         if by_page and not admins:
-            text = f"{name} is the last administrator who can sign in: make another one first"
-            raise AccountsError(text, "last_admin")
+            raise AccountsError(codes.ACCOUNT_LAST_ADMIN(name=name))
 
 
 def _now() -> datetime:

@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from robomesh import keys
+from robomesh import reason_codes as codes
 from robomesh.atomic_write import write_atomically
 from robomesh.errors import KeyNameError
 from robots.bounded_toml import read_toml
@@ -71,12 +72,13 @@ def check_account_name(name: str) -> str:
     Raises:
         AccountsError: If it is not.
     """
+    reason = codes.ACCOUNT_NAME(name=name, most=_LONGEST_NAME)
     try:
         keys.check_name(name, "account")
-    except KeyNameError as error:
-        raise AccountsError(str(error), "name") from None
+    except KeyNameError:
+        raise AccountsError(reason) from None
     if len(name) > _LONGEST_NAME:
-        raise AccountsError(f"account {name!r}: {_LONGEST_NAME} characters at most", "name")
+        raise AccountsError(reason)
     return name
 
 
@@ -89,8 +91,8 @@ def role_of(text: str) -> AccountRole:
     try:
         return AccountRole(text)
     except ValueError:
-        there_are = ", ".join(role.value for role in AccountRole)
-        raise AccountsError(f"role {text!r}: there are {there_are}") from None
+        roles = ", ".join(role.value for role in AccountRole)
+        raise AccountsError(codes.ACCOUNT_ROLE(role=text, roles=roles)) from None
 
 
 def read_accounts(path: Path) -> dict[str, Account]:

@@ -18,8 +18,9 @@ from typing import Any, TypeVar
 from argon2 import PasswordHasher
 from argon2.exceptions import InvalidHashError, VerificationError
 
-from services.console.accounts.sign_in_queue import SignInQueue, busy
-from services.console.errors import AccountsError
+from robomesh import reason_codes as codes
+from services.console.accounts.sign_in_queue import SignInQueue
+from services.console.errors import AccountsError, SignInBusyError
 
 Result = TypeVar("Result")
 
@@ -47,25 +48,20 @@ def check_password(password: str, *, name: str, site: str = "") -> str:
         AccountsError: With the reason and advice; never with the password.
     """
     if len(password) < SHORTEST:
-        raise AccountsError(
-            f"the password is too short: {SHORTEST} characters at least, a few words are good", "short"
-        )
+        raise AccountsError(codes.PASSWORD_SHORT(least=SHORTEST))
     if len(password.encode(errors="surrogatepass")) > _LONGEST:
-        raise AccountsError(f"the password is too long: {_LONGEST} bytes at most", "long")
+        raise AccountsError(codes.PASSWORD_LONG(most=_LONGEST))
     if any(ord(each) < 32 or 0xD800 <= ord(each) < 0xE000 for each in password):
-        raise AccountsError("the password contains a control character: leave it out", "control")
+        raise AccountsError(codes.PASSWORD_CONTROL())
     folded = password.casefold()
     if len(set(folded)) < _FEWEST_DIFFERENT:
-        raise AccountsError("the password repeats a few characters: a few words are good", "repeats")
+        raise AccountsError(codes.PASSWORD_REPEATS())
     if any(folded in run or folded in run[::-1] for run in _RUNS):
-        raise AccountsError("the password is a run of neighbours: a few words are good", "run")
+        raise AccountsError(codes.PASSWORD_RUN())
     ending = re.sub(r"[\W\d_]+$", "", folded)
     cores = {_core(folded), _core(folded.translate(_DISGUISED)), _core(ending.translate(_DISGUISED))}
     if cores & (_COMMON | {name.casefold(), site.casefold()}) or not _core(folded):
-        raise AccountsError(
-            "the password is easy to guess: a common word or a name, and digits; a few words are good",
-            "common",
-        )
+        raise AccountsError(codes.PASSWORD_COMMON())
     return password
 
 
@@ -134,7 +130,7 @@ class Verifier:
         job = _Job(work, asyncio.get_running_loop().create_future())
         displaced = self._queue.add(job, address=address, name=name)
         if displaced is not None and not displaced.done.done():
-            displaced.done.set_exception(busy())
+            displaced.done.set_exception(SignInBusyError())
         if self._serving is None or self._serving.done():
             self._serving = asyncio.create_task(self._serve())
         result: Result = await job.done

@@ -1,36 +1,44 @@
 """`/account/*`: sign-in and sign-out, own sessions and password, and for administrators the accounts.
 
-JSON in both directions. An error has a word for the page (`error`) and a sentence (`text`).
+JSON in both directions. A refusal also has a word (`error`), for programs that do not read its code.
 """
 
 import json
 import math
 import time
-from collections.abc import Mapping
 from typing import Any
 
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
-from services.console.accounts.auth_service import AuthService, SignInError
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+from services.console.accounts.auth_service import AuthService
 from services.console.accounts.file import AccountRole, role_of
 from services.console.accounts.rights import operator_name
 from services.console.accounts.sessions import SignedIn
-from services.console.errors import AccountsError, SignInBusyError
-from services.console.http.error_responses import Handler, with_error_responses
+from services.console.errors import AccountsError, RefusedRequest, SignInBusyError, SignInError
+from services.console.http.error_responses import Handler, as_json, with_error_responses
 
 Json = dict[str, Any]
 
 MOST_BODY = 16 * 1024
+# The words of codes whose last part is not the word.
+_WORDS = {
+    codes.PASSWORD_AGAIN.name: "resting",
+    codes.NOT_JSON_OBJECT.name: "not_json",
+    codes.NEEDS_TEXT.name: "missing",
+    codes.ACCOUNT_ROLE.name: "refused",
+    codes.ACCOUNT_ACTION.name: "refused",
+    codes.ACCOUNT_FAILED.name: "refused",
+}
 
 
-class RefusedError(Exception):
-    """A refused request of `/account`: HTTP status, a word for the page, a sentence."""
-
-    def __init__(self, status: int, error: str, text: str, **more: object) -> None:
-        super().__init__(text)
-        self.status, self.answer = status, {"error": error, "text": text, **more}
+def refused(status: int, reason: Reason, *, again_s: float | None = None, **more: object) -> RefusedRequest:
+    """Return a refusal of `/account`, with the word of its code."""
+    word = _WORDS.get(reason.code, reason.code.rpartition(".")[2])
+    return RefusedRequest(status, reason, again_s=again_s, error=word, **more)
 
 
 class AccountRoutes:
@@ -170,7 +178,7 @@ class AccountRoutes:
                     each, "signed_out" if each.account.name == user.account.name else "ended"
                 )
                 return JSONResponse({"ended": each.id})
-        raise RefusedError(404, "no_session", f"there is no session {asked['end'][:20]!r} any more")
+        raise refused(404, codes.ACCOUNT_NO_SESSION(session=asked["end"][:20]))
 
     @staticmethod
     def _may_see(user: SignedIn, other: SignedIn) -> bool:
@@ -206,7 +214,7 @@ class AccountRoutes:
         asked = await _json(request, "action", "name")
         by = _admin(request)
         if by.resting:
-            raise RefusedError(403, "resting", "give your password again first")
+            raise refused(403, codes.PASSWORD_AGAIN())
         role = role_of(asked["role"]) if isinstance(asked.get("role"), str) else None
         password = asked.get("password")
         password = password if isinstance(password, str) else ""
@@ -224,14 +232,14 @@ def _signed_in(request: Request) -> SignedIn:
     user = request.scope.get("signed_in")
     # The middleware has checked this, but the session may have ended while the body arrived.
     if not isinstance(user, SignedIn) or user.ended:
-        raise RefusedError(401, "sign_in", "sign in first")
+        raise refused(401, codes.ACCOUNT_SIGN_IN())
     return user
 
 
 def _admin(request: Request) -> SignedIn:
     user = _signed_in(request)
     if user.account.role is not AccountRole.ADMIN:
-        raise RefusedError(403, "not_admin", f"{user.account.name} is not an administrator")
+        raise refused(403, codes.ACCOUNT_NOT_ADMIN(account=user.account.name))
     return user
 
 
@@ -243,57 +251,43 @@ async def _json(request: Request, *texts: str) -> Json:
     """Return a request's JSON object, which must have the given texts.
 
     Raises:
-        RefusedError: If the body is invalid or too large, or has another content type: a page of another site
-            can
-            send a form without permission, but no JSON.
+        RefusedRequest: If the body is invalid or too large, or has another content type: a page of another
+            site can send a form without permission, but no JSON.
     """
     if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
-        raise RefusedError(415, "not_json", "send application/json")
+        raise refused(415, codes.NOT_JSON(detail="its content type is not application/json"))
     body = bytearray()
     async for chunk in request.stream():
         body += chunk
         if len(body) > MOST_BODY:
-            raise RefusedError(413, "too_large", f"the request is larger than {MOST_BODY} bytes")
+            raise refused(413, codes.TOO_LARGE(bytes=MOST_BODY))
     try:
         asked = json.loads(body)
-    except (ValueError, RecursionError):
-        raise RefusedError(400, "not_json", "the request is not JSON") from None
+    except (ValueError, RecursionError) as error:
+        # Names the place, never the password.
+        raise refused(400, codes.NOT_JSON(detail=error)) from None
     if not isinstance(asked, dict):
-        raise RefusedError(400, "not_json", "the request must be a JSON object")
+        raise refused(400, codes.NOT_JSON_OBJECT())
     for name in texts:
         if not isinstance(asked.get(name), str):
-            # The text must not contain the value.
-            raise RefusedError(422, "missing", f"{name}: must be a text")
+            # The refusal must not contain the value.
+            raise refused(422, codes.NEEDS_TEXT(field=name))
     return asked
 
 
 def _answered(handler: Handler) -> Handler:
-    return with_error_responses(handler, _refused)
+    return with_error_responses(handler, as_json, _refused)
 
 
-def _refused(error: Exception) -> Response | None:
+def _refused(error: Exception) -> RefusedRequest | None:
     match error:
-        case RefusedError():
-            return JSONResponse(error.answer, status_code=error.status)
-        case SignInError():
-            return _refused_sign_in(error)
         case SignInBusyError():
-            return _refusal(503, "busy", str(error), {"Retry-After": "1"})
+            return refused(503, error.reason, again_s=error.wait_s)
+        case SignInError() if error.wait_s > 0:
+            return refused(429, error.reason, again_s=error.wait_s, seconds=math.ceil(error.wait_s))
+        case SignInError():
+            return refused(401, error.reason)
         case AccountsError():
-            return _refusal(422, error.word, str(error))
+            return refused(422, error.reason)
         case _:
             return None
-
-
-def _refused_sign_in(error: SignInError) -> Response:
-    if error.wait_s <= 0:
-        return _refusal(401, "wrong", str(error))
-    seconds = math.ceil(error.wait_s)
-    text = f"{error}: again in {seconds} s"
-    return _refusal(429, "wait", text, {"Retry-After": str(seconds)}, seconds=seconds)
-
-
-def _refusal(
-    status: int, error: str, text: str, headers: Mapping[str, str] | None = None, **more: object
-) -> Response:
-    return JSONResponse({"error": error, "text": text, **more}, status_code=status, headers=headers)

@@ -37,15 +37,15 @@ class SignInQueue(Generic[Job]):
         names: AskerQueue[Job] = self._names.get(address, AskerQueue())
         own, displaced = names.count(name), None
         if own >= MOST_OF_NAME:
-            raise busy()
+            raise SignInBusyError
         if self._addresses.count(address) >= MOST_OF_ADDRESS:
             if names.count(names.fullest()) <= own + 1:
-                raise busy()
+                raise SignInBusyError
             displaced = self._remove_newest(address)
         elif len(self) >= MOST_WAITING:
             fullest = self._addresses.fullest()
             if self._addresses.count(fullest) <= self._addresses.count(address) + 1:
-                raise busy()
+                raise SignInBusyError
             displaced = self._remove_newest(fullest)
         self._addresses.add(address, address)
         self._names.setdefault(address, names).add(name, job)
@@ -70,8 +70,3 @@ class SignInQueue(Generic[Job]):
     def _forget_empty(self, address: str) -> None:
         if not self._names[address]:
             del self._names[address]
-
-
-def busy() -> SignInBusyError:
-    """Return the error for an attempt that the queue rejects."""
-    return SignInBusyError("too many passwords wait to be verified: try again in a moment")

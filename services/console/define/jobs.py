@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from robomesh import reason_codes as codes
 from robots.collision.link_pairs import plan_of
 from robots.description import DESCRIPTION_FILE, Problem, RobotDescription, from_values, robot_name
 from robots.description_checks import named_files
@@ -28,8 +29,8 @@ from robots.save_description import read_robot, refused_path
 from robots.schema import UrdfDescription
 from robots.summary import mesh_summary
 from robots.units import position_factor
-from services.console.define.errors import RefusedRequest
 from services.console.define.store import MOST_FILES, Store, put
+from services.console.errors import RefusedRequest
 
 Json = dict[str, Any]
 
@@ -117,18 +118,20 @@ def unzip(store: Store, folder: Path, request: Json) -> Json:
             entries = [entry for entry in archive.infolist() if not entry.is_dir()]
             size = sum(entry.file_size for entry in entries)
             if len(entries) > MOST_FILES or size > _MOST_UNZIPPED:
-                raise RefusedRequest(
-                    422,
-                    f"holds {len(entries)} files of {size / 1e6:.0f} MB: "
-                    f"{MOST_FILES} files and {_MOST_UNZIPPED / 1e6:.0f} MB at most",
+                reason = codes.DEFINE_ZIP_TOO_LARGE(
+                    count=len(entries),
+                    megabytes=size / 1e6,
+                    most=MOST_FILES,
+                    most_megabytes=_MOST_UNZIPPED / 1e6,
                 )
+                raise RefusedRequest(422, reason)
             for entry in entries:
-                if reason := refused_path(entry.filename):
-                    raise RefusedRequest(422, f"{entry.filename!r}: {reason}")
+                if reason_of_path := refused_path(entry.filename):
+                    raise RefusedRequest(422, reason_of_path)
                 # zipfile raises an error if an entry is larger than it declares.
                 files[entry.filename] = put(store, archive.read(entry))
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, zlib.error, EOFError) as error:
-        raise RefusedRequest(422, f"is not a readable zip archive: {error}") from None
+        raise RefusedRequest(422, codes.DEFINE_NOT_ZIP(detail=error)) from None
     return {"files": files}
 
 
@@ -153,7 +156,7 @@ def import_robot(store: Store, folder: Path, request: Json) -> Json:
     values = values or {"name": robot_name(Path(file).stem), "urdf": file}
     description = _description(folder, values)
     if not isinstance(description, UrdfDescription):
-        raise RefusedRequest(422, f"{file} is not a robot's URDF")
+        raise RefusedRequest(422, codes.DEFINE_NOT_URDF(file=file))
     found = import_as_dh(description)
     return {
         "description": found.values,
@@ -196,7 +199,7 @@ def _positions(model: RobotModel, description: RobotDescription, given: Any) -> 
     count = len(model.joints)
     numbers = [each for each in given if isinstance(each, int | float)] if isinstance(given, list) else []
     if len(numbers) != count or len(given) != count or not np.isfinite(numbers).all():
-        raise RefusedRequest(422, f"joints: should be one finite number for each joint, {count} in total")
+        raise RefusedRequest(422, codes.DEFINE_JOINTS(count=count))
     factors = [position_factor(kind, description.units) for kind in model.joints.types]
     return np.multiply(numbers, factors)
 

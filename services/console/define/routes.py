@@ -1,6 +1,6 @@
 """Define's HTTP requests: validated here, and executed by a worker or on disk.
 
-Errors are sentences (text/plain), or the problems of a description with their places.
+A refused description also has `problems`, each with its place.
 """
 
 import asyncio
@@ -14,19 +14,20 @@ from pathlib import Path
 from typing import Any, TypedDict, TypeVar
 
 from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Mount, Route
 
+from robomesh import reason_codes as codes
 from robots.description import library_names
 from robots.errors import RobotError, RobotExistsError
 from robots.save_description import read_robot, refused_path, revision_of, write_description, zip_description
 from services.console.accounts.sessions import SignedIn
 from services.console.define import saved_robots, store
-from services.console.define.errors import RefusedRequest
 from services.console.define.settings import DefineSettings
 from services.console.define.start import start, started_names, stop
 from services.console.define.worker_pool import Workshop
-from services.console.http.error_responses import Handler, with_error_responses
+from services.console.errors import RefusedRequest
+from services.console.http.error_responses import Handler, as_json, with_error_responses
 
 log = logging.getLogger(__name__)
 
@@ -122,7 +123,7 @@ class Define:
     def _folder(self, name: str) -> Path:
         folder = saved_robots.robot_folder(self.settings.site, name)
         if folder is None:
-            raise RefusedRequest(404, f"there is no robot {name!r} here")
+            raise RefusedRequest(404, codes.DEFINE_NO_ROBOT(name=name))
         return folder
 
     async def _opened(self, name: str) -> tuple[Json, dict[str, str]]:
@@ -139,7 +140,7 @@ class Define:
         """Return a converted mesh."""
         path = store.stored(self.store, request.path_params["sha"])
         if path is None:
-            raise RefusedRequest(404, "this mesh is no longer stored; load the page again")
+            raise RefusedRequest(404, codes.DEFINE_MODEL_GONE())
         return FileResponse(
             path,
             media_type="model/gltf-binary",
@@ -152,9 +153,9 @@ class Define:
         """Store a file of a draft."""
         name = request.query_params.get("name", "")
         if reason := refused_path(name):
-            raise RefusedRequest(422, f"name {name!r}: {reason}")
+            raise RefusedRequest(422, reason)
         if self._uploads >= _MOST_UPLOADS:
-            raise RefusedRequest(503, f"{_MOST_UPLOADS} files are being sent already: try again in a moment")
+            raise RefusedRequest(503, codes.DEFINE_UPLOADS(count=_MOST_UPLOADS))
         self._uploads += 1
         try:
             sha, size = await store.put_stream(
@@ -222,7 +223,7 @@ class Define:
             )
             problems = found["problems"]
         if problems:
-            return JSONResponse({"problems": problems}, status_code=422)
+            raise RefusedRequest(422, codes.DEFINE_PROBLEMS(count=len(problems)), problems=problems)
         files = {path: folder / path for path in asked["files"]}
         own = self.settings.site.define.folder
         replaces, overwrite = str(asked.get("revision") or ""), asked.get("overwrite") is True
@@ -231,9 +232,9 @@ class Define:
             async with self._writing:
                 written = await asyncio.to_thread(write)
         except RobotExistsError as error:
-            there = f"there is a robot {name} in {own} already"
-            text = f"{name} in {own} was changed since it was opened" if error.changed else there
-            return JSONResponse({"exists": True, "text": text, "changed": error.changed}, status_code=409)
+            code = codes.DEFINE_CHANGED if error.changed else codes.DEFINE_EXISTS
+            reason = code(name=name, folder=own)
+            raise RefusedRequest(409, reason, exists=True, changed=error.changed) from None
         log.info("robot saved: %s", written.path)
         return JSONResponse({"name": name, "folder": str(own / name), "revision": written.revision})
 
@@ -257,7 +258,7 @@ class Define:
         folder = await self._laid_out({"files": files})
         found = await self.workshop.slow.run("meshes", folder, {"description": values}, asker=_asker(request))
         if found["problems"]:
-            raise RefusedRequest(422, found["problems"][0]["text"])
+            raise RefusedRequest(422, codes.DEFINE_UNREADABLE(detail=found["problems"][0]["text"]))
         async with self._writing:
             await asyncio.to_thread(start, self.settings.site, name, can_start=self.settings.can_start)
         return JSONResponse({"site": self.settings.site.site, "robot": name})
@@ -281,30 +282,30 @@ class Define:
         async for chunk in request.stream():
             body += chunk
             if len(body) > most:
-                raise RefusedRequest(413, f"the request is larger than {most / 1e6:g} MB")
+                raise RefusedRequest(413, codes.TOO_LARGE(bytes=most))
         try:
             asked = json.loads(body, parse_int=_whole_number)
         except (ValueError, RecursionError) as error:
-            raise RefusedRequest(400, f"the request is not JSON: {error}") from None
+            raise RefusedRequest(400, codes.NOT_JSON(detail=error)) from None
         if not isinstance(asked, dict):
-            raise RefusedRequest(400, "the request must be a JSON object")
+            raise RefusedRequest(400, codes.NOT_JSON_OBJECT())
         for key, kind in needed.items():
             if not isinstance(asked.get(key), kind):
-                word = "a text" if kind is str else "an object"
-                raise RefusedRequest(422, f"{key} = {str(asked.get(key))[:60]!r}: must be {word}")
+                code = codes.NEEDS_TEXT if kind is str else codes.NEEDS_OBJECT
+                raise RefusedRequest(422, code(field=key))
         return asked
 
     async def _laid_out(self, asked: Json) -> Path:
         files = asked.setdefault("files", {})
         if not isinstance(files, dict) or not all(isinstance(sha, str) for sha in files.values()):
-            raise RefusedRequest(422, "files: must give each path the SHA-256 of its file")
+            raise RefusedRequest(422, codes.DEFINE_FILES())
         return await asyncio.to_thread(store.lay_out, self.store, files)
 
     @staticmethod
     def _file_of(asked: Json) -> str:
         file: str = asked["file"]
         if file not in asked["files"]:
-            raise RefusedRequest(422, f"file {file!r}: is not one of the files given")
+            raise RefusedRequest(422, codes.DEFINE_FILE_NOT_GIVEN(file=file))
         return file
 
 
@@ -347,22 +348,20 @@ def _remember(kept: OrderedDict[Key, Value], key: Key, value: Value) -> None:
 
 
 def _answered(handler: Handler) -> Handler:
-    return with_error_responses(handler, _refused)
+    return with_error_responses(handler, as_json, _refused)
 
 
-def _refused(error: Exception) -> Response:
+def _refused(error: Exception) -> RefusedRequest:
     match error:
-        case RefusedRequest():
-            return PlainTextResponse(error.text, status_code=error.status)
         case RobotError():
-            return PlainTextResponse(str(error), status_code=422)
+            return RefusedRequest(422, codes.DEFINE_UNREADABLE(detail=error))
         case UnicodeError():
-            return PlainTextResponse("the request contains an unpaired surrogate", status_code=422)
+            return RefusedRequest(422, codes.HALF_CHARACTER())
         case RecursionError():
-            return PlainTextResponse("the request is nested too deeply", status_code=422)
+            return RefusedRequest(422, codes.DEFINE_NESTED())
         case OSError():
             log.error("define: %s", error)
-            return PlainTextResponse(f"the console's disk: {error.strerror}", status_code=507)
+            return RefusedRequest(507, codes.DEFINE_DISK(detail=error.strerror))
         case _:
             log.error("define: an internal error", exc_info=error)
-            return PlainTextResponse(f"an internal error of robomesh: {error!r}"[:300], status_code=500)
+            return RefusedRequest(500, codes.FAILED(request="define", detail=repr(error)[:300]))

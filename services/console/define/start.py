@@ -1,6 +1,7 @@
 """Starting and stopping a defined robot as a simulated robot of the site."""
 
-from services.console.define.errors import RefusedRequest
+from robomesh import reason_codes as codes
+from services.console.errors import RefusedRequest
 from services.errors import SiteFileError
 from services.site_file.site import Robot, Site
 from services.site_file.started_robots import read_started, robot_to_start, write_started
@@ -21,20 +22,14 @@ def start(site: Site, name: str, *, can_start: bool) -> None:
         RefusedRequest: If there is no supervisor, or the site has a robot with that name.
     """
     if name in {robot.name for robot in site.robot}:
-        raise RefusedRequest(
-            409, f"the site {site.site} has a robot {name} already: save yours under another name"
-        )
+        raise RefusedRequest(409, codes.DEFINE_SITE_HAS(site=site.site, name=name))
     robot = robot_to_start(site, name)
     if not can_start:
         model = (site.define.folder / robot.model).absolute() if "/" in robot.model else robot.model
-        raise RefusedRequest(
-            409,
-            "no supervisor runs here (robomesh up). Add this to the site file and restart the site's "
-            f'services:\n\n[[robot]]\nname = "{name}"\nmodel = "{model}"\ncontroller = "simulated"',
-        )
+        raise RefusedRequest(409, codes.DEFINE_NO_SUPERVISOR(name=name, model=model))
     robots = _read(site)
     if name in {each.name for each in robots}:
-        raise RefusedRequest(409, f"{name} runs already; it restarts whenever it is saved")
+        raise RefusedRequest(409, codes.DEFINE_RUNS(name=name))
     write_started(site, (*robots, robot))
 
 
@@ -47,8 +42,8 @@ def stop(site: Site, name: str) -> None:
     robots = _read(site)
     if name not in {robot.name for robot in robots}:
         if name in {robot.name for robot in site.robot}:
-            raise RefusedRequest(409, f"{name} is in the site file: remove it there")
-        raise RefusedRequest(409, f"{name} was not started from the page")
+            raise RefusedRequest(409, codes.DEFINE_IN_SITE_FILE(name=name))
+        raise RefusedRequest(409, codes.DEFINE_NOT_STARTED(name=name))
     write_started(site, tuple(robot for robot in robots if robot.name != name))
 
 
@@ -56,4 +51,4 @@ def _read(site: Site) -> tuple[Robot, ...]:
     try:
         return read_started(site)
     except SiteFileError as error:
-        raise RefusedRequest(409, f"{error}: repair or remove it") from None
+        raise RefusedRequest(409, codes.DEFINE_STARTED_UNREADABLE(detail=error)) from None

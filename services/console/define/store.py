@@ -15,8 +15,9 @@ from collections.abc import AsyncIterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+from robomesh import reason_codes as codes
 from robots.save_description import refused_path
-from services.console.define.errors import RefusedRequest
+from services.console.errors import RefusedRequest
 
 MOST_BYTES = 2 * 1024**3
 MOST_DRAFTS = 64
@@ -93,7 +94,7 @@ async def put_stream(store: Store, chunks: AsyncIterable[bytes], *, most_bytes: 
             async for chunk in chunks:
                 size += len(chunk)
                 if size > most_bytes:
-                    raise RefusedRequest(413, f"the file is larger than {most_bytes / 1e6:g} MB")
+                    raise RefusedRequest(413, codes.DEFINE_FILE_TOO_LARGE(megabytes=most_bytes / 1e6))
                 digest.update(chunk)
                 file.write(chunk)
         path.replace(store.files / digest.hexdigest())
@@ -116,24 +117,24 @@ def lay_out(store: Store, files: Mapping[str, str]) -> Path:
         RefusedRequest: If a path is not below the folder, or a file is not in the store.
     """
     if len(files) > MOST_FILES:
-        raise RefusedRequest(413, f"{len(files)} files: {MOST_FILES} at most")
-    problems = [f"{path!r}: {reason}" for path in files if (reason := refused_path(path))]
-    if problems:
-        raise RefusedRequest(422, problems[0])
+        raise RefusedRequest(413, codes.DEFINE_TOO_MANY_FILES(count=len(files), most=MOST_FILES))
+    for path in files:
+        if reason := refused_path(path):
+            raise RefusedRequest(422, reason)
     recipe = "\n".join(f"{sha} {path}" for path, sha in sorted(files.items()))
     folder = store.drafts / hashlib.sha256(recipe.encode()).hexdigest()
     if _touch(folder):
         return folder
     sources = {path: stored(store, sha) for path, sha in files.items()}
     if missing := [path for path, source in sources.items() if source is None]:
-        raise RefusedRequest(
-            410, f"{', '.join(missing[:5])}: no longer stored; drop the file on the page again"
-        )
+        raise RefusedRequest(410, codes.DEFINE_FILE_GONE(files=", ".join(missing[:5])))
     # A file under a thousand names is stored once, but saved a thousand times.
     size = sum(source.stat().st_size for source in sources.values() if source is not None)
     if size > MOST_DRAFT_BYTES:
-        most = MOST_DRAFT_BYTES / 1e6
-        raise RefusedRequest(413, f"{len(files)} files of {size / 1e6:.0f} MB: {most:.0f} MB at most")
+        reason = codes.DEFINE_FILES_TOO_LARGE(
+            count=len(files), megabytes=size / 1e6, most=MOST_DRAFT_BYTES / 1e6
+        )
+        raise RefusedRequest(413, reason)
     fresh = Path(tempfile.mkdtemp(dir=store.drafts))
     try:
         for path, source in sources.items():
@@ -144,10 +145,10 @@ def lay_out(store: Store, files: Mapping[str, str]) -> Path:
             os.link(source, place)
         fresh.rename(folder)
     except FileExistsError:
-        raise RefusedRequest(422, "a file's name is another file's folder") from None
+        raise RefusedRequest(422, codes.DEFINE_FILE_IS_FOLDER()) from None
     except OSError as error:
         if not folder.is_dir():  # otherwise a concurrent request made the same draft
-            raise RefusedRequest(507, f"the draft's files cannot be linked: {error.strerror}") from None
+            raise RefusedRequest(507, codes.DEFINE_DISK(detail=error.strerror)) from None
     finally:
         shutil.rmtree(fresh, ignore_errors=True)
     _evict_drafts(store, MOST_DRAFTS)

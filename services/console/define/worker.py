@@ -1,4 +1,7 @@
-"""Worker process that reads untrusted files for the console: `python -m services.console.define.worker`."""
+"""Worker process that reads untrusted files for the console: `python -m services.console.define.worker`.
+
+An answer is `{"done": {...}}` or `{"refused": {"code": ..., "values": {...}, "text": "sentence"}}`.
+"""
 
 import os
 import shutil
@@ -23,11 +26,12 @@ def begin(settings: tuple[Path, Path, int]) -> Callable[[Job], dict[str, Any]]:
     temporary.mkdir()
     os.environ.update(TMPDIR=str(temporary), XDG_CACHE_HOME=str(temporary))
     # Imported after the limit and the environment are set, and before `confine`.
+    from robomesh import reason_codes as codes
     from robots.errors import DescriptionError, RobotError
-    from services.console.define.errors import RefusedRequest
     from services.console.define.jobs import JOBS
     from services.console.define.sandbox import confine
     from services.console.define.store import Store
+    from services.console.errors import RefusedRequest
 
     store = Store(store_folder)
     confine(store_folder)
@@ -35,23 +39,26 @@ def begin(settings: tuple[Path, Path, int]) -> Callable[[Job], dict[str, Any]]:
     def answer(job: Job) -> dict[str, Any]:
         name, folder, request = job
         try:
-            return JOBS[name](store, folder, request)
+            return {"done": JOBS[name](store, folder, request)}
+        except RefusedRequest as error:
+            reason = error.reason
         except DescriptionError as error:
-            text = "\n".join(error.problems)
-        except (RobotError, RefusedRequest) as error:
-            text = str(error)
+            reason = codes.DEFINE_UNREADABLE(detail=_relative_paths("; ".join(error.problems), folder))
+        except RobotError as error:
+            reason = codes.DEFINE_UNREADABLE(detail=_relative_paths(str(error), folder))
         except PermissionError as error:
-            text = f"{error.filename}: {error.strerror}"
+            detail = _relative_paths(f"{error.filename}: {error.strerror}", folder)
+            reason = codes.DEFINE_UNREADABLE(detail=detail)
         except MemoryError:
-            text = f"reading it takes more than {most_bytes / 1024**3:g} GB of memory"
+            reason = codes.DEFINE_MEMORY(gigabytes=most_bytes / 1024**3)
         except RecursionError:
-            text = "it is nested too deeply to read"
+            reason = codes.DEFINE_NESTED()
         except Exception as error:
             import traceback
 
             traceback.print_exc()
-            text = f"an internal error of robomesh; see the console's log: {error!r}"[:300]
-        raise RefusedRequest(422, _relative_paths(text, folder))
+            reason = codes.FAILED(request=f"define/{name}", detail=repr(error)[:300])
+        return {"refused": {"code": reason.code, "values": dict(reason.values), "text": reason.text}}
 
     return answer
 

@@ -14,9 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from robomesh import reason_codes as codes
 from robomesh.memory_limit import MEMORY_BYTES
+from robomesh.reasons import Reason
 from robomesh.worker import HandlerError, Worker, WorkerError, WorkerTimeoutError
-from services.console.define.errors import RefusedRequest, TooSlowError
+from services.console.errors import RefusedRequest, TooSlowError
 from services.console.fair_queue import AskerQueue
 
 log = logging.getLogger(__name__)
@@ -74,28 +76,28 @@ class ConfinedWorker:
             RefusedRequest: If the worker refuses it or crashes, or the client has disconnected.
         """
         if wanted is not None and not await wanted():
-            raise RefusedRequest(499, "the client has disconnected")
+            raise RefusedRequest(499, codes.ABANDONED())
         failure = ""
         # A crash may have another cause than this file, so it gets a second try.
         for _ in range(2):
             try:
-                done: dict[str, Any] = await self._worker.ask(
+                answer: dict[str, Any] = await self._worker.ask(
                     (job, folder, request), timeout_s=self._longest_s
                 )
-                return done
+                break
             except HandlerError as error:
-                raise RefusedRequest(422, str(error)) from None
+                raise RefusedRequest(422, codes.FAILED(request=f"define/{job}", detail=error)) from None
             except WorkerTimeoutError:
-                raise TooSlowError(
-                    422, f"this took more than {self._longest_s:g} s and was stopped"
-                ) from None
+                raise TooSlowError(422, codes.DEFINE_TOO_SLOW(seconds=self._longest_s)) from None
             except WorkerError as error:
                 failure = str(error)
                 log.warning("%s: %s", job, failure)
-        raise RefusedRequest(
-            422,
-            f"this crashed the worker process twice: it may be damaged, or need too much memory ({failure})",
-        )
+        else:
+            raise RefusedRequest(422, codes.DEFINE_CRASHED(detail=failure))
+        if "refused" in answer:
+            raise RefusedRequest(422, Reason(**answer["refused"]))
+        done: dict[str, Any] = answer["done"]
+        return done
 
     async def close(self) -> None:
         """Stop the process and remove its temporary files."""

@@ -12,8 +12,12 @@ from collections.abc import Collection
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+from services.console.errors import RefusedRequest
+from services.console.http.error_responses import as_text
 
 _OWN_NAMES = frozenset({"localhost"})
 
@@ -37,7 +41,7 @@ SECURITY_HEADERS = {
 }
 
 
-def refused_host(host: str, names: Collection[str]) -> str | None:
+def refused_host(host: str, names: Collection[str]) -> Reason | None:
     """Return why a Host header is rejected; None if it is one of the console's.
 
     IP addresses are always accepted, because DNS rebinding needs a name.
@@ -54,11 +58,11 @@ def refused_host(host: str, names: Collection[str]) -> str | None:
     try:
         ipaddress.ip_address(name)
     except ValueError:
-        return f"host {host!r} is not this console's: use its address, or name it in the console's hosts"
+        return codes.HTTP_HOST(host=host)
     return None
 
 
-def refused_origin(origin: str, host: str, *, secure: bool = False) -> str | None:
+def refused_origin(origin: str, host: str, *, secure: bool = False) -> Reason | None:
     """Return why an Origin is rejected; None if it is the page's own.
 
     Args:
@@ -68,23 +72,25 @@ def refused_origin(origin: str, host: str, *, secure: bool = False) -> str | Non
         parts = urlsplit(origin)
         if origin and parts.netloc.lower() == host.lower() and (parts.scheme == "https" or not secure):
             return None
-    return f"origin {origin!r} is not this page's: {host}"
+    return codes.HTTP_ORIGIN(origin=origin, host=host)
 
 
-def refused_body(scope: Scope, headers: Headers) -> tuple[int, str] | None:
-    """Return status and reason if a body is declared too large, or is not allowed; otherwise None.
+def refused_body(scope: Scope, headers: Headers) -> RefusedRequest | None:
+    """Return the refusal if a body is declared too large, or is not allowed; otherwise None.
 
     The body's reader counts a chunked body, which declares no size.
     """
     lengths, pieces = headers.getlist("content-length"), headers.getlist("transfer-encoding")
     if lengths and pieces:
         # A proxy before the console may have seen the end of the request elsewhere (RFC 9112, 6.1).
-        return 400, "a request has a content-length or a transfer-encoding, not both"
+        return RefusedRequest(400, codes.HTTP_TWO_LENGTHS())
     if scope["method"] in _READING:
-        return (400, f"a {scope['method']} has no body") if pieces or lengths not in ([], ["0"]) else None
+        if pieces or lengths not in ([], ["0"]):
+            return RefusedRequest(400, codes.HTTP_BODY(method=scope["method"]))
+        return None
     most = next((most for path, most in _MOST_BODY if scope["path"].startswith(path)), 0)
     if lengths and (not lengths[0].isdecimal() or int(lengths[0]) > most):
-        return 413, f"the request is larger than {most} bytes"
+        return RefusedRequest(413, codes.TOO_LARGE(bytes=most))
     return None
 
 
@@ -109,29 +115,30 @@ class Guard:
         refused = self._refused(scope, Headers(scope=scope))
 
         async def send_guarded(message: Message) -> None:
-            if message["type"] == "http.response.start":
+            if message["type"].endswith("http.response.start"):  # also of a refused WebSocket
                 MutableHeaders(scope=message).update(self._headers)
             await send(message)
 
         if refused is None:
             await self._app(scope, receive, send_guarded)
-        elif scope["type"] == "http":
-            # Further bytes of this connection may be the rest of the rejected request.
-            answer = PlainTextResponse(refused[1], status_code=refused[0], headers={"Connection": "close"})
-            await answer(scope, receive, send_guarded)
         else:
-            await send({"type": "websocket.close", "code": 1008, "reason": refused[1]})
+            if scope["type"] == "websocket":
+                refused.status = 403
+            answer = as_text(refused)
+            # Further bytes of this connection may be the rest of the rejected request.
+            answer.headers["Connection"] = "close"
+            await answer(scope, receive, send_guarded)
 
-    def _refused(self, scope: Scope, headers: Headers) -> tuple[int, str] | None:
+    def _refused(self, scope: Scope, headers: Headers) -> RefusedRequest | None:
         host = headers.get("host", "")
         if (problem := refused_host(host, self._names)) is not None:
-            return 421, problem
+            return RefusedRequest(421, problem)
         changing = scope["type"] == "websocket" or scope["method"] not in _READING
         if changing:
             # Browsers send this header (not all for WebSockets); other clients need not.
             site = headers.get("sec-fetch-site", "same-origin")
             if scope["type"] == "http" and site != "same-origin":
-                return 403, "the request comes from another page"
+                return RefusedRequest(403, codes.HTTP_OTHER_PAGE())
             if problem := refused_origin(headers.get("origin", ""), host, secure=self._secure):
-                return 403, problem
+                return RefusedRequest(403, problem)
         return refused_body(scope, headers) if scope["type"] == "http" else None

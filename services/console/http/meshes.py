@@ -2,20 +2,21 @@
 
 import contextlib
 import hashlib
-import math
 from collections import OrderedDict
 
 from starlette.requests import Request
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import Response
 
 from robomesh import keys
-from robomesh.errors import BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError
+from robomesh import reason_codes as codes
+from robomesh.errors import BusError, NoAnswerError, QuotaError
 from robomesh.session import Session
+from services.console.errors import RefusedRequest
+from services.console.http.error_responses import as_text, refused_on_the_mesh
 
 _MOST_BYTES = 256 * 1024 * 1024
 # A busy machine may lose a reply; a retry is better than an arm without a link.
 _TIMEOUTS_S = (3.0, 5.0, 10.0)
-_BUSY_AGAIN_S = 1.0
 
 
 class MeshCache:
@@ -60,23 +61,15 @@ async def mesh_response(request: Request, session: Session, cache: MeshCache) ->
             name = keys.check_chunk(path["name"], "mesh")
             key = keys.robot_key(path["site"], path["robot"], f"mesh/{name}")
             data = await _ask(session, key)
-        except KeyNameError as error:
-            return PlainTextResponse(str(error), status_code=400)
-        except (BusyError, QuotaError) as error:
-            again_s = error.again_s if isinstance(error, QuotaError) else _BUSY_AGAIN_S
-            headers = {"Retry-After": str(math.ceil(again_s))}
-            return PlainTextResponse(str(error), status_code=503, headers=headers)
-        except RefusedError as error:
-            return PlainTextResponse(str(error), status_code=404)
-        except NoAnswerError as error:
-            return PlainTextResponse(str(error), status_code=504)
+        except BusError as error:
+            refused = refused_on_the_mesh(error)
+            if isinstance(error, QuotaError):
+                refused.status = 503  # pages retry after 503
+            return as_text(refused)
         sha256 = hashlib.sha256(data).hexdigest()
         if wanted and wanted != sha256:
-            return PlainTextResponse(
-                f"{key} has SHA-256 {sha256}, not {wanted}: "
-                "the robot's description has changed; load the page again",
-                status_code=409,
-            )
+            reason = codes.MESH_CHANGED(key=key, sha256=sha256, wanted=wanted)
+            return as_text(RefusedRequest(409, reason))
         cache.put(sha256, data)
     lasting = "private, max-age=31536000, immutable" if wanted else "no-store"
     return Response(data, media_type="model/gltf-binary", headers={"Cache-Control": lasting})

@@ -13,7 +13,6 @@ disconnects or stops reading.
 import asyncio
 import contextlib
 import logging
-import math
 import time
 from collections import Counter
 from collections.abc import AsyncGenerator, Callable
@@ -26,7 +25,7 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from google.protobuf.message import DecodeError
 from starlette.datastructures import QueryParams
 from starlette.requests import Request
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import Response
 from starlette.routing import Route
 from starlette.types import Scope
 
@@ -37,7 +36,13 @@ from robomesh import reason_codes as codes
 from robomesh.errors import BusError, BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError
 from robomesh.schemas.robomesh_pb2 import VideoFrames, ViewRequest
 from robomesh.subscription import Sample
-from services.console.errors import PictureError
+from services.console.errors import RefusedRequest
+from services.console.http.error_responses import (
+    Handler,
+    as_text,
+    refused_on_the_mesh,
+    with_error_responses,
+)
 from services.console.http.png import png
 from services.console.http.streaming import Streamed
 from services.console.requested_views import Views, robot_key
@@ -58,7 +63,6 @@ _STALE_AFTER_S, _SILENT_S = 1.0, 10.0
 _STALE_AFTER = 2.0  # in missed pictures
 _READS_WITHIN_S = 10.0
 _NO_STORE = {"Cache-Control": "no-store"}
-_BUSY_AGAIN_S = 1.0
 # Shown when no picture comes, because an <img> would show the last one for ever.
 _STALE = (Path(__file__).parent / "stale.jpg").read_bytes()
 
@@ -96,55 +100,44 @@ class Pictures:
     def routes(self) -> list[Route]:
         """Return the routes of videos and stills."""
         return [
-            Route("/video/{site}/{robot}/{view}.mjpeg", self.mjpeg, methods=["GET"]),
-            Route("/video/{site}/{robot}/{view}.mp4", self.mp4, methods=["GET"]),
-            Route("/image/{site}/{robot}/{view}.jpg", self.still, methods=["GET"]),
-            Route("/image/{site}/{robot}/{view}.png", self.still_png, methods=["GET"]),
+            Route("/video/{site}/{robot}/{view}.mjpeg", _answered(self.mjpeg), methods=["GET"]),
+            Route("/video/{site}/{robot}/{view}.mp4", _answered(self.mp4), methods=["GET"]),
+            Route("/image/{site}/{robot}/{view}.jpg", _answered(self.still), methods=["GET"]),
+            Route("/image/{site}/{robot}/{view}.png", _answered(self.still_png), methods=["GET"]),
         ]
 
     async def mjpeg(self, request: Request) -> Response:
         """Send one JPEG after another; each replaces the one before."""
-        try:
-            view = await self._view(request)
-            stale_after_s = max(_STALE_AFTER_S, _STALE_AFTER / view.fps)
-            pieces = _mjpeg_parts(self.subscriptions, view.image, stale_after_s)
-            return await self._stream(request, pieces, f"{MJPEG}; boundary={_BOUNDARY}")
-        except PictureError as error:
-            return _refused(error)
+        view = await self._view(request)
+        stale_after_s = max(_STALE_AFTER_S, _STALE_AFTER / view.fps)
+        pieces = _mjpeg_parts(self.subscriptions, view.image, stale_after_s)
+        return await self._stream(request, pieces, view.image, f"{MJPEG}; boundary={_BOUNDARY}")
 
     async def mp4(self, request: Request) -> Response:
         """Send fragmented MP4, from the newest key frame on."""
-        try:
-            view = await self._view(request)
-            return await self._stream(request, _fragments(self.subscriptions, view.video), "video/mp4")
-        except PictureError as error:
-            return _refused(error)
+        view = await self._view(request)
+        pieces = _fragments(self.subscriptions, view.video)
+        return await self._stream(request, pieces, view.video, "video/mp4")
 
     async def still(self, request: Request) -> Response:
         """Send the newest picture as JPEG."""
-        try:
-            return Response(await self._still(request), media_type="image/jpeg", headers=_NO_STORE)
-        except PictureError as error:
-            return _refused(error)
+        return Response(await self._still(request), media_type="image/jpeg", headers=_NO_STORE)
 
     async def still_png(self, request: Request) -> Response:
         """Send the newest picture as PNG."""
-        try:
-            data = await asyncio.to_thread(png, await self._still(request))
-        except PictureError as error:
-            return _refused(error)
+        data = await asyncio.to_thread(png, await self._still(request))
         return Response(data, media_type="image/png", headers=_NO_STORE)
 
     async def _still(self, request: Request) -> bytes:
         if self.stills >= _MOST_STILLS:
-            raise PictureError(503, f"{_MOST_STILLS} stills are being made: ask again in a moment")
+            raise RefusedRequest(503, codes.VIEW_TOO_MANY_STILLS(count=_MOST_STILLS))
         self.stills += 1
         try:
             key = (await self._view(request)).image
             with contextlib.closing(_Watch(self.subscriptions, key, NewestQueue())) as watch:
                 sample = await watch.next(_STILL_WITHIN_S)
             if sample is None:
-                raise PictureError(504, f"no picture of {key} came within {_STILL_WITHIN_S:g} s")
+                raise RefusedRequest(504, codes.VIEW_NO_PICTURE(view=key, seconds=_STILL_WITHIN_S))
             return _jpeg(sample)
         finally:
             self.stills -= 1
@@ -155,44 +148,40 @@ class Pictures:
         try:
             robot, view = robot_key(path["site"], path["robot"]), keys.check_chunk(path["view"], "view")
         except KeyNameError as error:
-            raise PictureError(404, str(error)) from None
+            raise RefusedRequest(404, codes.INVALID(detail=error)) from None
         wanted = ViewRequest(of=view, width=size.width, height=size.height, fps=size.fps)
         try:
             answer = await self.views.ask(robot, wanted, self.asker(request.scope))
         except NoAnswerError as error:
-            raise PictureError(
-                503,
-                f"no renderer answers for {path['site']}/{path['robot']}: is its name right, and does its "
-                f"renderer run? ({error})",
-            ) from None
-        except QuotaError as error:
-            raise PictureError(429, str(error), again_s=error.again_s) from None
-        except BusyError as error:
-            raise PictureError(503, str(error), again_s=_BUSY_AGAIN_S) from None
+            named = f"{path['site']}/{path['robot']}"
+            raise RefusedRequest(503, codes.VIEW_NO_RENDERER(robot=named, detail=error)) from None
+        except (QuotaError, BusyError) as error:
+            raise refused_on_the_mesh(error) from None
         except RefusedError as error:
             # An earlier version of the renderer sends no code.
             if error.reason.code == codes.VIEW_NO_ROOM.name or str(error).startswith("no room: "):
-                raise PictureError(503, str(error)) from None
+                raise RefusedRequest(503, error.reason) from None
             # Find out whether the view or the size was rejected.
             status = 404
             if any(size):
                 with contextlib.suppress(BusError):
                     await self.views.ask(robot, ViewRequest(of=view), self.asker(request.scope))
                     status = 400
-            raise PictureError(status, str(error)) from None
+            raise RefusedRequest(status, error.reason) from None
         return _View(f"{robot}/{answer.topic}", f"{robot}/{answer.image}", max(answer.fps, 1.0))
 
-    async def _stream(self, request: Request, pieces: AsyncGenerator[bytes], media_type: str) -> Response:
+    async def _stream(
+        self, request: Request, pieces: AsyncGenerator[bytes], key: str, media_type: str
+    ) -> Response:
         if request.method == "HEAD":
             await pieces.aclose()
             return _endless(media_type)
         address = request.client.host if request.client else ""
         if self.streams.total() >= _MOST_STREAMS:
-            raise PictureError(503, f"{_MOST_STREAMS} video streams are open already: close one first")
+            raise RefusedRequest(503, codes.VIEW_TOO_MANY_STREAMS(count=_MOST_STREAMS))
         if self.streams[address] >= _MOST_OF_ONE:
-            raise PictureError(
-                503, f"{_MOST_OF_ONE} video streams of {address} are open already: close one first"
-            )
+            reason = codes.VIEW_TOO_MANY_STREAMS_OF(count=_MOST_OF_ONE, address=address)
+            raise RefusedRequest(503, reason)
         self.streams[address] += 1
         begun = False
         try:
@@ -201,7 +190,8 @@ class Pictures:
                 async with asyncio.timeout(_FIRST_WITHIN_S):
                     first = await anext(pieces)
             except (TimeoutError, StopAsyncIteration):
-                raise PictureError(504, f"no picture came within {_FIRST_WITHIN_S:g} s") from None
+                reason = codes.VIEW_NO_PICTURE(view=key, seconds=_FIRST_WITHIN_S)
+                raise RefusedRequest(504, reason) from None
             begun = True
         finally:
             if not begun:
@@ -298,30 +288,30 @@ def _jpeg(sample: Sample) -> bytes:
     try:
         return CompressedImage.FromString(sample.payload).data
     except DecodeError:
-        raise PictureError(502, f"{sample.key} is no picture") from None
+        raise RefusedRequest(502, codes.VIEW_NOT_A_PICTURE(key=sample.key)) from None
 
 
 def _size(query: QueryParams) -> _Size:
     """Return what a query requests of a view; the renderer checks the values.
 
     Raises:
-        PictureError: If it cannot be parsed.
+        RefusedRequest: If it cannot be parsed.
     """
     unknown = set(query) - set(_Size._fields)
     if unknown:
-        raise PictureError(400, f"?{sorted(unknown)[0][:20]}= is unknown: width, height and fps are right")
+        raise RefusedRequest(400, codes.VIEW_PARAMETER(name=sorted(unknown)[0][:20]))
     text = query.get("fps", "0")
     try:
         fps = float(text)
     except ValueError:
-        raise PictureError(400, f"fps={text[:20]!r} is not a number") from None
+        raise RefusedRequest(400, codes.VIEW_NOT_A_NUMBER(name="fps", value=text[:20])) from None
     return _Size(_pixels(query, "width"), _pixels(query, "height"), fps)
 
 
 def _pixels(query: QueryParams, name: str) -> int:
     text = query.get(name, "0")
     if not (text.isascii() and text.isdecimal() and len(text) < 6):
-        raise PictureError(400, f"{name}={text[:20]!r} is not a number of pixels")
+        raise RefusedRequest(400, codes.VIEW_NOT_PIXELS(name=name, value=text[:20]))
     return int(text)
 
 
@@ -332,6 +322,5 @@ def _endless(media_type: str) -> Response:
     return response
 
 
-def _refused(error: PictureError) -> Response:
-    again = {} if error.again_s is None else {"Retry-After": str(math.ceil(error.again_s))}
-    return PlainTextResponse(str(error), status_code=error.status, headers=_NO_STORE | again)
+def _answered(handler: Handler) -> Handler:
+    return with_error_responses(handler, as_text)

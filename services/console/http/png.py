@@ -5,7 +5,8 @@ import io
 from fractions import Fraction
 from importlib import import_module
 
-from services.console.errors import PictureError
+from robomesh import reason_codes as codes
+from services.console.errors import RefusedRequest
 
 
 def prepare() -> None:
@@ -18,12 +19,12 @@ def png(jpeg: bytes) -> bytes:
     """Convert a JPEG to PNG.
 
     Raises:
-        PictureError: If PyAV is missing, or the picture cannot be read.
+        RefusedRequest: If PyAV is missing, or the picture cannot be read.
     """
     try:
         import av
     except ImportError:
-        raise PictureError(503, "this console has no PyAV to make PNG: request .jpg instead") from None
+        raise RefusedRequest(503, codes.VIEW_NO_PNG()) from None
     try:
         with av.open(io.BytesIO(jpeg), "r", format="mjpeg") as container:
             frame = next(container.decode(video=0))
@@ -34,4 +35,4 @@ def png(jpeg: bytes) -> bytes:
         encoder.framerate = Fraction(1)
         return b"".join(bytes(packet) for packet in (*encoder.encode(picture), *encoder.encode(None)))
     except (av.FFmpegError, StopIteration) as error:
-        raise PictureError(502, f"the newest picture cannot be read: {error}") from None
+        raise RefusedRequest(502, codes.VIEW_PICTURE_UNREADABLE(detail=error)) from None

@@ -11,7 +11,6 @@ import contextlib
 import csv
 import io
 import logging
-import math
 import re
 from collections.abc import AsyncIterator, Callable
 from typing import NamedTuple, TypeVar
@@ -20,17 +19,23 @@ from urllib.parse import quote
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.message import DecodeError, Message
 from starlette.requests import Request
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import Response
 from starlette.routing import Route
 from starlette.types import Scope
 
 from mcap_files.table import Table, is_due, table_of
 from robomesh import reason_codes as codes
-from robomesh.errors import BusError, BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError
+from robomesh.errors import BusError, NoAnswerError, QuotaError
 from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
-from services.console.errors import RecordingChangedError
+from services.console.errors import RecordingChangedError, RefusedRequest
+from services.console.http.error_responses import (
+    Handler,
+    as_text,
+    refused_on_the_mesh,
+    with_error_responses,
+)
 from services.console.http.streaming import Streamed
 
 log = logging.getLogger(__name__)
@@ -75,18 +80,15 @@ class Recordings:
     def routes(self) -> list[Route]:
         """Return the routes of files, thumbnails and values."""
         return [
-            Route("/recordings/{site}/{file}", self.file, methods=["GET"]),
-            Route("/recordings/{site}/{file}/thumbnail.jpg", self.thumbnail, methods=["GET"]),
-            Route("/recordings/{site}/{file}/values.csv", self.values, methods=["GET"]),
+            Route("/recordings/{site}/{file}", _answered(self.file), methods=["GET"]),
+            Route("/recordings/{site}/{file}/thumbnail.jpg", _answered(self.thumbnail), methods=["GET"]),
+            Route("/recordings/{site}/{file}/values.csv", _answered(self.values), methods=["GET"]),
         ]
 
     async def file(self, request: Request) -> Response:
         """Send the file, or a range of it."""
         where, name = self._where(request), request.path_params["file"]
-        try:
-            first = await self._piece(where, schema.PieceRequest(file=name, length=1))
-        except BusError as error:
-            return _refused(error)
+        first = await self._piece(where, schema.PieceRequest(file=name, length=1))
         total, tag = first.total, f'"{first.version}"'
         headers = {
             "ETag": tag,
@@ -105,10 +107,11 @@ class Recordings:
             begin, end = _within(wanted[1], wanted[2], total)
             status = 206
             if begin >= end:
-                headers["Content-Range"] = f"bytes */{total}"
-                return PlainTextResponse(
-                    f"{asked}: {name} has {total} bytes", status_code=416, headers=headers
+                refused = as_text(
+                    RefusedRequest(416, codes.RECORDING_RANGE(range=asked, file=name, bytes=total))
                 )
+                refused.headers.update({"ETag": tag, "Content-Range": f"bytes */{total}"})
+                return refused
             headers["Content-Range"] = f"bytes {begin}-{end - 1}/{total}"
         headers["Content-Length"] = str(end - begin)
         if request.method == "HEAD":
@@ -119,10 +122,7 @@ class Recordings:
         """Send a picture from the recording."""
         where, name = self._where(request), request.path_params["file"]
         asked = schema.PieceRequest(file=name, attachment="thumbnail.jpg", length=4 << 20)
-        try:
-            piece = await self._piece(where, asked)
-        except BusError as error:
-            return _refused(error)
+        piece = await self._piece(where, asked)
         # A recording's open part may be replaced, so browsers must revalidate; the body is seldom sent.
         headers = {"ETag": f'"{piece.version}"', "Cache-Control": "no-cache"}
         if request.headers.get("if-none-match") == headers["ETag"]:
@@ -132,14 +132,11 @@ class Recordings:
     async def values(self, request: Request) -> Response:
         """Send joints and tool as CSV, one row for each state."""
         where, name = self._where(request), request.path_params["file"]
-        try:
-            info = await self._ask(where, "info", schema.RecordingQuery(file=name))
-            assert isinstance(info, schema.Recording)
-            topics = {each.topic.split("/", 3)[-1]: each.topic for each in info.topics if each.messages}
-            if "joints" not in topics:
-                raise RefusedError(codes.RECORDING_NO_JOINTS(file=name))
-        except BusError as error:
-            return _refused(error)
+        info = await self._ask(where, "info", schema.RecordingQuery(file=name))
+        assert isinstance(info, schema.Recording)
+        topics = {each.topic.split("/", 3)[-1]: each.topic for each in info.topics if each.messages}
+        if "joints" not in topics:
+            raise RefusedRequest(404, codes.RECORDING_NO_JOINTS(file=name))
         saved = quote(name.removesuffix(".mcap") + ".csv")
         headers = {
             "Cache-Control": "no-cache",
@@ -150,8 +147,7 @@ class Recordings:
 
     def _streamed(self, content: AsyncIterator[bytes], headers: dict[str, str], status: int) -> Response:
         if self._downloads >= _MOST_DOWNLOADS:
-            text = f"{_MOST_DOWNLOADS} recordings are sent already: try again soon"
-            return PlainTextResponse(text, status_code=503, headers={"Retry-After": "5"})
+            raise RefusedRequest(503, codes.RECORDING_TOO_MANY(count=_MOST_DOWNLOADS), again_s=5.0)
         self._downloads += 1
 
         async def end() -> None:
@@ -250,15 +246,9 @@ def _decoded(kind: type[AnyMessage], data: bytes) -> AnyMessage | None:
         return None
 
 
-def _refused(error: BusError) -> Response:
-    status, headers = 404, {}
-    match error:
-        case KeyNameError():
-            status = 400
-        case QuotaError():
-            status, headers = 429, {"Retry-After": str(math.ceil(error.again_s))}
-        case BusyError():
-            status, headers = 503, {"Retry-After": "1"}
-        case NoAnswerError():
-            status = 504
-    return PlainTextResponse(str(error), status_code=status, headers=headers)
+def _answered(handler: Handler) -> Handler:
+    return with_error_responses(handler, as_text, _refused)
+
+
+def _refused(error: Exception) -> RefusedRequest | None:
+    return refused_on_the_mesh(error) if isinstance(error, BusError) else None

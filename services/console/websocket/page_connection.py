@@ -53,6 +53,8 @@ _CLOSED_WITHIN_S = 1.0
 _LONGEST_ASK_S = 30.0  # a collision check of a program
 _KEY_FRAME_EACH_S = 1.0
 _POLICY_VIOLATION, _LONGEST_REASON = 1008, 120
+# Id of the answer that says why the console closes the connection; requests of the page begin at 1.
+_NO_REQUEST = 0
 
 
 class Browser:
@@ -143,10 +145,13 @@ class Browser:
         except WebSocketDisconnect:
             pass
         except (WatchError, DecodeError) as error:
-            log.warning("a browser was cut off: %s", error)
+            reason = error.reason if isinstance(error, WatchError) else codes.PAGE_NOT_A_MESSAGE(detail=error)
+            log.warning("a browser was cut off: %s", reason)
+            self.send_message(refusal(_NO_REQUEST, reason.text, reason))
+            self._serve()
             with contextlib.suppress(TimeoutError):  # a page that reads nothing does not get the reason
                 async with asyncio.timeout(_CLOSED_WITHIN_S):
-                    await websocket.close(_POLICY_VIOLATION, _reason(error))
+                    await websocket.close(_POLICY_VIOLATION, _close_reason(reason))
         finally:
             self.operator.close()
             for expression in tuple(self._watches):
@@ -160,7 +165,7 @@ class Browser:
         while True:
             message = FromPage.FromString(await _bytes(websocket))
             if self._cut_off:
-                raise WatchError(f"more than {_MOST_UNREAD} bytes wait for a page that does not read")
+                raise WatchError(codes.PAGE_READS_TOO_SLOWLY(bytes=_MOST_UNREAD))
             match message.WhichOneof("message"):
                 case "watch":
                     self._watch(message.watch.key)
@@ -173,9 +178,9 @@ class Browser:
         if expression in self._watches:
             return
         if len(expression) > _LONGEST_KEY:
-            raise WatchError(f"a key of {len(expression)} characters: {_LONGEST_KEY} at most")
+            raise WatchError(codes.KEY_TOO_LONG(count=len(expression), most=_LONGEST_KEY))
         if len(self._watches) >= _MOST_WATCHES:
-            raise WatchError(f"more than {_MOST_WATCHES} keys watched by one page")
+            raise WatchError(codes.PAGE_TOO_MANY_KEYS(count=_MOST_WATCHES))
         if check_expression(expression).history is History.KEY_FRAME:
             self._video[expression] = AdaptiveVideo(
                 expression,
@@ -352,14 +357,14 @@ async def _bytes(websocket: WebSocket) -> bytes:
     if message["type"] == "websocket.disconnect":
         raise WebSocketDisconnect(message["code"])
     if not isinstance(message.get("bytes"), bytes):
-        raise WatchError("a page sends binary messages")
+        raise WatchError(codes.PAGE_TEXT())
     data: bytes = message["bytes"]
     return data
 
 
-def _reason(error: Exception) -> str:
-    """Return the error's text, cut to the bytes that a close frame can hold."""
-    return str(error).encode()[:_LONGEST_REASON].decode(errors="ignore")
+def _close_reason(reason: Reason) -> str:
+    """Return the reason's sentence, cut to the bytes that a close frame can hold."""
+    return reason.text.encode()[:_LONGEST_REASON].decode(errors="ignore")
 
 
 def refusal(ask_id: int, text: str, reason: Reason | None = None, *, no_answer: bool = False) -> ToPage:

@@ -5,6 +5,7 @@ import logging
 from collections.abc import Callable
 
 from robomesh import keys, topics
+from robomesh import reason_codes as codes
 from robomesh.errors import BusError
 from robomesh.session import Session
 from robomesh.subscription import Sample
@@ -149,15 +150,13 @@ def check_expression(expression: str) -> topics.Topic:
         row = topics.topic(key.topic)
         every_source = key.topic == row.name and row.history is History.LAST_100  # events/* is allowed
         if "*" in key.topic and not every_source:
-            raise WatchError(
-                f"{expression!r} cannot be watched: name the view; '*' may replace site and robot only"
-            )
+            raise WatchError(codes.PAGE_WATCH_WILDCARD(key=expression))
         if row.history is History.KEY_FRAME and "*" in expression:
-            raise WatchError(f"{expression!r} cannot be watched: name the site and the robot of a video")
+            raise WatchError(codes.PAGE_WATCH_VIDEO(key=expression))
         if row.name.endswith("/*") and not every_source:
             keys.check_chunk(key.topic.split("/", 1)[1], "view")
     except BusError as error:
-        raise WatchError(f"{expression!r} cannot be watched: {error}") from None
+        raise WatchError(codes.PAGE_CANNOT_WATCH(key=expression, detail=error)) from None
     if topics.Role.CONSOLE not in row.subscribers:
-        raise WatchError(f"{expression!r} cannot be watched: the console has no right to {row.name}")
+        raise WatchError(codes.PAGE_WATCH_NO_RIGHT(key=expression, topic=row.name))
     return row

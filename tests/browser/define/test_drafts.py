@@ -111,7 +111,7 @@ def test_what_somebody_else_saved_meanwhile_is_asked_about_and_ones_own_is_not(o
     field(page, "title").fill("Mine")
     button(page, "Save").click()
     question = page.get_by_role("alertdialog")
-    expect(question).to_contain_text("shared was changed at the site since it was opened here")
+    expect(question).to_contain_text("was changed after it was opened: a save over it loses these changes")
     assert load(plant.robots / "shared").title == "Own"
     button(page, "Cancel").click()
     # A question about one robot is no answer for another.

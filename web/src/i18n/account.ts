@@ -10,10 +10,8 @@ const TEXTS = {
   password: ["Password", "密码"],
   show: ["Show", "显示"],
   hide: ["Hide", "隐藏"],
-  wrong: ["The account or the password is wrong.", "账户或密码错误。"],
-  wait: ["Too many tries. Again in {seconds} s.", "尝试次数过多，请在 {seconds} 秒后重试。"],
-  busy: ["Many sign in at this moment. Try again.", "当前登录人数较多，请重试。"],
-  unreachable: ["The console does not answer. Try again.", "控制台无响应，请重试。"],
+  not_signed_in: ["Not signed in: {text}", "未登录：{text}"],
+  unreachable: ["the console does not answer: try again", "控制台无响应：请重试"],
   caps: ["Caps Lock is on.", "大写锁定已开启。"],
   forgotten: ["Forgotten? An administrator gives a new password.", "忘记密码？请管理员重设。"],
   no_stop: [
@@ -69,36 +67,6 @@ const TEXTS = {
   cancel: ["Cancel", "取消"],
   close: ["Close", "关闭"],
 
-  refused_short: [
-    "The password is too short: 10 characters at least, a few words are good.",
-    "密码太短：至少 10 个字符，几个词语即可。",
-  ],
-  refused_long: ["The password is too long: 256 bytes at most.", "密码太长：最多 256 字节。"],
-  refused_control: ["The password holds a control character: leave it out.", "密码含有控制字符，请去掉。"],
-  refused_repeats: [
-    "The password repeats a few characters: a few words are good.",
-    "密码只重复少数几个字符：请用几个词语。",
-  ],
-  refused_run: ["The password is a run of neighbours: a few words are good.", "密码是连续或相邻的字符：请用几个词语。"],
-  refused_common: [
-    "The password is one that is tried first: a common word or a name, and digits. A few words are good.",
-    "密码最容易被猜到（常用词或名称加数字）：请用几个词语。",
-  ],
-  refused_name: [
-    "That cannot be an account’s name: small letters, digits, _ and -, beginning with a letter or digit, 32 at most.",
-    "账户名不可用：请用小写字母、数字、_ 和 -，以字母或数字开头，最多 32 个字符。",
-  ],
-  refused_taken: ["There is an account of that name already.", "已有同名账户。"],
-  refused_no_account: ["There is no such account any more.", "该账户已不存在。"],
-  refused_last_admin: [
-    "That is the last administrator who can sign in: make another one first.",
-    "这是最后一个可登录的管理员：请先添加另一个。",
-  ],
-  refused_not_admin: ["Only an administrator may do that.", "只有管理员可以这样做。"],
-  refused_resting: ["Give your password again first.", "请先再次输入密码。"],
-  refused_sign_in: ["Sign in first.", "请先登录。"],
-  refused_no_session: ["That session is over already.", "该会话已结束。"],
-
   monitor_only: [
     "{account} is a monitor’s account: it watches, and asks for no control. A stop request works all the same.",
     "{account} 是监视账户：只能监视，不能请求控制权，但可请求停止。",
@@ -119,11 +87,6 @@ export function a(name: AccountText, values: Record<string, string | number> = {
 /** Explain the end of a session by the server's code. */
 export function endText(word: string): string {
   return `out_${word}` in TEXTS ? a(`out_${word}` as AccountText) : a("out_signed_out");
-}
-
-/** Explain a refusal by the server's code; empty: no text for it. */
-export function refusedText(word: string): string {
-  return `refused_${word}` in TEXTS ? a(`refused_${word}` as AccountText) : "";
 }
 
 export function roleText(role: string): string {

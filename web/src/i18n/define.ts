@@ -72,10 +72,6 @@ const TEXTS = {
   no_changes: ["No changes", "无更改"],
   saved: ["{name} is saved in {folder}", "{name} 已保存到 {folder}"],
   exists: ["{text}. Save over it?", "{text}。是否覆盖？"],
-  exists_changed: [
-    "{name} was changed at the site since it was opened here; that would be lost. Save over it?",
-    "{name} 在此处打开后已被更改，覆盖将丢失这些更改。是否覆盖？",
-  ],
   save_over: ["Save over it", "覆盖"],
   cancel: ["Cancel", "取消"],
   close: ["Close", "关闭"],

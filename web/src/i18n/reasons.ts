@@ -51,6 +51,12 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     "request.not_json_object",
     ["the request is not a JSON object: send an object with the request's fields", "应为 JSON 对象"],
   ],
+  ["request.needs_text", ["the field '{field}' is missing or is not a text", "字段“{field}”缺失或不是文本"]],
+  ["request.needs_object", ["the field '{field}' is missing or is not an object", "字段“{field}”缺失或不是对象"]],
+  ["request.too_large", ["the request is larger than {bytes} bytes", "请求超过 {bytes} 字节"]],
+  ["request.half_character", ["the request contains an unpaired surrogate", "请求中含有不成对的代理字符"]],
+  ["request.no_answer", ["{detail}", "{detail}"]],
+  ["request.abandoned", ["the client has disconnected", "客户端已断开"]],
   [
     "request.unknown_field",
     ["{request} has no field '{field}'; it takes {fields}", "{request} 没有字段“{field}”；可用：{fields}"],
@@ -84,7 +90,108 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     "page.own_name_only",
     ["{who} may send requests only as {own}, not as {name}", "{who} 只能以 {own} 的名义请求，不能以 {name}"],
   ],
+  [
+    "page.too_many_pages",
+    ["this session already has {count} open pages: close a page first", "该会话已打开 {count} 个页面：请先关闭一个"],
+  ],
+  ["page.text", ["this connection takes binary messages only", "此连接只接受二进制消息"]],
+  ["page.not_a_message", ["not a message of a page: {detail}", "不是页面的消息：{detail}"]],
+  [
+    "page.reads_too_slowly",
+    ["more than {bytes} bytes are waiting for a page that does not read", "超过 {bytes} 字节等待一个不读取的页面"],
+  ],
+  [
+    "page.too_many_keys",
+    ["this page already watches {count} keys: unwatch one first", "本页已在监视 {count} 个键：请先取消一个"],
+  ],
+  [
+    "page.watch_wildcard",
+    [
+      "'{key}' cannot be watched: name the view; '*' may replace the site and the robot only",
+      "不能监视“{key}”：请写明视图；“*”只可代替站点和机器人",
+    ],
+  ],
+  [
+    "page.watch_video",
+    ["'{key}' cannot be watched: name the site and the robot of a video", "不能监视“{key}”：请写明视频的站点和机器人"],
+  ],
+  [
+    "page.watch_no_right",
+    ["'{key}' cannot be watched: the console has no right to {topic}", "不能监视“{key}”：控制台无权订阅 {topic}"],
+  ],
+  ["page.cannot_watch", ["'{key}' cannot be watched: {detail}", "不能监视“{key}”：{detail}"]],
   ["request.worker_gave_up", ["aborted: {detail}", "已放弃：{detail}"]],
+  [
+    "http.host",
+    [
+      "host '{host}' is not this console's: use its address, or name it in the console's hosts",
+      "主机名“{host}”不属于此控制台：请使用其地址，或在控制台的 hosts 中列出该名称",
+    ],
+  ],
+  ["http.origin", ["origin '{origin}' is not this page's: {host}", "来源“{origin}”不是本页的来源：{host}"]],
+  ["http.other_page", ["the request comes from another page", "请求来自另一个页面"]],
+  [
+    "http.two_lengths",
+    [
+      "the request has a content-length and a transfer-encoding: send one of them",
+      "请求同时含有 content-length 和 transfer-encoding：请只发送其一",
+    ],
+  ],
+  ["http.body", ["a {method} request has no body", "{method} 请求不应有正文"]],
+  ["http.no_path", ["there is no {path}", "没有 {path}"]],
+  ["http.method", ["{path} does not take {method}", "{path} 不接受 {method}"]],
+  ["account.sign_in", ["no account is signed in: sign in first", "没有账户登录：请先登录"]],
+  ["account.wrong", ["the account or the password is wrong", "账户或密码错误"]],
+  ["account.wait", ["too many attempts: try again in {seconds} s", "尝试次数过多：请在 {seconds} 秒后重试"]],
+  ["account.busy", ["too many passwords wait to be verified: try again in a moment", "等待验证的密码过多：请稍后重试"]],
+  ["account.not_admin", ["{account} is not an administrator", "{account} 不是管理员"]],
+  ["account.no_session", ["session '{session}' has ended", "会话“{session}”已结束"]],
+  [
+    "account.name",
+    [
+      "account name '{name}' is invalid: use at most {most} lower-case letters, digits, '_' and '-', beginning with a letter or digit",
+      "账户名“{name}”不可用：请用最多 {most} 个小写字母、数字、“_”和“-”，以字母或数字开头",
+    ],
+  ],
+  ["account.taken", ["there is an account {name} already", "已有账户 {name}"]],
+  ["account.no_account", ["there is no account '{name}': there are {accounts}", "没有账户“{name}”：现有 {accounts}"]],
+  [
+    "account.last_admin",
+    [
+      "{name} is the last administrator who can sign in: make another administrator first",
+      "{name} 是最后一个可登录的管理员：请先添加另一个管理员",
+    ],
+  ],
+  ["account.role", ["role '{role}' is unknown: there are {roles}", "未知角色“{role}”：现有 {roles}"]],
+  ["account.action", ["action '{action}' is unknown: there are {actions}", "未知操作“{action}”：现有 {actions}"]],
+  ["account.failed", ["{detail}", "{detail}"]],
+  [
+    "account.short",
+    [
+      "the password is too short: use at least {least} characters; a few words are good",
+      "密码太短：请用至少 {least} 个字符，几个词语即可",
+    ],
+  ],
+  ["account.long", ["the password is too long: use at most {most} bytes", "密码太长：最多 {most} 字节"]],
+  [
+    "account.control",
+    ["the password contains a control character: leave this character out", "密码含有控制字符：请去掉该字符"],
+  ],
+  [
+    "account.repeats",
+    ["the password repeats a few characters: a few words are good", "密码只重复少数几个字符：请用几个词语"],
+  ],
+  [
+    "account.run",
+    ["the password is a run of neighbouring characters: a few words are good", "密码是连续或相邻的字符：请用几个词语"],
+  ],
+  [
+    "account.common",
+    [
+      "the password is easy to guess, because it is a common word or a name with digits: a few words are good",
+      "密码容易被猜到，因为它是常用词或名称加数字：请用几个词语",
+    ],
+  ],
   ["lease.taken", ["control taken", "已取得控制"]],
   ["lease.renewed", ["control renewed", "控制权已续期"]],
   ["lease.released", ["control released", "已释放控制"]],
@@ -534,6 +641,13 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "{field}：给出 {count} 个，{robot} 有 {joints} 个关节（{names}）",
     ],
   ],
+  [
+    "mesh.changed",
+    [
+      "{key} has SHA-256 {sha256}, not {wanted}, because the robot's description has changed: load the page again",
+      "{key} 的 SHA-256 是 {sha256}，不是 {wanted}，因为机器人的描述已更改：请重新加载页面",
+    ],
+  ],
   ["mesh.unknown", ["no mesh '{name}'; {robot} has {meshes}", "没有网格“{name}”；{robot} 有 {meshes}"]],
   [
     "recording.name",
@@ -546,7 +660,27 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ["recording.not_open", ["{robot} is not being recorded", "{robot} 未在录制"]],
   ["recording.failed", ["{detail}", "{detail}"]],
   ["recording.unreadable", ["{detail}", "{detail}"]],
+  [
+    "recording.unknown",
+    [
+      "no recording '{name}' here: use a file name from recordings/list",
+      "此处没有录制“{name}”：请使用 recordings/list 中的文件名",
+    ],
+  ],
+  [
+    "recording.no_attachment",
+    ["{file} has no attachment '{name}': there are {attachments}", "{file} 没有附件“{name}”：现有 {attachments}"],
+  ],
+  [
+    "recording.no_topic",
+    ["{file} has no topic '{topic}': there are {topics}", "{file} 没有主题“{topic}”：现有 {topics}"],
+  ],
   ["recording.no_joints", ["{file} contains no joint states", "{file}：其中没有关节记录"]],
+  ["recording.range", ["{range}: {file} has {bytes} bytes", "{range}：{file} 有 {bytes} 字节"]],
+  [
+    "recording.too_many_downloads",
+    ["{count} recordings are being sent already: try again soon", "已有 {count} 个录制正在发送：请稍后重试"],
+  ],
   [
     "recorder.busy",
     [
@@ -601,6 +735,138 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ["view.no_room", ["no capacity: {detail}", "没有余量：{detail}"]],
   ["view.invalid", ["{detail}", "{detail}"]],
   ["view.no_answer", ["the answer to {key}/views contains no view", "{key}/views 的应答中没有视图"]],
+  [
+    "view.no_renderer",
+    [
+      "no renderer answers for {robot} ({detail}): check that its name is right and that its renderer runs",
+      "{robot} 没有渲染服务应答（{detail}）：请检查其名称是否正确、渲染服务是否运行",
+    ],
+  ],
+  ["view.no_picture", ["no picture of {view} arrived within {seconds} s", "{seconds} 秒内没有收到 {view} 的画面"]],
+  ["view.not_a_picture", ["{key} is not a picture", "{key} 不是图像"]],
+  ["view.picture_unreadable", ["the newest picture cannot be read: {detail}", "无法读取最新画面：{detail}"]],
+  [
+    "view.no_png",
+    ["this console has no PyAV to make PNG: request .jpg instead", "此控制台没有 PyAV，无法生成 PNG：请改用 .jpg"],
+  ],
+  [
+    "view.parameter",
+    ["the parameter '{name}' is unknown: use width, height and fps", "未知参数“{name}”：请用 width、height 和 fps"],
+  ],
+  ["view.not_a_number", ["{name}='{value}' is not a number", "{name}=“{value}”不是数字"]],
+  ["view.not_pixels", ["{name}='{value}' is not a number of pixels", "{name}=“{value}”不是像素数"]],
+  [
+    "view.too_many_stills",
+    ["{count} stills are being made: try again in a moment", "正在生成 {count} 张静止画面：请稍后重试"],
+  ],
+  [
+    "view.too_many_streams",
+    ["{count} video streams are open already: close one first", "已打开 {count} 个视频流：请先关闭一个"],
+  ],
+  [
+    "view.too_many_streams_of",
+    [
+      "{address} has {count} open video streams already: close one first",
+      "{address} 已打开 {count} 个视频流：请先关闭一个",
+    ],
+  ],
+  ["define.unreadable", ["{detail}", "{detail}"]],
+  ["define.no_robot", ["there is no robot '{name}' here", "此处没有机器人“{name}”"]],
+  ["define.model_gone", ["this mesh is no longer stored: load the page again", "该网格已不再保存：请重新加载页面"]],
+  [
+    "define.file_gone",
+    ["{files}: no longer stored: drop the files on the page again", "{files}：已不再保存：请重新拖入文件"],
+  ],
+  [
+    "define.path",
+    [
+      "'{path}' is not the path of a robot's file: use a path below the robot's folder, like meshes/base.wrl",
+      "“{path}”不是机器人文件的路径：请用机器人文件夹下的路径，例如 meshes/base.wrl",
+    ],
+  ],
+  ["define.path_too_long", ["'{path}' is too long for a file name", "“{path}”作为文件名太长"]],
+  ["define.files", ["`files` must give each path the SHA-256 of its file", "`files` 应为每个路径给出其文件的 SHA-256"]],
+  ["define.file_not_given", ["'{file}' is not one of the given files", "“{file}”不在给出的文件中"]],
+  ["define.file_is_folder", ["a file's name is another file's folder", "一个文件的名称是另一个文件的文件夹"]],
+  ["define.file_too_large", ["the file is larger than {megabytes} MB", "文件超过 {megabytes} MB"]],
+  ["define.too_many_files", ["{count} files: at most {most} are possible", "{count} 个文件：最多 {most} 个"]],
+  [
+    "define.files_too_large",
+    [
+      "{count} files of {megabytes} MB: at most {most} MB are possible",
+      "{count} 个文件共 {megabytes} MB：最多 {most} MB",
+    ],
+  ],
+  [
+    "define.uploads",
+    ["{count} files are being sent already: try again in a moment", "已有 {count} 个文件正在上传：请稍后重试"],
+  ],
+  ["define.not_zip", ["the file is not a readable zip archive: {detail}", "文件不是可读取的 zip 压缩包：{detail}"]],
+  [
+    "define.zip_too_large",
+    [
+      "the archive contains {count} files of {megabytes} MB: at most {most} files and {most_megabytes} MB are possible",
+      "压缩包含 {count} 个文件，共 {megabytes} MB：最多 {most} 个文件、{most_megabytes} MB",
+    ],
+  ],
+  ["define.not_urdf", ["{file} is not a robot's URDF", "{file} 不是机器人的 URDF"]],
+  [
+    "define.joints",
+    [
+      "`joints` must have one finite number for each joint, {count} in total",
+      "`joints` 应为每个关节给出一个有限数值，共 {count} 个",
+    ],
+  ],
+  [
+    "define.problems",
+    [
+      "the robot is not saved, because its description has problems ({count}): correct them first",
+      "机器人未保存，因为其描述有问题（{count}）：请先更正",
+    ],
+  ],
+  ["define.exists", ["there is a robot {name} in {folder} already", "{folder} 中已有机器人 {name}"]],
+  [
+    "define.changed",
+    [
+      "{name} in {folder} was changed after it was opened: a save over it loses these changes",
+      "{folder} 中的 {name} 在打开后已被更改：覆盖将丢失这些更改",
+    ],
+  ],
+  ["define.too_slow", ["this took more than {seconds} s and was stopped", "此操作超过 {seconds} 秒，已停止"]],
+  [
+    "define.crashed",
+    [
+      "this crashed the worker process twice: it may be damaged, or need too much memory ({detail})",
+      "此操作使工作进程两次崩溃：文件可能已损坏，或需要过多内存（{detail}）",
+    ],
+  ],
+  ["define.memory", ["reading it takes more than {gigabytes} GB of memory", "读取需要超过 {gigabytes} GB 内存"]],
+  ["define.nested", ["it is nested too deeply to read", "嵌套太深，无法读取"]],
+  ["define.disk", ["the console cannot write to its disk: {detail}", "控制台无法写入磁盘：{detail}"]],
+  [
+    "define.site_has",
+    [
+      "the site {site} has a robot {name} already: save yours under another name",
+      "站点 {site} 已有机器人 {name}：请用另一名称保存",
+    ],
+  ],
+  [
+    "define.no_supervisor",
+    [
+      'no supervisor runs here (robomesh up). Add this to the site file and restart the site\'s services:\n\n[[robot]]\nname = "{name}"\nmodel = "{model}"\ncontroller = "simulated"',
+      '此处没有运行监管进程（robomesh up）。请将以下内容加入站点文件并重启站点的服务：\n\n[[robot]]\nname = "{name}"\nmodel = "{model}"\ncontroller = "simulated"',
+    ],
+  ],
+  ["define.runs", ["{name} runs already: it restarts whenever it is saved", "{name} 已在运行：每次保存后自动重启"]],
+  ["define.in_site_file", ["{name} is in the site file: remove it there", "{name} 在站点文件中：请在那里删除"]],
+  ["define.not_started", ["{name} was not started from the page", "{name} 不是从本页启动的"]],
+  [
+    "define.started_unreadable",
+    [
+      "the list of started robots is invalid ({detail}): repair or remove it",
+      "已启动机器人的列表无效（{detail}）：请修复或删除",
+    ],
+  ],
 ] as const);
 
 /** A reason's sentence in the page's language; `text` where this page does not know the code. */

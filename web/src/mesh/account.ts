@@ -1,7 +1,9 @@
 // The signed-in account of this page, and requests to the console about it.
 
 import { computed, signal } from "@preact/signals";
+import { a } from "../i18n/account";
 import { hello } from "./connection";
+import { RefusedRequest, readRefusal } from "./refusal";
 
 export interface Me {
   /** Whether this console has accounts. */
@@ -17,17 +19,6 @@ export interface Me {
   /** The right to command is suspended until the password is given again. */
   resting: boolean;
   session: string;
-}
-
-/** A refused request; `word` is the server's code for the page. */
-export class AccountError extends Error {
-  constructor(
-    readonly word: string,
-    text: string,
-    readonly seconds = 0,
-  ) {
-    super(text);
-  }
 }
 
 const ACTIVE_INTERVAL_MS = 60_000;
@@ -68,7 +59,7 @@ export function signedOut(word: string): void {
 
 /** Post to `/account/...`.
  *
- * @throws AccountError with the server's code and text. */
+ * @throws RefusedRequest with the reason. */
 export async function post<Answer>(path: string, body: object = {}): Promise<Answer> {
   let answer: Response;
   try {
@@ -78,11 +69,10 @@ export async function post<Answer>(path: string, body: object = {}): Promise<Ans
       body: JSON.stringify(body),
     });
   } catch {
-    throw new AccountError("unreachable", "");
+    throw new RefusedRequest(0, a("unreachable"));
   }
-  const reply = (await answer.json().catch(() => ({}))) as { error?: string; text?: string; seconds?: number };
-  if (!answer.ok) throw new AccountError(reply.error ?? "unreachable", reply.text ?? "", reply.seconds ?? 0);
-  return reply as Answer;
+  if (!answer.ok) throw await readRefusal(answer);
+  return (await answer.json()) as Answer;
 }
 
 export async function signIn(name: string, password: string): Promise<void> {

@@ -5,6 +5,7 @@ import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
 import { signal } from "@preact/signals";
 import type { Reason, ToPage_Hello } from "../gen/robomesh_pb";
 import { FromPageSchema, ToPageSchema } from "../gen/robomesh_pb";
+import { reasonText } from "../i18n/reasons";
 import { t } from "../i18n/texts";
 import { ageClock } from "./age-clock";
 import { sampleDelay } from "./delay";
@@ -25,7 +26,7 @@ export interface Sample {
   step: number;
 }
 
-/** A request that was refused or not answered; the text is for the operator. */
+/** A request that was refused or not answered; the message is for the operator, in the page's language. */
 export class AskError extends Error {
   /** No answer arrived: the request was not refused, and may have been carried out. */
   readonly noAnswer: boolean;
@@ -33,7 +34,7 @@ export class AskError extends Error {
   readonly reason: Reason | undefined;
 
   constructor(text: string, noAnswer: boolean, reason?: Reason) {
-    super(text);
+    super(reasonText(reason, text));
     this.noAnswer = noAnswer;
     this.reason = reason;
   }

@@ -78,8 +78,7 @@ export function holds(robotKey: string): boolean {
 export function reasonOf(error: unknown): string {
   if (!(error instanceof Error)) return String(error);
   // Older gateways give only a sentence.
-  const text = error.message.replace(/^Not (sent|run): /, "");
-  return error instanceof AskError ? reasonText(error.reason, text) : text;
+  return error.message.replace(/^Not (sent|run): /, "");
 }
 
 export function ms(stamp: Timestamp | undefined): number {

@@ -1,9 +1,9 @@
 // A form for the account's new password.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { a, refusedText } from "../i18n/account";
+import { a } from "../i18n/account";
 import type { Me } from "../mesh/account";
-import { AccountError, me, post } from "../mesh/account";
+import { me, post } from "../mesh/account";
 import { PasswordField } from "../ui/password-field";
 import "./account-form.css";
 
@@ -24,7 +24,8 @@ export function ChangePassword({ close }: { close: () => void }) {
       me.value = await post<Me>("password", { password: oldPassword, new: newPassword });
       setOutcome({ done: true, text: a("changed") });
     } catch (error) {
-      setOutcome({ done: false, text: a("not_changed", { text: refusalText(error) }) });
+      const text = error instanceof Error ? error.message : String(error);
+      setOutcome({ done: false, text: a("not_changed", { text }) });
     }
   };
   return (
@@ -62,13 +63,4 @@ export function ChangePassword({ close }: { close: () => void }) {
       </div>
     </form>
   );
-}
-
-/** Return a refusal in the page's language if it has one, otherwise the server's text. */
-export function refusalText(error: unknown): string {
-  if (!(error instanceof AccountError)) return String(error);
-  const { word, seconds } = error;
-  if (word === "wait") return a("wait", { seconds });
-  if (word === "wrong" || word === "busy" || word === "unreachable") return a(word);
-  return refusedText(word) || error.message;
 }

@@ -4,6 +4,7 @@ import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
 import { t } from "../i18n/texts";
+import { readRefusal } from "../mesh/refusal";
 
 const NOT_YET: readonly number[] = [503, 504]; // the mesh service is busy, or did not answer
 const ASK_AGAIN_MS = 2000;
@@ -54,9 +55,9 @@ async function fetched(url: string, failed: (why: string) => void): Promise<Arra
     failed(t("not_connected"));
     return null;
   }
-  const why = await answer.text();
-  if (!NOT_YET.includes(answer.status)) throw new Error(why);
-  failed(why);
+  const refused = await readRefusal(answer);
+  if (!NOT_YET.includes(refused.status)) throw refused;
+  failed(refused.message);
   return null;
 }
 

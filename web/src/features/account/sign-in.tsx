@@ -2,8 +2,10 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { a, endText } from "../../i18n/account";
+import { reasonText } from "../../i18n/reasons";
 import { switchLanguage, t } from "../../i18n/texts";
-import { AccountError, endedBy, me, signIn } from "../../mesh/account";
+import { endedBy, me, signIn } from "../../mesh/account";
+import { RefusedRequest } from "../../mesh/refusal";
 import { PasswordField } from "../../ui/password-field";
 import { switchTheme, theme } from "../../ui/theme";
 import "../../panels/account-form.css";
@@ -12,7 +14,7 @@ import "./sign-in.css";
 export function SignIn() {
   const [name, setName] = useState("");
   const [password, setPassword] = useState("");
-  const [problem, setProblem] = useState("");
+  const [problem, setProblem] = useState<RefusedRequest | null>(null);
   const [busy, setBusy] = useState(false);
   const [waitUntil, setWaitUntil] = useState(0);
   const left = useSecondsUntil(waitUntil);
@@ -22,14 +24,14 @@ export function SignIn() {
   const send = async () => {
     if (busy || left > 0) return;
     setBusy(true);
-    setProblem("");
+    setProblem(null);
     try {
       await signIn(name, password);
     } catch (error) {
-      const { word, seconds } = error instanceof AccountError ? error : new AccountError("unreachable", "");
-      if (word === "wait") setWaitUntil(Date.now() + seconds * 1000);
-      setProblem(word === "wait" ? "" : a(word === "wrong" || word === "busy" ? word : "unreachable"));
-      setPassword(word === "wrong" ? "" : password);
+      const refused = error instanceof RefusedRequest ? error : new RefusedRequest(0, a("unreachable"));
+      setProblem(refused);
+      if (refused.reason?.code === "account.wait") setWaitUntil(Date.now() + Number(refused.reply.seconds) * 1000);
+      if (refused.reason?.code === "account.wrong") setPassword("");
     }
     setBusy(false);
   };
@@ -66,7 +68,7 @@ export function SignIn() {
         </label>
         <PasswordField label={a("password")} kind="current-password" value={password} set={setPassword} />
         <p class="sign-in-problem" role="alert">
-          {left > 0 ? a("wait", { seconds: left }) : problem}
+          {problem && (!waitUntil || left > 0) && a("not_signed_in", { text: textOf(problem, left) })}
         </p>
         <button class="action primary" type="submit" disabled={busy || left > 0}>
           {a(busy ? "signing_in" : "sign_in")}
@@ -91,6 +93,12 @@ export function SignIn() {
       </footer>
     </section>
   );
+}
+
+/** Return the reason in words, with the seconds that are left to wait. */
+function textOf({ reason, message }: RefusedRequest, left: number): string {
+  if (!reason || left === 0) return message;
+  return reasonText({ ...reason, values: { ...reason.values, seconds: String(left) } }, message);
 }
 
 /** Return the whole seconds until a time, counted down. */

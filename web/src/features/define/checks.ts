@@ -2,13 +2,14 @@
 
 import { computed, effect, signal } from "@preact/signals";
 import { d } from "../../i18n/define";
+import { RefusedRequest } from "../../mesh/refusal";
 import { bodies } from "./description";
 import type { Draft } from "./draft";
 import { draft, identity } from "./draft";
 import { shapeOf } from "./mesh-files";
 import { positions } from "./selection";
 import type { Checked, Problem } from "./server-requests";
-import { check, RefusedError } from "./server-requests";
+import { check } from "./server-requests";
 
 const CHECK_DELAY_MS = 200;
 const RETRY_MS = 1500;
@@ -119,7 +120,7 @@ async function ask(of: Draft, joints: readonly number[]): Promise<void> {
     checked.value = null;
     checkError.value = error instanceof Error ? error.message : String(error);
     // Retry: the console may come back without any typing.
-    if (error instanceof RefusedError && (error.status === 0 || error.status >= 500)) {
+    if (error instanceof RefusedRequest && (error.status === 0 || error.status >= 500)) {
       clearTimeout(timer);
       timer = setTimeout(() => void ask(of, joints), RETRY_MS);
     }

@@ -2,6 +2,7 @@
 
 import { signal } from "@preact/signals";
 import { d } from "../../i18n/define";
+import { RefusedRequest } from "../../mesh/refusal";
 import { checked, invalidNumbers, parsePath } from "./checks";
 import { draft, identity, isOpen, isUnsaved, markSaved } from "./draft";
 import { openField } from "./selection";
@@ -70,18 +71,17 @@ export async function save(thenStart: boolean, over = ""): Promise<boolean> {
     try {
       return await server.save(now, revision, over !== "" && over === name);
     } catch (error) {
-      if (!(error instanceof server.RefusedError) || !isOpen(of)) throw error;
+      if (!(error instanceof RefusedRequest) || !isOpen(of)) throw error;
       if (error.status === 409) {
-        const text = error.isChanged
-          ? d("exists_changed", { name })
-          : d("exists", { text: error.message.replace(/\.$/, "") });
+        const text = d("exists", { text: error.message });
         outcome.value = { kind: "exists", text, name, thenStart };
         return undefined;
       }
-      if (error.problems.length === 0) throw error;
-      checked.value = { tool: null, links: {}, ...checked.value, problems: error.problems };
+      const problems = server.problemsOf(error);
+      if (problems.length === 0) throw error;
+      checked.value = { tool: null, links: {}, ...checked.value, problems };
       outcome.value = { kind: "refused", text: d("mend_first") };
-      openField(error.problems[0]?.path ?? []);
+      openField(problems[0]?.path ?? []);
       return undefined;
     }
   });

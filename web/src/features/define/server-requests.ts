@@ -1,6 +1,7 @@
 // Requests of Define to the console's server.
 
 import { t } from "../../i18n/texts";
+import { RefusedRequest, readRefusal } from "../../mesh/refusal";
 import type { GivenDescription } from "./description";
 import { concise } from "./description";
 import type { Draft } from "./draft";
@@ -81,41 +82,21 @@ export interface Pair {
   values: Readonly<Record<string, number>>;
 }
 
-/** A request that was refused or not answered; the text is for the user. */
-export class RefusedError extends Error {
-  constructor(
-    readonly status: number,
-    text: string,
-    readonly problems: Problem[] = [],
-    /** The robot to overwrite has changed since it was opened. */
-    readonly isChanged = false,
-  ) {
-    super(text);
-  }
-}
-
 async function send(path: string, init?: RequestInit): Promise<Response> {
   let answer: Response;
   try {
     answer = await fetch(`/define${path}`, init);
   } catch (error) {
     if (init?.signal?.aborted) throw error;
-    throw new RefusedError(0, t("not_connected"));
+    throw new RefusedRequest(0, t("not_connected"));
   }
   if (answer.ok) return answer;
-  const text = await answer.text();
-  let problems: Problem[] = [];
-  let words = text;
-  let changed = false;
-  try {
-    const reply = JSON.parse(text) as { problems?: Problem[]; text?: string; changed?: boolean };
-    problems = reply.problems ?? [];
-    changed = reply.changed ?? false;
-    words = reply.text ?? problems.map((problem) => problem.text).join("; ");
-  } catch {
-    // it is already text
-  }
-  throw new RefusedError(answer.status, words || `HTTP ${answer.status}`, problems, changed);
+  throw await readRefusal(answer);
+}
+
+/** Return the problems of a description that was refused; empty: it was refused for another reason. */
+export function problemsOf({ reply }: RefusedRequest): readonly Problem[] {
+  return (reply.problems as Problem[] | undefined) ?? [];
 }
 
 function post(path: string, body: unknown, signal?: AbortSignal): Promise<Response> {
@@ -139,7 +120,7 @@ async function withFiles(files: Readonly<Record<string, string>>, asked: () => P
   try {
     return await asked();
   } catch (error) {
-    if (!(error instanceof RefusedError) || error.status !== FORGOTTEN) throw error;
+    if (!(error instanceof RefusedRequest) || error.status !== FORGOTTEN) throw error;
     // Opening a saved robot restores its own files.
     const { owner } = identity.value;
     let sent = owner

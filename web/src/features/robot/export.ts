@@ -2,6 +2,7 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../../i18n/texts";
+import { readRefusal } from "../../mesh/refusal";
 
 // A browser keeps the recording in memory.
 const MOST_BYTES = 512 * 1024 * 1024;
@@ -69,7 +70,7 @@ export function useRecording(address: string, name: string): VideoRecording {
     let bytes = 0;
     try {
       const answer = await fetch(address, { signal: stop.signal });
-      if (!answer.ok || !answer.body) throw new Error(await answer.text());
+      if (!answer.ok || !answer.body) throw await readRefusal(answer);
       const reader = answer.body.getReader();
       while (bytes < MOST_BYTES) {
         const { done, value } = await reader.read();

@@ -5,7 +5,6 @@ import { fullTime } from "../../i18n/format";
 import { s } from "../../i18n/settings";
 import { me, post } from "../../mesh/account";
 import type { Notice } from "../../mesh/control";
-import { refusalText } from "../../panels/change-password";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
 import { Select } from "../../ui/select";
@@ -36,7 +35,8 @@ export function Accounts() {
       setAccounts((await post<{ accounts: Account[] }>("accounts", { action, name, ...values })).accounts);
       setNotice({ kind: "done", text: s("done") });
     } catch (error) {
-      setNotice({ kind: "refused", text: s("not_done", { text: refusalText(error) }) });
+      const text = error instanceof Error ? error.message : String(error);
+      setNotice({ kind: "refused", text: s("not_done", { text }) });
       throw error;
     }
   };

@@ -5,7 +5,6 @@ import { fullTime } from "../../i18n/format";
 import { s } from "../../i18n/settings";
 import { post } from "../../mesh/account";
 import type { Notice } from "../../mesh/control";
-import { refusalText } from "../../panels/change-password";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
 
@@ -40,7 +39,8 @@ export function Sessions() {
       await fetchSessions();
       setNotice({ kind: "done", text: s("done") });
     } catch (error) {
-      setNotice({ kind: "refused", text: s("not_done", { text: refusalText(error) }) });
+      const text = error instanceof Error ? error.message : String(error);
+      setNotice({ kind: "refused", text: s("not_done", { text }) });
     }
   };
   return (

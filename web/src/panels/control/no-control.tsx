@@ -5,7 +5,6 @@ import { a } from "../../i18n/account";
 import { commandSuspended, isMonitor, me, unlock } from "../../mesh/account";
 import { hello } from "../../mesh/connection";
 import { PasswordField } from "../../ui/password-field";
-import { refusalText } from "../change-password";
 import "../account-form.css";
 
 /** Return whether the signed-in account may not request control now. */
@@ -21,7 +20,7 @@ export function NoControl() {
     try {
       await unlock(password);
     } catch (error) {
-      setProblem(refusalText(error));
+      setProblem(error instanceof Error ? error.message : String(error));
     }
     setPassword("");
   };
