@@ -513,7 +513,7 @@ VIEW_INVALID = Code("view.invalid", "{detail}")
 VIEW_NO_ANSWER = Code("view.no_answer", "the answer to {key}/views contains no view")
 VIEW_NO_RENDERER = Code(
     "view.no_renderer",
-    "no renderer answers for {robot} ({detail})",
+    "no renderer answers for {robot}",
     "check that its name is right and that its renderer runs",
 )
 VIEW_NO_PICTURE = Code("view.no_picture", "no picture of {view} arrived within {seconds:g} s")

@@ -73,7 +73,7 @@ def test_an_operator_signs_in_has_control_in_its_own_name_and_signs_out_in_all_t
     expect(button(page, "Stop request")).to_be_disabled()
     assert serious(page) == []
     sign_in(page, "li", "not the password")
-    expect(page.get_by_role("alert")).to_have_text("The account or the password is wrong.")
+    expect(page.get_by_role("alert")).to_have_text("Not signed in: the account or the password is wrong")
     expect(page.get_by_label("Password", exact=True)).to_have_value("")
     sign_in(page, "li")
     expect(signed_in(page)).to_contain_text("operator")
@@ -93,6 +93,28 @@ def test_an_operator_signs_in_has_control_in_its_own_name_and_signs_out_in_all_t
     # Control ended with the session: the next session finds none in control.
     sign_in(page, "li")
     expect(page.locator(".holder")).to_have_text("Nobody is in control")
+
+
+def test_the_page_counts_the_seconds_until_the_next_attempt_and_shows_an_unknown_code_in_english(open_tab):
+    page = open_tab()
+    expect(page.get_by_role("heading", name="Console of hall")).to_be_visible()
+    wait = {"code": "account.wait", "values": {"seconds": "40"}, "causes": [], "text": "too many attempts"}
+    page.route("**/account/sign-in", lambda route: route.fulfill(status=429, json=answer(wait, seconds=40)))
+    sign_in(page, "li")
+    counted = re.compile(r"^Not signed in: too many attempts: try again in [123]\d s$")
+    expect(page.get_by_role("alert")).to_have_text(counted)
+    expect(button(page, "Sign in")).to_be_disabled()
+    page.reload()
+    newer = {"code": "account.later", "values": {}, "causes": [], "text": "the moon is full"}
+    page.unroute("**/account/sign-in")
+    page.route("**/account/sign-in", lambda route: route.fulfill(status=403, json=answer(newer)))
+    sign_in(page, "li")
+    expect(page.get_by_role("alert")).to_have_text("Not signed in: the moon is full")
+
+
+def answer(refusal, **more):
+    """Return a refusal of the console as it answers it."""
+    return {"error": "a word", "text": refusal["text"], "refusal": refusal, **more}
 
 
 def test_a_monitor_finds_why_it_has_no_control_and_its_stop_request_works(open_tab, plant):
@@ -144,11 +166,24 @@ def test_on_a_phone_in_chinese_signing_in_fits_and_has_no_serious_finding(contex
     expect(page.get_by_role("heading", name="hall 的控制台")).to_be_visible()
     assert serious(page) == []
     assert page.locator("html").evaluate("html => html.scrollWidth") == 360
+    alert = page.get_by_role("alert")
     page.get_by_label("账户", exact=True).fill("li")
+    page.get_by_label("密码", exact=True).fill("not the password")
+    button(page, "登录").click()
+    expect(alert).to_have_text("未登录：账户或密码错误")
+    assert page.locator("html").evaluate("html => html.scrollWidth") == 360
     page.get_by_label("密码", exact=True).fill(PASSWORD)
     button(page, "登录").click()
     expect(signed_in(page)).to_be_visible()
     signed_in(page).click()
     expect(page.locator(".account-sheet")).to_contain_text("操作员")
     assert page.locator("html").evaluate("html => html.scrollWidth") == 360
+    button(page, "更改密码").click()
+    page.get_by_label("当前密码", exact=True).fill(PASSWORD)
+    page.get_by_label("新密码", exact=True).fill("short")
+    page.get_by_label("再次输入新密码", exact=True).fill("short")
+    button(page, "更改").click()
+    expect(page.locator(".account-sheet [role=status]")).to_have_text(
+        "未更改：密码太短：请用至少 10 个字符，几个词语即可"
+    )
     contexts.give_back(context, kind, plant.address)

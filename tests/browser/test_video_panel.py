@@ -102,3 +102,26 @@ def test_a_browser_without_a_decoder_shows_still_pictures_and_says_so(open_page,
         expect(page.locator(".camera .age")).to_have_count(0)
     expect(page.locator(".camera .footnote")).to_contain_text("Still pictures")
     publisher.close()
+
+
+@pytest.mark.parametrize(
+    ("locale", "save", "words"),
+    [
+        (
+            "en-GB",
+            "Save MP4",
+            "The video was not saved: no renderer answers for hall/arm: check that its name",
+        ),
+        ("zh-CN", "保存 MP4", "视频未保存：hall/arm 没有渲染服务应答：请检查其名称是否正确"),
+    ],
+)
+def test_a_refused_video_is_explained_in_the_page_s_language(open_page, plant, locale, save, words):
+    publisher, encoder = publisher_of(plant, "video/front"), Encoder()
+    message, key = encoder.frame(200, 30, 30)
+    publisher.put(message, key_frame=key)
+    page = open_page("#/hall/arm", drawn=False, refused=True, locale=locale)
+    page.wait_for_selector('.camera canvas[data-drawn="true"]')
+    page.get_by_role("button", name=save).click()
+    # This site has no renderer, so the console refuses the video.
+    expect(page.locator(".camera .footnote")).to_contain_text(words)
+    publisher.close()

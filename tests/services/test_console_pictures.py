@@ -57,11 +57,11 @@ async def rendered(mesh, page):  # noqa: F811
 
         async def views(request):
             if request.message.of != "front":
-                raise RefusedError(f"no view {request.message.of!r}; there are front")
+                raise RefusedError(codes.VIEW_UNKNOWN(view=request.message.of, views="front"))
             if request.message.width == 640:
                 raise QuotaError("li has had its views", again_s=30.5)
             if request.message.width > 1920:
-                raise RefusedError("a view of 2000 pixels: up to 1920 are possible")
+                raise RefusedError(codes.VIEW_INVALID(detail="2000 pixels: up to 1920 are possible"))
             if request.message == ViewRequest(of="front"):
                 return ViewAnswer(topic="video/front", image="image/front", width=160, height=90, fps=20)
             if request.message.width == 1920:

@@ -152,9 +152,9 @@ class Pictures:
         wanted = ViewRequest(of=view, width=size.width, height=size.height, fps=size.fps)
         try:
             answer = await self.views.ask(robot, wanted, self.asker(request.scope))
-        except NoAnswerError as error:
+        except NoAnswerError:
             named = f"{path['site']}/{path['robot']}"
-            raise RefusedRequest(503, codes.VIEW_NO_RENDERER(robot=named, detail=error)) from None
+            raise RefusedRequest(503, codes.VIEW_NO_RENDERER(robot=named)) from None
         except (QuotaError, BusyError) as error:
             raise refused_on_the_mesh(error) from None
         except RefusedError as error:

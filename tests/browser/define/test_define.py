@@ -529,3 +529,6 @@ def test_other_units_say_the_same_robot(open_page):
 def test_a_robot_that_is_not_here_is_said(open_page):
     page = open_page("#/define/nobody", drawn=False, refused=True)
     expect(page.locator(".outcome.refused")).to_contain_text("nobody cannot be opened: there is no robot")
+    page.evaluate("localStorage.setItem('robomesh.language', 'zh')")
+    page.reload()
+    expect(page.locator(".outcome.refused")).to_contain_text("无法打开 nobody：此处没有机器人“nobody”")

@@ -738,8 +738,8 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   [
     "view.no_renderer",
     [
-      "no renderer answers for {robot} ({detail}): check that its name is right and that its renderer runs",
-      "{robot} 没有渲染服务应答（{detail}）：请检查其名称是否正确、渲染服务是否运行",
+      "no renderer answers for {robot}: check that its name is right and that its renderer runs",
+      "{robot} 没有渲染服务应答：请检查其名称是否正确、渲染服务是否运行",
     ],
   ],
   ["view.no_picture", ["no picture of {view} arrived within {seconds} s", "{seconds} 秒内没有收到 {view} 的画面"]],

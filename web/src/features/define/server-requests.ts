@@ -95,7 +95,7 @@ async function send(path: string, init?: RequestInit): Promise<Response> {
 }
 
 /** Return the problems of a description that was refused; empty: it was refused for another reason. */
-export function problemsOf({ reply }: RefusedRequest): readonly Problem[] {
+export function problemsOf({ reply }: RefusedRequest): Problem[] {
   return (reply.problems as Problem[] | undefined) ?? [];
 }
 
