@@ -2,7 +2,7 @@ import "@preact/signals";
 import { render } from "preact";
 import { isolateForeignTexts } from "../i18n/foreign-text";
 import { language } from "../i18n/texts";
-import { reportActivity, signedOut, whoAmI } from "../mesh/account";
+import { fetchAccount, reportActivity, signedOut } from "../mesh/account";
 import { keepConnected } from "../mesh/connection";
 import { followThisTab } from "../mesh/control";
 import { applyTheme } from "../ui/theme";
@@ -14,7 +14,7 @@ applyTheme();
 document.documentElement.lang = language.value === "zh" ? "zh-Hans" : "en";
 followThisTab();
 const maySee = async () => {
-  const who = await whoAmI();
+  const who = await fetchAccount();
   return who && (!who.accounts || who.account !== "");
 };
 reportActivity(keepConnected(maySee, signedOut));

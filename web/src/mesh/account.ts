@@ -36,7 +36,7 @@ export const commandSuspended = computed(() => !!hello.value?.account && !hello.
 let connects: () => void = () => undefined;
 
 /** Ask the console which account is signed in; null: no answer. */
-export async function whoAmI(): Promise<Me | null> {
+export async function fetchAccount(): Promise<Me | null> {
   try {
     const answer = await fetch("/account/me", { cache: "no-store", signal: AbortSignal.timeout(ANSWER_TIMEOUT_MS) });
     if (!answer.ok) return null;
@@ -54,7 +54,7 @@ export async function whoAmI(): Promise<Me | null> {
 export function signedOut(word: string): void {
   endedBy.value = word || "signed_out";
   if (me.value) me.value = { ...me.value, account: "", role: "", operator: "", may_command: false, session: "" };
-  void whoAmI();
+  void fetchAccount();
 }
 
 /** Post to `/account/...`.
@@ -103,6 +103,6 @@ export function reportActivity(connect: () => void): void {
   for (const kind of ["pointerdown", "keydown"] as const)
     addEventListener(kind, touched, { capture: true, passive: true });
   hello.subscribe((greeting) => {
-    if (greeting?.account && greeting.mayCommand !== me.value?.may_command) void whoAmI();
+    if (greeting?.account && greeting.mayCommand !== me.value?.may_command) void fetchAccount();
   });
 }

@@ -5,7 +5,7 @@ import { watch } from "./connection";
 import type { Replay } from "./replay";
 
 /** `coming`: the replay has just jumped, and data recorded there may be on its way. */
-export type OfMoment = "here" | "coming" | "absent";
+export type MomentState = "here" | "coming" | "absent";
 
 const ARRIVAL_MS = 2000;
 const CHECK_INTERVAL_MS = 50;
@@ -13,8 +13,8 @@ const CHECK_INTERVAL_MS = 50;
 const ON_ITS_WAY_S = 0.5;
 
 /** Follow a replay's topic whose messages are valid for a time [s]; an empty topic is absent. */
-export function useOfMoment(replay: Replay | null, topic: string, holdsS: number): OfMoment {
-  const [state, setState] = useState<OfMoment>("coming");
+export function useMomentState(replay: Replay | null, topic: string, holdsS: number): MomentState {
+  const [state, setState] = useState<MomentState>("coming");
   useEffect(() => {
     setState("coming");
     if (!replay || !topic) return;

@@ -14,26 +14,26 @@ import type { Latest } from "./topics";
 
 const UPDATE_INTERVAL_MS = 250;
 
-export interface RobotNow {
+export interface RobotSnapshot {
   controller: Signal<Latest<ControllerState> | undefined>;
   lease: Signal<Latest<Lease> | undefined>;
   /** Its state when the tile was last visible. */
   description: Description | undefined;
 }
 
-const robots = new Map<string, RobotNow>();
+const robots = new Map<string, RobotSnapshot>();
 
 /** Return the snapshot of a robot; always the same object. */
-export function robotNow(robotKey: string): RobotNow {
+export function robotSnapshot(robotKey: string): RobotSnapshot {
   const present = robots.get(robotKey);
   if (present) return present;
-  const made: RobotNow = { controller: signal(undefined), lease: signal(undefined), description: undefined };
+  const made: RobotSnapshot = { controller: signal(undefined), lease: signal(undefined), description: undefined };
   robots.set(robotKey, made);
   return made;
 }
 
 /** Follow the states and leases of every robot while the component is mounted. */
-export function useFleetNow(): void {
+export function useFleetSnapshots(): void {
   useEffect(() => {
     const ends = [
       follow("robomesh/*/*/controller", ControllerStateSchema, (now) => now.controller),
@@ -49,7 +49,7 @@ export function useFleetNow(): void {
 function follow<S extends DescMessage>(
   expression: string,
   schema: S,
-  place: (now: RobotNow) => Signal<Latest<MessageShape<S>> | undefined>,
+  place: (now: RobotSnapshot) => Signal<Latest<MessageShape<S>> | undefined>,
 ): () => void {
   const waiting = new Map<string, Sample>();
   const stop = watch(expression, (sample) => waiting.set(sample.key, sample));
@@ -59,7 +59,7 @@ function follow<S extends DescMessage>(
       addKnownRobots(waiting.keys());
       for (const [key, sample] of waiting) {
         const robotKey = key.slice(0, key.lastIndexOf("/"));
-        place(robotNow(robotKey)).value = { key, sample, message: fromBinary(schema, sample.payload) };
+        place(robotSnapshot(robotKey)).value = { key, sample, message: fromBinary(schema, sample.payload) };
       }
     });
     waiting.clear();

@@ -38,7 +38,7 @@ export class Arm {
       description.links.map(async ({ name, mesh, meshSha256, color }) => {
         if (!mesh) return;
         const url = meshUrl(this.prefix, mesh, meshSha256);
-        const model = await loadOrSay(
+        const model = await loadOrReport(
           url,
           () => !this.removed,
           (why) => failed(name, why),
@@ -144,7 +144,7 @@ export function meshUrl(prefix: string, mesh: string, sha256: string): string {
 }
 
 /** Load a model; on failure report why and return null. */
-export async function loadOrSay(
+export async function loadOrReport(
   url: string,
   wanted: () => boolean,
   failed: (why: string) => void,

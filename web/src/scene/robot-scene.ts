@@ -7,7 +7,7 @@ import type { Description, View } from "../gen/robomesh_pb";
 import { View_Projection, ViewSchema } from "../gen/robomesh_pb";
 import { floorOf } from "../mesh/clearance";
 import type { Failed } from "./arm";
-import { Arm, loadOrSay, meshUrl } from "./arm";
+import { Arm, loadOrReport, meshUrl } from "./arm";
 import type { Nearest } from "./lines";
 import { Gap, Path, Trail } from "./lines";
 import { colourEdges, paint, withEdges } from "./models";
@@ -145,7 +145,7 @@ export class RobotScene {
     await Promise.all(
       fixtures.map(async ({ name, mesh, meshSha256, fixtureToSite, color }) => {
         const url = meshUrl(this.prefix, mesh, meshSha256);
-        const model = await loadOrSay(
+        const model = await loadOrReport(
           url,
           () => !this.disposed,
           (why) => failed(name, why),

@@ -10,7 +10,7 @@ import { r } from "../i18n/recordings";
 import { t, viewText } from "../i18n/texts";
 import { distanceText, useClearanceLevel } from "../mesh/clearance";
 import { watch } from "../mesh/connection";
-import type { OfMoment } from "../mesh/replay-moment";
+import type { MomentState } from "../mesh/replay-moment";
 import { ageOf, isStale, useTopic } from "../mesh/topics";
 import { Choice, Toggle } from "../ui/choice";
 import { theme } from "../ui/theme";
@@ -57,7 +57,7 @@ export function SceneView(props: {
   age: number | null | undefined;
   lostAt: number | null;
   /** Replay only: whether its joints belong to the replay's current moment. */
-  arm?: OfMoment;
+  arm?: MomentState;
   /** Called with each new scene, and with null at its end, so that other components can add parts. */
   staged?: (stage: Stage | null) => void;
 }) {

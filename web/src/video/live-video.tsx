@@ -8,14 +8,14 @@ import { t } from "../i18n/texts";
 import { watch } from "../mesh/connection";
 import { isStale, now } from "../mesh/topics";
 import type { RequestedView } from "./requested-view";
-import { isStandardView, withView } from "./requested-view";
+import { isStandardView, receiveView } from "./requested-view";
 import { decodesVideo, playVideo } from "./video-canvas";
 
 const QUIET_MS = 4000;
 const STILL_FPS = 10;
 const REDUCED_STILL = { width: 640, height: 360 };
 
-export interface Live {
+export interface LiveVideo {
   picture: JSX.Element | null;
   /** Its canvas or image, for saving. */
   place: RefObject<HTMLCanvasElement | null> | RefObject<HTMLImageElement | null>;
@@ -33,7 +33,7 @@ export interface Live {
 }
 
 /** Show the live picture of a view; null: none for now. */
-export function useLive(robotKey: string, wanted: RequestedView | null, label: string): Live {
+export function useLiveVideo(robotKey: string, wanted: RequestedView | null, label: string): LiveVideo {
   const canvas = useRef<HTMLCanvasElement>(null);
   const image = useRef<HTMLImageElement>(null);
   const [video, setVideo] = useState(decodesVideo);
@@ -60,7 +60,7 @@ export function useLive(robotKey: string, wanted: RequestedView | null, label: s
     };
     // Stills need many times the bytes of video: limit their size and rate.
     const request = video || !isStandardView(wanted) ? wanted : { ...wanted, ...REDUCED_STILL, fps: STILL_FPS };
-    return withView(
+    return receiveView(
       robotKey,
       request,
       (keys) => {

@@ -38,7 +38,7 @@ export function isStandardView(wanted: RequestedView): boolean {
  * @param attach Called with the keys, again when they change; returns a function that detaches.
  * @param quiet Returns whether no picture has arrived for long: the renderer may have restarted.
  * @param refused Called with the reason why there are none. */
-export function withView(
+export function receiveView(
   robotKey: string,
   wanted: RequestedView,
   attach: (keys: PictureKeys) => () => void,

@@ -6,7 +6,7 @@ import type { Body, Description } from "./description";
 import { complete, empty, radians, tidy } from "./description";
 import type { Draft, Identity } from "./draft";
 import { draft, editDraft, identity, isOpen, openDraft } from "./draft";
-import { freshName, insertJoint, nameFromFile } from "./edits";
+import { insertJoint, nameFromFile, unusedName } from "./edits";
 import { cacheFile } from "./file-cache";
 import { missingFiles, readShape, resolvePath, setShape } from "./mesh-files";
 import { choosePart, resetSelection } from "./selection";
@@ -219,7 +219,7 @@ function addLink(into: Description, path: string, info: MeshInfo): void {
   const joint = insertJoint(into, into.joint.length);
   const name = nameFromFile(path);
   const taken = ["base", "tool", ...into.joint.flatMap((other) => [other.name, other.link.name])];
-  joint.link.name = taken.includes(name) ? freshName(`${name}_`, taken) : name;
+  joint.link.name = taken.includes(name) ? unusedName(`${name}_`, taken) : name;
   shapeBody(into, joint.link, path, info);
 }
 

@@ -4,7 +4,7 @@ import type { Description, Joint, JointType, Pose, Triple, Units } from "./descr
 import { linkName, linkNames, metres, newJoint, radians, tidy, usualLimits } from "./description";
 
 /** Return a free name: "joint3". */
-export function freshName(stem: string, taken: readonly string[]): string {
+export function unusedName(stem: string, taken: readonly string[]): string {
   for (let number = 1; ; number++) if (!taken.includes(`${stem}${number}`)) return `${stem}${number}`;
 }
 
@@ -17,7 +17,7 @@ export function nameFromFile(path: string): string {
 /** Insert a joint and its link into the chain; return the joint. */
 export function insertJoint(into: Description, at: number): Joint {
   const names = into.joint.map((joint) => joint.name);
-  const joint = newJoint(freshName("joint", [...names, ...linkNames(into)]), "rotary", into.units);
+  const joint = newJoint(unusedName("joint", [...names, ...linkNames(into)]), "rotary", into.units);
   into.joint.splice(at, 0, joint);
   return joint;
 }

@@ -4,7 +4,7 @@ import { d } from "../../i18n/define";
 import type { Constraint, NamedFrame, Range } from "./description";
 import { angleUnit, jointUnit, linkNames } from "./description";
 import { draft, editDraft, endUndoStep } from "./draft";
-import { freshName } from "./edits";
+import { unusedName } from "./edits";
 import { NumberField, PoseFields, ProblemWords, Section, SelectField, TextField } from "./fields";
 
 function RemoveButton({ name, remove }: { name: string; remove: () => void }) {
@@ -34,7 +34,7 @@ export function FramesTab() {
     }, `frame/${index}/${field}`);
   const add = () =>
     editDraft(({ description }) => {
-      const name = freshName("frame", [...links, "tool", ...frames.map((frame) => frame.name)]);
+      const name = unusedName("frame", [...links, "tool", ...frames.map((frame) => frame.name)]);
       description.frame.push({ name, link: links.at(-1) ?? "base", xyz: [0, 0, 0], rpy: [0, 0, 0] });
     });
   return (

@@ -8,7 +8,7 @@ import { t } from "../../i18n/texts";
 import { alarmsOf } from "../../mesh/alarms";
 import { lostAt } from "../../mesh/connection";
 import { fleetRobots } from "../../mesh/known-robots";
-import { robotNow, useFleetNow } from "../../mesh/robot-snapshots";
+import { robotSnapshot, useFleetSnapshots } from "../../mesh/robot-snapshots";
 import type { Level, StateWord } from "../../mesh/robot-state";
 import { stateWord } from "../../mesh/robot-state";
 import { isClockOff, isMeshStale, isSilent, reportAge, useMesh } from "../../mesh/site-health";
@@ -29,12 +29,12 @@ const state = signal<(typeof STATES)[number]>("any_state");
 const order = signal<(typeof ORDERS)[number]>("by_name");
 
 export function FleetPage() {
-  useFleetNow();
+  useFleetSnapshots();
   // Once a second: tiles that move more often are unreadable.
   const second = useComputed(() => Math.floor(now.value / 1000));
   const robots = fleetRobots.value;
   void second.value;
-  const states = new Map(robots.map((key) => [key, stateWord(robotNow(key).controller.peek())]));
+  const states = new Map(robots.map((key) => [key, stateWord(robotSnapshot(key).controller.peek())]));
   const shown = chosen(robots, states);
   const bySite = Map.groupBy(shown, (key) => key.split("/")[1] ?? "");
   const size = shown.length <= 3 ? "few" : shown.length <= 12 ? "some" : "many";

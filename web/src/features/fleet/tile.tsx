@@ -10,7 +10,7 @@ import { staleText, stampFull, stampTime } from "../../i18n/format";
 import { t } from "../../i18n/texts";
 import { alarmsOf } from "../../mesh/alarms";
 import { hello, watch } from "../../mesh/connection";
-import { robotNow } from "../../mesh/robot-snapshots";
+import { robotSnapshot } from "../../mesh/robot-snapshots";
 import { problemOf, stateWord } from "../../mesh/robot-state";
 import { ageOf, isStale, now, staleAfter, useTopic } from "../../mesh/topics";
 import { AliveServices } from "../../panels/alive-services";
@@ -25,7 +25,7 @@ export function RobotTile({ robotKey }: { robotKey: string }) {
   const place = useRef<HTMLAnchorElement>(null);
   const visible = useVisible(place);
   const [, site = "", robot = ""] = robotKey.split("/");
-  const level = visible ? stateWord(robotNow(robotKey).controller.value).level : "";
+  const level = visible ? stateWord(robotSnapshot(robotKey).controller.value).level : "";
   return (
     <a ref={place} class={`tile ${level}`} href={robotLink(site, robot)} data-robot={robotKey}>
       {visible ? <Shown robotKey={robotKey} site={site} robot={robot} /> : <InvisibleTile robot={robot} />}
@@ -49,7 +49,7 @@ function InvisibleTile({ robot }: { robot: string }) {
 }
 
 function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robot: string }) {
-  const known = robotNow(robotKey);
+  const known = robotSnapshot(robotKey);
   const [controller, lease] = [known.controller.value, known.lease.value];
   const newest = useTopic(DescriptionSchema, `${robotKey}/description`)?.message;
   if (newest) known.description = newest;

@@ -69,7 +69,7 @@ export function setField(element: HTMLTextAreaElement | null): void {
 }
 
 /** Record text that the operator typed into the field. */
-export function typed(): void {
+export function recordTyping(): void {
   if (!field) return;
   const now = performance.now();
   change(field.value, now - typedAt < TOGETHER_MS);

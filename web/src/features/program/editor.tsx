@@ -5,9 +5,9 @@ import { useLayoutEffect, useRef } from "preact/hooks";
 import { p } from "../../i18n/program";
 import { Panel } from "../../ui/panel";
 import { lineAtMoment } from "./checked-motion";
-import { download, draft, insert, LINE_PX, redo, setField, storageError, typed, undo } from "./draft";
+import { download, draft, insert, LINE_PX, recordTyping, redo, setField, storageError, undo } from "./draft";
 import { checked, isCurrent } from "./program-check";
-import { coloured } from "./program-text";
+import { highlightSyntax } from "./program-text";
 import { runningLine } from "./running-program";
 import { severityOf } from "./violation-severity";
 import "./editor.css";
@@ -59,7 +59,7 @@ export function Editor() {
             autocapitalize="off"
             wrap="off"
             readOnly={!draft.value}
-            onInput={typed}
+            onInput={recordTyping}
             onBeforeInput={(event) => {
               const step = { historyUndo: undo, historyRedo: redo }[event.inputType];
               if (step) event.preventDefault(), step();
@@ -103,7 +103,7 @@ class Line extends Component<{ text: string }> {
   override render() {
     return (
       <>
-        {coloured(this.props.text).map(({ text, is }, index) =>
+        {highlightSyntax(this.props.text).map(({ text, is }, index) =>
           is ? (
             <span key={index} class={is}>
               {text}

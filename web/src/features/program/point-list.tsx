@@ -6,7 +6,7 @@ import { p } from "../../i18n/program";
 import { draft, goToLine, replace } from "./draft";
 import { description, livePositions } from "./program-robot";
 import type { Point } from "./program-text";
-import { isName, jointsOf, pointsOf, renamed, usesOf, withoutLine } from "./program-text";
+import { isName, jointsOf, pointsOf, removeLine, renamePoint, usesOf } from "./program-text";
 import { teach } from "./scene-overlay";
 import { poseOf, taughtPositions, teachPose } from "./taught-pose";
 
@@ -19,11 +19,11 @@ export function PointList({ tell }: { tell: (words: Words) => void }) {
     if (to === point.name) return;
     if (!isName(to)) return tell(() => p("name_wrong", { name: to }));
     if (points.some((each) => each.name === to)) return tell(() => p("name_taken", { name: to }));
-    replace(renamed(text, point.name, to), point.line);
+    replace(renamePoint(text, point.name, to), point.line);
   };
   const remove = (point: Point) => {
     const uses = usesOf(text, point.name);
-    replace(withoutLine(text, point.line), Math.max(1, point.line - 1));
+    replace(removeLine(text, point.line), Math.max(1, point.line - 1));
     const lines = uses.map((line) => line - (line > point.line ? 1 : 0)).join(", ");
     tell(() => (uses.length ? p("deleted_used", { name: point.name, lines }) : p("deleted", { name: point.name })));
   };

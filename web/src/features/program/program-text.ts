@@ -38,13 +38,13 @@ export function usesOf(text: string, name: string): readonly number[] {
 }
 
 /** Return the first free name of p1, p2, ... */
-export function freeName(text: string): string {
+export function unusedName(text: string): string {
   const taken = new Set(pointsOf(text).map((point) => point.name));
   for (let number = 1; ; number++) if (!taken.has(`p${number}`)) return `p${number}`;
 }
 
 /** Add a point below the last one, and a move to it below the cursor's line; return the text and that line's number. */
-export function withPoint(text: string, name: string, value: string, move: Move, cursorLine: number) {
+export function insertPoint(text: string, name: string, value: string, move: Move, cursorLine: number) {
   const lines = text.split("\n");
   const last = pointsOf(text).at(-1)?.line;
   // Before the first statement, below the initial comments.
@@ -62,7 +62,7 @@ export function withPoint(text: string, name: string, value: string, move: Move,
 }
 
 /** Rename a point in the whole text. */
-export function renamed(text: string, from: string, to: string): string {
+export function renamePoint(text: string, from: string, to: string): string {
   return text
     .split("\n")
     .map((line) => {
@@ -72,7 +72,7 @@ export function renamed(text: string, from: string, to: string): string {
     .join("\n");
 }
 
-export function withoutLine(text: string, line: number): string {
+export function removeLine(text: string, line: number): string {
   return text
     .split("\n")
     .toSpliced(line - 1, 1)
@@ -80,7 +80,7 @@ export function withoutLine(text: string, line: number): string {
 }
 
 /** Return the parts of a line with their kinds. */
-export function coloured(line: string): readonly { text: string; is: "" | "keyword" | "comment" }[] {
+export function highlightSyntax(line: string): readonly { text: string; is: "" | "keyword" | "comment" }[] {
   const at = line.indexOf("#");
   const code = at < 0 ? line : line.slice(0, at);
   const word = /^(\s*)(\S+)(.*)$/.exec(code);

@@ -14,7 +14,7 @@ import { PointList } from "./point-list";
 import { PosePanel } from "./pose-panel";
 import { description, livePositions } from "./program-robot";
 import type { Move } from "./program-text";
-import { freeName, jointsText, withPoint } from "./program-text";
+import { insertPoint, jointsText, unusedName } from "./program-text";
 import { teach } from "./scene-overlay";
 import { taughtPositions, taughtProblem } from "./taught-pose";
 import "./teach-panel.css";
@@ -31,8 +31,8 @@ export function TeachPanel() {
   const live = livePositions.value;
   const add = (positions: readonly number[]) => {
     const text = draft.value?.text ?? "";
-    const name = freeName(text);
-    const made = withPoint(text, name, jointsText(joints, positions), move, cursorLine());
+    const name = unusedName(text);
+    const made = insertPoint(text, name, jointsText(joints, positions), move, cursorLine());
     replace(made.text, made.line);
     setOutcome({ words: () => p("added", { name }) });
   };

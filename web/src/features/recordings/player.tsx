@@ -6,8 +6,8 @@ import { DescriptionSchema } from "../../gen/robomesh_pb";
 import { durationS, recordedViews, startMs } from "../../i18n/recording-format";
 import { r, recordedView } from "../../i18n/recordings";
 import type { Replay } from "../../mesh/replay";
-import type { OfMoment } from "../../mesh/replay-moment";
-import { useOfMoment } from "../../mesh/replay-moment";
+import type { MomentState } from "../../mesh/replay-moment";
+import { useMomentState } from "../../mesh/replay-moment";
 import { useTopic } from "../../mesh/topics";
 import { SceneView, viewsOf } from "../../scene/scene-view";
 import { ReplayTag } from "../../ui/replay-tag";
@@ -44,8 +44,8 @@ export function Player({ first, second }: { first: RecordingName; second: Record
   const description = useTopic(DescriptionSchema, `${key}/description`)?.message;
   const firstS = useFirstFrameTime(first, info.value);
   useEffect(() => replay?.beginAt(firstS), [replay, firstS]);
-  const arm = useOfMoment(replay, "frames", FRAMES_HOLD_S);
-  const otherArm = useOfMoment(other.replay, "joints", FRAMES_HOLD_S);
+  const arm = useMomentState(replay, "frames", FRAMES_HOLD_S);
+  const otherArm = useMomentState(other.replay, "joints", FRAMES_HOLD_S);
   const ghosted = useSecondGhost(key, description, other.replay?.robotKey ?? null, otherArm === "here");
   const beside = useMemo(
     () => second && { name: second, info: secondInfo.value, shift },
@@ -132,7 +132,7 @@ export function Player({ first, second }: { first: RecordingName; second: Record
   );
 }
 
-function SecondVideo({ replay, arm, info }: { replay: Replay; arm: OfMoment; info: Recording | null }) {
+function SecondVideo({ replay, arm, info }: { replay: Replay; arm: MomentState; info: Recording | null }) {
   const description = useTopic(DescriptionSchema, `${replay.robotKey}/description`)?.message;
   return (
     <ReplayVideo

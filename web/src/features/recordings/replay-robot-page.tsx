@@ -7,7 +7,7 @@ import type { ReplayState } from "../../gen/robomesh_pb";
 import { DescriptionSchema, KinematicStateSchema, ReplayStateSchema } from "../../gen/robomesh_pb";
 import { r } from "../../i18n/recordings";
 import { Replay } from "../../mesh/replay";
-import { useOfMoment } from "../../mesh/replay-moment";
+import { useMomentState } from "../../mesh/replay-moment";
 import type { RobotName } from "../../mesh/robot-name";
 import { ageOf, isStale, useTopic } from "../../mesh/topics";
 import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
@@ -33,7 +33,7 @@ export function ReplayRobotPage({ site, robot }: RobotName) {
   const kinematics = useTopic(KinematicStateSchema, `${key}/kinematics`);
   const replay = useReplay(key, latest?.message);
   const moment = usePosition(replay);
-  const arm = useOfMoment(replay, "frames", 1);
+  const arm = useMomentState(replay, "frames", 1);
   const gone = latest !== undefined && isStale("replay", ageOf(latest));
   if (useRobotNotFound(key, Boolean(latest ?? description))) return <RobotNotFound site={site} robot={robot} />;
   const state = latest?.message;

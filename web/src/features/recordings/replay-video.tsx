@@ -5,11 +5,11 @@ import type { Description } from "../../gen/robomesh_pb";
 import { r, viewName } from "../../i18n/recordings";
 import { t } from "../../i18n/texts";
 import type { Replay } from "../../mesh/replay";
-import type { OfMoment } from "../../mesh/replay-moment";
-import { useOfMoment } from "../../mesh/replay-moment";
+import type { MomentState } from "../../mesh/replay-moment";
+import { useMomentState } from "../../mesh/replay-moment";
 import { viewsOf } from "../../scene/scene-view";
 import { Panel } from "../../ui/panel";
-import { useLive } from "../../video/live-video";
+import { useLiveVideo } from "../../video/live-video";
 import { standardView } from "../../video/requested-view";
 
 const PICTURE_HOLDS_S = 2; // a busy renderer delivers fewer frames than requested
@@ -17,7 +17,7 @@ const PICTURE_HOLDS_S = 2; // a busy renderer delivers fewer frames than request
 export function ReplayVideo(props: {
   replay: Replay | null;
   /** Whether its joints are of the current moment, as rendered views require. */
-  arm: OfMoment;
+  arm: MomentState;
   description: Description | undefined;
   /** Names of its recorded views. */
   recorded: readonly string[];
@@ -27,13 +27,13 @@ export function ReplayVideo(props: {
   const [view, setView] = useState("");
   const names = description ? [...recorded, ...viewsOf(description).map(({ name }) => name)] : [];
   const shown = names.includes(view) ? view : (names[0] ?? "");
-  const live = useLive(
+  const live = useLiveVideo(
     replay?.robotKey ?? "robomesh/-/-",
     replay && shown ? standardView(shown) : null,
     `${props.title}: ${viewName(shown)}`,
   );
   const filmed = recorded.includes(shown);
-  const picture = useOfMoment(replay, filmed ? `video/${shown}` : "", PICTURE_HOLDS_S);
+  const picture = useMomentState(replay, filmed ? `video/${shown}` : "", PICTURE_HOLDS_S);
   const state = filmed ? picture : props.arm;
   const waiting = t("camera_waiting", { view: viewName(shown) });
   const word =

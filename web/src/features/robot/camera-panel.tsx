@@ -8,7 +8,7 @@ import { viewsOf } from "../../scene/scene-view";
 import { isRemote, topicSelection } from "../../scene/topic-selection";
 import { Panel } from "../../ui/panel";
 import { Age } from "../../ui/state";
-import { useLive } from "../../video/live-video";
+import { useLiveVideo } from "../../video/live-video";
 import type { RequestedView } from "../../video/requested-view";
 import { standardView } from "../../video/requested-view";
 import { saveBlob, saveStill, useRecording } from "./export";
@@ -49,7 +49,7 @@ export function CameraPanel(props: {
   const own = useOwnView(shown === OWN_VIEW, props.sceneView);
   const requested: RequestedView | null =
     shown !== OWN_VIEW ? standardView(shown) : own && { of: OWN_VIEW, view: own, ...OWN_SIZE };
-  const live = useLive(robotKey, requested, viewText(shown));
+  const live = useLiveVideo(robotKey, requested, viewText(shown));
   const picture = useRef<HTMLDivElement>(null);
   const [, site = "", robot = ""] = robotKey.split("/");
   const name = `${robot}-${shown}`;

@@ -3,7 +3,7 @@
 import { s } from "../../i18n/settings";
 import { presence } from "../../mesh/connection";
 import { OPERATOR } from "../../mesh/known-robots";
-import { robotNow } from "../../mesh/robot-snapshots";
+import { robotSnapshot } from "../../mesh/robot-snapshots";
 import { Panel } from "../../ui/panel";
 import { robotLink } from "../../ui/route";
 
@@ -44,5 +44,5 @@ function word(service: string): string {
 }
 
 function holder(site: string, robot: string): string {
-  return robotNow(`robomesh/${site}/${robot}`).lease.value?.message.holder ?? "";
+  return robotSnapshot(`robomesh/${site}/${robot}`).lease.value?.message.holder ?? "";
 }

@@ -11,7 +11,7 @@ import type { ViewName } from "../../ui/route";
 import { robotLink } from "../../ui/route";
 import { Age, State } from "../../ui/state";
 import { Tag } from "../../ui/tag";
-import { useLive } from "../../video/live-video";
+import { useLiveVideo } from "../../video/live-video";
 import { requestFor } from "./grid";
 
 export function WallTile(props: {
@@ -51,7 +51,7 @@ export function WallTile(props: {
   const view = viewText(shown.view);
   const label = `${shown.robot}, ${view}`;
   const watched = visible && width > 0 && height > 0 && props.known;
-  const live = useLive(robotKey, watched ? requestFor(shown.view, width, height) : null, label);
+  const live = useLiveVideo(robotKey, watched ? requestFor(shown.view, width, height) : null, label);
   const state = stateWord(controller);
   const problem = state.level === "normal" ? "" : problemOf(controller?.message);
   const word = !props.known
