@@ -50,13 +50,13 @@ def test_a_collada_file_may_begin_with_an_empty_line(tmp_path: Path) -> None:
     assert (mesh.triangle_count, mesh.unit_m) == (1, 0.001)
 
 
-def test_bomb_in_utf16_is_seen_as_one(tmp_path: Path) -> None:
+def test_doctype_in_utf16_is_rejected(tmp_path: Path) -> None:
     bomb = '<?xml version="1.0" encoding="utf-16"?><!DOCTYPE COLLADA [<!ENTITY a "a">]><COLLADA>&a;</COLLADA>'
     with pytest.raises(MeshError, match="DOCTYPE"):
         read_mesh(written(tmp_path, "a.dae", bomb.encode("utf-16")))
 
 
-def test_faces_of_an_obj_may_count_backwards(tmp_path: Path) -> None:
+def test_obj_faces_may_have_negative_indices(tmp_path: Path) -> None:
     first = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf -3//-1 -2//-1 -1//-1 # -9\n"
     text = first + "v 5 0 0\nv 6 0 0\nv 5 1 0\nf -3 5 \\\n -1\n"
     mesh = read_mesh(written(tmp_path, "a.obj", text))
@@ -65,7 +65,7 @@ def test_faces_of_an_obj_may_count_backwards(tmp_path: Path) -> None:
     assert corners == {(5, 0, 0), (6, 0, 0), (5, 1, 0)}
 
 
-def test_face_that_counts_back_beyond_the_first_is_named(tmp_path: Path) -> None:
+def test_negative_index_before_the_first_vertex_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(MeshError, match="line 4: a face uses vertex -9; there are 3"):
         read_mesh(written(tmp_path, "a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -9 -2 -1\n"))
 
@@ -78,7 +78,7 @@ def test_obj_of_thousands_of_materials_is_drawn_grey(tmp_path: Path) -> None:
     assert "2500 materials" in mesh.warnings[0]
 
 
-def test_nodes_of_collada_that_instance_each_other_to_billions_are_refused(tmp_path: Path) -> None:
+def test_collada_with_billions_of_nested_instances_is_rejected(tmp_path: Path) -> None:
     nodes = "".join(
         f'<node id="n{each}">' + f'<instance_node url="#n{each - 1}"/>' * 10 + "</node>"
         for each in range(1, 10)
@@ -93,7 +93,7 @@ def test_nodes_of_collada_that_instance_each_other_to_billions_are_refused(tmp_p
     assert thrice.triangle_count == 10
 
 
-def test_nodes_of_gltf_that_draw_the_same_too_often_are_refused(tmp_path: Path) -> None:
+def test_gltf_with_too_many_uses_of_a_mesh_is_rejected(tmp_path: Path) -> None:
     data = struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0) * 1000
     document = {
         "asset": {"version": "2.0"},
@@ -114,7 +114,7 @@ def test_nodes_of_gltf_that_draw_the_same_too_often_are_refused(tmp_path: Path) 
         read_mesh(written(tmp_path, "a.gltf", json.dumps(document)))
 
 
-def test_broken_entity_of_a_drawing_is_left_out_and_named(tmp_path: Path) -> None:
+def test_invalid_dxf_entity_is_omitted_with_a_warning(tmp_path: Path) -> None:
     drawing = ezdxf.new()
     space = drawing.modelspace()
     space.add_line((0, 0), (1, 0))
@@ -131,7 +131,7 @@ def test_broken_entity_of_a_drawing_is_left_out_and_named(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("kind", ["ACAD_TABLE", "acad_table"])
-def test_table_of_a_drawing_is_left_out_and_counted(tmp_path: Path, kind: str) -> None:
+def test_dxf_table_is_omitted_and_counted(tmp_path: Path, kind: str) -> None:
     drawing = ezdxf.new()
     drawing.modelspace().add_line((0, 0), (1, 0))
     path = tmp_path / "a.dxf"
@@ -145,7 +145,9 @@ def test_table_of_a_drawing_is_left_out_and_counted(tmp_path: Path, kind: str) -
     assert mesh.warnings == (f"left out: 1 {kind}",)
 
 
-def test_step_that_needs_too_much_memory_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_step_that_needs_too_much_memory_is_rejected_with_that_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     done = step.subprocess.CompletedProcess([], 0, b"", b"")
     monkeypatch.setattr(step.subprocess, "run", lambda *_, **__: done)
     file = written(tmp_path, "a.step", "ISO-10303-21;\n")
@@ -158,7 +160,7 @@ def test_step_that_needs_too_much_memory_says_so(tmp_path: Path, monkeypatch: py
         read_mesh(file)
 
 
-def test_objects_with_texture_places_and_normals_may_count_backwards(tmp_path: Path) -> None:
+def test_obj_texture_and_normal_indices_may_be_negative(tmp_path: Path) -> None:
     # As trimesh's models/negative_indices.obj, with a second object.
     points = "".join(f"v {x} {y} {z}\n" for x in (1, -1) for y in (1, -1) for z in (-1, 1))
     rest = "vt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\n"

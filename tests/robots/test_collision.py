@@ -28,7 +28,7 @@ STRETCHED = np.zeros(2)
 ORIGIN = np.eye(4)
 
 
-def alone(folder: Path, *fixtures: Fixture, more: str = "") -> CellDescription:
+def arm_cell(folder: Path, *fixtures: Fixture, more: str = "") -> CellDescription:
     return cell_of({"arm": (bar_arm(folder, more), ORIGIN)}, fixtures)
 
 
@@ -37,7 +37,7 @@ def by_pair(found: tuple[Nearest, ...]) -> dict[tuple[str, str], float]:
 
 
 def test_distance_to_a_wall_is_what_the_arm_does_not_reach(tmp_path: Path) -> None:
-    cell = build_cell(alone(tmp_path, block("wall", (0.1, 2.0, 2.0), placed(1.05))))
+    cell = build_cell(arm_cell(tmp_path, block("wall", (0.1, 2.0, 2.0), placed(1.05))))
     found = outside_nearest(cell, "arm", STRETCHED, {})
     assert [each.pair for each in found] == [("arm/elbow", "wall"), ("arm/shoulder", "wall")]
     assert [each.distance_m for each in found] == pytest.approx([0.22, 0.62], abs=1e-6)
@@ -50,7 +50,7 @@ def test_distance_to_a_wall_is_what_the_arm_does_not_reach(tmp_path: Path) -> No
 
 
 def test_distance_to_a_ball_is_measured_to_its_surface(tmp_path: Path) -> None:
-    cell = build_cell(alone(tmp_path, globe("ball", 0.1, placed(0.6, 0.3, 0.01))))
+    cell = build_cell(arm_cell(tmp_path, globe("ball", 0.1, placed(0.6, 0.3, 0.01))))
     nearest = outside_clearance(cell, "arm", STRETCHED, {})
     assert nearest is not None
     assert nearest.pair == ("arm/elbow", "ball")
@@ -59,7 +59,7 @@ def test_distance_to_a_ball_is_measured_to_its_surface(tmp_path: Path) -> None:
 
 
 def test_pairs_beyond_the_requested_distance_are_left_out(tmp_path: Path) -> None:
-    cell = build_cell(alone(tmp_path, block("wall", (0.1, 2.0, 2.0), placed(1.05))))
+    cell = build_cell(arm_cell(tmp_path, block("wall", (0.1, 2.0, 2.0), placed(1.05))))
     assert by_pair(outside_nearest(cell, "arm", STRETCHED, {}, within_m=0.3)) == {
         ("arm/elbow", "wall"): pytest.approx(0.22, abs=1e-6)
     }
@@ -67,7 +67,7 @@ def test_pairs_beyond_the_requested_distance_are_left_out(tmp_path: Path) -> Non
 
 
 def test_folded_arm_touches_its_post_from_the_geometric_angle_on(tmp_path: Path) -> None:
-    cell = build_cell(alone(tmp_path))
+    cell = build_cell(arm_cell(tmp_path))
     # The post's corner at (0.1, 0.1) meets the bar's flank, 0.02 m beside its middle; elbow at (0.4, 0).
     reach = np.hypot(0.3, 0.1)
     touch = pi - np.arctan2(0.1, 0.3) - np.arcsin(0.02 / reach)
@@ -86,20 +86,20 @@ def test_folded_arm_touches_its_post_from_the_geometric_angle_on(tmp_path: Path)
 
 def test_neighbours_and_ignored_pairs_are_not_contacts(tmp_path: Path) -> None:
     ignored = '[collision]\nignore = [["elbow", "base"]]\n'
-    cell = build_cell(alone(tmp_path, more=ignored))
+    cell = build_cell(arm_cell(tmp_path, more=ignored))
     assert own_contacts(cell, "arm", np.array([0.0, pi])) == ()
     assert own_nearest(cell, "arm", np.array([0.0, pi])) is None
 
 
 def test_fixture_inside_the_base_is_ignored(tmp_path: Path) -> None:
     floor = block("floor", (0.5, 0.5, 0.2), placed(0.0, 0.0, -0.2))
-    cell = build_cell(alone(tmp_path, floor))
+    cell = build_cell(arm_cell(tmp_path, floor))
     assert ("arm/base", "floor") not in by_pair(outside_nearest(cell, "arm", STRETCHED, {}))
 
 
 def test_fixture_that_a_link_may_touch_is_ignored(tmp_path: Path) -> None:
     wall = replace(block("wall", (0.1, 2.0, 2.0), placed(0.8)), ignore=("arm/elbow",))
-    cell = build_cell(alone(tmp_path, wall))
+    cell = build_cell(arm_cell(tmp_path, wall))
     assert by_pair(outside_nearest(cell, "arm", STRETCHED, {})) == {
         ("arm/shoulder", "wall"): pytest.approx(0.37, abs=1e-6)
     }
@@ -134,20 +134,20 @@ def test_the_larger_distance_of_two_robots_counts(tmp_path: Path) -> None:
 
 def test_moving_the_whole_cell_changes_no_distance(tmp_path: Path) -> None:
     path = bar_arm(tmp_path)
-    here = cell_of(
+    cell = cell_of(
         {"one": (path, ORIGIN), "two": (path, placed(1.5, 0.2, yaw=pi))},
         (block("wall", (0.1, 2.0, 2.0), placed(0.3, 1.0, yaw=0.3)),),
     )
     moved = np.eye(4)
     moved[:3, :3] = rpy_rotation(0.4, -1.1, 2.0)
     moved[:3, 3] = 3.0, -2.0, 0.7
-    there = CellDescription(
-        tuple(replace(robot, base_to_site=moved @ robot.base_to_site) for robot in here.robots),
-        tuple(replace(each, fixture_to_site=moved @ each.fixture_to_site) for each in here.fixtures),
+    moved_cell = CellDescription(
+        tuple(replace(robot, base_to_site=moved @ robot.base_to_site) for robot in cell.robots),
+        tuple(replace(each, fixture_to_site=moved @ each.fixture_to_site) for each in cell.fixtures),
     )
     at, other = np.array([0.3, 0.9]), np.array([-0.2, 0.4])
-    found = outside_nearest(build_cell(here), "one", at, {"two": other})
-    again = outside_nearest(build_cell(there), "one", at, {"two": other})
+    found = outside_nearest(build_cell(cell), "one", at, {"two": other})
+    again = outside_nearest(build_cell(moved_cell), "one", at, {"two": other})
     assert len(found) == 10
     assert by_pair(again) == {pair: pytest.approx(d, abs=1e-6) for pair, d in by_pair(found).items()}
     # The nearest point is a corner, so it is unique.
@@ -158,7 +158,7 @@ def test_moving_the_whole_cell_changes_no_distance(tmp_path: Path) -> None:
 def test_hull_fills_a_bracket_that_the_exact_mesh_leaves_open(tmp_path: Path) -> None:
     def nearest(*, exact: bool) -> Nearest:
         # The elbow's bar ends 0.02 m before the back, 0.08 m from each cheek.
-        cell = build_cell(alone(tmp_path, bracket("bracket", placed(0.8), exact=exact)))
+        cell = build_cell(arm_cell(tmp_path, bracket("bracket", placed(0.8), exact=exact)))
         found = outside_clearance(cell, "arm", STRETCHED, {})
         assert found is not None
         return found
@@ -169,14 +169,14 @@ def test_hull_fills_a_bracket_that_the_exact_mesh_leaves_open(tmp_path: Path) ->
 
 
 def test_disconnected_pieces_of_a_mesh_become_separate_hulls(tmp_path: Path) -> None:
-    cell = build_cell(alone(tmp_path, two_cheeks("cheeks", placed(0.8))))
+    cell = build_cell(arm_cell(tmp_path, two_cheeks("cheeks", placed(0.8))))
     found = outside_clearance(cell, "arm", STRETCHED, {})
     assert found is not None
     assert found.distance_m == pytest.approx(0.08, abs=1e-6)
 
 
 def test_exact_meshes_and_hulls_of_boxes_measure_the_same(tmp_path: Path) -> None:
-    description = alone(
+    description = arm_cell(
         tmp_path, globe("ball", 0.1, placed(0.6, 0.4)), block("b", (0.1,) * 3, placed(0.2, 0.3))
     )
     hulls, meshes = build_cell(description), build_cell(description, exact=True)
@@ -221,29 +221,31 @@ def test_bare_frames_are_not_reported_unless_a_mesh_is_missing(tmp_path: Path) -
 
 
 def test_pickled_cell_gives_the_same_distances(tmp_path: Path) -> None:
-    description = alone(tmp_path, block("wall", (0.1, 2.0, 2.0), placed(1.05)))
+    description = arm_cell(tmp_path, block("wall", (0.1, 2.0, 2.0), placed(1.05)))
     sent = pickle.loads(pickle.dumps(description))
-    here, there = (outside_clearance(build_cell(each), "arm", STRETCHED, {}) for each in (description, sent))
-    assert here is not None
-    assert there is not None
-    assert (here.pair, here.distance_m) == (there.pair, there.distance_m)
-    assert np.array_equal(here.points, there.points)
+    expected, found = (
+        outside_clearance(build_cell(each), "arm", STRETCHED, {}) for each in (description, sent)
+    )
+    assert expected is not None
+    assert found is not None
+    assert (expected.pair, expected.distance_m) == (found.pair, found.distance_m)
+    assert np.array_equal(expected.points, found.points)
 
 
 def test_fixture_that_cannot_be_checked_is_refused_with_a_reason(tmp_path: Path) -> None:
     (tmp_path / "broken.wrl").write_text("#VRML V2.0 utf8\nShape {")
     broken = Fixture("jig", (Shape(tmp_path / "broken.wrl", ORIGIN),), ORIGIN)
     with pytest.raises(MeshError, match=r"broken\.wrl"):
-        build_cell(alone(tmp_path / "a", broken))
+        build_cell(arm_cell(tmp_path / "a", broken))
     with pytest.raises(MeshError, match=r"fixture jig: has no surface"):
-        build_cell(alone(tmp_path / "a", Fixture("jig", (), ORIGIN)))
+        build_cell(arm_cell(tmp_path / "a", Fixture("jig", (), ORIGIN)))
     wrong = replace(block("wall", (1.0, 1.0, 1.0), ORIGIN), ignore=("arm/elbw",))
     with pytest.raises(MeshError, match=r"fixture wall: ignore 'arm/elbw': no such link.*'arm/elbow'"):
-        build_cell(alone(tmp_path / "a", wrong))
+        build_cell(arm_cell(tmp_path / "a", wrong))
 
 
 def test_positions_of_another_robot_are_refused(tmp_path: Path) -> None:
-    cell = build_cell(alone(tmp_path, globe("ball", 0.1, ORIGIN)))
+    cell = build_cell(arm_cell(tmp_path, globe("ball", 0.1, ORIGIN)))
     for ask in (own_contacts, own_nearest):
         with pytest.raises(JointCountError):
             ask(cell, "arm", np.zeros(3))

@@ -69,7 +69,9 @@ def test_path_check_equals_the_check_of_each_sample(cell: Cell, beside: dict[str
             seen.setdefault(sample, {})[each.pair] = distance
     near = touching = 0
     for sample in range(0, len(path), 7):
-        least, expected = measured(cell, path[sample], {name: there[0] for name, there in beside.items()})
+        least, expected = measured(
+            cell, path[sample], {name: positions[0] for name, positions in beside.items()}
+        )
         assert along.clearances[sample] == pytest.approx(least, abs=1e-5)
         assert seen.get(sample, {}) == {pair: pytest.approx(d, abs=1e-5) for pair, d in expected.items()}
         near += bool(expected)
@@ -89,7 +91,7 @@ def test_another_arms_path_counts_as_all_of_its_positions(cell: Cell) -> None:
     stands = [way[0] + share * (way[1] - way[0]) for share in np.linspace(0.0, 1.0, count)]
     for sample in range(0, len(path), 25):
         # Every tenth position: not nearer than all of them, and not farther than the interval allows.
-        found = [measured(cell, path[sample], {"two": there})[0] for there in stands[::10]]
+        found = [measured(cell, path[sample], {"two": positions})[0] for positions in stands[::10]]
         assert swept[sample] <= min(found) + 1e-6
         assert swept[sample] >= min(found) - 10 * SAMPLE_M
     ends = [path_encounters(cell, "one", path, {"two": end[None]}, within_m=WITHIN).clearances for end in way]
@@ -119,8 +121,8 @@ def test_body_placements_equal_pinocchios(cell: Cell, tmp_path: Path) -> None:
     for arm in (*cell.arms.values(), *build_cell(others).arms.values()):
         assert arm.moving.any()
         path = allowed_positions(arm.joints, 20, seed=2)
-        for there, positions in zip(placements_along(arm, path), path, strict=True):
-            assert there == pytest.approx(arm_obstacles(arm, positions).placements, abs=1e-12)
+        for placements, positions in zip(placements_along(arm, path), path, strict=True):
+            assert placements == pytest.approx(arm_obstacles(arm, positions).placements, abs=1e-12)
 
 
 def test_travel_bounds_the_movement_of_every_point(cell: Cell) -> None:

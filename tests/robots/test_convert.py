@@ -24,7 +24,9 @@ def box(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("ending", [".stl", ".obj", ".ply", ".wrl", ".3ds"])
-def test_shape_units_and_axes_stay(box: Path, ending: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_conversion_keeps_shape_units_and_axes(
+    box: Path, ending: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     target = box.with_name(f"out{ending}")
     assert run(["mesh", "convert", str(box), str(target)]) == 0
     assert capsys.readouterr().out == f"{target}: 12 triangles\n"
@@ -34,7 +36,7 @@ def test_shape_units_and_axes_stay(box: Path, ending: str, capsys: pytest.Captur
 
 
 @pytest.mark.parametrize("ending", [".obj", ".ply", ".wrl", ".3ds"])
-def test_colour_and_transparency_stay(box: Path, ending: str) -> None:
+def test_conversion_keeps_colour_and_transparency(box: Path, ending: str) -> None:
     target = box.with_name(f"out{ending}")
     assert run(["mesh", "convert", str(box), str(target)]) == 0
     (part,) = read_mesh(target).parts
@@ -42,21 +44,23 @@ def test_colour_and_transparency_stay(box: Path, ending: str) -> None:
     assert part.material.transparency == pytest.approx(0.5, abs=0.005)
 
 
-def test_glb_is_in_metres_and_the_guess_is_said(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_glb_is_in_metres_and_the_guessed_unit_is_printed(
+    box: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     target = box.with_name("out.glb")
     assert run(["mesh", "convert", str(box), str(target)]) == 0
     assert "millimetres assumed" in capsys.readouterr().err
     np.testing.assert_allclose(bounds(read_mesh(target)), [[-0.05, -0.1, -0.15], [0.05, 0.1, 0.15]])
 
 
-def test_scale_and_up_are_taken(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_scale_and_up_options_are_applied(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
     target = box.with_name("out.glb")
     assert run(["mesh", "convert", str(box), str(target), "--scale", "0.01", "--up", "y"]) == 0
     assert capsys.readouterr().err == ""
     np.testing.assert_allclose(bounds(read_mesh(target)), [[-0.5, -1.5, -1.0], [0.5, 1.5, 1.0]])
 
 
-def test_what_is_lost_is_said(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_lost_properties_are_printed(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["mesh", "convert", str(box), str(box.with_name("out.stl"))]) == 0
     assert (
         "out.stl: STL holds shape only: colours, transparency and names are lost" in capsys.readouterr().err
@@ -73,7 +77,7 @@ def test_what_is_lost_is_said(box: Path, capsys: pytest.CaptureFixture[str]) -> 
         (["none/out.stl"], "cannot be written: No such file or directory"),
     ],
 )
-def test_what_cannot_be_is_said_in_a_line(
+def test_error_of_an_impossible_conversion_is_one_line(
     box: Path, arguments: list[str], expected: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     target = str(box.parent / arguments[0])
@@ -83,7 +87,7 @@ def test_what_cannot_be_is_said_in_a_line(
     assert expected in error
 
 
-def test_mesh_of_nothing_is_not_written(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_empty_mesh_is_not_written(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
     nothing = box.with_name("nothing.wrl")
     nothing.write_text("#VRML V2.0 utf8\n")
     assert run(["mesh", "convert", str(nothing), str(box.with_name("out.glb"))]) == 2
@@ -113,7 +117,7 @@ def test_mesh_too_large_for_3ds_is_refused(tmp_path: Path, capsys: pytest.Captur
     assert not (tmp_path / "out.3ds").exists()
 
 
-def test_info_prints_the_agreed_json(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_info_prints_the_documented_json(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["mesh", "info", str(box), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {
         "triangles": 12,
@@ -125,7 +129,7 @@ def test_info_prints_the_agreed_json(box: Path, capsys: pytest.CaptureFixture[st
     }
 
 
-def test_info_tells_people_the_unit_that_it_takes(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_info_prints_the_assumed_unit(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["mesh", "info", str(box)]) == 0
     assert (
         "millimetres assumed, the file states no unit: 300 mm large; z up assumed" in capsys.readouterr().out

@@ -26,10 +26,10 @@ URDF = """<robot name="u"><link name="l0"/><link name="l1"/><link name="l2"/>
 
 def changed(path: tuple[str | int, ...], value: object) -> dict[str, Any]:
     values = deepcopy(ARM)
-    place: Any = values
+    node: Any = values
     for step in path[:-1]:
-        place = place.setdefault(step, {}) if isinstance(place, dict) else place[step]
-    place[path[-1]] = value
+        node = node.setdefault(step, {}) if isinstance(node, dict) else node[step]
+    node[path[-1]] = value
     return values
 
 

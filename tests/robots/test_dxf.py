@@ -30,7 +30,7 @@ def read(folder: Path, drawing: Any, kind: str = "asc") -> Mesh:
 
 
 @pytest.mark.parametrize("kind", ["asc", "bin"])
-def test_face_of_four_corners_is_two_triangles(tmp_path: Path, drawing: Any, kind: str) -> None:
+def test_quadrilateral_face_becomes_two_triangles(tmp_path: Path, drawing: Any, kind: str) -> None:
     drawing.modelspace().add_3dface(SQUARE)
     drawing.modelspace().add_3dface([(0, 0, 5), (1, 0, 5), (0, 1, 5), (0, 1, 5)])
     mesh = read(tmp_path, drawing, kind)
@@ -110,13 +110,13 @@ def test_curves_and_points_are_wires_and_no_triangles(tmp_path: Path, drawing: A
     assert len(points.segments) == 0
 
 
-def test_curve_that_is_nowhere_is_refused(tmp_path: Path, drawing: Any) -> None:
+def test_curve_without_finite_points_is_rejected(tmp_path: Path, drawing: Any) -> None:
     drawing.modelspace().add_circle((float("nan"), 0), 5)
     with pytest.raises(MeshError, match="CIRCLE on layer '0' has a point with a non-finite coordinate"):
         read(tmp_path, drawing)
 
 
-def test_solids_are_named_with_what_would_be_right(tmp_path: Path, drawing: Any) -> None:
+def test_acis_solids_are_omitted_with_a_recommendation(tmp_path: Path, drawing: Any) -> None:
     drawing.modelspace().add_3dface(SQUARE)
     drawing.modelspace().add_3dsolid().sat = ["400 0 1 0", "End-of-ACIS-data"]
     drawing.modelspace().add_text("a note")
@@ -127,14 +127,14 @@ def test_solids_are_named_with_what_would_be_right(tmp_path: Path, drawing: Any)
 
 
 @pytest.mark.parametrize(("units", "unit_m"), [(0, None), (1, 0.0254), (4, 0.001), (6, 1.0)])
-def test_unit_is_the_drawings(tmp_path: Path, units: int, unit_m: float | None) -> None:
+def test_unit_is_read_from_the_drawing(tmp_path: Path, units: int, unit_m: float | None) -> None:
     drawing = ezdxf.new("R2010", units=units)
     drawing.modelspace().add_3dface(SQUARE)
     assert read(tmp_path, drawing).unit_m == unit_m
 
 
 @pytest.mark.slow
-def test_blocks_of_blocks_that_make_millions_are_refused(tmp_path: Path, drawing: Any) -> None:
+def test_nested_blocks_with_millions_of_copies_are_rejected(tmp_path: Path, drawing: Any) -> None:
     drawing.blocks.new("b0").add_3dface(SQUARE)
     for level in range(1, 8):
         block = drawing.blocks.new(f"b{level}")
@@ -153,7 +153,7 @@ def test_huge_array_is_refused(tmp_path: Path, drawing: Any) -> None:
         read(tmp_path, drawing)
 
 
-def test_file_cut_short_is_mended_or_refused(tmp_path: Path, drawing: Any) -> None:
+def test_truncated_file_is_repaired_or_rejected(tmp_path: Path, drawing: Any) -> None:
     for _ in range(5):
         drawing.modelspace().add_3dface(SQUARE)
     path = tmp_path / "drawing.dxf"
@@ -170,7 +170,7 @@ def test_file_cut_short_is_mended_or_refused(tmp_path: Path, drawing: Any) -> No
 
 
 @pytest.mark.parametrize("content", [b"hello\n", b"  0\nSECTION\n", b"AutoCAD Binary DXF\r\n\x1a\x00xx"])
-def test_wrong_file_is_told(tmp_path: Path, content: bytes) -> None:
+def test_invalid_file_is_rejected_with_a_reason(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "wrong.dxf"
     path.write_bytes(content)
     with pytest.raises(MeshError, match=r"wrong\.dxf: cannot be read as DXF"):

@@ -76,10 +76,10 @@ def compare(model: RobotModel, description: UrdfDescription, other: pinocchio.Mo
             else:
                 leader = tree.joints[joint.mimic.leader].name
                 value = joint.mimic.multiplier * own[leader] + joint.mimic.offset
-            there = other.joints[other.getJointId(joint.name)]
-            if there.nq:  # the name may have been made safe
-                turned = [value] if there.nq == 1 else [np.cos(value), np.sin(value)]
-                positions[there.idx_q : there.idx_q + there.nq] = turned
+            joint_model = other.joints[other.getJointId(joint.name)]
+            if joint_model.nq:  # the name may have been made safe
+                turned = [value] if joint_model.nq == 1 else [np.cos(value), np.sin(value)]
+                positions[joint_model.idx_q : joint_model.idx_q + joint_model.nq] = turned
         pinocchio.framesForwardKinematics(other, data, positions)
         placed = dict(zip(model.link_names, link_placements(model, list(own.values())), strict=True))
         for name in names:
@@ -133,8 +133,8 @@ def test_arms_as_rows_have_the_same_tool_placement(name: str, tmp_path: Path) ->
     home = dict(zip(before.joints.names, before.joints.home, strict=True))
 
     def tool_before(positions: np.ndarray) -> np.ndarray:
-        here = home | dict(zip(after.joints.names, positions, strict=True))
-        return tool_placement(before, [here[joint] for joint in before.joints.names])
+        named_positions = home | dict(zip(after.joints.names, positions, strict=True))
+        return tool_placement(before, [named_positions[joint] for joint in before.joints.names])
 
     base = tool_before(after.joints.home) @ np.linalg.inv(tool_placement(after, after.joints.home))
     random = np.random.default_rng(9)

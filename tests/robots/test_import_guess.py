@@ -45,18 +45,18 @@ def a_cube(size: float, unit_m: float | None = None, up: str = "") -> Mesh:
         (Mesh(), 0.001, "z", "no triangles to judge the size by: millimetres assumed; z up assumed"),
     ],
 )
-def test_guess_says_what_and_why(mesh: Mesh, scale_m: float, up: str, sentence: str) -> None:
+def test_guess_has_a_sentence_with_its_reason(mesh: Mesh, scale_m: float, up: str, sentence: str) -> None:
     found = guess(mesh)
     assert (found.scale_m, found.up, found.sentence) == (scale_m, up, sentence)
 
 
-def test_upward_y_is_turned_to_z_and_forward_stays_right_handed() -> None:
+def test_upward_y_is_turned_to_z_without_mirroring() -> None:
     matrix = file_to_link(guess(a_cube(0.3, 0.5, "y")))
     np.testing.assert_allclose(matrix[:3, :3] @ [1, 2, 3], [0.5, -1.5, 1.0])
     assert np.linalg.det(matrix[:3, :3]) > 0
 
 
-def test_our_own_glb_comes_back_with_z_up(tmp_path: Path) -> None:
+def test_exported_glb_is_read_with_z_up(tmp_path: Path) -> None:
     path = tmp_path / "own.glb"
     path.write_bytes(glb_of(a_cube(0.3)))
     assert guess(read_mesh(path)).up == "z"

@@ -78,20 +78,22 @@ def test_solution_beyond_limits_is_reported_without_a_closed_form(tmp_path: Path
 
 
 @pytest.mark.parametrize(
-    ("task", "what"), [(Task.POSE_6D, "orientation"), (Task.POSITION_AND_AXIS_5D, "axis")]
+    ("task", "error_part"), [(Task.POSE_6D, "orientation"), (Task.POSITION_AND_AXIS_5D, "axis")]
 )
-def test_unreachable_orientation_of_five_joints_reports_the_least_deviation(task: Task, what: str) -> None:
+def test_unreachable_orientation_of_five_joints_reports_the_least_deviation(
+    task: Task, error_part: str
+) -> None:
     _, model, solver = arm("pt600")
     # Only the 3 degrees out of the arm's plane make this pose unreachable.
     target = placed(350, 0, 300, 177, 45, 0)
     result = solve(solver, target, task=task)
     off = np.degrees(result.residual_rad)
     assert none(result) == (
-        f"not this orientation: at this position, the tool's {what} is at least {off:.2f}° off"
+        f"not this orientation: at this position, the tool's {error_part} is at least {off:.2f}° off"
     )
     assert result.residual_m < 1e-4
-    there = solve(solver, target, task=Task.POSITION_3D, all_solutions=True).solutions
-    axes = [tool_placement(model, each)[:3, 2] for each in there]
+    solutions = solve(solver, target, task=Task.POSITION_3D, all_solutions=True).solutions
+    axes = [tool_placement(model, each)[:3, 2] for each in solutions]
     assert len(axes) > 20
     least = np.degrees(np.arccos(max(axis @ target[:3, 2] for axis in axes)))
     assert 0.5 < off < least + 0.1

@@ -81,7 +81,7 @@ def test_links_one_joint_apart_are_adjacent_and_others_apart_at_home_are_checked
     }
 
 
-def test_an_arm_that_stays_folded_always_touches_its_post(tmp_path: Path) -> None:
+def test_an_arm_whose_limits_keep_it_folded_always_touches_its_post(tmp_path: Path) -> None:
     folded = an_arm(tmp_path, "[179.0, 181.0]", home=180.0)
     assert kinds(folded)["base", "elbow"] is Kind.ALWAYS
     may_unfold = an_arm(tmp_path, "[-180.0, 180.0]", home=180.0)

@@ -115,7 +115,7 @@ def binary_stl(*triangles: tuple[tuple[float, ...], ...], header: bytes = b"", c
 TRIANGLE = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 
-def test_text_stl_keeps_every_facet_and_its_solids(tmp_path: Path) -> None:
+def test_text_stl_keeps_all_facets_and_solids(tmp_path: Path) -> None:
     mesh = read(tmp_path, "a.stl", ASCII_STL)
     assert [(part.name, len(part.triangles)) for part in mesh.parts] == [("one", 2), ("two", 1)]
     np.testing.assert_array_equal(bounds(mesh), [[0, 0, 0], [5, 1, 0]])
@@ -129,7 +129,7 @@ def test_binary_stl_is_read_whatever_its_header(tmp_path: Path, header: bytes) -
     np.testing.assert_allclose(mesh.parts[0].normals[mesh.parts[0].triangles[0]], [[0, 0, 1]] * 3)
 
 
-def test_obj_keeps_polygons_materials_and_what_is_degenerate(tmp_path: Path) -> None:
+def test_obj_keeps_polygons_materials_and_degenerate_faces(tmp_path: Path) -> None:
     (tmp_path / "a.mtl").write_text(MTL)
     mesh = read(tmp_path, "a.obj", OBJ)
     found = {part.material.name: part for part in mesh.parts}
@@ -145,7 +145,7 @@ def test_obj_keeps_polygons_materials_and_what_is_degenerate(tmp_path: Path) -> 
     assert mesh.files == (tmp_path / "a.mtl", tmp_path / "wood.png")
 
 
-def test_obj_without_its_materials_is_grey_and_says_so(tmp_path: Path) -> None:
+def test_obj_without_its_materials_is_grey_with_a_warning(tmp_path: Path) -> None:
     mesh = read(tmp_path, "a.obj", OBJ)
     assert mesh.triangle_count == 4
     assert mesh.warnings[0] == "materials: no file 'a.mtl' in this file's folder; drawn grey"
@@ -173,7 +173,7 @@ def test_ply_gives_colours_of_vertices(tmp_path: Path) -> None:
     assert len(part.triangles) == 2
 
 
-def test_ply_of_points_alone_is_a_wire(tmp_path: Path) -> None:
+def test_ply_of_points_only_is_a_wire(tmp_path: Path) -> None:
     text = PLY[: PLY.index("element face")] + "end_header\n" + "0 0 0 255 0 0\n" * 4
     mesh = read(tmp_path, "a.ply", text)
     assert mesh.triangle_count == 0
@@ -233,7 +233,7 @@ def test_gltf_is_placed_by_its_nodes_with_its_vertices_colours_and_textures_name
     assert (mesh.unit_m, mesh.up) == (1.0, "y")
 
 
-def test_gltf_reads_its_buffer_from_beside_it_and_misses_it_in_words(tmp_path: Path) -> None:
+def test_gltf_reads_its_buffer_from_its_folder_or_names_the_missing_file(tmp_path: Path) -> None:
     document = gltf()
     data = base64.b64decode(document["buffers"][0]["uri"].split(",")[1])
     document["buffers"][0]["uri"] = "a.bin"
@@ -282,7 +282,7 @@ def test_gltf_reads_its_buffer_from_beside_it_and_misses_it_in_words(tmp_path: P
         ("a.xyz", b"0 0 0\n", "ending '.xyz' is not supported; use .wrl"),
     ],
 )
-def test_broken_file_is_told_in_one_line(
+def test_error_of_an_invalid_file_is_one_line(
     tmp_path: Path, name: str, content: str | bytes, expected: str
 ) -> None:
     with pytest.raises(MeshError) as caught:
@@ -304,7 +304,7 @@ def test_broken_file_is_told_in_one_line(
         ),
     ],
 )
-def test_ending_that_lies_is_warned_of(tmp_path: Path, name: str, content: str, expected: str) -> None:
+def test_wrong_extension_causes_a_warning(tmp_path: Path, name: str, content: str, expected: str) -> None:
     mesh = read(tmp_path, name, content)
     assert mesh.triangle_count > 0
     assert mesh.warnings[0] == expected

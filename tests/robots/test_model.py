@@ -146,13 +146,15 @@ def test_jacobian_is_the_derivative_of_the_tools_placement(name: str, text: str)
     jacobian = tool_jacobian(model, positions)
     assert jacobian.shape == (6, len(model.joints))
     step = 1e-6
-    here = tool_placement(model, positions)
+    placement = tool_placement(model, positions)
     for index in range(len(positions)):
         moved = positions.copy()
         moved[index] += step
-        there = tool_placement(model, moved)
-        np.testing.assert_allclose(jacobian[:3, index], (there[:3, 3] - here[:3, 3]) / step, atol=1e-5)
-        turn = (there[:3, :3] @ here[:3, :3].T - np.eye(3)) / step
+        moved_placement = tool_placement(model, moved)
+        np.testing.assert_allclose(
+            jacobian[:3, index], (moved_placement[:3, 3] - placement[:3, 3]) / step, atol=1e-5
+        )
+        turn = (moved_placement[:3, :3] @ placement[:3, :3].T - np.eye(3)) / step
         angular = [turn[2, 1], turn[0, 2], turn[1, 0]]
         np.testing.assert_allclose(jacobian[3:, index], angular, atol=1e-5)
 

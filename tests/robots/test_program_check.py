@@ -34,7 +34,7 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Cell:
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory: pytest.TempPathFactory) -> Cell:
+def arm_cell(tmp_path_factory: pytest.TempPathFactory) -> Cell:
     return build_cell(cell_of({"arm": (bar_arm(tmp_path_factory.mktemp("arm")), placed(0))}))
 
 
@@ -102,8 +102,8 @@ def test_contact_at_the_start_is_reported(shelf: Cell) -> None:
     assert kinds(checked(shelf, "wait 0\n", np.array([MEETS + 0.05, 0.0]))) == ["collision"]
 
 
-def test_self_collision_is_a_violation(alone: Cell) -> None:
-    result = checked(alone, "move_joints 0 179\n")
+def test_self_collision_is_a_violation(arm_cell: Cell) -> None:
+    result = checked(arm_cell, "move_joints 0 179\n")
     (touch,) = result.violations
     assert touch.kind is ViolationKind.COLLISION
     assert set(touch.pair) == {"arm/base", "arm/elbow"}
@@ -120,8 +120,8 @@ def test_each_pass_is_a_separate_violation(shelf: Cell) -> None:
     assert spans[0][2] == pytest.approx(spans[1][1])
 
 
-def test_limits_are_reported_in_degrees_for_the_whole_move(alone: Cell) -> None:
-    result = checked(alone, "move_joints 0 0\nmove_joints 200 0\n")
+def test_limits_are_reported_in_degrees_for_the_whole_move(arm_cell: Cell) -> None:
+    result = checked(arm_cell, "move_joints 0 0\nmove_joints 200 0\n")
     (beyond,) = result.violations
     assert (beyond.kind, beyond.line, beyond.refuses) == (ViolationKind.LIMIT, 2, True)
     assert beyond.text == "joint shoulder at 200.00° is beyond its limit 180.00°"
@@ -135,23 +135,23 @@ def test_coupled_limits_count(pt600: Cell) -> None:
     ]
 
 
-def test_arm_beyond_a_limit_may_move_back(alone: Cell) -> None:
-    result = checked(alone, "move_joints 0 0\n", np.array([radians(185.0), 0.0]))
+def test_arm_beyond_a_limit_may_move_back(arm_cell: Cell) -> None:
+    result = checked(arm_cell, "move_joints 0 0\n", np.array([radians(185.0), 0.0]))
     (start,) = result.violations
     assert (start.line, start.refuses) == (0, False)
     assert start.text.startswith("at the start: joint shoulder at 185.00°")
 
 
-def test_asserted_tool_speed_is_checked(alone: Cell) -> None:
+def test_asserted_tool_speed_is_checked(arm_cell: Cell) -> None:
     # The tool is at a radius of 0.8 m and turns at 90°/s.
     most = 0.8 * radians(90)
-    result = checked(alone, f"move_joints 45 0\ntool_speed {most * 1000 - 20:.3f}\nmove_joints 0 0\n")
+    result = checked(arm_cell, f"move_joints 45 0\ntool_speed {most * 1000 - 20:.3f}\nmove_joints 0 0\n")
     (fast,) = result.violations
     assert (fast.kind, fast.line, fast.pair, fast.distance_m) == (ViolationKind.SPEED, 3, (), None)
     assert fast.text.startswith(f"the tool moves at {most * 1000:.0f} mm/s, ")
     assert result.path.tool_speeds.max() == pytest.approx(most)
-    assert checked(alone, f"tool_speed {most * 1000 + 1:.3f}\nmove_joints 45 0\nmove_joints 0 0\n").ok
-    assert checked(alone, f"speed 50\ntool_speed {most * 500 + 1:.3f}\nmove_joints 45 0\n").ok
+    assert checked(arm_cell, f"tool_speed {most * 1000 + 1:.3f}\nmove_joints 45 0\nmove_joints 0 0\n").ok
+    assert checked(arm_cell, f"speed 50\ntool_speed {most * 500 + 1:.3f}\nmove_joints 45 0\n").ok
 
 
 def test_line_near_a_singular_position_is_reported(pt600: Cell) -> None:
@@ -231,8 +231,8 @@ def test_links_without_a_shape_are_named(tmp_path: Path) -> None:
     )
 
 
-def test_unreadable_text_gives_violations_with_lines(alone: Cell) -> None:
-    result = checked(alone, "home\nspeed 0\nmov 1\n")
+def test_unreadable_text_gives_violations_with_lines(arm_cell: Cell) -> None:
+    result = checked(arm_cell, "home\nspeed 0\nmov 1\n")
     assert [(str(each.kind), each.line) for each in result.violations] == [("program", 2), ("program", 3)]
     assert (result.ok, result.steps, len(result.path.times_s)) == (False, (), 0)
 
@@ -266,8 +266,8 @@ def test_adjacent_samples_are_one_violation_with_the_worst_value() -> None:
     assert (second.time_s, second.until_s, second.refuses) == (0.9, 0.9, False)
 
 
-def test_more_joints_need_more_samples(alone: Cell) -> None:
-    chain = tool_chain(alone.arms["arm"])
+def test_more_joints_need_more_samples(arm_cell: Cell) -> None:
+    chain = tool_chain(arm_cell.arms["arm"])
     one = samples_between(chain, STRETCHED, np.array([1.0, 0.0]))
     # The outer bar's far corner is at a radius of 0.78 m.
     assert 0.78 / SAMPLE_M <= one <= 0.9 / SAMPLE_M

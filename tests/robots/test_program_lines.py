@@ -85,8 +85,8 @@ def test_arm_of_five_joints_reports_its_axis_deviation_on_a_line() -> None:
 
 
 def test_repeated_line_gives_bit_identical_moves() -> None:
-    there, back = "move_line 400 200 300 180 0 0", "move_line 400 0 300 180 0 0"
-    plan = planned("pt600", f"{back}\nrepeat 3\n{there}\n{back}\nend")
+    out, back = "move_line 400 200 300 180 0 0", "move_line 400 0 300 180 0 0"
+    plan = planned("pt600", f"{back}\nrepeat 3\n{out}\n{back}\nend")
     rounds = [step.target.tobytes() for step in plan.steps if step.line in (3, 4)]
     third = len(rounds) // 3
     assert third > 2

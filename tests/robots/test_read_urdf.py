@@ -88,7 +88,7 @@ def pinocchios_placements(text: str, names: tuple[str, ...], by_joint: dict[str,
     return np.array([data.oMf[frame].homogeneous for frame in frames])
 
 
-def test_links_stand_where_pinocchio_has_them(tmp_path: Path) -> None:
+def test_link_placements_equal_those_of_pinocchio(tmp_path: Path) -> None:
     model = build_model(load(arm_file(tmp_path)))
     assert model.joints.names == ("turn", "reach", "roll", "left_finger", "spin")
     random = np.random.default_rng(5)
@@ -100,7 +100,7 @@ def test_links_stand_where_pinocchio_has_them(tmp_path: Path) -> None:
         np.testing.assert_allclose(link_placements(model, positions), expected, atol=1e-12, rtol=0)
 
 
-def test_a_joint_that_follows_moves_the_tool_with_the_one_it_follows(tmp_path: Path) -> None:
+def test_mimic_joint_moves_the_tool_with_its_source_joint(tmp_path: Path) -> None:
     text = with_change('<link name="flange"/>', '<link name="flange"/><link name="tip"/>').replace(
         "</robot>",
         '<joint name="tip_joint" type="fixed"><parent link="right"/><child link="tip"/></joint></robot>',
@@ -119,7 +119,7 @@ def test_a_joint_that_follows_moves_the_tool_with_the_one_it_follows(tmp_path: P
     np.testing.assert_allclose(jacobian[:3, 3], (after - before)[:3, 3] / 0.001, atol=1e-9)
 
 
-def test_limits_and_speeds_are_the_files_and_a_continuous_joint_gets_one_turn_each_way(
+def test_limits_are_read_and_a_continuous_joint_gets_one_turn_each_way(
     tmp_path: Path,
 ) -> None:
     joints = build_model(load(arm_file(tmp_path))).joints
@@ -131,7 +131,7 @@ def test_limits_and_speeds_are_the_files_and_a_continuous_joint_gets_one_turn_ea
     np.testing.assert_allclose(joints.home, np.zeros(5))
 
 
-def test_visuals_are_drawn_and_collision_shapes_checked_each_in_place_of_the_other() -> None:
+def test_visual_and_collision_shapes_replace_each_other_where_one_is_missing() -> None:
     links = {link.name: link for link in read(ARM).tree.links}
     box, cylinder = links["pillar"].shapes
     assert (box.color, box.opacity) == ((0.0, 0.0, 1.0), 0.5)
@@ -145,7 +145,7 @@ def test_visuals_are_drawn_and_collision_shapes_checked_each_in_place_of_the_oth
     assert links["hand"].shapes == links["hand"].checked == ()
 
 
-def test_round_collision_shapes_are_nowhere_smaller_than_they_say() -> None:
+def test_meshes_of_round_collision_shapes_contain_the_shapes() -> None:
     links = {link.name: link for link in read(ARM).tree.links}
     (around,) = links["pillar"].checked
     assert isinstance(around.mesh, Mesh)
@@ -157,7 +157,7 @@ def test_round_collision_shapes_are_nowhere_smaller_than_they_say() -> None:
     assert np.linalg.norm(part.vertices, axis=1).max() < 9 * 1.005
 
 
-def test_collision_geometry_that_is_the_visual_geometry_is_kept_once() -> None:
+def test_collision_geometry_equal_to_the_visual_geometry_is_stored_once() -> None:
     visual = '<visual><geometry><box size="1 2 3"/></geometry></visual>'
     both = visual + visual.replace("visual", "collision")
     text = with_change('<link name="hand"/>', f'<link name="hand">{both}</link>')
@@ -192,7 +192,7 @@ def test_tool_is_at_the_end_of_the_longest_chain_unless_a_link_has_a_tools_name(
     assert end_link(read(named).tree) == "arm_tool0"
 
 
-def test_packages_are_found_above_the_file_beside_it_and_where_one_says(
+def test_packages_are_found_above_and_beside_the_file_and_in_configured_folders(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mesh = (
@@ -229,7 +229,7 @@ def test_packages_are_found_above_the_file_beside_it_and_where_one_says(
     assert found("../meshes/a b.stl", confined=package) == "a b.stl"
 
 
-def test_names_that_no_key_may_have_are_changed_with_a_note() -> None:
+def test_names_that_are_invalid_in_keys_are_changed_with_a_note() -> None:
     robot = read(ARM.replace('"hand"', '"my/hand 1"').replace('"roll"', '"_roll"'))
     assert "my_hand_1" in [link.name for link in robot.tree.links]
     assert "joint_roll" in [joint.name for joint in robot.tree.joints]
@@ -239,7 +239,7 @@ def test_names_that_no_key_may_have_are_changed_with_a_note() -> None:
     )
 
 
-def test_joint_whose_limits_leave_no_way_stands_still_there() -> None:
+def test_joint_with_equal_limits_is_fixed_at_that_position() -> None:
     text = with_change(LIMIT, '<limit lower="0.5" upper="0.5" velocity="1" effort="1"/>')
     robot = read(text)
     assert "turn" not in [joint.name for joint in robot.tree.joints]
@@ -248,7 +248,7 @@ def test_joint_whose_limits_leave_no_way_stands_still_there() -> None:
     np.testing.assert_allclose(arm.link_to_joint, expected, atol=1e-12)
 
 
-def test_speed_that_is_not_given_is_taken_with_a_note() -> None:
+def test_missing_speed_is_assumed_with_a_note() -> None:
     robot = read(with_change('velocity="3"', ""))
     assert robot.notes == ("joint 'turn': has no velocity limit; 1.571 rad/s is assumed",)
 
@@ -282,7 +282,7 @@ def test_speed_that_is_not_given_is_taken_with_a_note() -> None:
         ('rgba="0 0 1 0.5"', 'rgba="blue"', "material 'blue' color rgba = 'blue': must be 4 numbers"),
     ],
 )  # fmt: skip
-def test_wrong_urdf_is_told_with_its_element_and_what_would_be_right(
+def test_error_of_a_wrong_urdf_names_the_element_and_the_correction(
     old: str, new: str, expected: str, tmp_path: Path
 ) -> None:
     with pytest.raises(DescriptionError) as caught:
@@ -292,12 +292,12 @@ def test_wrong_urdf_is_told_with_its_element_and_what_would_be_right(
     assert "\n" not in str(caught.value)
 
 
-def test_more_links_than_any_robot_has_are_refused() -> None:
+def test_urdf_with_thousands_of_links_is_rejected() -> None:
     with pytest.raises(DescriptionError, match="has 3,000 links; at most 2,000 are read"):
         read("<robot>" + "".join(f"<link name='l{number}'/>" for number in range(3000)) + "</robot>")
 
 
-def test_links_that_run_in_a_circle_apart_from_the_root_are_told() -> None:
+def test_cycle_of_links_apart_from_the_root_is_rejected() -> None:
     circle = "".join(
         f'<link name="{a}"/><joint name="{a}{b}" type="fixed"><parent link="{a}"/><child link="{b}"/></joint>'
         for a, b in (("one", "two"), ("two", "one"))
@@ -306,7 +306,7 @@ def test_links_that_run_in_a_circle_apart_from_the_root_are_told() -> None:
         read(ARM.replace("</robot>", circle + "</robot>"))
 
 
-def test_changed_bytes_give_a_robot_or_an_error_in_words() -> None:
+def test_urdf_with_changed_bytes_is_read_or_raises_a_description_error() -> None:
     random = np.random.default_rng(12)
     pieces = [
         "nan",
@@ -349,6 +349,6 @@ def test_changed_bytes_give_a_robot_or_an_error_in_words() -> None:
         ('<robot name="r"><link name="a"/></robot>', "has no movable joint"),
     ],
 )
-def test_what_is_no_arm_is_told(text: str, expected: str) -> None:
+def test_urdf_that_is_not_an_arm_is_rejected(text: str, expected: str) -> None:
     with pytest.raises(DescriptionError, match=expected):
         read(text)

@@ -147,17 +147,17 @@ def test_robot_is_replaced_if_its_revision_is_unchanged(tmp_path):
     assert_whole(tmp_path, [2])
 
 
-@pytest.mark.parametrize("what", ["added", "changed", "gone", "renamed", "a link"])
-def test_any_change_in_a_folder_changes_its_revision(tmp_path, what):
+@pytest.mark.parametrize("change", ["added", "changed", "gone", "renamed", "a link"])
+def test_any_change_in_a_folder_changes_its_revision(tmp_path, change):
     before = save(tmp_path, 1).revision
     mesh = tmp_path / "arm" / "meshes" / "a.wrl"
-    if what == "added":
+    if change == "added":
         (tmp_path / "arm" / "README.md").write_text("hello")
-    elif what == "changed":
+    elif change == "changed":
         mesh.write_bytes(content(1)[:-1] + b"x")
-    elif what == "gone":
+    elif change == "gone":
         mesh.unlink()
-    elif what == "renamed":
+    elif change == "renamed":
         mesh.rename(mesh.with_name("b.wrl"))
     else:
         (tmp_path / "arm" / "link").symlink_to(mesh)

@@ -108,9 +108,9 @@ def test_pair_apart_at_home_of_which_only_hulls_often_touch_is_checked_as_meshes
     (encounter,) = (
         each for each in path_encounters(cell, "arm", path, {}, within_m=0.01).encounters if each.own
     )
-    there = path[encounter.samples, 1]
-    assert there.min() == pytest.approx(0.06, abs=0.006)
-    free = there[np.diff(there, append=there[-1]).argmax() :][:2]
+    angles = path[encounter.samples, 1]
+    assert angles.min() == pytest.approx(0.06, abs=0.006)
+    free = angles[np.diff(angles, append=angles[-1]).argmax() :][:2]
     assert free == pytest.approx([0.18, 0.24], abs=0.006)
     assert run(["robot", "check", str(model)]) == 0
     # 10 % expected, with a standard deviation of 1.5 %.

@@ -76,8 +76,8 @@ def step_box(
             around = ",".join(edge(a, b) for a, b in zip(loop, loop[1:] + loop[:1], strict=True))
             bound = chain(f"EDGE_LOOP('',({around}))", "FACE_OUTER_BOUND('',{},.T.)")
             normal, first = direction(axis, 1.0 if side else -1.0), direction((axis + 1) % 3)
-            place = add(f"AXIS2_PLACEMENT_3D('',{point(corner(base))},{normal},{first})")
-            faces.append(chain(f"PLANE('',{place})", f"ADVANCED_FACE('',({bound}),{{}},.T.)"))
+            axes = add(f"AXIS2_PLACEMENT_3D('',{point(corner(base))},{normal},{first})")
+            faces.append(chain(f"PLANE('',{axes})", f"ADVANCED_FACE('',({bound}),{{}},.T.)"))
     brep = chain(f"CLOSED_SHELL('',({','.join(faces)}))", "MANIFOLD_SOLID_BREP('box',{})")
     origin = add(f"AXIS2_PLACEMENT_3D('',{point([0, 0, 0])},{direction(2)},{direction(0)})")
     shape = add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('',({origin},{brep}),{context})")
@@ -118,7 +118,7 @@ def _listed(values: list[float]) -> str:
 
 @pytest.mark.parametrize(("unit", "unit_m"), [(MILLIMETRE, 0.001), (METRE, 1.0)])
 @pytest.mark.slow
-def test_box_has_the_files_own_unit_axes_and_colour(tmp_path: Path, unit: str, unit_m: float) -> None:
+def test_box_keeps_the_files_unit_axes_and_colour(tmp_path: Path, unit: str, unit_m: float) -> None:
     path = tmp_path / "box.step"
     path.write_text(step_box((10, 20, 30), unit=unit, color=(1.0, 0.5, 0.25)))
     mesh = read_mesh(path)
@@ -146,7 +146,7 @@ def test_triangles_face_outwards(tmp_path: Path) -> None:
     ],
 )
 @pytest.mark.slow
-def test_broken_file_is_told(tmp_path: Path, content: bytes, expected: str) -> None:
+def test_invalid_file_is_rejected_with_a_reason(tmp_path: Path, content: bytes, expected: str) -> None:
     path = tmp_path / "broken.step"
     path.write_bytes(content)
     with pytest.raises(MeshError, match=r"broken\.step") as caught:
@@ -156,7 +156,7 @@ def test_broken_file_is_told(tmp_path: Path, content: bytes, expected: str) -> N
 
 
 @pytest.mark.slow
-def test_file_that_runs_without_end_is_stopped(tmp_path: Path) -> None:
+def test_reading_is_stopped_at_the_time_limit(tmp_path: Path) -> None:
     path = tmp_path / "endless.step"
     # Open CASCADE hangs on a length that is no number.
     path.write_text(step_box((10, 20, 30)).replace("10.000000", "nan"))
@@ -166,9 +166,7 @@ def test_file_that_runs_without_end_is_stopped(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("megabytes", [150, 300])
 @pytest.mark.slow
-def test_want_of_memory_is_told_as_that_and_not_as_a_file_without_a_model(
-    tmp_path: Path, megabytes: int
-) -> None:
+def test_lack_of_memory_is_reported_instead_of_a_missing_model(tmp_path: Path, megabytes: int) -> None:
     path = tmp_path / "box.step"
     path.write_text(step_box((1, 2, 3)))
     # With so little it fails as it is loaded, or later and without a word.
@@ -177,12 +175,12 @@ def test_want_of_memory_is_told_as_that_and_not_as_a_file_without_a_model(
 
 
 @pytest.mark.parametrize("name", ["part.igs", "part.IGES"])
-def test_iges_is_refused_and_step_named(tmp_path: Path, name: str) -> None:
+def test_iges_is_rejected_and_the_error_recommends_step(tmp_path: Path, name: str) -> None:
     with pytest.raises(MeshError, match="IGES is not supported: export STEP"):
         read_mesh(tmp_path / name)
 
 
-def test_iges_of_another_ending_is_known_by_its_content(tmp_path: Path) -> None:
+def test_iges_with_another_extension_is_recognised_by_its_content(tmp_path: Path) -> None:
     path = tmp_path / "part.stl"
     path.write_text("from a CAD program".ljust(72) + "S      1\n")
     with pytest.raises(MeshError, match="contains IGES, which is not supported: export STEP"):

@@ -23,7 +23,7 @@ def a_box() -> Mesh:
     )
 
 
-def test_what_is_written_reads_the_same(tmp_path: Path) -> None:
+def test_written_file_is_read_back_unchanged(tmp_path: Path) -> None:
     path = tmp_path / "box.3ds"
     path.write_bytes(write_3ds(a_box()))
     mesh = read_3ds(path)
@@ -46,7 +46,7 @@ def test_transparency_and_names_of_a_real_file_are_read() -> None:
     assert [part.name for part in mesh.parts] == [f"Quader0{number}" for number in range(1, 6)]
 
 
-def test_file_cut_anywhere_is_refused_or_warned_of_with_its_byte(tmp_path: Path) -> None:
+def test_truncated_file_is_rejected_or_has_a_warning_with_the_byte(tmp_path: Path) -> None:
     whole = write_3ds(a_box())
     path = tmp_path / "cut.3ds"
     for end in range(len(whole)):
@@ -60,7 +60,7 @@ def test_file_cut_anywhere_is_refused_or_warned_of_with_its_byte(tmp_path: Path)
         assert "\n" not in warnings[0]
 
 
-def test_any_byte_changed_is_a_mesh_or_an_error(tmp_path: Path) -> None:
+def test_file_with_a_changed_byte_is_read_or_raises_a_mesh_error(tmp_path: Path) -> None:
     whole = bytearray(write_3ds(a_box()))
     path = tmp_path / "changed.3ds"
     for position in range(len(whole)):
@@ -82,7 +82,7 @@ def test_any_byte_changed_is_a_mesh_or_an_error(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_wrong_file_is_told(tmp_path: Path, content: bytes, expected: str) -> None:
+def test_invalid_file_is_rejected_with_a_reason(tmp_path: Path, content: bytes, expected: str) -> None:
     path = tmp_path / "wrong.3ds"
     path.write_bytes(content)
     with pytest.raises(MeshError, match=r"wrong\.3ds") as caught:
@@ -90,6 +90,6 @@ def test_wrong_file_is_told(tmp_path: Path, content: bytes, expected: str) -> No
     assert expected in str(caught.value)
 
 
-def test_missing_file_is_told(tmp_path: Path) -> None:
+def test_missing_file_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(MeshError, match="cannot be read: No such file"):
         read_3ds(tmp_path / "none.3ds")

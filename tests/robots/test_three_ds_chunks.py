@@ -95,7 +95,7 @@ def test_every_form_of_a_colour_is_read(
 @pytest.mark.parametrize(
     "fraction", [chunk(0x0030, struct.pack("<h", 40)), chunk(0x0031, struct.pack("<f", 0.4))]
 )
-def test_fractions_are_percent_or_float(tmp_path: Path, fraction: bytes) -> None:
+def test_fractions_are_read_as_percent_or_float(tmp_path: Path, fraction: bytes) -> None:
     material = chunk(
         0xAFFF,
         chunk(0xA000, b"m\0"),
@@ -135,16 +135,14 @@ def volume(mesh: Mesh) -> float:
 
 
 @pytest.mark.parametrize("turned", [False, True])
-def test_mirrored_object_shows_its_outside_whichever_way_its_faces_were_written(
-    tmp_path: Path, turned: bool
-) -> None:
+def test_faces_of_a_mirrored_object_point_outwards_in_either_order(tmp_path: Path, turned: bool) -> None:
     frame = chunk(0x4160, np.vstack([np.diag([-1.0, 1.0, 1.0]), np.zeros(3)]).astype("<f4").tobytes())
     numbers = [face[::-1] for face in FACES] if turned else FACES
     mesh = read(tmp_path, a_file(an_object(vertices(), frame, faces(numbers=numbers))))
     assert volume(mesh) == pytest.approx(1 / 6)
 
 
-def test_hierarchy_gives_parents_and_pivots_and_moves_no_vertex(tmp_path: Path) -> None:
+def test_hierarchy_sets_parents_and_pivots_but_moves_no_vertex(tmp_path: Path) -> None:
     quarter = np.pi / 2
     keyframes = chunk(
         0xB000,
@@ -162,7 +160,7 @@ def test_hierarchy_gives_parents_and_pivots_and_moves_no_vertex(tmp_path: Path) 
     assert bounds(mesh)[1].tolist() == [1, 1, 1]
 
 
-def test_copies_in_the_key_frames_are_warned_of(tmp_path: Path) -> None:
+def test_copies_in_the_key_frames_cause_a_warning(tmp_path: Path) -> None:
     keyframes = chunk(0xB000, key_object("tetra", 0, 65535), key_object("tetra", 1, 65535, instance="second"))
     mesh = read(tmp_path, a_file(an_object(vertices(), faces()), keyframes=keyframes))
     assert [node.name for node in mesh.nodes] == ["tetra", "tetra.second"]
@@ -170,7 +168,7 @@ def test_copies_in_the_key_frames_are_warned_of(tmp_path: Path) -> None:
     assert mesh.triangle_count == 4
 
 
-def test_hierarchy_in_a_circle_is_left_out(tmp_path: Path) -> None:
+def test_cyclic_hierarchy_is_omitted_with_a_warning(tmp_path: Path) -> None:
     keyframes = chunk(0xB000, key_object("tetra", 0, 1), key_object("b", 1, 0))
     mesh = read(tmp_path, a_file(an_object(vertices(), faces()), keyframes=keyframes))
     assert mesh.nodes == ()
@@ -178,7 +176,7 @@ def test_hierarchy_in_a_circle_is_left_out(tmp_path: Path) -> None:
     assert mesh.triangle_count == 4
 
 
-def test_outermost_lengths_that_lie_are_read_over(tmp_path: Path) -> None:
+def test_wrong_lengths_of_outer_chunks_are_ignored_with_a_warning(tmp_path: Path) -> None:
     data = bytearray(a_file(an_object(vertices(), faces())))
     data[2:6] = struct.pack("<I", 0xFFFFFFFF)
     data[8:12] = struct.pack("<I", 0x7FFFFFFF)
@@ -201,7 +199,7 @@ def test_outermost_lengths_that_lie_are_read_over(tmp_path: Path) -> None:
         (vertices() + faces(chunk(0x4130, b"endless")), "a name does not end with a zero byte"),
     ],
 )
-def test_broken_object_is_refused_with_its_byte(tmp_path: Path, contents: bytes, expected: str) -> None:
+def test_invalid_object_is_rejected_with_the_byte(tmp_path: Path, contents: bytes, expected: str) -> None:
     with pytest.raises(MeshError) as caught:
         read(tmp_path, a_file(an_object(contents)))
     assert caught.value.place.startswith("byte ")

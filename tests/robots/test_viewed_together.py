@@ -44,16 +44,16 @@ def test_every_link_of_every_robot_has_its_placement_in_the_site(pose):
 
 
 def test_several_sites_share_a_root_and_a_single_site_is_the_root():
-    here, there = (viewed(site, "pt600", pinocchio.SE3.Identity()) for site in ("here", "there"))
+    first, second = (viewed(site, "pt600", pinocchio.SE3.Identity()) for site in ("here", "there"))
 
     def roots(text):
         urdf = Xml.fromstring(text)
         children = {each.get("link") for each in urdf.iter("child")}
         return [link.get("name") for link in urdf.findall("link") if link.get("name") not in children]
 
-    assert roots(together([here], plain_joints=True)) == ["here"]
-    assert roots(together([here, there], plain_joints=False)) == [WORLD]
-    assert pinocchio.buildModelFromXML(together([here, there], plain_joints=False)).nq == 10
+    assert roots(together([first], plain_joints=True)) == ["here"]
+    assert roots(together([first, second], plain_joints=False)) == [WORLD]
+    assert pinocchio.buildModelFromXML(together([first, second], plain_joints=False)).nq == 10
 
 
 def test_upper_side_of_the_floors_plate_is_at_the_floors_height():

@@ -71,7 +71,7 @@ def test_real_file_has_the_triangles_and_bounds_that_other_readers_agree_on(
     assert mesh.warnings == () or str(expected["file"]).startswith("3ds/")
 
 
-def test_file_cut_anywhere_is_an_error_or_a_smaller_mesh(tmp_path: Path) -> None:
+def test_truncated_file_is_an_error_or_a_smaller_mesh(tmp_path: Path) -> None:
     path = tmp_path / "a.wrl"
     for end in range(20, len(PAPER_SAMPLE), 7):
         path.write_text(PAPER_SAMPLE[:end])
@@ -98,15 +98,15 @@ def grid(count: int) -> str:
 def test_progress_rises_to_one(tmp_path: Path) -> None:
     path = tmp_path / "a.wrl"
     path.write_text(f"#VRML V2.0 utf8\n{grid(300)}")
-    told: list[float] = []
-    assert read_vrml(path, told.append).triangle_count == 2 * 299**2
-    assert len(told) > 4
-    assert told == sorted(told)
-    assert told[-1] == 1.0
-    assert 0.0 <= told[0] <= 0.7
+    progress: list[float] = []
+    assert read_vrml(path, progress.append).triangle_count == 2 * 299**2
+    assert len(progress) > 4
+    assert progress == sorted(progress)
+    assert progress[-1] == 1.0
+    assert 0.0 <= progress[0] <= 0.7
 
 
-def test_list_that_is_read_in_pieces_keeps_every_number(draw: Draw) -> None:
+def test_list_read_in_pieces_keeps_every_number(draw: Draw) -> None:
     # Over a megabyte: more than one piece, numbers across the seam.
     numbers = np.arange(300_000)
     points = ", ".join(f"{n}.25 -{n} 0" for n in numbers.tolist())
@@ -153,7 +153,7 @@ def test_extrusion_of_millions_of_points_is_refused(draw: Draw) -> None:
     )
 
 
-def test_grid_that_claims_what_is_not_there_is_refused(draw: Draw) -> None:
+def test_grid_without_enough_heights_is_rejected(draw: Draw) -> None:
     refused_in_time(
         draw,
         "Shape { geometry ElevationGrid { xDimension 4000000000 zDimension 4000000000 height [ 0 0 ] } }",
@@ -172,5 +172,5 @@ def test_grid_that_claims_what_is_not_there_is_refused(draw: Draw) -> None:
         "#" * 100_000 + "\n" + " , " * 100_000 + '"',
     ],
 )
-def test_what_is_never_closed_is_refused(draw: Draw, text: str) -> None:
+def test_unclosed_or_deeply_nested_text_is_rejected(draw: Draw, text: str) -> None:
     refused_in_time(draw, text, r"nested deeper than 120|was expected|does not end")

@@ -39,7 +39,7 @@ def test_material_without_fields_has_the_standards_values(draw: Draw) -> None:
     )
 
 
-def test_colors_and_fractions_are_brought_into_zero_to_one(draw: Draw) -> None:
+def test_colors_and_fractions_are_clipped_to_zero_to_one(draw: Draw) -> None:
     found = material(
         draw, "Appearance { material Material { diffuseColor 2 -1 0.5 shininess 128 transparency -1 } }"
     )
@@ -52,7 +52,7 @@ def test_shape_without_a_material_is_white(draw: Draw, appearance: str) -> None:
     assert material(draw, appearance).diffuse == (1, 1, 1)
 
 
-def test_texture_is_kept_by_name(draw: Draw, tmp_path: Path) -> None:
+def test_texture_is_stored_by_name(draw: Draw, tmp_path: Path) -> None:
     (tmp_path / "wood.png").write_bytes(b"")
     text = 'Appearance { material Material { } texture ImageTexture { url [ "none.gif", "wood.png" ] } }'
     mesh = draw(f"Shape {{ appearance {text} geometry Box {{ }} }}")
@@ -60,7 +60,7 @@ def test_texture_is_kept_by_name(draw: Draw, tmp_path: Path) -> None:
     assert mesh.warnings == ()
 
 
-def test_texture_that_is_missing_is_told_once(draw: Draw) -> None:
+def test_missing_texture_causes_one_warning(draw: Draw) -> None:
     shape = 'Shape { appearance Appearance { texture ImageTexture { url "none.png" } } geometry Box { } }'
     mesh = draw(f"{shape}\n{shape}")
     assert mesh.parts[1].material.texture == "none.png"
@@ -105,7 +105,7 @@ def test_line_set_joins_the_points_of_each_line(draw: Draw) -> None:
         ("colorPerVertex FALSE colorIndex [ 2 0 ]", [[BLUE, BLUE], [BLUE, BLUE], [RED, RED]]),
     ],
 )
-def test_lines_have_colors_by_vertex_and_by_line(
+def test_lines_have_colors_per_vertex_and_per_line(
     draw: Draw, fields: str, expected: list[list[list[float]]]
 ) -> None:
     found = wire(draw, f"IndexedLineSet {{ {POINTS} {COLORS} {fields} coordIndex [ 0 1 2 -1 3 0 -1 ] }}")
@@ -113,13 +113,13 @@ def test_lines_have_colors_by_vertex_and_by_line(
     assert found.colors[found.segments].tolist() == expected
 
 
-def test_lines_to_points_that_are_not_there_are_left_out_with_a_warning(draw: Draw) -> None:
+def test_lines_to_missing_points_are_omitted_with_a_warning(draw: Draw) -> None:
     mesh = draw(f"Shape {{ geometry IndexedLineSet {{ {POINTS} coordIndex [ 0 1 7 2 3 ] }} }}")
     assert lines(mesh.wires[0]) == [[[0, 0, 0], [1, 0, 0]], [[1, 1, 0], [0, 1, 0]]]
     assert "coordIndex contains 7; there are 4 points, 0 to 3" in mesh.warnings[0]
 
 
-def test_points_stand_where_the_transform_puts_them(draw: Draw) -> None:
+def test_points_are_moved_by_the_transform(draw: Draw) -> None:
     mesh = draw(
         f"Transform {{ translation 0 0 5 children Shape {{ geometry PointSet {{ {POINTS} {COLORS} }} }} }}"
     )

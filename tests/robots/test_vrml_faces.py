@@ -38,8 +38,8 @@ def colors_at(part: Part) -> dict[tuple[float, ...], set[tuple[float, ...]]]:
     assert part.colors is not None
     found: dict[tuple[float, ...], set[tuple[float, ...]]] = {}
     for number in np.unique(part.triangles).tolist():
-        place = tuple(part.vertices[number].tolist())
-        found.setdefault(place, set()).add(tuple(part.colors[number].tolist()))
+        point = tuple(part.vertices[number].tolist())
+        found.setdefault(point, set()).add(tuple(part.colors[number].tolist()))
     return found
 
 
@@ -59,35 +59,35 @@ def test_faces_are_fans_from_their_first_corner(draw: Draw) -> None:
     ]
 
 
-def test_last_face_may_do_without_its_end(draw: Draw) -> None:
+def test_last_face_needs_no_end_marker(draw: Draw) -> None:
     assert len(face_set(draw, TWO_FACES.replace("2 1 -1", "2 1")).triangles) == 4
 
 
-def test_faces_of_one_and_two_corners_and_none_are_left_out(draw: Draw) -> None:
+def test_faces_of_fewer_than_three_corners_are_omitted(draw: Draw) -> None:
     part = face_set(draw, f"{POINTS} coordIndex [ -1 0 -1 0 1 -1 -1 0 1 2 -1 -1 ]")
     assert corners(part) == [[[0, 0, 0], [1, 0, 0], [1, 1, 0]]]
 
 
-def test_generated_normals_are_of_their_face(draw: Draw) -> None:
+def test_generated_normals_equal_those_of_their_face(draw: Draw) -> None:
     part = face_set(draw, TWO_FACES)
     np.testing.assert_allclose(part.normals[part.triangles[:2]].reshape(-1, 3), [[0, 0, 1]] * 6)
     # (1,0,1) (1,1,1) (1,1,0): counter-clockwise seen from -x... their cross product points to -x.
     np.testing.assert_allclose(part.normals[part.triangles[2:]].reshape(-1, 3), [[-1, 0, 0]] * 6)
 
 
-def test_ccw_false_turns_faces_and_their_normals_over(draw: Draw) -> None:
+def test_ccw_false_flips_faces_and_their_normals(draw: Draw) -> None:
     part = face_set(draw, f"ccw FALSE {TWO_FACES}")
     assert corners(part)[0] == [[1, 1, 0], [1, 0, 0], [0, 0, 0]]
     np.testing.assert_allclose(part.normals[part.triangles[0]], [[0, 0, -1]] * 3)
 
 
-def test_solid_false_is_seen_from_both_sides(draw: Draw) -> None:
+def test_solid_false_is_visible_from_both_sides(draw: Draw) -> None:
     assert face_set(draw, f"solid FALSE {TWO_FACES}").two_sided
     assert not face_set(draw, TWO_FACES).two_sided
 
 
 @pytest.mark.parametrize(("crease", "vertices"), [("1.5", 8), ("1.6", 6), ("3.2", 6)])
-def test_faces_at_a_right_angle_are_smooth_above_a_crease_of_it(
+def test_faces_at_a_right_angle_are_smooth_with_a_larger_crease_angle(
     draw: Draw, crease: str, vertices: int
 ) -> None:
     part = face_set(draw, f"creaseAngle {crease} {TWO_FACES}")
@@ -108,7 +108,7 @@ def test_smooth_normals_are_weighted_by_area(draw: Draw) -> None:
 # Normals
 
 
-def test_normal_of_a_vertex_is_the_one_of_its_point(draw: Draw) -> None:
+def test_vertices_without_a_normal_index_have_the_normals_of_their_points(draw: Draw) -> None:
     part = face_set(
         draw, f"normal Normal {{ vector [ 1 0 0, 0 2 0, 0 0 1, 1 0 0, 0 1 0, 0 0 1 ] }} {TWO_FACES}"
     )
@@ -119,7 +119,7 @@ def test_normal_of_a_vertex_is_the_one_of_its_point(draw: Draw) -> None:
     assert at[1, 1, 1] == [0, 0, 1]
 
 
-def test_normal_index_chooses_for_each_corner(draw: Draw) -> None:
+def test_normal_index_selects_the_normal_of_each_corner(draw: Draw) -> None:
     part = face_set(
         draw,
         "normal Normal { vector [ 0 0 1, -1 0 0 ] } normalIndex [ 0 0 0 0 -1 1 1 1 1 -1 ] " + TWO_FACES,
@@ -137,7 +137,7 @@ def test_normals_per_face(draw: Draw, index: str, first: list[int]) -> None:
     np.testing.assert_allclose(part.normals[part.triangles[3]], [[0, first[2], first[1]]] * 3)
 
 
-def test_given_normals_stay_as_they_are_when_faces_run_clockwise(draw: Draw) -> None:
+def test_given_normals_are_kept_for_clockwise_faces(draw: Draw) -> None:
     part = face_set(
         draw,
         f"ccw FALSE normalPerVertex FALSE normal Normal {{ vector [ 0 0 -1, 1 0 0 ] }} {TWO_FACES}",
@@ -146,7 +146,7 @@ def test_given_normals_stay_as_they_are_when_faces_run_clockwise(draw: Draw) -> 
     assert area_vector(part) == [1, 0, -1]
 
 
-def test_normals_that_are_too_few_are_left_out_with_a_warning(draw: Draw) -> None:
+def test_too_few_normals_are_ignored_with_a_warning(draw: Draw) -> None:
     mesh = draw(f"Shape {{ geometry IndexedFaceSet {{ normal Normal {{ vector [ 1 0 0 ] }} {TWO_FACES} }} }}")
     assert mesh.warnings == (
         "line 2, column 18: IndexedFaceSet: normal number 1; there are 1: normal is ignored",
@@ -157,14 +157,14 @@ def test_normals_that_are_too_few_are_left_out_with_a_warning(draw: Draw) -> Non
 # Colours
 
 
-def test_color_of_a_vertex_is_the_one_of_its_point(draw: Draw) -> None:
+def test_vertices_without_a_color_index_have_the_colors_of_their_points(draw: Draw) -> None:
     part = face_set(draw, f"{SIX_COLORS} {TWO_FACES}")
     found = colors_at(part)
     assert found[0, 0, 0] == {(1, 0, 0, 1)}
     assert found[1, 1, 1] == {(1, 1, 0, 1)}
 
 
-def test_color_index_chooses_for_each_corner(draw: Draw) -> None:
+def test_color_index_selects_the_color_of_each_corner(draw: Draw) -> None:
     part = face_set(draw, f"{SIX_COLORS} colorIndex [ 5 5 5 5 -1 4 4 4 2 -1 ] {TWO_FACES}")
     found = colors_at(part)
     assert found[0, 0, 0] == {(1, 1, 0, 1)}
@@ -180,7 +180,7 @@ def test_colors_per_face(draw: Draw, index: str, chosen: tuple[int, int]) -> Non
         assert part.colors[triangle].tolist() == [[*SIX_RGB[color], 1.0]] * 3
 
 
-def test_colors_of_faces_skip_none_that_is_not_drawn(draw: Draw) -> None:
+def test_omitted_faces_also_count_in_the_colors_of_faces(draw: Draw) -> None:
     # The second face has two corners only; the third keeps the third colour.
     fields = f"{SIX_COLORS} colorPerVertex FALSE {POINTS} coordIndex [ 0 1 2 -1 0 1 -1 1 2 3 -1 ]"
     part = face_set(draw, fields)
@@ -188,7 +188,7 @@ def test_colors_of_faces_skip_none_that_is_not_drawn(draw: Draw) -> None:
     assert part.colors[part.triangles[1]].tolist() == [[0, 0, 1, 1]] * 3
 
 
-def test_colors_have_the_materials_opacity_and_stay_when_normals_are_smooth(draw: Draw) -> None:
+def test_colors_have_the_materials_opacity_also_with_smooth_normals(draw: Draw) -> None:
     (part,) = draw(
         f"""Shape {{ appearance Appearance {{ material Material {{ transparency 0.25 }} }}
         geometry IndexedFaceSet {{ {SIX_COLORS} creaseAngle 3.2 {TWO_FACES} }} }}"""
@@ -197,7 +197,7 @@ def test_colors_have_the_materials_opacity_and_stay_when_normals_are_smooth(draw
     assert len(part.vertices) == 6
 
 
-def test_color_index_that_is_too_short_is_left_out_with_a_warning(draw: Draw) -> None:
+def test_too_short_color_index_is_ignored_with_a_warning(draw: Draw) -> None:
     mesh = draw(f"Shape {{ geometry IndexedFaceSet {{ {SIX_COLORS} colorIndex [ 0 1 ] {TWO_FACES} }} }}")
     assert mesh.parts[0].colors is None
     assert "colorIndex is shorter than coordIndex" in mesh.warnings[0]
@@ -206,12 +206,12 @@ def test_color_index_that_is_too_short_is_left_out_with_a_warning(draw: Draw) ->
 # What is not there
 
 
-def test_faces_of_points_that_are_not_there_are_left_out_with_a_warning(draw: Draw) -> None:
+def test_faces_of_missing_points_are_omitted_with_a_warning(draw: Draw) -> None:
     mesh = draw(f"Shape {{ geometry IndexedFaceSet {{ {POINTS} coordIndex [ 0 1 9 -1 0 1 2 -1 7 8 9 ] }} }}")
     assert mesh.triangle_count == 1
-    place, _, said = mesh.warnings[0].partition(": ")
-    assert place == "line 2, column 18"
-    assert said == ("IndexedFaceSet: coordIndex contains 9; there are 6 points, 0 to 5: 2 faces are left out")
+    location, _, text = mesh.warnings[0].partition(": ")
+    assert location == "line 2, column 18"
+    assert text == ("IndexedFaceSet: coordIndex contains 9; there are 6 points, 0 to 5: 2 faces are left out")
 
 
 def test_face_set_without_points_draws_nothing(draw: Draw) -> None:
@@ -241,7 +241,7 @@ CONCAVE = {
 
 @pytest.mark.parametrize(("outline", "area"), CONCAVE.values(), ids=CONCAVE)
 @pytest.mark.parametrize("clockwise", [False, True])
-def test_concave_face_is_cut_inside_itself(
+def test_concave_face_is_triangulated_within_its_outline(
     outline: list[tuple[float, float]], area: float, clockwise: bool
 ) -> None:
     flat = np.array(outline[::-1] if clockwise else outline, dtype=float)
@@ -257,13 +257,13 @@ def test_concave_face_is_cut_inside_itself(
     assert areas.sum() == pytest.approx(area)
 
 
-def test_face_without_area_still_gives_its_triangles() -> None:
+def test_face_without_area_has_triangles() -> None:
     flat = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0], [1.5, 0, 0]])
     assert len(ears(flat, Effort())) == 3
     assert len(ears(np.zeros((6, 3)), Effort())) == 4
 
 
-def test_concave_face_is_cut_only_when_it_says_so(draw: Draw) -> None:
+def test_face_is_triangulated_as_concave_only_with_convex_false(draw: Draw) -> None:
     points = "coord Coordinate { point [ 2 1 0, 1 1 0, 1 2 0, 0 2 0, 0 0 0, 2 0 0 ] }"
     cut = face_set(draw, f"convex FALSE {points} coordIndex [ 0 1 2 3 4 5 -1 ]")
     assert area_vector(cut) == pytest.approx([0, 0, 3])
@@ -302,7 +302,7 @@ LARGE = {
 
 
 @pytest.mark.parametrize("outline", LARGE.values(), ids=LARGE)
-def test_large_concave_face_is_cut_inside_itself_without_much_ado(outline: np.ndarray) -> None:
+def test_large_concave_face_is_triangulated_with_little_effort(outline: np.ndarray) -> None:
     # The area of a polygon by Gauss's formula.
     x, y = outline[:, 0], outline[:, 1]
     expected = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2
@@ -317,7 +317,7 @@ def test_large_concave_face_is_cut_inside_itself_without_much_ado(outline: np.nd
     assert effort.left > given / 2
 
 
-def test_face_that_takes_too_much_work_is_cut_anyhow_and_told(
+def test_face_beyond_the_effort_limit_is_cut_roughly_with_a_warning(
     draw: Draw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(polygons, "_A_CORNER", 0)
@@ -331,7 +331,7 @@ def test_face_that_takes_too_much_work_is_cut_anyhow_and_told(
     assert warning.startswith("line 2, column 18: IndexedFaceSet: concave faces take too long")
 
 
-def test_many_slow_faces_of_one_file_share_one_allowance(draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_slow_faces_of_one_file_share_one_effort_limit(draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
     outline = comb(500)
     shape = face_set_text(outline)
     monkeypatch.setattr(polygons, "_A_CORNER", 0)
@@ -344,7 +344,7 @@ def test_many_slow_faces_of_one_file_share_one_allowance(draw: Draw, monkeypatch
     assert len([warning for warning in mesh.warnings if "too long to triangulate" in warning]) == 3
 
 
-def test_work_that_is_spent_leaves_little_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_exhausted_effort_ends_the_search_for_ears(monkeypatch: pytest.MonkeyPatch) -> None:
     outline = comb(16_000)
     monkeypatch.setattr(polygons, "_A_CORNER", 0)
     monkeypatch.setattr(polygons, "_BEYOND", -1)

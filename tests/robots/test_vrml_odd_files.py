@@ -91,12 +91,12 @@ def test_gzip_is_known_by_its_content(tmp_path: Path, name: str) -> None:
     assert read_vrml(path).triangle_count == 1
 
 
-def test_string_may_hold_quotes_brackets_and_lines(draw: Draw) -> None:
+def test_string_may_contain_quotes_brackets_and_line_breaks(draw: Draw) -> None:
     mesh = draw(r'WorldInfo { title "a \" } ] # \\" info [ "one' + "\n" + 'two" "" ] } ' + SHAPE)
     assert mesh.triangle_count == 1
 
 
-def test_list_with_comments_and_signs_apart_keeps_every_number(draw: Draw) -> None:
+def test_list_with_comments_and_detached_signs_keeps_every_number(draw: Draw) -> None:
     text = "[ 0 0 0, # the first\n - 1 0 0, 0 - 1 0 # ]\n ]"
     mesh = draw(SHAPE.replace("[ 0 0 0, 1 0 0, 0 1 0 ]", text))
     assert [corner.tolist() for corner in bounds(mesh)] == [[-1, -1, 0], [0, 0, 0]]
@@ -123,14 +123,14 @@ def test_list_with_comments_and_signs_apart_keeps_every_number(draw: Draw) -> No
         ),
     ],
 )
-def test_file_of_another_kind_is_refused(tmp_path: Path, data: bytes, reason: str) -> None:
+def test_file_of_another_format_is_rejected(tmp_path: Path, data: bytes, reason: str) -> None:
     with pytest.raises(MeshError) as caught:
         read(tmp_path, data)
     assert str(caught.value).startswith(str(tmp_path / "a.wrl"))
     assert reason in str(caught.value)
 
 
-def test_folder_and_file_that_is_not_there_are_refused(tmp_path: Path) -> None:
+def test_folder_and_missing_file_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(MeshError, match="cannot be read: Is a directory"):
         read_vrml(tmp_path)
     with pytest.raises(MeshError, match="cannot be read: No such file"):
@@ -184,7 +184,7 @@ def face_set(points: str, rest: str = "coordIndex [ 0 1 2 ]") -> str:
         ("Group { children " * 200, "line 2, column 2041: nested deeper than 120"),
     ],
 )  # fmt: skip
-def test_broken_file_is_told_with_line_and_column(
+def test_error_of_an_invalid_file_has_line_and_column(
     draw: Draw, tmp_path: Path, text: str, expected: str
 ) -> None:
     with pytest.raises(MeshError) as caught:
@@ -194,13 +194,13 @@ def test_broken_file_is_told_with_line_and_column(
     assert "\n" not in str(caught.value)
 
 
-def test_line_is_counted_whatever_ends_lines(tmp_path: Path) -> None:
+def test_lines_are_counted_with_any_line_ending(tmp_path: Path) -> None:
     for end in ("\n", "\r\n", "\r"):
         with pytest.raises(MeshError, match="line 4, column 3: "):
             read(tmp_path, f"#VRML V2.0 utf8{end}{end}Group {{{end}  5".encode())
 
 
-def test_long_junk_makes_a_short_error(draw: Draw) -> None:
+def test_error_about_a_long_token_is_short(draw: Draw) -> None:
     with pytest.raises(MeshError) as caught:
         draw("Group { children [ " + "}" * 1 + "x" * 100_000)
     assert len(caught.value.reason) < 120
@@ -209,7 +209,7 @@ def test_long_junk_makes_a_short_error(draw: Draw) -> None:
     assert len(caught.value.reason) < 300
 
 
-def test_what_is_quoted_of_a_file_cannot_steer_a_terminal(draw: Draw) -> None:
+def test_text_quoted_from_a_file_has_no_control_characters(draw: Draw) -> None:
     mesh = draw(f"Evil\x1b {{ }} {SHAPE}")
     assert mesh.warnings == ("line 2, column 1: Evil?: is not a node of VRML 2.0; skipped",)
     with pytest.raises(MeshError) as caught:
@@ -221,7 +221,7 @@ def test_what_is_quoted_of_a_file_cannot_steer_a_terminal(draw: Draw) -> None:
 
 
 @given(st.text(alphabet='{}[]"#-+.,01eEx \n\\ABDEFSU', max_size=60))
-def test_any_text_is_tokens_to_its_end_or_refused(text: str) -> None:
+def test_any_text_is_tokenised_completely_or_rejected(text: str) -> None:
     with suppress(MeshError):  # of this string does not end
         lexer = Lexer(Source(Path("a.wrl"), text))
         for _ in range(len(text) + 1):
@@ -235,7 +235,7 @@ def test_any_text_is_tokens_to_its_end_or_refused(text: str) -> None:
     st.lists(st.floats(-1e38, 1e38, allow_subnormal=False), max_size=300),
     st.sampled_from([" ", ", ", ",", "\n", " # 1 ] 2\n", ",\t"]),
 )
-def test_list_gives_back_the_numbers_written(numbers: list[float], between: str) -> None:
+def test_list_returns_the_numbers_of_the_text(numbers: list[float], between: str) -> None:
     lexer = Lexer(Source(Path("a.wrl"), f"[ {between.join(map(repr, numbers))} ] end"))
     found = lexer.number_list()
     assert (found.tolist() if found is not None else []) == numbers

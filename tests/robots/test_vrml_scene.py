@@ -60,7 +60,7 @@ def write(folder: Path, name: str, text: str) -> Path:
         ("scale -1 1 1", [-1, -1, -1], [1, 1, 1]),
     ],
 )
-def test_transform_moves_what_is_in_it(draw: Draw, fields: str, low: list[float], high: list[float]) -> None:
+def test_transform_moves_its_children(draw: Draw, fields: str, low: list[float], high: list[float]) -> None:
     assert extent(draw(f"Transform {{ {fields} children {BOX} }}")) == [low, high]
 
 
@@ -112,16 +112,16 @@ def test_uneven_scale_keeps_normals_square_to_their_face(draw: Draw) -> None:
         "Group { children [ NULL %s NULL ] }",
     ],
 )
-def test_group_draws_what_is_shown_of_it(draw: Draw, text: str) -> None:
+def test_grouping_nodes_draw_their_visible_children(draw: Draw, text: str) -> None:
     assert corners(draw(text % SHAPE)) == [[[0, 0, 0], [1, 0, 0], [0, 1, 0]]]
 
 
 @pytest.mark.parametrize("which", ["", "whichChoice -1", "whichChoice 2", "whichChoice 1e9"])
-def test_switch_draws_nothing_unless_told_which(draw: Draw, which: str) -> None:
+def test_switch_without_a_valid_choice_draws_nothing(draw: Draw, which: str) -> None:
     assert draw(f"Switch {{ {which} choice [ {BOX} {BOX} ] }}").parts == ()
 
 
-def test_switch_with_levels_is_read_as_if_they_were_choices(draw: Draw) -> None:
+def test_levels_of_a_switch_are_read_as_choices(draw: Draw) -> None:
     mesh = draw(f"Switch {{ whichChoice 1 level [ {BOX} {SHAPE} ] }}")
     assert mesh.triangle_count == 1
     assert mesh.warnings == ("line 2, column 1: Switch: has 'level', a field of LOD; read as 'choice'",)
@@ -147,13 +147,13 @@ def test_coordinates_and_appearance_can_be_used_again(draw: Draw) -> None:
     assert mesh.parts[1].material.diffuse == (1, 0, 0)
 
 
-def test_the_last_def_of_a_name_counts(draw: Draw) -> None:
+def test_last_def_of_a_name_has_priority(draw: Draw) -> None:
     mesh = draw(f"DEF S {BOX} DEF S {SHAPE} USE S")
     assert mesh.triangle_count == 12 + 1 + 1
 
 
 @pytest.mark.parametrize("text", ["USE Nobody", "Group { children [ USE Nobody ] }"])
-def test_use_of_a_name_that_is_not_there_is_left_out_with_a_warning(draw: Draw, text: str) -> None:
+def test_use_of_an_unknown_name_is_omitted_with_a_warning(draw: Draw, text: str) -> None:
     mesh = draw(f"{text} {SHAPE}")
     assert mesh.triangle_count == 1
     column = text.index("USE") + 1
@@ -162,7 +162,7 @@ def test_use_of_a_name_that_is_not_there_is_left_out_with_a_warning(draw: Draw, 
     )
 
 
-def test_node_cannot_use_itself(draw: Draw) -> None:
+def test_use_of_a_node_in_itself_is_omitted_with_a_warning(draw: Draw) -> None:
     mesh = draw(f"DEF A Group {{ children [ {SHAPE} USE A ] }}")
     assert mesh.triangle_count == 1
     assert "USE A" in mesh.warnings[0]
@@ -187,7 +187,7 @@ def test_proto_is_drawn_with_its_fields(draw: Draw) -> None:
     assert extent(mesh) == [[4, -1, -1], [6, 1, 1]]
 
 
-def test_proto_that_is_not_used_draws_nothing(draw: Draw) -> None:
+def test_unused_proto_draws_nothing(draw: Draw) -> None:
     assert draw(PROTOS).parts == ()
 
 
@@ -207,7 +207,7 @@ def test_is_is_resolved_where_the_proto_is_used(draw: Draw) -> None:
     assert corners(mesh)[1][0] == [9, 9, 9]
 
 
-def test_proto_can_hold_protos_of_its_own(draw: Draw) -> None:
+def test_proto_can_contain_protos(draw: Draw) -> None:
     mesh = draw(
         f"""PROTO Outer [ ] {{
           PROTO Inner [ field SFVec3f at 1 0 0 ] {{ Transform {{ translation IS at children {SHAPE} }} }}
@@ -219,7 +219,7 @@ def test_proto_can_hold_protos_of_its_own(draw: Draw) -> None:
     assert mesh.warnings == ("line 7, column 19: Inner: is not a node of VRML 2.0; skipped",)
 
 
-def test_names_in_a_proto_are_its_own(draw: Draw) -> None:
+def test_names_in_a_proto_are_local(draw: Draw) -> None:
     mesh = draw(f"DEF S {BOX} PROTO P [ ] {{ Group {{ children [ DEF S {SHAPE} USE S ] }} }} P {{ }} USE S")
     assert mesh.triangle_count == 12 + 2 + 12
 
@@ -236,14 +236,14 @@ def test_names_in_a_proto_are_its_own(draw: Draw) -> None:
         N { g Sphere { radius 2 } }""",
     ],
 )
-def test_proto_can_stand_for_any_node(draw: Draw, text: str) -> None:
+def test_proto_can_replace_any_node(draw: Draw, text: str) -> None:
     mesh = draw(text)
     assert extent(mesh) == [[-2, -2, -2], [2, 2, 2]]
     if "c 0 1 0" in text:
         assert mesh.parts[0].material.diffuse == (0, 1, 0)
 
 
-def test_proto_can_stand_for_coordinates(draw: Draw) -> None:
+def test_proto_can_replace_coordinates(draw: Draw) -> None:
     mesh = draw(
         """PROTO C [ field MFVec3f p [ 0 0 0, 1 0 0, 0 1 0 ] ] { Coordinate { point IS p } }
         Shape { geometry IndexedFaceSet { coord C { } coordIndex [ 0 1 2 ] } }
@@ -273,7 +273,7 @@ def test_proto_without_a_field_of_its_own_has_the_nodes(draw: Draw) -> None:
     ],
     ids=["nodes", "uses", "fields"],
 )
-def test_uses_of_a_proto_that_make_millions_of_nodes_are_refused(tmp_path: Path, proto: str) -> None:
+def test_proto_uses_with_millions_of_nodes_are_rejected(tmp_path: Path, proto: str) -> None:
     # In another file: all files of a scene count together.
     write(tmp_path, "part.wrl", f"{proto} {'P { } ' * 1500}")
     path = write(tmp_path, "a.wrl", f'{proto} {"P {} " * 1500} Inline {{ url "part.wrl" }}')
@@ -332,9 +332,7 @@ def test_inline_in_an_externproto_is_beside_its_own_file(tmp_path: Path) -> None
         ("[ ]", "has no address"),
     ],
 )
-def test_externproto_that_is_not_found_is_left_out_with_a_warning(
-    tmp_path: Path, url: str, trouble: str
-) -> None:
+def test_missing_externproto_is_omitted_with_a_warning(tmp_path: Path, url: str, trouble: str) -> None:
     write(tmp_path, "library.wrl", LIBRARY)
     path = write(tmp_path, "a.wrl", f"EXTERNPROTO P [ ] {url} P {{ }} {SHAPE} P {{ }}")
     mesh = read_vrml(path)
@@ -343,7 +341,7 @@ def test_externproto_that_is_not_found_is_left_out_with_a_warning(
     assert sum("EXTERNPROTO" in warning for warning in mesh.warnings) == 1
 
 
-def test_externprotos_that_lead_back_to_themselves_are_refused(tmp_path: Path) -> None:
+def test_cyclic_externprotos_are_rejected(tmp_path: Path) -> None:
     write(tmp_path, "b.wrl", 'EXTERNPROTO P [ ] "a.wrl#P" PROTO Q [ ] { Group { children [ P { } P { } ] } }')
     path = write(
         tmp_path, "a.wrl", 'EXTERNPROTO Q [ ] "b.wrl#Q" PROTO P [ ] { Group { children Q { } } } P { }'
@@ -386,21 +384,21 @@ def test_inline_is_found_as_exporters_write_it(tmp_path: Path, url: str) -> None
     assert read_vrml(write(tmp_path, "a.wrl", f'Inline {{ url "{url}" }}')).triangle_count == 1
 
 
-def test_inline_takes_the_first_url_that_is_there(tmp_path: Path) -> None:
+def test_inline_reads_the_first_existing_url(tmp_path: Path) -> None:
     write(tmp_path, "b.wrl", SHAPE)
     write(tmp_path, "c.wrl", BOX)
     path = write(tmp_path, "a.wrl", 'Inline { url [ "http://x.org/b.wrl", "none.wrl", "b.wrl", "c.wrl" ] }')
     assert read_vrml(path).triangle_count == 1
 
 
-def test_inline_that_is_missing_is_left_out_with_a_warning(tmp_path: Path) -> None:
+def test_missing_inline_is_omitted_with_a_warning(tmp_path: Path) -> None:
     path = write(tmp_path, "a.wrl", f'{SHAPE} Inline {{ url "none.wrl" }}\nInline {{ url "none.wrl" }}')
     mesh = read_vrml(path)
     assert mesh.triangle_count == 1
     assert mesh.warnings == ("line 3, column 79: Inline: 'none.wrl': no such file; it is left out",)
 
 
-def test_file_of_which_everything_is_missing_is_empty_and_names_it(tmp_path: Path) -> None:
+def test_file_with_only_missing_inlines_is_empty_and_lists_them(tmp_path: Path) -> None:
     path = write(tmp_path, "a.wrl", 'Group { children [ Inline { url "x.wrl" } Inline { url "y.wrl" } ] }')
     mesh = read_vrml(path)
     assert mesh.triangle_count == 0
@@ -408,7 +406,7 @@ def test_file_of_which_everything_is_missing_is_empty_and_names_it(tmp_path: Pat
     assert mesh.warnings[0] == "line 2, column 20: Inline: 'x.wrl': no such file; it is left out"
 
 
-def test_inlines_that_lead_back_to_themselves_are_refused(tmp_path: Path) -> None:
+def test_cyclic_inlines_are_rejected(tmp_path: Path) -> None:
     write(tmp_path, "b.wrl", 'Inline { url "a.wrl" }')
     with pytest.raises(MeshError, match=r"b\.wrl, line 2, column 1: Inline: 'a.wrl' includes itself"):
         read_vrml(write(tmp_path, "a.wrl", 'Inline { url "b.wrl" }'))
@@ -416,7 +414,7 @@ def test_inlines_that_lead_back_to_themselves_are_refused(tmp_path: Path) -> Non
         read_vrml(write(tmp_path, "c.wrl", 'Inline { url "./c.wrl" }'))
 
 
-def test_inline_may_be_used_many_times_and_its_warnings_come_once(tmp_path: Path) -> None:
+def test_repeated_inline_has_its_warnings_once(tmp_path: Path) -> None:
     write(tmp_path, "b.wrl", f"{SHAPE} Company {{ }}")
     path = write(tmp_path, "a.wrl", 'Inline { url "b.wrl" } Inline { url "b.wrl" } Company { }')
     mesh = read_vrml(path)
@@ -462,7 +460,7 @@ def test_nodes_that_draw_nothing_are_named_once(draw: Draw) -> None:
     )
 
 
-def test_nodes_that_nobody_knows_are_named_once_each(draw: Draw) -> None:
+def test_unknown_nodes_are_named_once_each(draw: Draw) -> None:
     mesh = draw(
         f"""Company {{ secret [ 1 2 3 ] other NULL nested Thing {{ }} flags [ TRUE FALSE ] }} Company {{ }}
         Other {{ name "x" }} {SHAPE}
@@ -478,7 +476,7 @@ def test_nodes_that_nobody_knows_are_named_once_each(draw: Draw) -> None:
     ]
 
 
-def test_a_list_of_nodes_is_not_gone_through_at_each_use(tmp_path: Path) -> None:
+def test_list_of_nodes_is_not_copied_at_each_use(tmp_path: Path) -> None:
     """Thousands of uses of a list of thousands, of which each draws one, took minutes."""
     path = write(tmp_path, "a.wrl", f"LOD {{ level [ {SHAPE} Group {{ }} ] }}")
     (node,) = parse_vrml(load(path)).nodes

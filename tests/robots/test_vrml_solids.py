@@ -65,7 +65,7 @@ def test_solid_has_its_volume_and_faces_outwards(
         ("Cone { bottomRadius 3 height 4 }", [-3, -2, -3], [3, 2, 3]),
     ],
 )
-def test_solid_stands_along_y(draw: Draw, geometry: str, low: list[float], high: list[float]) -> None:
+def test_solid_extends_along_y(draw: Draw, geometry: str, low: list[float], high: list[float]) -> None:
     assert extent(draw, geometry) == [low, high]
 
 
@@ -87,17 +87,17 @@ def test_cone_has_its_tip_above_and_normals_square_to_its_side(draw: Draw) -> No
         ("side FALSE top FALSE", 32),
     ],
 )
-def test_parts_of_a_cylinder_can_be_left_out(draw: Draw, fields: str, triangles: int) -> None:
+def test_parts_of_a_cylinder_can_be_omitted(draw: Draw, fields: str, triangles: int) -> None:
     assert len(solid(draw, f"Cylinder {{ {fields} }}").triangles) == triangles
 
 
-def test_parts_of_a_cone_can_be_left_out(draw: Draw) -> None:
+def test_parts_of_a_cone_can_be_omitted(draw: Draw) -> None:
     assert len(solid(draw, "Cone { side FALSE }").triangles) == 32
     assert len(solid(draw, "Cone { bottom FALSE }").triangles) == 32
     assert draw("Shape { geometry Cone { side FALSE bottom FALSE } }").parts == ()
 
 
-def test_size_below_zero_is_taken_without_its_sign_with_a_warning(draw: Draw) -> None:
+def test_negative_size_is_read_as_positive_with_a_warning(draw: Draw) -> None:
     mesh = draw("Shape { geometry Sphere { radius -2 } }")
     assert bounds(mesh)[1].tolist() == [2, 2, 2]
     assert mesh.warnings == ("line 2, column 18: Sphere: a size is -2; it must be above 0",)
@@ -108,7 +108,7 @@ def test_size_below_zero_is_taken_without_its_sign_with_a_warning(draw: Draw) ->
 GRID = "xDimension 3 zDimension 2 xSpacing 2 zSpacing 5 height [ 0 1 0, 0 3 0 ]"
 
 
-def test_elevation_grid_stands_above_x_and_z(draw: Draw) -> None:
+def test_elevation_grid_rises_above_the_xz_plane(draw: Draw) -> None:
     part = solid(draw, f"ElevationGrid {{ {GRID} }}")
     assert len(part.triangles) == 4
     points = {tuple(point) for point in part.vertices.tolist()}
@@ -117,14 +117,14 @@ def test_elevation_grid_stands_above_x_and_z(draw: Draw) -> None:
     assert outwards(part)
 
 
-def test_elevation_grid_turns_over_with_ccw_false_and_is_smooth_by_crease_angle(draw: Draw) -> None:
+def test_elevation_grid_is_flipped_by_ccw_false_and_smoothed_by_crease_angle(draw: Draw) -> None:
     down = solid(draw, f"ElevationGrid {{ ccw FALSE solid FALSE {GRID} }}")
     assert (down.normals[:, 1] < 0).all()
     assert down.two_sided
     assert len(solid(draw, f"ElevationGrid {{ creaseAngle 3 {GRID} }}").vertices) == 6
 
 
-def test_elevation_grid_has_colors_by_vertex_and_by_square(draw: Draw) -> None:
+def test_elevation_grid_has_colors_per_vertex_and_per_square(draw: Draw) -> None:
     six = "color Color { color [ 1 0 0, 0 1 0, 0 0 1, 1 1 1, 0 0 0, 1 1 0 ] }"
     part = solid(draw, f"ElevationGrid {{ {six} {GRID} }}")
     assert part.colors is not None
@@ -136,7 +136,7 @@ def test_elevation_grid_has_colors_by_vertex_and_by_square(draw: Draw) -> None:
     assert part.colors[part.triangles[3]].tolist() == [[0, 1, 0, 1]] * 3
 
 
-def test_elevation_grid_has_normals_by_vertex_and_by_square(draw: Draw) -> None:
+def test_elevation_grid_has_normals_per_vertex_and_per_square(draw: Draw) -> None:
     six = "normal Normal { vector [ 1 0 0, 0 1 0, 0 0 1, 1 0 0, 0 1 0, 0 0 1 ] }"
     part = solid(draw, f"ElevationGrid {{ {six} {GRID} }}")
     assert len(part.vertices) == 6
@@ -164,18 +164,18 @@ def test_extrusion_without_fields_is_a_box(draw: Draw) -> None:
     ("caps", "triangles"),
     [("beginCap FALSE", 10), ("endCap FALSE", 10), ("beginCap FALSE endCap FALSE", 8)],
 )
-def test_caps_can_be_left_out(draw: Draw, caps: str, triangles: int) -> None:
+def test_caps_can_be_omitted(draw: Draw, caps: str, triangles: int) -> None:
     assert len(solid(draw, f"Extrusion {{ {caps} }}").triangles) == triangles
 
 
-def test_caps_close_a_cross_section_that_is_open(draw: Draw) -> None:
+def test_caps_close_an_open_cross_section(draw: Draw) -> None:
     # Three sides of a square: 3 walls, and caps of 4 corners.
     part = solid(draw, "Extrusion { crossSection [ 1 1, 1 -1, -1 -1, -1 1 ] }")
     assert len(part.triangles) == 6 + 4
     assert volume(part) != 0
 
 
-def test_concave_caps_are_cut_inside_themselves(draw: Draw) -> None:
+def test_concave_caps_are_triangulated_within_their_outline(draw: Draw) -> None:
     # An L of area 3, one high.
     section = "crossSection [ 0 0, 0 2, 1 2, 1 1, 2 1, 2 0, 0 0 ] convex FALSE"
     part = solid(draw, f"Extrusion {{ {section} }}")
@@ -193,19 +193,19 @@ def test_scale_tapers_and_orientation_twists(draw: Draw) -> None:
     assert top == {(2, 1, -0.5), (-2, 1, -0.5), (-2, 1, 0.5), (2, 1, 0.5)}
 
 
-def test_one_scale_and_orientation_are_for_all_points(draw: Draw) -> None:
+def test_single_scale_and_orientation_apply_to_all_points(draw: Draw) -> None:
     low, high = extent(draw, "Extrusion { scale 2 3 spine [ 0 0 0, 0 1 0, 0 2 0 ] }")
     assert (low, high) == ([-2, 0, -3], [2, 2, 3])
 
 
-def test_values_that_are_too_few_are_told(draw: Draw) -> None:
+def test_too_few_values_cause_a_warning(draw: Draw) -> None:
     mesh = draw("Shape { geometry Extrusion { scale [ 1 1, 2 2 ] spine [ 0 0 0, 0 1 0, 0 2 0 ] } }")
     assert "scale has 2 values for 3 spine points; the last is repeated" in mesh.warnings[0]
     with pytest.raises(MeshError, match="scale is empty"):
         draw("Shape { geometry Extrusion { scale [ ] } }")
 
 
-def test_extrusion_of_one_point_draws_nothing_and_says_so(draw: Draw) -> None:
+def test_extrusion_of_one_point_draws_nothing_with_a_warning(draw: Draw) -> None:
     mesh = draw("Shape { geometry Extrusion { spine [ 0 0 0 ] } }")
     assert mesh.parts == ()
     assert "has 1 spine and 5 crossSection points" in mesh.warnings[0]
@@ -247,19 +247,19 @@ def test_planes_of_a_bent_spine_follow_the_standard() -> None:
     np.testing.assert_allclose(planes[2], np.column_stack([[0, 1, 0], [1, 0, 0], [0, 0, -1]]))
 
 
-def test_plane_is_flipped_where_the_bend_changes_its_side() -> None:
+def test_plane_is_flipped_where_the_bend_changes_direction() -> None:
     # An S: the second bend's z would be (0,0,1).
     planes = section_planes(np.array([[0, 0, 0], [0, 1, 0], [1, 1, 0], [1, 2, 0.0]]))
     assert planes[:, 2, 2].tolist() == [-1, -1, -1, -1]
 
 
-def test_straight_stretch_keeps_the_plane_before_it() -> None:
+def test_straight_segment_keeps_the_previous_plane() -> None:
     planes = section_planes(np.array([[0, 0, 0], [0, 1, 0], [0, 2, 0], [1, 3, 0], [2, 4, 0.0]]))
     # The first bend is at the third point; those before have its z axis, and those after keep it.
     assert planes[:, 2, 2].tolist() == [-1, -1, -1, -1, -1]
 
 
-def test_points_that_coincide_have_the_same_plane() -> None:
+def test_coincident_points_have_the_same_plane() -> None:
     spine = np.array([[0, 0, 0], [0, 1, 0], [0, 1, 0], [1, 1, 0.0]])
     planes = section_planes(spine)
     np.testing.assert_array_equal(planes[1], planes[2])

@@ -31,7 +31,7 @@ def back(folder: Path, mesh: Mesh) -> Mesh:
     return read_mesh(path)
 
 
-def test_material_and_shape_come_back(tmp_path: Path) -> None:
+def test_material_and_shape_survive_a_round_trip(tmp_path: Path) -> None:
     mesh = back(tmp_path, Mesh((a_box(),)))
     (part,) = mesh.parts
     assert len(part.triangles) == 12
@@ -61,7 +61,7 @@ def test_vrml_to_glb_keeps_triangles_bounds_colours_and_transparency(tmp_path: P
         assert part.material.transparency == pytest.approx(colors[same])
 
 
-def test_colours_of_vertices_arrive_here_and_in_the_renderer(tmp_path: Path) -> None:
+def test_vertex_colours_are_read_by_robots_and_by_the_renderer(tmp_path: Path) -> None:
     plain = a_box()
     colors = np.tile([0.2, 0.4, 0.6, 1.0], (len(plain.vertices), 1))
     colors[0] = [1.0, 0.0, 0.5, 0.5]
@@ -75,7 +75,7 @@ def test_colours_of_vertices_arrive_here_and_in_the_renderer(tmp_path: Path) -> 
     np.testing.assert_allclose(surface.colors, colors, atol=1e-6)
 
 
-def test_lines_and_points_come_back_and_the_renderer_reads_over_them(tmp_path: Path) -> None:
+def test_lines_and_points_survive_a_round_trip_and_the_renderer_ignores_them(tmp_path: Path) -> None:
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0]])
     red = Material("red", (1.0, 0.0, 0.0))
     lines = Wire("lines", red, corners, np.array([[0, 1], [1, 2]]))
@@ -89,7 +89,7 @@ def test_lines_and_points_come_back_and_the_renderer_reads_over_them(tmp_path: P
     assert len(read_glb(glb_of(mesh))) == 1
 
 
-def test_empty_mesh_is_a_glb_all_the_same(tmp_path: Path) -> None:
+def test_empty_mesh_is_a_valid_glb(tmp_path: Path) -> None:
     mesh = back(tmp_path, Mesh())
     assert mesh.triangle_count == 0
     assert read_glb(glb_of(Mesh())) == ()
@@ -99,7 +99,7 @@ def test_same_mesh_gives_the_same_bytes() -> None:
     assert glb_of(Mesh((a_box(),))) == glb_of(Mesh((a_box(),)))
 
 
-def test_heavy_mesh_is_lightened_and_keeps_its_shape() -> None:
+def test_large_mesh_is_simplified_and_keeps_its_shape() -> None:
     heavy = Mesh((a_ball(128), a_box()))
     light = lightened(heavy, 2000)
     assert light.triangle_count == pytest.approx(2000, rel=0.1)
@@ -110,7 +110,7 @@ def test_heavy_mesh_is_lightened_and_keeps_its_shape() -> None:
     assert lightened(heavy, 10**6) is heavy
 
 
-def test_lightened_vertices_keep_the_colours_of_their_places() -> None:
+def test_simplified_vertices_keep_the_colours_of_their_positions() -> None:
     part = a_ball(128)
     halves = np.where(part.vertices[:, 2:] > 0, [1.0, 0, 0, 1], [0.0, 0, 1, 1])
     (light,) = lightened(Mesh((replace(part, colors=halves),)), 2000).parts
