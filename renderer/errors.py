@@ -14,6 +14,8 @@ RendererError
 
 from collections.abc import Iterable
 
+from robomesh import reason_codes as codes
+
 
 class RendererError(Exception):
     """Base of the renderer's errors; the text is one line for the operator."""
@@ -64,8 +66,14 @@ class CameraError(RendererError):
 
 
 class UnknownViewError(RendererError):
-    """The robot has no view of that name."""
+    """The robot has no view of that name.
+
+    Attributes:
+        reason: The code and its parameters.
+        view: The requested name.
+    """
 
     def __init__(self, view: str, known: Iterable[str]) -> None:
-        super().__init__(f"no view {view!r}; there are {', '.join(sorted(known))}")
+        self.reason = codes.VIEW_UNKNOWN(view=view, views=", ".join(sorted(known)))
+        super().__init__(self.reason.text)
         self.view = view

@@ -7,12 +7,13 @@ import time
 from collections import deque
 from dataclasses import dataclass
 
-from mcap_files.errors import RecordingsError
+from mcap_files.errors import RecordingError
 from robomesh import reason_codes as codes
 from robomesh import topics
 from robomesh.errors import BusError, RefusedError
 from robomesh.keys import replay_name, robot_key
 from robomesh.publisher import Publisher
+from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Answerer, Handler, Request
 from robomesh.session import Session
@@ -111,7 +112,7 @@ class Replay:
             while not self._closed.is_set():
                 try:
                     await self._step()
-                except RecordingsError as error:
+                except RecordingError as error:
                     log.warning("%s: %s", self.robot, error)
                     self._text = str(error)
                     self._clock.pause(time.monotonic())
@@ -152,10 +153,10 @@ class Replay:
     async def _on_mesh(self, request: Request) -> bytes:
         try:
             return await asyncio.to_thread(self._source.file.attachment, f"mesh/{request.chunk}")
-        except RecordingsError as error:
-            return await self._mesh_of_robot(request.chunk, str(error))
+        except RecordingError as error:
+            return await self._mesh_of_robot(request.chunk, error.reason)
 
-    async def _mesh_of_robot(self, name: str, text: str) -> bytes:
+    async def _mesh_of_robot(self, name: str, missing: Reason) -> bytes:
         """Fetch a mesh from the recorded robot, if it is online: old recordings contain no meshes."""
         of = (self._source.of_site, self._source.of_robot)
         with contextlib.suppress(BusError):
@@ -163,7 +164,7 @@ class Replay:
                 return await self._session.ask_bytes(
                     robot_key(*of, f"mesh/{name}"), timeout_s=_MESH_TIMEOUT_S
                 )
-        raise RefusedError(codes.RECORDING_UNREADABLE(detail=text))
+        raise RefusedError(missing)
 
     async def _on_request(self, request: Request) -> schema.ReplayState:
         message = request.message

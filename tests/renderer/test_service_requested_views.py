@@ -96,17 +96,18 @@ def test_an_invalid_request_is_rejected_and_does_not_affect_others(mesh, tmp_pat
             await picture(monitor)
             video = monitor.subscribe(f"{ARM}/video/front", newest=100, history=False)
             await frames(video, 3)
-            for fields, says in (
-                ({"of": "behind"}, "no view 'behind'"),
-                ({"of": "front", "width": 5000, "height": 5000}, "5000 x 5000"),
-                ({"of": "front", "width": 1920, "height": 1080, "fps": 60.0}, "million pixels a second"),
-                ({"view": View(projection=View.PERSPECTIVE)}, "eye and target are both at"),
-                ({"view": View()}, "PERSPECTIVE, ORTHOGRAPHIC"),
-                ({"of": "front", "fps": float("nan")}, "finite"),
+            full_hd = {"of": "front", "width": 1920, "height": 1080, "fps": 60.0}
+            for fields, code, says in (
+                ({"of": "behind"}, "view.unknown", "no view 'behind'"),
+                ({"of": "front", "width": 5000, "height": 5000}, "view.invalid", "5000 x 5000"),
+                (full_hd, "view.invalid", "million pixels a second"),
+                ({"view": View(projection=View.PERSPECTIVE)}, "view.invalid", "eye and target are both at"),
+                ({"view": View()}, "request.invalid", "PERSPECTIVE, ORTHOGRAPHIC"),
+                ({"of": "front", "fps": float("nan")}, "request.invalid", "finite"),
             ):
                 with pytest.raises(RefusedError) as caught:
                     await ask(monitor, **fields)
-                assert says in str(caught.value)
+                assert (caught.value.reason.code, says in str(caught.value)) == (code, True), fields
             # Quotas of operators are independent.
             mine = await ask(monitor, of="top", width=240, height=200)
             assert await ask(monitor, of="top", width=240, height=200) == mine

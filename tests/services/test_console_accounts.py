@@ -7,6 +7,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from robomesh.schemas import robomesh_pb2 as schema
+from services.console import app
 from services.console.accounts.auth_middleware import SIGNED_OUT
 from services.console.accounts.auth_service import change_account
 from services.console.accounts.file import AccountRole
@@ -163,6 +164,24 @@ def test_a_wrong_password_and_an_unknown_name_get_the_same_refusal(mesh, page, t
             assert wrong[0] == nobody[0] == 401
             assert wrong[2] == nobody[2]
             assert client.cookie == ""
+
+    run(main())
+
+
+def test_a_session_with_too_many_pages_opens_no_other(mesh, page, tmp_path, monkeypatch):
+    monkeypatch.setattr(app, "MOST_PAGES", 1)
+
+    async def main():
+        async with guarded(mesh, page, tmp_path) as (client, _, _):
+            await client.sign_in("li")
+            async with client.browse() as browser:
+                await hello(browser)
+                with pytest.raises(InvalidStatus, match="403") as refused:
+                    async with client.browse():
+                        pass
+            answer = refused.value.response
+            reason = read_refusal(answer.headers, answer.body)
+            assert (reason.code, reason.values) == ("page.too_many_pages", {"count": "1"})
 
     run(main())
 
