@@ -17,12 +17,17 @@ from typing import Any, TypeVar
 import pytest
 import zenoh
 from google.protobuf.message import Message
+from hypothesis import HealthCheck, settings
 
 from robomesh.endpoints import router_config
 from robomesh.publisher import Publisher
 from robomesh.session import Session, SessionSettings
 
 T = TypeVar("T")
+
+# A test must not depend on the machine's speed.
+settings.register_profile("robomesh", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("robomesh")
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 

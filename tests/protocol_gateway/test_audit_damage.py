@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from protocol_gateway.audit.entry import audit_entry, chain_link, parse_line
@@ -166,7 +166,6 @@ def test_a_torn_last_line_latches_a_stop_when_it_may_have_been_one(
     assert (memory.stop is not None) == latched
 
 
-@settings(deadline=None)
 @given(st.data())
 def test_changed_bytes_never_lose_a_latched_stop(tmp_path_factory, data):
     live = tmp_path_factory.mktemp("any") / "arm.jsonl"
@@ -229,7 +228,6 @@ def test_a_read_only_robot_shows_no_stop_but_its_log_keeps_it(mesh, tmp_path):
 NUMBERS = st.integers() | st.integers(0, 10**5000) | st.just("7" * 5000)
 
 
-@settings(deadline=None)
 @given(
     st.fixed_dictionaries({"number": NUMBERS, "time_ns": NUMBERS, "repeated": NUMBERS}),
     st.dictionaries(st.sampled_from(["stop_id", "last_stop_id", "stop"]), st.text() | st.just("9" * 5000)),

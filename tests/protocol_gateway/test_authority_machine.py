@@ -199,4 +199,4 @@ class Machine(RuleBasedStateMachine):
 
 
 TestAuthorityMachine = Machine.TestCase
-TestAuthorityMachine.settings = settings(max_examples=200, stateful_step_count=40, deadline=None)
+TestAuthorityMachine.settings = settings(max_examples=200, stateful_step_count=40)

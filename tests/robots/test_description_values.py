@@ -182,7 +182,7 @@ KEYS = st.sampled_from(
 )
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     st.dictionaries(KEYS, JSON, max_size=4),
     st.dictionaries(st.sampled_from([*JOINT, "name", "link"]), JSON, max_size=4),

@@ -211,7 +211,7 @@ def test_following_to_another_branch_or_out_of_reach_gives_nothing() -> None:
     assert follow(solver, away, task=Task.POSE_6D, near=near) is None
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(shares=st.lists(st.floats(0.0, 1.0), min_size=6, max_size=6))
 def test_any_allowed_position_is_among_all_solutions_of_its_pose(shares: list[float]) -> None:
     _, model, solver = arm("puma560")

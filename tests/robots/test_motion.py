@@ -21,7 +21,7 @@ UNEVEN = replace(
 shares = st.lists(st.floats(0.0, 1.0), min_size=5, max_size=5).map(np.array)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(shares, shares, st.floats(0.01, 1.0), st.sampled_from([JOINTS, UNEVEN]))
 def test_motion_from_rest_is_a_straight_line_within_all_limits(one, other, speed, joints):
     start, target = (joints.lower + share * (joints.upper - joints.lower) for share in (one, other))
@@ -42,7 +42,7 @@ interruptions = st.lists(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(shares, shares, interruptions, st.sampled_from([JOINTS, UNEVEN]))
 def test_speed_changes_brakes_and_resumes_stay_on_the_line_within_limits(one, other, interrupted, joints):
     start, target = (joints.lower + share * (joints.upper - joints.lower) for share in (one, other))

@@ -197,7 +197,7 @@ STEPS = st.lists(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(STEPS)
 def test_whatever_happens_nothing_unseen_is_forgotten(steps):
     """A naive reference: an alarm that was activated since its last acknowledgement must be listed."""

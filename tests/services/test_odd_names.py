@@ -253,7 +253,7 @@ def say(plain, key, payload):
 @pytest.mark.filterwarnings(
     "ignore:Do not use the `random` module:hypothesis.errors.HypothesisDeprecationWarning"
 )
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(odd_keys(), min_size=1, max_size=4), st.binary(max_size=20))
 def test_every_service_goes_on_whatever_keys_come(site, keys, payload):
     for key in keys:

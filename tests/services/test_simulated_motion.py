@@ -24,7 +24,7 @@ positions = st.lists(st.floats(0.0, 1.0), min_size=5, max_size=5).map(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(positions, st.floats(0.02, 2.0), st.floats(0.01, 1.0)), min_size=1, max_size=5))
 def test_motion_keeps_limits_speeds_and_accelerations_however_it_is_interrupted(legs):
     motion, now_s = Motion(JOINTS, JOINTS.home.copy()), 0.0
