@@ -213,7 +213,13 @@ def test_a_recording_is_begun_and_ended_on_the_robots_page(open_page, recorded):
 
 def test_what_cannot_be_played_is_said(open_page, recorded):
     page = open_page("#/recordings/hall/gone.mcap", drawn=False)
-    expect(page.locator(".player-trouble")).to_contain_text("gone.mcap")
+    expect(page.locator(".player-trouble")).to_contain_text("no recording 'gone.mcap' here")
+    page.evaluate("localStorage.setItem('robomesh.language', 'zh')")
+    page.reload()
+    expect(page.locator(".player-trouble")).to_contain_text("此处没有录制“gone.mcap”")
+    page.evaluate("localStorage.setItem('robomesh.language', 'en')")
+    page.reload()
+    expect(page.locator(".player-trouble")).to_contain_text("no recording 'gone.mcap' here")
     page.goto(page.url.replace("hall/gone.mcap", "nowhere/x.mcap"))
     expect(page.locator(".player-trouble")).to_contain_text("No player answers at nowhere")
 
