@@ -177,7 +177,8 @@ class Robot:
                 _S.ERROR, "audit.damaged", f"audit log {self._audit.path.name}: {self._audit.damage}"
             )
         if self._read_only:
-            self._journal.report(_S.WARNING, "robot.read_only", f"the robot is read-only: {self._read_only}")
+            text = f"the robot is read-only: {self._read_only}"
+            self._journal.report(_S.WARNING, "robot.read_only", text, why=self._read_only)
         stop = self._control.authority.stop
         if stop is not None:
             text = f"stop request {stop.id} ({stop.by}: {stop.reason}) is still latched after the restart"
@@ -338,8 +339,8 @@ class Robot:
             self._telemetry.forget()
         elif status.code == JOINT_COUNT:
             self._telemetry.forget_positions()
-        for severity, code, text in transition_events(before, status):
-            self._journal.report(severity, code, text)
+        for event in transition_events(before, status):
+            self._journal.report(event.severity, event.code, event.text, why=event.reason)
         if before.state is not status.state:
             if before.state is LinkState.UP:
                 self._control.link_lost(status.text)

@@ -96,7 +96,8 @@ class AuditTrail:
     def _report_failure(self, error: BaseException) -> None:
         self._failing = True
         text = f"{error}: motion is refused until this is fixed; stop still works"
-        self._journal.report(Event.Severity.ERROR, "audit.failed", text)
+        why = error.reason if isinstance(error, AuditError) else None
+        self._journal.report(Event.Severity.ERROR, "audit.failed", text, why=why)
 
 
 def entry_of(

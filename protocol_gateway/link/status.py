@@ -37,16 +37,32 @@ class LinkStatus:
         return self.reason.text
 
 
-def transition_events(before: LinkStatus, after: LinkStatus) -> list[tuple[Event.Severity, str, str]]:
-    """Return severity, code and text of the events that report a change; none if only the text changed."""
-    said: list[tuple[Event.Severity, str, str]] = []
+@dataclass(frozen=True)
+class TransitionEvent:
+    """An event that reports a change of the link.
+
+    Attributes:
+        reason: The reason in the text, if it has one.
+    """
+
+    severity: Event.Severity
+    code: str
+    text: str
+    reason: Reason | None = None
+
+
+def transition_events(before: LinkStatus, after: LinkStatus) -> list[TransitionEvent]:
+    """Return the events that report a change; none if only the text changed."""
+    said: list[TransitionEvent] = []
     if before.state is not after.state or after.code not in ("", before.code):
         lost = after.state is LinkState.DOWN or before.state is LinkState.UP or after.code
         code = after.code or f"link.{after.state.value}"
-        said.append((_S.WARNING if lost else _S.INFO, code, f"link to the controller: {after.text}"))
+        severity = _S.WARNING if lost else _S.INFO
+        said.append(TransitionEvent(severity, code, f"link to the controller: {after.text}", after.reason))
     if after.flooding and not before.flooding:
         text = "the controller sends too much: only the newest data are published, the rest is counted"
-        said.append((_S.WARNING, "link.flooding", text))
+        said.append(TransitionEvent(_S.WARNING, "link.flooding", text))
     if before.flooding and not after.flooding and after.state is not LinkState.DOWN:
-        said.append((_S.INFO, "link.flooding_ended", "the controller no longer sends too much"))
+        text = "the controller no longer sends too much"
+        said.append(TransitionEvent(_S.INFO, "link.flooding_ended", text))
     return said

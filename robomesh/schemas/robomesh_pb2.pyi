@@ -1347,7 +1347,7 @@ class MeshState(_message.Message):
     def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., site: _Optional[str] = ..., services: _Optional[_Iterable[_Union[MeshState.Seen, _Mapping]]] = ..., hops: _Optional[_Iterable[_Union[MeshState.Hop, _Mapping]]] = ...) -> None: ...
 
 class Alarm(_message.Message):
-    __slots__ = ("id", "site", "robot", "source", "code", "text", "priority", "state", "since", "last", "count", "returned", "by", "at", "shelved_until", "reason", "advice", "values")
+    __slots__ = ("id", "site", "robot", "source", "code", "text", "priority", "state", "since", "last", "count", "returned", "by", "at", "shelved_until", "reason", "advice", "values", "cause")
     class Priority(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         PRIORITY_UNSPECIFIED: _ClassVar[Alarm.Priority]
@@ -1397,6 +1397,7 @@ class Alarm(_message.Message):
     REASON_FIELD_NUMBER: _ClassVar[int]
     ADVICE_FIELD_NUMBER: _ClassVar[int]
     VALUES_FIELD_NUMBER: _ClassVar[int]
+    CAUSE_FIELD_NUMBER: _ClassVar[int]
     id: str
     site: str
     robot: str
@@ -1415,7 +1416,8 @@ class Alarm(_message.Message):
     reason: str
     advice: str
     values: _containers.ScalarMap[str, str]
-    def __init__(self, id: _Optional[str] = ..., site: _Optional[str] = ..., robot: _Optional[str] = ..., source: _Optional[str] = ..., code: _Optional[str] = ..., text: _Optional[str] = ..., priority: _Optional[_Union[Alarm.Priority, str]] = ..., state: _Optional[_Union[Alarm.State, str]] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., last: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., count: _Optional[int] = ..., returned: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., by: _Optional[str] = ..., at: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., shelved_until: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., reason: _Optional[str] = ..., advice: _Optional[str] = ..., values: _Optional[_Mapping[str, str]] = ...) -> None: ...
+    cause: Reason
+    def __init__(self, id: _Optional[str] = ..., site: _Optional[str] = ..., robot: _Optional[str] = ..., source: _Optional[str] = ..., code: _Optional[str] = ..., text: _Optional[str] = ..., priority: _Optional[_Union[Alarm.Priority, str]] = ..., state: _Optional[_Union[Alarm.State, str]] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., last: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., count: _Optional[int] = ..., returned: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., by: _Optional[str] = ..., at: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., shelved_until: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., reason: _Optional[str] = ..., advice: _Optional[str] = ..., values: _Optional[_Mapping[str, str]] = ..., cause: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
 
 class AlarmList(_message.Message):
     __slots__ = ("alarms", "site")

@@ -74,6 +74,7 @@ class AlarmRegistry:
                 text=alarm.text,
                 over=f"over: {alarm.text}",
                 values=alarm.values,
+                cause=alarm.cause,
                 reported=alarm.source != "watch",
                 what=alarm.id.removeprefix(f"{alarm.robot}:"),
             )
@@ -92,7 +93,7 @@ class AlarmRegistry:
 
     def change(self, condition: Condition) -> None:
         """Update the text of a condition's alarm."""
-        self.alarms.change(condition.id, condition.code, condition.text, condition.values)
+        self.alarms.change(condition.id, condition.code, condition.text, condition.values, condition.cause)
 
     def end(self, condition: Condition, now: float) -> None:
         """Clear a condition's alarm."""
@@ -187,6 +188,7 @@ def _message(alarm: Alarm, site: str) -> schema.Alarm:
         reason=alarm.reason,
         advice=alarm.advice,
         values=dict(alarm.values),
+        cause=alarm.cause,
     )
     for name in ("since", "last", "returned", "at", "shelved_until"):
         at = getattr(alarm, name)

@@ -6,8 +6,11 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
+from google.protobuf.json_format import MessageToDict, ParseDict, ParseError
+
 from robomesh.atomic_write import write_atomically
 from robomesh.schemas.robomesh_pb2 import Alarm as AlarmMessage
+from robomesh.schemas.robomesh_pb2 import Reason as ReasonMessage
 from services.watch.alarms import Alarm
 
 _KINDS = {each.name: each.type for each in fields(Alarm)}
@@ -40,7 +43,15 @@ def load(path: Path) -> tuple[dict[str, Alarm], dict[str, int]]:
         ).encode()  # raises if a value cannot be published
         alarms = [_alarm(entry) for entry in values["alarms"]]
         return {alarm.id: alarm for alarm in alarms}, {str(k): int(v) for k, v in values["told_ns"].items()}
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+    except (
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        OverflowError,
+        RecursionError,
+        ParseError,
+    ) as error:
         raise ValueError(f"{path}: not a file of alarms: {error or type(error).__name__}") from None
 
 
@@ -56,7 +67,10 @@ def save(path: Path, alarms: Iterable[Alarm], last_event_ns: Mapping[str, int]) 
 
 
 def _entry(alarm: Alarm) -> dict[str, Any]:
-    return {_FILE_KEYS.get(name, name): value for name, value in asdict(alarm).items()}
+    entry = {_FILE_KEYS.get(name, name): value for name, value in asdict(alarm).items()}
+    if alarm.cause is not None:
+        entry["cause"] = MessageToDict(alarm.cause)
+    return entry
 
 
 def _alarm(entry: dict[str, Any]) -> Alarm:
@@ -64,6 +78,8 @@ def _alarm(entry: dict[str, Any]) -> Alarm:
     values = {fields_by_key[key]: value for key, value in entry.items() if key in fields_by_key}
     values["values"] = tuple((str(name), str(value)) for name, value in values.get("values", ()))
     values["occurrences"] = tuple(float(at) for at in values.get("occurrences", ()))
+    if values.get("cause") is not None:
+        values["cause"] = ParseDict(values["cause"], ReasonMessage())
     for name, value in values.items():
         if not _fits(name, value):
             raise ValueError(f"{name} {value!r:.80} of an alarm")
@@ -82,7 +98,9 @@ def _fits(name: str, value: object) -> bool:
         case int() | float():
             return _KINDS[name] in (float, float | None) and 0 <= value <= _LAST_S
         case None:
-            return _KINDS[name] == float | None
+            return _KINDS[name] in (float | None, ReasonMessage | None)
+        case ReasonMessage():
+            return name == "cause"
         case str():
             return _KINDS[name] is str
         case _:

@@ -26,6 +26,7 @@ from dataclasses import dataclass, field, replace
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import Alarm as AlarmMessage
+from robomesh.schemas.robomesh_pb2 import Reason as ReasonMessage
 
 State = AlarmMessage.State
 
@@ -49,6 +50,7 @@ class Alarm:
     """A condition that a person must act on. Times are seconds since the Unix epoch.
 
     Attributes:
+        cause: The reason in the text; None if the reporter sends no code for it.
         by_state: Active while a reported state lasts; otherwise an event activated it.
         latching: No event may ever clear it, so acknowledging it clears it.
         over_after_s: Cleared if it is not activated again within this time.
@@ -68,6 +70,7 @@ class Alarm:
     last: float
     advice: str = ""
     values: tuple[tuple[str, str], ...] = ()
+    cause: ReasonMessage | None = None
     by_state: bool = False
     latching: bool = False
     over_after_s: float | None = None
@@ -125,11 +128,20 @@ class Alarms:
         self.by_id[alarm.id] = alarm
         self._evict()
 
-    def change(self, identity: str, code: str, text: str, values: tuple[tuple[str, str], ...]) -> None:
-        """Replace the text of an active alarm."""
+    def change(
+        self,
+        identity: str,
+        code: str,
+        text: str,
+        values: tuple[tuple[str, str], ...],
+        cause: ReasonMessage | None = None,
+    ) -> None:
+        """Replace the text of an active alarm, and the reason in it."""
         alarm = self.by_id.get(identity)
         if alarm is not None:
-            self.by_id[identity] = replace(alarm, code=code, text=text[:_MAX_TEXT], values=values)
+            self.by_id[identity] = replace(
+                alarm, code=code, text=text[:_MAX_TEXT], values=values, cause=cause
+            )
 
     def clear(self, identity: str, now: float) -> None:
         """Clear an alarm; a chattering one is cleared later."""

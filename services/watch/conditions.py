@@ -3,12 +3,14 @@
 A condition begins after it has held for a minimum time, and ends when it no longer holds. Pure.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from robomesh import reason_codes as codes
 from robomesh.keys import WHOLE_SITE
 from robomesh.schemas.robomesh_pb2 import ControllerState
+from robomesh.schemas.robomesh_pb2 import Reason as ReasonMessage
 
 # A site's services start one after the other.
 _LINK_AFTER_S = 1.0
@@ -24,6 +26,7 @@ class Condition:
     """A fault that holds now.
 
     Attributes:
+        cause: The reason in the text; None if it has no code.
         what: Part of the alarm's id, with the robot and `each`; usually the code.
         reported: Another service has published an event for it.
         latching: It may last for good, so acknowledging its alarm clears the alarm.
@@ -41,6 +44,7 @@ class Condition:
     what: str = ""
     each: str = ""
     values: tuple[tuple[str, str], ...] = ()
+    cause: ReasonMessage | None = None
     reported: bool = False
     latching: bool = False
     after_s: float = 0.0
@@ -130,7 +134,12 @@ def robot_conditions(robot: str, state: ControllerState, age_s: float) -> Iterat
         text = f"link to the controller: {state.link_text or 'not up'}"
         # One that is frozen is silent, given up and connected to, again and again: that is one alarm.
         yield condition(
-            _LINK[state.link], text, what="link", after_s=_LINK_AFTER_S, words_after_s=_WORDS_AFTER_S
+            _LINK[state.link],
+            text,
+            cause=_one_reason(state.link_reasons),
+            what="link",
+            after_s=_LINK_AFTER_S,
+            words_after_s=_WORDS_AFTER_S,
         )
     if state.fault or state.activity == ControllerState.FAULT:
         yield condition(
@@ -149,5 +158,17 @@ def robot_conditions(robot: str, state: ControllerState, age_s: float) -> Iterat
         yield condition("link.flooding", "the controller sends far too much: only the newest is published")
     if state.check_text and not state.check_starting:
         yield condition(
-            "check.missing", f"motions are not checked: {state.check_text}", after_s=_CHECK_AFTER_S
+            "check.missing",
+            f"motions are not checked: {state.check_text}",
+            cause=state.check_reason if state.HasField("check_reason") else None,
+            after_s=_CHECK_AFTER_S,
         )
+
+
+def _one_reason(reasons: Sequence[ReasonMessage]) -> ReasonMessage | None:
+    """Return one reason for several; None without any, as from an older gateway."""
+    if len(reasons) < 2:
+        return reasons[0] if reasons else None
+    return ReasonMessage(
+        code=codes.SEVERAL.name, causes=reasons, text="; ".join(each.text for each in reasons)
+    )

@@ -74,6 +74,7 @@ class EventHandler:
                 since=now,
                 last=now,
                 values=tuple(values.items()),
+                cause=event.reason if event.HasField("reason") else None,
                 latching=rule.over_after_s is None and not _end_is_reported(event.code),
                 over_after_s=rule.over_after_s,
                 reporter=reporter if _end_is_reported(event.code) else "",
@@ -96,6 +97,7 @@ def alarm_of(condition: Condition, now: float) -> Alarm:
         since=now,
         last=now,
         values=condition.values,
+        cause=condition.cause,
         by_state=True,
         latching=condition.latching,
     )

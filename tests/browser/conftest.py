@@ -15,6 +15,7 @@ from protocol_gateway.legacy.settings import LegacySettings
 from protocol_gateway.settings import RobotSettings
 from robomesh.endpoints import router_config
 from robomesh.keys import WHOLE_SITE
+from robomesh.messages import reason_message
 from robomesh.schemas.robomesh_pb2 import Event
 from robomesh.session import Session, SessionSettings, open_session
 from robots.cells import Fixture
@@ -341,11 +342,15 @@ def raised(plant, tmp_path_factory):
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
 
-    async def publish(publisher, code, text, severity):
-        event = Event(code=code, text=text, severity=severity, source="recorder")
+    async def publish(publisher, code, text, severity, reason, values):
+        event = Event(code=code, text=text, severity=severity, source="recorder", values=values)
+        if reason is not None:
+            event.reason.CopyFrom(reason_message(reason))
         event.timestamp.GetCurrentTime()
         publisher.put(event)
 
     task, publisher = plant.call(start())
-    yield lambda code, text, severity=Event.WARNING: plant.call(publish(publisher, code, text, severity))
+    yield lambda code, text, severity=Event.WARNING, reason=None, **values: plant.call(
+        publish(publisher, code, text, severity, reason, values)
+    )
     plant.call(end(task))

@@ -5,6 +5,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
+from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.keys import WHOLE_SITE
 from robomesh.schemas import robomesh_pb2 as schema
@@ -114,6 +115,25 @@ def test_the_audit_of_every_robot_is_there_and_its_logs_are_searched_when_asked(
     expect(page.locator(".entry-details [lang=en]")).to_contain_text(
         "no operator is in control, or the lease"
     )
+
+
+def test_alarms_and_events_have_their_reason_in_chinese(open_page, raised):
+    page = open_page(EVENTS, drawn=False)
+    button(page, "中文").click()
+    raised("audit.failed", "the audit log's disk", Event.ERROR, codes.AUDIT_SLOW(seconds=3))
+    alarm = page.locator(".alarm-line").filter(has_text="audit.failed")
+    expect(alarm.locator("strong")).to_have_text("审计日志无法写入：审计日志所在磁盘超过 3 秒无响应")
+    happened = page.locator(".journal-line").filter(has_text="审计日志")
+    expect(happened.first).to_contain_text("审计日志无法写入：审计日志所在磁盘超过 3 秒无响应。")
+    released = codes.ENDED_RELEASED(name="li")
+    raised("lease.ended", "control ended: li", Event.INFO, released, holder="li")
+    ended = page.locator(".journal-line").filter(has_text="的控制权已结束")
+    expect(ended.first).to_contain_text("li 的控制权已结束：li 释放了控制权。")
+    # An older publisher sends no reason.
+    raised("audit.failed", "the audit log's disk")
+    expect(alarm.locator("strong")).to_have_text("审计日志无法写入")
+    raised("lease.ended", "control ended: zhao", Event.INFO, holder="zhao")
+    expect(ended.first).to_contain_text("zhao 的控制权已结束。")
 
 
 def test_texts_of_others_change_the_order_of_nothing_beside_them(open_page, raised):

@@ -26,6 +26,8 @@ async def code(awaitable):
 def test_reply_audit_entry_event_and_state_have_the_same_code(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            linked = await until(lambda: site.events("link.up"))
+            assert linked[0].reason.code == "link.connected"
             assert (await code(site.command(C.HOME))).code == "lease.none"
             assert (await code(site.lease(A.RENEW))).code == "lease.none"
             await site.home()

@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robomesh import reason_codes as codes
 from robomesh.keys import parse_key
+from robomesh.messages import reason_message
 from robomesh.schemas.robomesh_pb2 import Alarm as Message
 from robomesh.schemas.robomesh_pb2 import Event
 from services.watch import alarm_store
@@ -239,7 +241,8 @@ def test_whatever_happens_nothing_unseen_is_forgotten(steps):
 def test_alarms_survive_in_their_file_as_they_were(tmp_path):
     path = tmp_path / "watch" / "site.json"
     alarms = Alarms()
-    alarms.activate(alarm(values=(("joint", "Hüfte"),)), 5.0)
+    cause = reason_message(codes.LINK_DOWN(codes.LINK_NO_ANSWER(where="10.0.0.7:5400")))
+    alarms.activate(alarm(values=(("joint", "Hüfte"),), cause=cause), 5.0)
     alarms.acknowledge(["arm:link"], "li", 6.0)
     alarm_store.save(path, alarms.by_id.values(), {"arm/events": 12345})
     assert alarm_store.load(path) == (alarms.by_id, {"arm/events": 12345})
@@ -267,6 +270,8 @@ def test_an_invalid_file_of_alarms_is_named(tmp_path, text):
         ("robot", 3),
         ("text", ["down"]),
         ("text", "\ud800"),
+        ("cause", "link.down"),
+        ("cause", {"code": 3}),
     ],
     ids=str,
 )
@@ -278,6 +283,15 @@ def test_a_file_of_alarms_with_a_value_that_cannot_be_is_named(tmp_path, name, v
     path.write_text(json.dumps(values), encoding="utf-8")
     with pytest.raises(ValueError, match=r"site\.json: not a file of alarms"):
         alarm_store.load(path)
+
+
+def test_a_file_of_an_earlier_version_has_alarms_without_a_cause(tmp_path):
+    path = tmp_path / "site.json"
+    alarm_store.save(path, [alarm()], {})
+    values = json.loads(path.read_text(encoding="utf-8"))
+    del values["alarms"][0]["cause"]
+    path.write_text(json.dumps(values), encoding="utf-8")
+    assert alarm_store.load(path)[0] == {"arm:link": alarm()}
 
 
 def test_a_clock_that_is_set_back_keeps_no_alarm_standing_for_longer():

@@ -7,10 +7,12 @@ from contextlib import asynccontextmanager
 import pytest
 import zenoh
 
+from robomesh import reason_codes as codes
 from robomesh.clock import answer_clock
 from robomesh.endpoints import router_config
 from robomesh.errors import RefusedError
 from robomesh.health import Served, present
+from robomesh.messages import reason_message
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import SessionSettings, open_session
 from services.watch import Settings, serve
@@ -121,10 +123,16 @@ def test_a_link_that_is_down_is_an_alarm_until_it_is_up_and_seen(mesh, tmp_path)
         async with (
             watched(mesh, tmp_path) as desk,
             open_session(mesh) as gateway,
-            controller(gateway, link=State.DOWN, link_text="connecting to 10.0.0.7:5400") as state,
+            controller(
+                gateway,
+                link=State.DOWN,
+                link_text="connecting to 10.0.0.7:5400",
+                link_reasons=[reason_message(codes.LINK_CONNECTING(where="10.0.0.7:5400"))],
+            ) as state,
         ):
             await desk.until(lambda: "arm:link" in desk.alarms)
             alarm = desk.alarms["arm:link"]
+            assert alarm.cause == state.link_reasons[0]
             assert (alarm.site, alarm.robot, alarm.code) == ("s", "arm", "link.down")
             assert (alarm.priority, alarm.state) == (Alarm.HIGH, Alarm.UNACKNOWLEDGED)
             assert "10.0.0.7:5400" in alarm.text
@@ -142,7 +150,12 @@ def test_a_restart_keeps_acknowledged_and_shelved_alarms(mesh, tmp_path):
     async def main():
         async with (
             open_session(mesh) as gateway,
-            controller(gateway, link=State.DOWN, fault="E 17") as state,
+            controller(
+                gateway,
+                link=State.DOWN,
+                link_reasons=map(reason_message, (codes.LINK_CLOSED(), codes.LINK_JUST_ENDED())),
+                fault="E 17",
+            ) as state,
         ):
             async with watched(mesh, tmp_path) as desk:
                 await desk.until(lambda: {"arm:link", "arm:controller.fault"} <= desk.alarms.keys())
@@ -155,6 +168,11 @@ def test_a_restart_keeps_acknowledged_and_shelved_alarms(mesh, tmp_path):
                 shelved = desk.alarms["arm:controller.fault"]
                 assert (shelved.state, shelved.reason, shelved.by) == (Alarm.SHELVED, "service", "li.s")
                 assert desk.alarms["arm:link"].state == Alarm.ACKNOWLEDGED
+                assert desk.alarms["arm:link"].cause.code == "several"
+                assert [each.code for each in desk.alarms["arm:link"].cause.causes] == [
+                    "link.closed",
+                    "link.just_ended",
+                ]
                 # An alarm from before the restart clears as if there had been none.
                 state.link, state.fault = State.UP, ""
                 await desk.until(lambda: "arm:link" not in desk.alarms)
@@ -168,7 +186,9 @@ def test_events_are_alarms_by_the_table_and_end_as_it_says(mesh, tmp_path):
             await desk.until(lambda: desk.mesh.site)
             said = recorder.declare_publisher("s", "-", "events/recorder")
             said.put(event(schema.Event.WARNING, "recorder.space", "little space is left"))
-            said.put(event(schema.Event.CRITICAL, "recorder.ended", "recording a ended"))
+            ended = event(schema.Event.CRITICAL, "recorder.ended", "recording a ended")
+            ended.reason.CopyFrom(reason_message(codes.LINK_CLOSED()))
+            said.put(ended)
             said.put(event(schema.Event.WARNING, "kinematics.limit", joint="waist", limit="upper"))
             said.put(event(schema.Event.WARNING, "kinematics.limit", joint="elbow", limit="upper"))
             said.put(event(schema.Event.ERROR, "nobody.knows", "not in the table"))
@@ -182,6 +202,8 @@ def test_events_are_alarms_by_the_table_and_end_as_it_says(mesh, tmp_path):
             }
             await desk.until(lambda: desk.alarms.keys() == names)
             assert desk.alarms["-:recorder.ended"].priority == Alarm.HIGH
+            assert desk.alarms["-:recorder.ended"].cause == ended.reason
+            assert not desk.alarms["-:recorder.space"].HasField("cause")
             said.put(event(schema.Event.INFO, "recorder.space", "there is space again"))
             said.put(event(schema.Event.INFO, "kinematics.limit.over", joint="waist", limit="upper"))
             await desk.until(lambda: desk.alarms["-:recorder.space"].state == Alarm.RETURNED)

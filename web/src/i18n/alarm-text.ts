@@ -1,5 +1,7 @@
-// Alarms in Chinese by code: what happened and what to do. In English the watch's own text is shown.
+// Alarms in Chinese by code: what happened and what to do; and the cause. In English the watch's own text is shown.
 
+import type { Alarm } from "../gen/robomesh_pb";
+import { reasonText } from "./reasons";
 import { language } from "./texts";
 
 const CHINESE: Record<string, readonly [title: string, advice: string]> = {
@@ -69,6 +71,12 @@ const CHINESE: Record<string, readonly [title: string, advice: string]> = {
 /** Return the Chinese text of an alarm with a known code; null: show the watch's text. */
 export function alarmTitle(code: string): string | null {
   return language.value === "zh" ? (CHINESE[code]?.[0] ?? null) : null;
+}
+
+/** Return the Chinese text of an alarm with its cause; null: show the watch's text. */
+export function alarmText({ code, cause }: Alarm): string | null {
+  const [title, why] = [alarmTitle(code), reasonText(cause, "")];
+  return title && why ? `${title}：${why}` : title;
 }
 
 export function alarmAdvice(code: string, told: string): string {

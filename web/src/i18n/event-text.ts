@@ -1,10 +1,11 @@
-// Events in Chinese by code: a sentence with their values, or the alarm that ended. In English the event's own
-// text is shown.
+// Events in Chinese by code: a sentence with their values, or the alarm that ended; and the reason. In English the
+// event's own text is shown.
 
 import type { Event } from "../gen/robomesh_pb";
 import { Event_Severity as Severity } from "../gen/robomesh_pb";
 import { alarmTitle } from "./alarm-text";
 import { isolated } from "./foreign-text";
+import { reasonText } from "./reasons";
 import { language, t } from "./texts";
 
 // Events that need no action. A code that can also be an alarm is listed for its normal severity.
@@ -17,7 +18,7 @@ const CHINESE: Record<string, string> = {
   "status.back": "重新收到控制器状态。",
   "controller.remote": "控制器恢复远程模式。",
   "motion.foreign": "机器人开始运动，并非由网关命令。",
-  "lease.ended": "{holder} 的控制权结束。",
+  "lease.ended": "{holder} 的控制权已结束{cause}。",
   "program.started": "{operator} 开始运行程序 {program}。",
   "program.done": "程序 {program} 已完成。",
   "audit.rotated": "审计日志换用新文件：{file}。",
@@ -62,11 +63,17 @@ const VALUES: Record<string, string> = {
 // Alarm texts that need a value, because there may be several.
 const OF_WHAT = ["joint", "second", "robot", "service", "site"] as const;
 
-/** Return the text of an event that needs no action, in the page's language; null: show its own text. */
-function eventInChinese({ code, severity, values }: Event): string | null {
-  if (language.value !== "zh" || severity > Severity.INFO) return null;
+/** Return the Chinese text of an event; null: show its own text. Of an event that needs action, only its reason has one. */
+function eventInChinese({ code, severity, values, reason }: Event): string | null {
+  if (language.value !== "zh") return null;
+  const why = reasonText(reason, "");
+  if (why && reason?.code === code) return `${why}。`;
+  if (severity > Severity.INFO) {
+    const title = alarmTitle(code);
+    return why && title ? `${title}：${why}。` : null;
+  }
   const sentence = CHINESE[code];
-  if (sentence) return filled(sentence, values);
+  if (sentence) return filled(sentence, { ...values, cause: why && `：${why}` });
   const title = alarmTitle(code.replace(/\.over$/, ""));
   if (!title) return null;
   const of = OF_WHAT.map((name) => values[name]).find(Boolean);

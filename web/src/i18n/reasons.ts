@@ -255,7 +255,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ["the robot began to move without a command from its holder", "机器人开始运动，并非由控制者命令"],
   ],
   ["lease.ended.gateway", ["the gateway is shutting down", "网关正在关闭"]],
-  ["lease.ended.unknown", ["no reason given", "原因未知"]],
+  ["lease.ended.unknown", ["no reason given", "未说明原因"]],
   [
     "lease.ended.client",
     ["{name}'s old client program {client} has disconnected", "{name} 的旧客户端程序 {client} 已断开"],
@@ -481,7 +481,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ["program.stopped", ["stopped by {by}: {reason}", "{by} 请求停止：{reason}"]],
   ["program.stopped_by_number", ["stopped: stop request {id}", "已停止：停止请求 {id}"]],
   ["program.given_up", ["cancelled by RESET", "已以复位放弃"]],
-  ["program.control_ended", ["control ended: {cause}", "控制权结束：{cause}"]],
+  ["program.control_ended", ["control ended: {cause}", "控制权已结束：{cause}"]],
   ["program.not_arrived", ["the robot came to rest before the target of the line", "机器人在到达该行目标之前停下"]],
   ["program.done", ["program {program} is done", "程序 {program} 已完成"]],
   ["program.ended", ["program {program} ended at line {line}: {cause}", "程序 {program} 中止于第 {line} 行：{cause}"]],

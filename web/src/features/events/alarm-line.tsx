@@ -1,7 +1,7 @@
 // One alarm: priority, state, since when, source, advice, acknowledgement.
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
-import { alarmAdvice, alarmTitle } from "../../i18n/alarm-text";
+import { alarmAdvice, alarmText } from "../../i18n/alarm-text";
 import type { EventsTextName } from "../../i18n/events";
 import { e } from "../../i18n/events";
 import { fullTime, stampFull, stampTime, timeOfDay } from "../../i18n/format";
@@ -29,7 +29,7 @@ export function AlarmLine(props: {
   const { alarm, able } = props;
   const { text, site, robot, state } = alarm;
   const open = isUnacknowledged(alarm);
-  const [title, advice] = [alarmTitle(alarm.code), alarmAdvice(alarm.code, alarm.advice)];
+  const [title, advice] = [alarmText(alarm), alarmAdvice(alarm.code, alarm.advice)];
   const when = alarm.last ?? alarm.since;
   return (
     <li class={`alarm-line ${open ? "open" : ""} ${state === State.RETURNED ? "over" : ""}`} data-alarm={nameOf(alarm)}>
@@ -37,7 +37,7 @@ export function AlarmLine(props: {
         <input
           type="checkbox"
           checked={props.selected}
-          aria-label={e("select", { text })}
+          aria-label={e("select", { text: title ?? text })}
           onChange={(event) => props.select(event.currentTarget.checked)}
         />
       </label>
@@ -73,14 +73,14 @@ export function AlarmLine(props: {
           <button
             class="action"
             disabled={!able}
-            aria-label={e("acknowledge_of", { text })}
+            aria-label={e("acknowledge_of", { text: title ?? text })}
             onClick={props.acknowledge}
           >
             {e("acknowledge")}
           </button>
         )}
         {state === State.SHELVED ? (
-          <button class="action" disabled={!able} aria-label={e("unshelve_of", { text })} onClick={props.unshelve}>
+          <button class="action" disabled={!able} aria-label={e("unshelve_of", { text: title ?? text })} onClick={props.unshelve}>
             {e("unshelve")}
           </button>
         ) : (

@@ -2,6 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
+import { alarmText } from "../../i18n/alarm-text";
 import type { EventsTextName } from "../../i18n/events";
 import { e } from "../../i18n/events";
 import { t } from "../../i18n/texts";
@@ -61,7 +62,7 @@ export function AlarmPanel() {
       passes(alarm, shown) &&
       alarm.priority >= LEAST[least] &&
       (!site || alarm.site === site) &&
-      `${alarm.text} ${alarm.code} ${alarm.site} ${alarm.robot} ${alarm.source}`.toLowerCase().includes(searchText),
+      wordsOf(alarm).toLowerCase().includes(searchText),
   );
   const drawn = listed.slice(0, MOST_SHOWN);
   const chosen = drawn.filter((alarm) => selected.has(nameOf(alarm)));
@@ -234,4 +235,10 @@ export function SiteSelect(props: { site: string; sites: readonly string[]; choo
       choose={props.choose}
     />
   );
+}
+
+/** All texts in which the filter searches. */
+function wordsOf(alarm: Alarm): string {
+  const { text, code, site, robot, source } = alarm;
+  return `${text} ${alarmText(alarm) ?? ""} ${code} ${site} ${robot} ${source}`;
 }

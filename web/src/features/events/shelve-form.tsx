@@ -1,6 +1,7 @@
 // A form that shelves alarms for a time, with a reason.
 
 import { useState } from "preact/hooks";
+import { alarmText } from "../../i18n/alarm-text";
 import { e } from "../../i18n/events";
 import type { Alarm } from "../../mesh/alarms";
 import { Choice } from "../../ui/choice";
@@ -21,7 +22,9 @@ export function ShelveForm(props: {
       required
       title={e("shelve_do")}
       text={
-        others.length ? e("shelve_count", { count: props.alarms.length }) : e("shelve_one", { text: first?.text ?? "" })
+        others.length
+          ? e("shelve_count", { count: props.alarms.length })
+          : e("shelve_one", { text: (first && alarmText(first)) ?? first?.text ?? "" })
       }
       does={e("shelve_do")}
       close={props.close}
