@@ -143,10 +143,11 @@ def accept(
     from services.pki import authority
     from services.pki.folder import read
 
+    certificate = read(file)
     try:
-        site = authority.accept(keys_folder(folder), read(file), sites=_listed(sites))
+        site = authority.accept(keys_folder(folder), certificate, sites=_listed(sites))
     except KeysError as error:
-        raise KeysError(f"{file}: {error}" if str(file) not in str(error) else str(error)) from None
+        raise KeysError(f"{file}: {error}") from None
     print(f'site {site} admits us: connect = ["{site}"] under [router] in the site file links to it')
 
 

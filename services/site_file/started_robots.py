@@ -13,6 +13,7 @@ from robots.bounded_toml import read_toml
 from robots.description import DESCRIPTION_FILE, library_names
 from services.errors import SiteFileError
 from services.site_file.site import Robot, Site
+from services.site_file.validation_errors import problem_text
 
 STARTED_FILE = "started.toml"
 
@@ -37,7 +38,7 @@ def read_started(site: Site) -> tuple[Robot, ...]:
     except ValidationError as error:
         detail = error.errors()[0]
         where = ".".join(map(str, detail["loc"]))
-        raise SiteFileError(f"{path}: {where}: {detail['msg'].removeprefix('Value error, ')}") from None
+        raise SiteFileError(f"{path}: {where}: {problem_text(detail)}") from None
     own = {robot.name for robot in site.robot}
     if added.site != site.site:
         raise SiteFileError(f"{path}: site = {added.site!r}: should be {site.site!r}")

@@ -30,7 +30,7 @@ def sentence(path: Path, problem: Any, values: dict[str, Any], model: type[BaseM
             f": is {near[0]} meant?" if near else f": there are {', '.join(keys)}" if len(parts) > 1 else ""
         )
         return f"{path}: {where} is not a key that a site file has{hint}"
-    message = problem["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    message = problem_text(problem)
     if kind == "string_type":
         message = f'should be text in quotes, as in "{given}"'
     elif kind == "tuple_type" and isinstance(given, dict):
@@ -43,6 +43,13 @@ def sentence(path: Path, problem: Any, values: dict[str, Any], model: type[BaseM
     if not where or (given and isinstance(given, dict | list | tuple)):
         return f"{path}: {where + ': ' if where else ''}{message}"
     return f"{path}: {where} = {given!r}: {message}"
+
+
+def problem_text(problem: Any) -> str:
+    """Return what is wrong: the text of the model's own error, otherwise pydantic's."""
+    if problem["type"] == "value_error":
+        return str(problem["ctx"]["error"])
+    return str(problem["msg"]).removeprefix("Input ")  # the sentence names the key in place of "Input"
 
 
 def _keys(model: type[BaseModel], place: Sequence[str | int]) -> list[str]:

@@ -50,9 +50,8 @@ class Expected:
                 case "service.gone":
                     for robot in values.get("robots", "").split():
                         service = values.get("service", "")
-                        # An alarm saved by an earlier version has the name only in its text.
-                        name = values.get("name") or condition.text.removesuffix(" is gone")
-                        self.expect(service, robot, name)
+                        # An alarm saved by an earlier version does not have the process's name.
+                        self.expect(service, robot, values.get("name") or service)
                 case "site.gone":
                     self.sites.add(values.get("site", ""))
 
@@ -125,13 +124,12 @@ def _missing(mesh: Mesh, tokens: list[PresenceKey], site: str, expected: Expecte
         else:
             expected.sites.add(who.site)
     # A gateway of a hundred robots gives one condition.
-    gone: dict[str, list[str]] = defaultdict(list)
+    gone: dict[tuple[str, str], list[str]] = defaultdict(list)
     for (service, robot), name in expected.services.items():
         if (service, robot) not in here:
-            gone[name].append(robot)
+            gone[service, name].append(robot)
     expected.without_gateway.clear()
-    for name, robots in gone.items():
-        service = name.split()[0]
+    for (service, name), robots in gone.items():
         first = sorted(robots)[0]
         condition = Condition(
             code="service.gone",

@@ -9,6 +9,7 @@ from services.site_file import site
 from services.site_file.listen_address import check_reach, split_address
 from services.site_file.router import OTHER_PARTS, RoutedSite, read_routed
 from services.site_file.started_robots import read_started, robot_to_start, write_started
+from services.site_file.validation_errors import problem_text
 
 ROBOT = '[[robot]]\nname = "arm"\nmodel = "pt600"\n'
 
@@ -313,3 +314,9 @@ def test_read_routed_leaves_errors_to_load(tmp_path, more):
     assert read_routed(path) is None
     with pytest.raises(SiteFileError):
         site.load(path)
+
+
+def test_the_text_of_a_models_own_error_does_not_depend_on_pydantics_wording():
+    own = {"type": "value_error", "msg": "Wrong: 7", "ctx": {"error": ValueError("should be 8")}}
+    assert problem_text(own) == "should be 8"
+    assert problem_text({"type": "int_type", "msg": "Input should be an integer"}) == "should be an integer"
