@@ -22,6 +22,7 @@ from mcap_protobuf.schema import build_file_descriptor_set
 from mcap_files import records
 from mcap_files.channel_names import ABOUT, INDEXING, LOST
 from mcap_files.errors import CaptureError
+from robomesh import reason_codes as codes
 from robomesh.header import Header
 from robomesh.topics import Topic
 
@@ -86,7 +87,7 @@ class Capture:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
         except OSError as error:
-            raise CaptureError(f"{path}: cannot be written: {error.strerror}") from None
+            raise CaptureError(codes.RECORDING_NOT_WRITABLE(file=path, detail=error.strerror)) from None
         with contextlib.suppress(OSError):  # a disk without locks
             fcntl.flock(self._file, fcntl.LOCK_EX)
         self._put(records.start())

@@ -14,6 +14,7 @@ from mcap_files.errors import RecordingError
 from mcap_files.layout import Layout, layout_of
 from mcap_files.reading import RecordingFile
 from mcap_files.records import number_in
+from robomesh import reason_codes as codes
 from robomesh.schemas import robomesh_pb2 as schema
 
 _CONTROLLER = "/controller"
@@ -28,7 +29,7 @@ def describe_file(path: Path) -> schema.Recording:
     try:
         found = path.stat()
     except OSError as error:
-        raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None
+        raise RecordingError(codes.RECORDING_FILE(file=path, detail=error.strerror)) from None
     recording = schema.Recording()
     recording.CopyFrom(_described(path, found.st_ino, found.st_size, found.st_mtime_ns))
     return recording
@@ -46,11 +47,11 @@ def describe_unreadable(path: Path, *, robot: str, problem: str) -> schema.Recor
 @lru_cache(maxsize=4096)
 def _described(path: Path, inode: int, size: int, mtime_ns: int) -> schema.Recording:
     if not size:
-        raise RecordingError(f"{path.name} is empty: the disk was full, or the recorder was killed")
+        raise RecordingError(codes.RECORDING_EMPTY(file=path.name))
     layout = layout_of(path)
     about, lost = layout.metadata.get(ABOUT, {}), _lost(layout.metadata.get(LOST, {}))
     if not layout.whole and not about and not layout.counts:
-        raise RecordingError(f"{path}: not a readable recording: it ends before its first message")
+        raise RecordingError(codes.RECORDING_CUT(file=path))
     recording = schema.Recording(
         site=about.get("site", ""),
         robot=about.get("robot", ""),

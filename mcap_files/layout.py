@@ -29,6 +29,7 @@ from mcap_files.records import (
     unpack_chunk,
     walk_chunk,
 )
+from robomesh import reason_codes as codes
 
 _BLOCK_BYTES = 1 << 20
 _ATTACHMENT = struct.Struct("<QQ")
@@ -95,14 +96,14 @@ def layout_of(path: Path) -> Layout:
         found = path.stat()
         return _layout_of(path, found.st_ino, found.st_size, found.st_mtime_ns)
     except OSError as error:
-        raise RecordingError(f"{path.name}: cannot be read: {error.strerror}") from None
+        raise RecordingError(codes.RECORDING_FILE(file=path.name, detail=error.strerror)) from None
 
 
 @lru_cache(maxsize=256)
 def _layout_of(path: Path, inode: int, size: int, mtime_ns: int) -> Layout:
     with path.open("rb") as stream:
         if stream.read(len(MAGIC)) != MAGIC:
-            raise RecordingError(f"{path.name}: not an MCAP file: its first bytes are wrong")
+            raise RecordingError(codes.RECORDING_NOT_MCAP(file=path.name))
         try:
             stream.seek(0)
             reader = make_reader(stream)
@@ -147,10 +148,8 @@ def _indexed(summary: Summary, metadata: dict[str, dict[str, str]], size: int) -
 
 def _block_of(chunk: ChunkIndex, size: int) -> Block:
     if chunk.uncompressed_size > MOST_RECORD_BYTES or chunk.chunk_length > MOST_RECORD_BYTES:
-        raise RecordingError(
-            f"a chunk has {max(chunk.uncompressed_size, chunk.chunk_length) >> 20} MiB: "
-            f"the limit is {MOST_RECORD_BYTES >> 20} MiB"
-        )
+        mib = max(chunk.uncompressed_size, chunk.chunk_length) >> 20
+        raise RecordingError(codes.RECORDING_CHUNK(mib=mib, most=MOST_RECORD_BYTES >> 20))
     if chunk.chunk_start_offset + chunk.chunk_length > size:
         raise ValueError("the position of a chunk is outside the file")
     return Block(

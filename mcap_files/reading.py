@@ -52,7 +52,7 @@ class RecordingFile:
         try:
             self._stream: IO[bytes] = path.open("rb")
         except OSError as error:
-            raise RecordingError(f"{path.name}: cannot be read: {error.strerror}") from None
+            raise RecordingError(codes.RECORDING_FILE(file=path.name, detail=error.strerror)) from None
         self._unpacked: tuple[Block, bytes] | None = None
 
     def __enter__(self) -> Self:
@@ -224,12 +224,13 @@ class RecordingFile:
     def _bytes(self, offset: int, length: int) -> bytes:
         try:
             if offset + length > os.fstat(self._stream.fileno()).st_size:
-                raise RecordingError(f"{self.path.name}: it ends before byte {offset + length}")
+                raise RecordingError(codes.RECORDING_ENDS(file=self.path.name, byte=offset + length))
             data = os.pread(self._stream.fileno(), length, offset)
         except OSError as error:
-            raise RecordingError(f"{self.path.name}: cannot be read: {error.strerror}") from None
+            reason = codes.RECORDING_FILE(file=self.path.name, detail=error.strerror)
+            raise RecordingError(reason) from None
         if len(data) < length:
-            raise RecordingError(f"{self.path.name}: it ends before byte {offset + length}")
+            raise RecordingError(codes.RECORDING_ENDS(file=self.path.name, byte=offset + length))
         return data
 
     def _read(
@@ -257,7 +258,8 @@ class RecordingFile:
                         )
                 at += length
         except (struct.error, KeyError, ValueError):
-            raise RecordingError(f"{self.path.name}: damaged near byte {block.offset + at}") from None
+            reason = codes.RECORDING_DAMAGED(file=self.path.name, byte=block.offset + at)
+            raise RecordingError(reason) from None
 
     def _records(self, block: Block) -> bytes:
         """Return a block's unpacked records; caches the last block, where most callers read on."""

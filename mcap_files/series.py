@@ -16,6 +16,7 @@ from mcap_files.publisher_time import PublisherTimes
 from mcap_files.reading import RecordingFile
 from mcap_files.values import has_values, unit_of, values_of
 from robomesh import keys
+from robomesh import reason_codes as codes
 from robomesh.errors import KeyNameError
 from robomesh.schemas.robomesh_pb2 import Description
 
@@ -100,15 +101,14 @@ class SeriesReader:
             RecordingError: If a value is missing, or the file is damaged.
         """
         if len(names) > MOST_VALUES:
-            raise RecordingError(f"{len(names)} values are too many: request at most {MOST_VALUES}")
+            raise RecordingError(codes.RECORDING_TOO_MANY_VALUES(count=len(names), most=MOST_VALUES))
         topics = topics_of_values(file)
         wanted: dict[str, list[str]] = {}
         for name in names:
             topic = _topic_of(name, topics)
             if topic is None:
-                raise RecordingError(
-                    f"{file.path.name}: no value {name!r}; topics with values: {', '.join(topics) or 'none'}"
-                )
+                there = ", ".join(topics) or "none"
+                raise RecordingError(codes.RECORDING_NO_VALUE(file=file.path.name, name=name, topics=there))
             wanted.setdefault(topic, []).append(name)
         sliding = _sliding(file, names)
         found: dict[str, Series] = {}

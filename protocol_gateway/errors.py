@@ -35,11 +35,16 @@ class CodeTableError(ProtocolGatewayError):
 
 
 class CommandError(ProtocolGatewayError):
-    """A command that the controller's protocol cannot express; `reason` says why."""
+    """A command that the controller's protocol cannot express; `reason` says why.
 
-    def __init__(self, text: str) -> None:
-        super().__init__(text)
-        self.reason = codes.COMMAND_UNSUPPORTED(detail=text)
+    Args:
+        why: A reason from the table, or a driver's own text.
+    """
+
+    def __init__(self, why: Reason | str) -> None:
+        super().__init__(str(why))
+        cause = codes.OTHER(detail=why) if isinstance(why, str) else why
+        self.reason = codes.COMMAND_UNSUPPORTED(cause)
 
 
 class LinkError(ProtocolGatewayError):

@@ -310,18 +310,17 @@ class Robot:
         name = request.chunk
         try:
             if len(name) > LONGEST_TEXT:
-                raise KeyNameError(
-                    f"operator {one_line(name, 40)}: a name has at most {LONGEST_TEXT} characters"
-                )
+                raise KeyNameError(codes.OPERATOR_TOO_LONG(name=one_line(name, 40), most=LONGEST_TEXT))
             return check_operator(name)
         except KeyNameError as error:
-            self._record_unreadable(what, name, str(error))
-            raise RefusedError(codes.INVALID(detail=error)) from None
+            reason = codes.INVALID(error.reason)
+            self._record_unreadable(what, name, reason)
+            raise RefusedError(reason) from None
 
-    def _record_unreadable(self, what: str, name: str, text: str) -> None:
+    def _record_unreadable(self, what: str, name: str, why: Reason) -> None:
         """Audit a request that was rejected before evaluation: unreadable, or with an invalid operator."""
-        who, why = one_line(name, 40), one_line(text, LONGEST_SENTENCE)
-        entry = entry_of(what, operator=who, source=MESH, outcome=Outcome.REFUSED, text=why)
+        who, text = one_line(name, 40), one_line(why.text, LONGEST_SENTENCE)
+        entry = entry_of(what, operator=who, source=MESH, outcome=Outcome.REFUSED, text=text, why=why)
         self._audit_trail.write_later(entry)
 
     # ------------------------------------------------------------------ state

@@ -6,15 +6,17 @@ RendererError
 ├── GlbError                a mesh is not valid GLB
 ├── ChainError              a URDF is not a tree of joints
 ├── Mp4Error                packets cannot be put into an MP4 file
-├── ViewRequestError        a requested view is not possible
-│   └── NoRoomError         a requested view exceeds what can be drawn now
-├── CameraError             a camera has no mount, no direction, or invalid numbers
-└── UnknownViewError        neither the description nor the renderer has the view
+└── ViewError               a view that cannot be drawn, with the reason
+    ├── ViewRequestError    a requested view is not possible
+    │   └── NoRoomError     a requested view exceeds what can be drawn now
+    ├── CameraError         a camera has no mount, no direction, or invalid numbers
+    └── UnknownViewError    neither the description nor the renderer has the view
 """
 
 from collections.abc import Iterable
 
 from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 
 
 class RendererError(Exception):
@@ -53,7 +55,15 @@ class Mp4Error(RendererError):
     """Packets cannot be put into an MP4 file."""
 
 
-class ViewRequestError(RendererError):
+class ViewError(RendererError):
+    """A view that cannot be drawn; `reason` says why."""
+
+    def __init__(self, reason: Reason) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
+class ViewRequestError(ViewError):
     """A requested view is not possible."""
 
 
@@ -61,19 +71,13 @@ class NoRoomError(ViewRequestError):
     """A requested view exceeds what the renderer can draw now."""
 
 
-class CameraError(RendererError):
+class CameraError(ViewError):
     """A camera has no mount, no direction, or invalid numbers."""
 
 
-class UnknownViewError(RendererError):
-    """The robot has no view of that name.
-
-    Attributes:
-        reason: The code and its parameters.
-        view: The requested name.
-    """
+class UnknownViewError(ViewError):
+    """The robot has no view of that name."""
 
     def __init__(self, view: str, known: Iterable[str]) -> None:
-        self.reason = codes.VIEW_UNKNOWN(view=view, views=", ".join(sorted(known)))
-        super().__init__(self.reason.text)
+        super().__init__(codes.VIEW_UNKNOWN(view=view, views=", ".join(sorted(known))))
         self.view = view

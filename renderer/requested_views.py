@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from renderer.appearance import Appearance
 from renderer.errors import UnknownViewError, ViewRequestError
 from renderer.views import camera_from, camera_of, view_names
+from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import View, ViewRequest
 
 # Name of the view for slow links.
@@ -95,11 +96,11 @@ def requested_view(
         fps: Default rate.
 
     Raises:
-        RendererError: If the request is invalid; the text says what is wrong and what is possible.
+        ViewError: If the request is invalid; the text says what is wrong and what is possible.
     """
     own = request.HasField("view")
     if own == bool(request.of):
-        raise ViewRequestError("a view request needs either `view`, a camera, or `of`, a view's name")
+        raise ViewRequestError(codes.VIEW_OR_OF())
     width, height = _size(request, size)
     rate = _between("fps", request.fps, _LEAST_FPS, _MOST_FPS) if request.fps else min(fps, _MOST_FPS)
     bits = request.most_bits_per_s
@@ -150,27 +151,22 @@ def _size(request: ViewRequest, own: tuple[int, int]) -> tuple[int, int]:
         and width % 2 == height % 2 == 0
     )
     if not possible and (width, height) != own:
-        raise ViewRequestError(
-            f"size {width} x {height}: must be even numbers from {_LEAST_PX} to {_MOST_PX}, "
-            "with at most as many pixels as 1920 x 1080"
-        )
+        raise ViewRequestError(codes.VIEW_SIZE(width=width, height=height, least=_LEAST_PX, most=_MOST_PX))
     return width, height
 
 
 def _between(name: str, value: float, least: float, most: float) -> float:
     if not least <= value <= most:
-        raise ViewRequestError(f"{name} {value:g}: must be from {least:g} to {most:g}, or 0 for the default")
+        raise ViewRequestError(codes.VIEW_VALUE(field=name, value=value, least=least, most=most))
     return value
 
 
 def _check_show(show: ViewRequest.Show, appearance: Appearance) -> None:
     joints = len(appearance.description.joints)
     if show.ghost and len(show.ghost) != joints:
-        raise ViewRequestError(
-            f"the ghost has {len(show.ghost)} joint positions: the robot has {joints} joints"
-        )
+        raise ViewRequestError(codes.VIEW_GHOST(count=len(show.ghost), joints=joints))
     if len(show.path) > _MOST_POINTS:
-        raise ViewRequestError(f"the path has {len(show.path)} points: at most {_MOST_POINTS} are drawn")
+        raise ViewRequestError(codes.VIEW_PATH(count=len(show.path), most=_MOST_POINTS))
     numbers = [*show.ghost, *(value for point in show.path for value in (point.x, point.y, point.z))]
     if not all(map(math.isfinite, numbers)):
-        raise ViewRequestError("the ghost or path has a number that is not finite")
+        raise ViewRequestError(codes.VIEW_NOT_FINITE())

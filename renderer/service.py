@@ -13,7 +13,7 @@ from typing import ParamSpec, TypeVar
 
 from renderer.cache import cache_folder
 from renderer.composition import Composition
-from renderer.errors import NoRoomError, RendererError, UnknownViewError
+from renderer.errors import NoRoomError, UnknownViewError, ViewError
 from renderer.frame_scheduler import FrameScheduler, next_view
 from renderer.post_processing import EncodedPicture, PictureJob, PostProcessor
 from renderer.requested_views import FAR, ViewSpec, low_rate_view, requested_view, standard_view
@@ -271,11 +271,11 @@ class _Renderer:
                 self._view_budget.check(asked_for, spec, request.asker)
                 stream = self._open(state, spec)
         except NoRoomError as error:
-            raise RefusedError(codes.VIEW_NO_ROOM(detail=error)) from None
+            raise RefusedError(codes.VIEW_NO_ROOM(error.reason)) from None
         except UnknownViewError as error:
             raise RefusedError(error.reason) from None
-        except RendererError as error:
-            raise RefusedError(codes.VIEW_INVALID(detail=error)) from None
+        except ViewError as error:
+            raise RefusedError(codes.VIEW_INVALID(error.reason)) from None
         stream.restart_timeout(request.asker)
         spec = stream.spec
         width, height = spec.size

@@ -58,22 +58,20 @@ class ViewBudget:
             QuotaError: If it exceeds the asker's quota.
         """
         if len(views) >= self.most_views:
-            raise NoRoomError(
-                f"{len(views)} requested views exist, and {self.most_views} are possible "
-                "(most_views in the site file's [renderer]): retry when some of them have ended"
-            )
+            raise NoRoomError(codes.VIEWS_TOO_MANY(count=len(views), most=self.most_views))
         most = self._most_pixels_per_s
         if spec.pixels_per_s > most:
+            possible = math.floor(most / (spec.size[0] * spec.size[1]))
             raise ViewRequestError(
-                f"{_cost(spec)}: requested views may have {most / 1e6:.1f} million together; "
-                f"{math.floor(most / (spec.size[0] * spec.size[1]))} a second is possible, more with a "
-                "larger size, fps or most_views in the site file's [renderer]"
+                codes.VIEW_TOO_COSTLY(**_cost(spec), most_megapixels=most / 1e6, possible=possible)
             )
         left = most - _pixels_per_s(views)
         if spec.pixels_per_s > left:
+            left_megapixels = max(left, 0.0) / 1e6
             raise NoRoomError(
-                f"{_cost(spec)}: {max(left, 0.0) / 1e6:.1f} of {most / 1e6:.1f} million are left "
-                "for requested views; request a smaller or slower one"
+                codes.VIEWS_TOO_COSTLY(
+                    **_cost(spec), left_megapixels=left_megapixels, most_megapixels=most / 1e6
+                )
             )
         while not self._fits(views, spec, asker):
             if not self._reassign(views, asker):
@@ -120,9 +118,9 @@ def _views_of(views: Collection[RequestedView], asker: str) -> list[RequestedVie
     return [view for view in views if view.askers[:1] == [asker]]
 
 
-def _cost(spec: ViewSpec) -> str:
-    size = f"{spec.size[0]} x {spec.size[1]}"
-    return f"{size} at {spec.fps:g} a second counts for {spec.pixels_per_s / 1e6:.1f} million pixels a second"
+def _cost(spec: ViewSpec) -> dict[str, float]:
+    width, height = spec.size
+    return {"width": width, "height": height, "fps": spec.fps, "megapixels": spec.pixels_per_s / 1e6}
 
 
 def _pixels_per_s(views: Collection[RequestedView]) -> float:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from renderer.appearance import Appearance, frame_placements, home_placements
 from renderer.cameras import FIELD_OF_VIEW, Camera, fitted
 from renderer.errors import CameraError, UnknownViewError
+from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import Vector3, View
 
 FloatArray = NDArray[np.float64]
@@ -81,8 +82,7 @@ def camera_from(
     eye, target = _vector(view.eye, "eye"), _vector(view.target, "target")
     up = _vector(view.up, "up")
     if np.linalg.norm(target - eye) < _LEAST_LOOK_M:
-        where = ", ".join(f"{value:g}" for value in eye)
-        raise CameraError(f"eye and target are both at ({where}) m: they must be different points")
+        raise CameraError(codes.CAMERA_NO_DIRECTION(place=", ".join(f"{value:g}" for value in eye)))
     mount_to_site = _mount(appearance, view.mount, placements)
     camera = Camera(eye, target, up if up.any() else _UP, field_of_view=_field_of_view(view))
     if view.projection == View.ORTHOGRAPHIC:
@@ -107,7 +107,7 @@ def _fixed_camera(appearance: Appearance, name: str, aspect: float) -> Camera:
 def _scaled(appearance: Appearance, camera: Camera, view: View, aspect: float) -> Camera:
     if view.HasField("height"):
         if not _LEAST_HEIGHT_M <= view.height <= _MOST_M:
-            raise CameraError(f"height {view.height:g} m: must be from {_LEAST_HEIGHT_M:g} to {_MOST_M:g}")
+            raise CameraError(codes.CAMERA_HEIGHT(value=view.height, least=_LEAST_HEIGHT_M, most=_MOST_M))
         return replace(camera, half_height=view.height / 2.0)
     if view.mount:
         return replace(camera, half_height=appearance.radius)
@@ -121,8 +121,13 @@ def _field_of_view(view: View) -> float:
     degrees = math.degrees(view.field_of_view)
     if not least <= degrees <= most:
         raise CameraError(
-            f"field_of_view {view.field_of_view:g} rad: must be from {math.radians(least):.3f} to "
-            f"{math.radians(most):.3f} ({least:g}° to {most:g}°)"
+            codes.CAMERA_ANGLE(
+                value=view.field_of_view,
+                least=math.radians(least),
+                most=math.radians(most),
+                least_deg=least,
+                most_deg=most,
+            )
         )
     return view.field_of_view
 
@@ -136,14 +141,14 @@ def _mount(appearance: Appearance, mount: str, placements: Mapping[str, FloatArr
         return known[mount]
     except KeyError:
         names = ", ".join(sorted(known))
-        raise CameraError(f"mount {mount!r} is not a link or frame of the robot; use {names}") from None
+        raise CameraError(codes.CAMERA_MOUNT(mount=mount, names=names)) from None
 
 
 def _vector(vector: Vector3, what: str) -> FloatArray:
     values = np.array([vector.x, vector.y, vector.z])
     if not np.isfinite(values).all() or np.abs(values).max() > _MOST_M:
         numbers = ", ".join(f"{value:g}" for value in values)
-        raise CameraError(f"{what} ({numbers}): numbers must be from {-_MOST_M:g} to {_MOST_M:g}")
+        raise CameraError(codes.CAMERA_VECTOR(field=what, numbers=numbers, most=_MOST_M))
     return values
 
 

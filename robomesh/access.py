@@ -16,8 +16,10 @@ from typing import Any, Literal, get_args
 import zenoh
 
 from robomesh import keys
+from robomesh import reason_codes as codes
 from robomesh.certificate_identity import Identity
 from robomesh.errors import KeyNameError
+from robomesh.reasons import Reason
 from robomesh.topics import PEOPLE, REQUESTS, SERVICES, TOPICS, Request, Role, Topic
 
 Act = Literal[
@@ -322,26 +324,26 @@ def _let_out(site: str) -> Iterator[str]:
 # --------------------------------------------------------------------- words
 
 
-def refusal(principal: Principal, act: Act, key: str) -> str:
-    """Return why a principal may not do an act on a key, as a sentence for people."""
-    who = f"{principal.name} is {_a(principal.role)}"
+def refusal(principal: Principal, act: Act, key: str) -> Reason:
+    """Return why a principal may not do an act on a key."""
+    who = {"name": principal.name, "role": principal.role.value}
     try:
-        site, robot, name = keys.parse_expression(key)
+        site, robot, topic = keys.parse_expression(key)
     except KeyNameError:
-        return f"{who}: it may not use {key}"
-    row = _row(name)
+        return codes.RIGHT_KEY(**who, key=key)
+    row = _row(topic)
     if row is None:
-        return f"{who}: it may not use {key}"
+        return codes.RIGHT_KEY(**who, key=key)
     verb, roles = _verb(row, act)
+    what = {**who, "act": verb, "topic": topic}
     if principal.role not in roles:
-        return f"{who}: it may not {verb} {name}; {_listed(roles)} may"
+        return codes.RIGHT_ROLE(**what, roles=", ".join(sorted(role.value for role in roles)))
     if isinstance(row, Request) and row.in_name and act == "query":
         own = _asked_as(row, _names_of(principal, principal.site).replace("$*", "NAME"))
-        return f"{who}: it may not {verb} {name}, which carries another name; it may {verb} {own}"
+        return codes.RIGHT_NAME(**what, own=own)
     if site != principal.site:
-        return f"{who}: it may not {verb} {name} at site {site}, which is another site"
-    own = ", ".join(sorted(principal.robots or ()))
-    return f"{who}: it may not {verb} {name} of {robot}; its robots are {own}"
+        return codes.RIGHT_SITE(**what, site=site)
+    return codes.RIGHT_ROBOT(**what, robot=robot, robots=", ".join(sorted(principal.robots or ())))
 
 
 def _verb(row: Topic | Request, act: Act) -> tuple[str, frozenset[Role]]:
@@ -357,12 +359,3 @@ def _row(name: str) -> Topic | Request | None:
         (row for table in rows for pattern, row in table.items() if zenoh.KeyExpr(pattern).includes(asked)),
         None,
     )
-
-
-def _a(role: Role) -> str:
-    return f"{'an' if role.value[0] in 'aeiou' else 'a'} {role.value}"
-
-
-def _listed(roles: frozenset[Role]) -> str:
-    names = sorted(_a(role) for role in roles)
-    return " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

@@ -1,16 +1,17 @@
 """Errors of the library.
 
 BusError
-├── KeyNameError            a site, robot, topic or operator name that is invalid in a key
-├── UnknownTopicError       a topic that is not in the table
-├── MessageError            bytes or JSON that are not the expected message
 ├── SessionError            a session that cannot be opened with its settings
-├── RefusedError            a request that its owner refused, with the reason
-│   ├── BusyError           a request that its owner is too busy to do
-│   ├── QuotaError          a request over the caller's quota; it may be repeated later
-│   └── NoRightError        a request that our certificate does not allow; it was not sent
-└── NoAnswerError           a request without an answer in time
-    └── BrokenAnswerError   a long answer that ended early
+├── NoAnswerError           a request without an answer in time
+│   └── BrokenAnswerError   a long answer that ended early
+└── CodedError              an error with a reason of the table
+    ├── KeyNameError        a site, robot, topic or operator name that is invalid in a key
+    ├── UnknownTopicError   a topic that is not in the table
+    ├── MessageError        bytes or JSON that are not the expected message
+    └── RefusedError        a request that its owner refused, with the reason
+        ├── BusyError       a request that its owner is too busy to do
+        ├── QuotaError      a request over the caller's quota; it may be repeated later
+        └── NoRightError    a request that our certificate does not allow; it was not sent
 """
 
 from robomesh import reason_codes as codes
@@ -21,26 +22,12 @@ class BusError(Exception):
     """Base of the library's errors; the text is one line for people."""
 
 
-class KeyNameError(BusError):
-    """A name that is invalid in a key."""
-
-
-class UnknownTopicError(BusError):
-    """A topic that is not in the table of `robomesh.topics`."""
-
-
-class MessageError(BusError):
-    """A payload that is not the expected message."""
-
-
 class SessionError(BusError):
     """A session that cannot be opened with its settings."""
 
 
-class RefusedError(BusError):
-    """A refused request; the text says what was wrong and what to do.
-
-    A request's handler raises it to refuse the request; `ask` raises it at the caller.
+class CodedError(BusError):
+    """An error with a reason of the table.
 
     Args:
         reason: A reason from the table; a plain text has the code `other`.
@@ -53,6 +40,25 @@ class RefusedError(BusError):
     def __init__(self, reason: Reason | str, *, text: str = "") -> None:
         super().__init__(text or str(reason))
         self.reason = codes.OTHER(detail=reason) if isinstance(reason, str) else reason
+
+
+class KeyNameError(CodedError):
+    """A name that is invalid in a key."""
+
+
+class UnknownTopicError(CodedError):
+    """A topic that is not in the table of `robomesh.topics`."""
+
+
+class MessageError(CodedError):
+    """A payload that is not the expected message."""
+
+
+class RefusedError(CodedError):
+    """A refused request; the text says what was wrong and what to do.
+
+    A request's handler raises it to refuse the request; `ask` raises it at the caller.
+    """
 
 
 class BusyError(RefusedError):

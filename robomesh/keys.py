@@ -9,6 +9,7 @@ robomesh/<site>/<robot>/alive/<service>/<id>    presence: a liveliness token
 import re
 from typing import NamedTuple
 
+from robomesh import reason_codes as codes
 from robomesh.errors import KeyNameError
 from robomesh.texts import one_line
 
@@ -53,10 +54,7 @@ def check_name(name: str, what: str = "name") -> str:
             letter or digit.
     """
     if len(name) > LONGEST_NAME or not _NAME.fullmatch(name):
-        raise KeyNameError(
-            f"{what} {one_line(name, LONGEST_NAME)!r} cannot be used: lower-case letters, digits, '_' and "
-            f"'-', beginning with a letter or digit, at most {LONGEST_NAME}"
-        )
+        raise KeyNameError(codes.KEY_NAME(what=what, name=one_line(name, LONGEST_NAME), most=LONGEST_NAME))
     return name
 
 
@@ -67,10 +65,7 @@ def check_chunk(name: str, what: str = "operator") -> str:
         KeyNameError: If it is not.
     """
     if len(name) > LONGEST_CHUNK or not _CHUNK.fullmatch(name):
-        raise KeyNameError(
-            f"{what} {one_line(name, LONGEST_NAME)!r} cannot be used: letters, digits, '_', '.' and '-', "
-            f"beginning with a letter or digit, at most {LONGEST_CHUNK} characters"
-        )
+        raise KeyNameError(codes.KEY_CHUNK(what=what, name=one_line(name, LONGEST_NAME), most=LONGEST_CHUNK))
     return name
 
 
@@ -128,8 +123,7 @@ def parse_expression(key_expr: str | Key) -> Key:
         return key_expr
     root, *rest = key_expr.split("/", 3)
     if root != ROOT or len(rest) != 3 or not all(rest):
-        shown = one_line(key_expr, LONGEST_CHUNK)
-        raise KeyNameError(f"{shown!r} is not a key of the mesh: robomesh/<site>/<robot>/<topic>")
+        raise KeyNameError(codes.KEY_OTHER(key=one_line(key_expr, LONGEST_CHUNK)))
     return Key(*rest)
 
 
@@ -173,4 +167,4 @@ def parse_presence_key(key: str) -> PresenceKey:
     match topic.split("/"):
         case ["alive", service, identity]:
             return PresenceKey(site, robot, service, identity)
-    raise KeyNameError(f"{key!r} is not a presence key: {ROOT}/<site>/<robot>/alive/<service>/<id>")
+    raise KeyNameError(codes.KEY_NOT_PRESENCE(key=key))

@@ -15,6 +15,7 @@ from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.message import DecodeError, Message
 from google.protobuf.timestamp_pb2 import Timestamp
 
+from robomesh import reason_codes as codes
 from robomesh.errors import MessageError
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
@@ -68,7 +69,8 @@ def decode(schema: type[AnyMessage], payload: bytes) -> AnyMessage:
     try:
         message = schema.FromString(payload)
     except DecodeError as error:
-        raise MessageError(f"{len(payload)} bytes are not a {schema.DESCRIPTOR.full_name}: {error}") from None
+        name = schema.DESCRIPTOR.full_name
+        raise MessageError(codes.NOT_MESSAGE(count=len(payload), message=name, detail=error)) from None
     _check_times(message, _dated(schema.DESCRIPTOR))
     return message
 
@@ -92,15 +94,16 @@ def _from_json(schema: type[AnyMessage], payload: bytes) -> AnyMessage:
         text = payload.decode() or "{}"
         values = json.loads(text)
         if not isinstance(values, dict):
-            raise MessageError(f"not {_a(name)}: send a JSON object, as in {{}}")
+            raise MessageError(codes.NOT_JSON_OBJECT())
         for key, value in values.items():
             _check_key(schema, key, value)
         json_format.Parse(text, message)
     except (ValueError, RecursionError) as error:  # includes UnicodeDecodeError and JSONDecodeError
-        raise MessageError(f"not JSON: {error}") from None
+        raise MessageError(codes.NOT_JSON(detail=error)) from None
     except json_format.ParseError as error:
         # After " at " protobuf repeats the path in its own names.
-        raise MessageError(f"not {_a(name)}: {str(error).splitlines()[0].partition(' at ')[0]}") from None
+        text = str(error).splitlines()[0].partition(" at ")[0]
+        raise MessageError(codes.NOT_JSON_MESSAGE(message=name, detail=text)) from None
     return message
 
 
@@ -111,17 +114,13 @@ def _check_key(schema: type[Message], key: str, value: object) -> None:
     field = fields.get(key)
     if field is None:
         names = ", ".join(field.name for field in descriptor.fields)
-        raise MessageError(f"not {_a(descriptor.name)}: it has no field {key!r}; its fields are: {names}")
+        raise MessageError(codes.UNKNOWN_FIELD(request=descriptor.name, field=key, fields=names))
     if field.enum_type is not None and isinstance(value, str) and value not in field.enum_type.values_by_name:
         names = ", ".join(each.name for each in field.enum_type.values if each.number)
-        raise MessageError(f"{key}: {value!r} is not one of {names}")
+        raise MessageError(codes.FIELD_NOT_ONE_OF(field=key, value=value, names=names))
 
 
-def _a(name: str) -> str:
-    return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
-
-
-def _problems(message: Message, path: str = "") -> Iterator[str]:
+def _problems(message: Message, path: str = "") -> Iterator[Reason]:
     for field in message.DESCRIPTOR.fields:
         name = path + field.name
         enum = field.enum_type
@@ -130,12 +129,13 @@ def _problems(message: Message, path: str = "") -> Iterator[str]:
             number = getattr(message, field.name)
             names = [value.name for value in enum.values if value.number]
             if number == 0 or number not in enum.values_by_number:
-                yield f"{name}: set one of {', '.join(names)}"
+                yield codes.FIELD_UNSET(field=name, names=", ".join(names))
     for field, value in message.ListFields():
         name = path + field.name
         values = value if field.is_repeated and not _is_map(field) else (value,)
         if field.type in _FLOATS and not all(math.isfinite(number) for number in values):
-            yield f"{name}: {value if not field.is_repeated else list(value)} is not finite"
+            shown = list(value) if field.is_repeated else value
+            yield codes.FIELD_NOT_FINITE(field=name, value=shown)
         elif field.type == FieldDescriptor.TYPE_MESSAGE and not _is_map(field):
             for child in values:
                 yield from _problems(child, f"{name}.")
@@ -157,7 +157,7 @@ def _check_times(message: Message, dated: _Dated) -> None:
             if within is not None:
                 _check_times(each, within)
             elif not (_FIRST_S <= each.seconds <= _LAST_S and 0 <= each.nanos < 1_000_000_000):
-                raise MessageError(f"{name}: {each.seconds} s and {each.nanos} ns is not a valid time")
+                raise MessageError(codes.FIELD_TIME(field=name, seconds=each.seconds, nanos=each.nanos))
 
 
 @cache

@@ -2,6 +2,9 @@
 
 The sentence is the problem, then a colon and the advice. Words in braces are parameters; `{cause}` is the
 sentence of another reason. The page translates these codes (`web/src/i18n/reasons.ts`).
+
+`{detail}` is a text of another author: the operating system, a third-party reader, a controller; or the
+problem of a file, which has too many forms for codes.
 """
 
 from robomesh.reasons import Code
@@ -13,12 +16,24 @@ BUSY = Code(
 )
 TURNED_AWAY = Code("request.turned_away", "refused unread: too many requests were waiting")
 FAILED = Code("request.failed", "{request} failed with an internal error", "see the log of its service")
-INVALID = Code("request.invalid", "{detail}")
+INVALID = Code("request.invalid", "{cause}")
 # A refusal without a code, and several reasons for one refusal.
 OTHER = Code("other", "{detail}")
 SEVERAL = Code("several", "{cause}")
 WILDCARD = Code("request.wildcard", "{key} has a wildcard", "ask one {request} by its whole key")
-NO_RIGHT = Code("request.no_right", "{detail}")
+NO_RIGHT = Code("request.no_right", "{cause}")
+RIGHT_KEY = Code("right.key", "{name} has the role {role}: it may not use {key}")
+RIGHT_ROLE = Code("right.role", "{name} has the role {role}: it may not {act} {topic}; only {roles} may")
+RIGHT_NAME = Code(
+    "right.name",
+    "{name} has the role {role}: it may not {act} {topic}, which carries another name; it may {act} {own}",
+)
+RIGHT_SITE = Code(
+    "right.site", "{name} has the role {role}: it may not {act} {topic} at site {site}, which is another site"
+)
+RIGHT_ROBOT = Code(
+    "right.robot", "{name} has the role {role}: it may not {act} {topic} of {robot}; its robots are {robots}"
+)
 OVER_QUOTA = Code(
     "quota.rate",
     "{asker} has used up its quota: {quota} = {most:g} for each name ([quotas] in the site file)",
@@ -49,6 +64,38 @@ NO_ANSWER = Code("request.no_answer", "{detail}")
 ABANDONED = Code("request.abandoned", "the client has disconnected")
 UNKNOWN_FIELD = Code("request.unknown_field", "{request} has no field '{field}'; it takes {fields}")
 NOT_FINITE = Code("request.not_finite", "{value} is not finite")
+NOT_MESSAGE = Code("request.not_message", "{count} bytes are not a {message}: {detail}")
+NOT_JSON_MESSAGE = Code("request.not_json_message", "the JSON does not fit {message}: {detail}")
+NOT_LEASE_REQUEST = Code("request.not_lease_request", "this is no LeaseRequest")
+FIELD_NOT_ONE_OF = Code("request.field_not_one_of", "{field}: '{value}' is not one of {names}")
+FIELD_UNSET = Code("request.field_unset", "{field}: set one of {names}")
+FIELD_NOT_FINITE = Code("request.field_not_finite", "{field}: {value} is not finite")
+FIELD_TIME = Code("request.field_time", "{field}: {seconds} s and {nanos} ns is not a valid time")
+REQUEST_UNKNOWN = Code("request.unknown", "no request '{name}'; there are {names}")
+TOPIC_UNKNOWN = Code("key.topic_unknown", "no topic '{name}'; there are {names}")
+KEY_NAME = Code(
+    "key.name",
+    "{what} '{name}' cannot be used",
+    "lower-case letters, digits, '_' and '-', beginning with a letter or digit, at most {most}",
+)
+KEY_CHUNK = Code(
+    "key.chunk",
+    "{what} '{name}' cannot be used",
+    "letters, digits, '_', '.' and '-', beginning with a letter or digit, at most {most} characters",
+)
+KEY_OTHER = Code("key.other", "'{key}' is not a key of the mesh: robomesh/<site>/<robot>/<topic>")
+KEY_NOT_PRESENCE = Code(
+    "key.not_presence", "'{key}' is not a presence key: robomesh/<site>/<robot>/alive/<service>/<id>"
+)
+OPERATOR_RESERVED = Code(
+    "key.operator_reserved", "operator '{name}' cannot be used: it is the name of a request"
+)
+OPERATOR_TOO_LONG = Code("key.operator_too_long", "operator {name}: a name has at most {most} characters")
+FAULT_UNKNOWN = Code("fault.unknown", "fault '{name}' is unknown; there are {names}")
+FAULT_TIMES = Code(
+    "fault.times",
+    "fault '{given}': NAME@BEGIN+LENGTH is right, both in seconds, as in {name}@2.5+10",
+)
 KEY_TOO_LONG = Code("request.key_too_long", "the key has {count} characters", "at most {most} are allowed")
 PAGE_TOO_MANY = Code(
     "page.too_many_requests", "more than {count} requests are waiting for an answer", "try again later"
@@ -83,7 +130,15 @@ PAGE_WATCH_NO_RIGHT = Code(
     "page.watch_no_right", "'{key}' cannot be watched: the console has no right to {topic}"
 )
 PAGE_CANNOT_WATCH = Code("page.cannot_watch", "'{key}' cannot be watched: {detail}")
-WORKER_GAVE_UP = Code("request.worker_gave_up", "aborted: {detail}")
+WORKER_GAVE_UP = Code("request.worker_gave_up", "aborted: {cause}")
+WORKER_TOO_SLOW = Code("worker.too_slow", "no answer within {seconds:g} s")
+WORKER_NOT_STARTED = Code("worker.not_started", "{module} could not be started: {detail}")
+WORKER_START_TOO_SLOW = Code("worker.start_too_slow", "{module} did not start within {seconds:g} s")
+WORKER_CRASHED = Code("worker.crashed", "{module} crashed (status {status})")
+WORKER_ANSWER_TOO_LONG = Code(
+    "worker.answer_too_long", "{module}: its answer has {count} bytes: {most} at most"
+)
+WORKER_ANSWER_INVALID = Code("worker.answer_invalid", "{module}: its answer is invalid: {detail}")
 
 # ----------------------------------------------------------------------- HTTP
 
@@ -220,7 +275,9 @@ COMMAND_NOT_WRITTEN = Code(
     "command.not_written", "{cause}; a command that cannot be recorded is not executed"
 )
 COMMAND_CHANGED = Code("command.changed", "{cause} since the motion was checked")
-COMMAND_UNSUPPORTED = Code("command.unsupported", "{detail}")
+COMMAND_UNSUPPORTED = Code("command.unsupported", "{cause}")
+COMMAND_NOT_A_UNIT = Code("command.not_a_unit", "cannot be sent: {detail}")
+COMMAND_VALUES = Code("command.values", "{count} values for {joints} joints")
 COMMAND_NOT_LATCHED = Code("command.not_latched", "{cause}, so a restart would forget a stop")
 
 STOP_NOT_LATCHED = Code("stop.not_latched", "stop {id} is not latched; no stop is")
@@ -275,12 +332,14 @@ LINK_NO_UNIT = Code("link.no_unit", "connected to {where}, no unit yet")
 LINK_FAILED = Code("link.failed", "cannot connect to {where}: {detail}")
 LINK_NO_ANSWER = Code("link.no_answer", "{where} does not answer")
 LINK_CLOSED = Code("link.closed", "the link was closed")
-LINK_LOST = Code("link.lost", "{where}: {detail}")
+LINK_LOST = Code("link.lost", "{where}: {cause}")
+LINK_CLOSED_THERE = Code("link.closed_there", "the controller closed the connection")
 LINK_REFUSED = Code("link.refused", "{where} refused the connection: {detail}")
 LINK_NO_DATA = Code("link.no_data", "{where} sends nothing")
 LINK_RECONNECTS = Code("link.reconnects", "{where} sends nothing; connecting again")
 LINK_DELUGE = Code("link.deluge", "{where} sends far too much data: all of it is discarded")
-LINK_OTHER_JOINTS = Code("link.other_joints", "{where} sends {detail}")
+LINK_OTHER_JOINTS = Code("link.other_joints", "{where} sends {cause}")
+JOINT_VALUES = Code("joints.values", "{count} joint values, the description has {joints}")
 LINK_JUST_ENDED = Code("link.just_ended", "the connection has just ended")
 LINK_BROKE = Code("link.broke", "the connection broke while it was written")
 LINK_CLOGGED = Code("link.clogged", "the controller does not read; connecting again")
@@ -329,12 +388,79 @@ JOINT_COUNT = Code("joints.count", "{count} joint positions, but the robot has {
 JOINTS_OUTSIDE = Code("joints.outside", "{cause}")
 JOINT_LIMIT = Code("joints.limit", "joint {name} at {value} is beyond its limit {limit}")
 JOINT_NOT_FINITE = Code("joints.not_finite", "joint {name} at {value} is not a finite number")
+JOINT_BEYOND = Code("joints.beyond", "joint {name} at {value}, limits {lower} to {upper}")
+JOINT_SHAPE = Code(
+    "joints.shape",
+    "joint positions of shape {shape}: this robot takes ({joints},), one value per joint",
+)
 JOINT_CONSTRAINT = Code("joints.constraint", "{terms} at {value} is beyond its limit {limit}")
 
 # ------------------------------------------------------------------- programs and checks
 
-PROGRAM_UNREADABLE = Code("program.unreadable", "{detail}")
-PROGRAM_UNREACHABLE = Code("program.unreachable", "{detail}")
+PROGRAM_UNREADABLE = Code("program.unreadable", "{cause}")
+PROGRAM_UNREACHABLE = Code("program.unreachable", "{cause}")
+PROGRAM_EMPTY = Code("program.empty", "the program has no statement that does anything")
+PROGRAM_BYTES = Code("program.bytes", "the program has {count} bytes; up to {most} are read")
+PROGRAM_LINES = Code("program.lines", "the program has {count} lines; up to {most} are read")
+PROGRAM_STEPS = Code("program.steps", "the program has more than {most} steps here, including repeats")
+PROGRAM_STEPS_OF_LINES = Code(
+    "program.steps_of_lines",
+    "the program has more than {most} steps here, including those that lines are cut into",
+)
+STATEMENT_NEAR = Code("program.statement_near", "'{word}' is not a statement; did you mean '{near}'?")
+STATEMENT_UNKNOWN = Code("program.statement_unknown", "'{word}' is not a statement; there are {names}")
+POINT_FORM = Code(
+    "program.point_form", "write a definition as 'point NAME = joints ...' or 'point NAME = pose ...'"
+)
+POINT_NAME = Code(
+    "program.point_name",
+    "'{name}' is not a valid point name: small letters, digits, _ and -, a letter first, up to {most}",
+)
+POINT_RESERVED = Code(
+    "program.point_reserved", "'{name}' is a statement and not a valid point name: choose another"
+)
+POINT_TWICE = Code("program.point_twice", "point '{name}' is already defined in line {line}")
+POINT_NEAR = Code("program.point_near", "{word}: there is no point '{name}'; did you mean '{near}'?")
+POINT_UNKNOWN = Code("program.point_unknown", "{word}: there is no point '{name}'; there are {names}")
+POINT_NONE = Code("program.point_none", "{word}: there is no point '{name}'; none is defined")
+TRACE_FORM = Code("program.trace_form", "'trace' takes on or off, not {given}")
+REPEAT_NOT_CLOSED = Code("program.repeat_not_closed", "'repeat' has no 'end'")
+REPEAT_NOT_WHOLE = Code("program.repeat_not_whole", "'repeat' takes a whole number, not {given}")
+REPEAT_TOO_DEEP = Code("program.repeat_too_deep", "'repeat' is nested more than {most} deep")
+END_WITHOUT_REPEAT = Code("program.end_without_repeat", "'end' without an open 'repeat' above")
+NOT_A_NUMBER = Code("program.not_a_number", "'{word}': '{given}' is not a number")
+JOINT_NUMBERS = Code(
+    "program.joint_numbers",
+    "'{word}' takes {count} numbers ({names}: degrees, mm of a prismatic joint), not {given}",
+)
+POSE_NUMBERS = Code(
+    "program.pose_numbers", "'{word}' takes {count} numbers ({names}: mm and degrees), not {given}"
+)
+NUMBER_TOO_LARGE = Code(
+    "program.number_too_large", "'{word}': {name} is {given}; must be between -{most:.0f} and {most:.0f}"
+)
+ONE_NUMBER = Code("program.one_number", "'{word}' takes one number ({unit}), not {given}")
+NUMBER_OUTSIDE = Code(
+    "program.number_outside", "'{word}' is {given}; must be between {least:g} and {most:g} {unit}"
+)
+NO_ARGUMENT = Code("program.no_argument", "'{word}' takes no argument, not '{given}'")
+POINT_UNREACHABLE = Code("program.point_unreachable", "point {name} cannot be reached: {cause}")
+POSE_UNREACHABLE = Code("program.pose_unreachable", "the pose at {place} mm cannot be reached: {cause}")
+LINE_NOT_FOLLOWED = Code("program.line_not_followed", "the line cannot be followed: {cause}")
+LINE_NOT_FOLLOWED_BEYOND = Code(
+    "program.line_not_followed_beyond",
+    "the line cannot be followed beyond {done_mm:.1f} of its {length_mm:.1f} mm: {cause}",
+)
+LINE_END = Code("program.line_end", "its end cannot be reached: {cause}")
+LINE_JUMP = Code(
+    "program.line_jump",
+    "the arm would have to jump to another posture there, with joint {name} moving most",
+)
+LINE_AWAY = Code("program.line_away", "the tool stays {distance_mm:.1f} mm away from it")
+LINE_BENT = Code(
+    "program.line_bent",
+    "the arm cannot keep its tool's axis within {limit_deg:g}° of a uniform rotation there",
+)
 PROGRAM_START_OUTSIDE = Code("program.start_outside", "at the start: {cause}")
 PROGRAM_LINE = Code("program.line", "line {line}: {cause}")
 PROGRAM_TOO_LONG = Code("program.too_long", "a program has at most {kib} KiB")
@@ -381,9 +507,10 @@ CHECK_REQUIRED = Code(
 )
 CHECK_SKIPPED = Code("check.skipped", "not checked: {cause}")
 CHECK_STARTING = Code("check.starting", "the check is still starting", "try again in a few seconds")
-CHECK_BROKEN = Code("check.broken", "the check does not work: {detail}")
-CHECK_FAILED = Code("check.failed", "the check failed: {detail}")
-CHECK_IMPOSSIBLE = Code("check.impossible", "{detail}")
+CHECK_BROKEN = Code("check.broken", "the check does not work: {cause}")
+CHECK_FAILED = Code("check.failed", "the check failed: {cause}")
+CHECK_IMPOSSIBLE = Code("check.impossible", "{cause}")
+CHECK_NOTHING = Code("check.nothing", "its description has no link with a shape, so nothing can be checked")
 CHECK_QUEUED_TOO_LONG = Code(
     "check.queued_too_long", "the check waited longer than {seconds:g} s for other checks"
 )
@@ -412,12 +539,14 @@ FIXED_WITHOUT_SHAPE = Code(
 # ------------------------------------------------------------------- audit log and latch file
 
 AUDIT_SLOW = Code("audit.slow", "the audit log's disk takes longer than {seconds:g} s")
-AUDIT_NOT_WRITABLE = Code("audit.not_writable", "the audit log {file} cannot be written ({detail})")
+AUDIT_NOT_WRITABLE = Code("audit.not_writable", "the audit log {file} cannot be written ({cause})")
 AUDIT_QUEUE_FULL = Code("audit.queue_full", "{count} entries wait for the disk")
 LATCH_SLOW = Code("latch.slow", "the latch file {name} takes longer than {seconds:g} s to write")
 LATCH_CLOSED = Code("latch.closed", "the latch file {name} is closed: its gateway is shutting down")
-LATCH_NOT_WRITABLE = Code("latch.not_writable", "the latch file {name} cannot be written ({detail})")
-LATCH_NOT_ALLOCATED = Code("latch.not_allocated", "the latch file {name} cannot be allocated ({detail})")
+LATCH_NOT_WRITABLE = Code("latch.not_writable", "the latch file {name} cannot be written ({cause})")
+LATCH_NOT_ALLOCATED = Code("latch.not_allocated", "the latch file {name} cannot be allocated ({cause})")
+DISK_FULL = Code("disk.full", "{detail}", "make space on its disk")
+DISK_FAULT = Code("disk.fault", "{detail}", "check its disk")
 LAST_OF_MANY = Code("audit.last_of_many", "{cause} (the last of many callers)")
 NOT_DONE = Code("audit.not_done", "not done: {cause}")
 AUDIT_SEARCHES = Code(
@@ -443,8 +572,42 @@ ALARM_UNKNOWN = Code("alarm.unknown", "no alarm '{id}'", "it may have ended and 
 # ------------------------------------------------------------------- kinematics
 
 INVERSE_TASK = Code("inverse.task", "task {task} is unknown", "use POSE_6D or POSITION_AND_AXIS_5D")
-INVERSE_POSE = Code("inverse.pose", "{detail}")
-INVERSE_NEAR = Code("inverse.near", "near: {detail}")
+INVERSE_POSE = Code("inverse.pose", "{cause}")
+INVERSE_NEAR = Code("inverse.near", "near: {cause}")
+INVERSE_LIMITS = Code("inverse.limits", "limits: found only with {cause}")
+INVERSE_TOO_FAR = Code(
+    "inverse.too_far",
+    "out of reach: {distance} from the first joint; the tool reaches at most {reach}",
+)
+INVERSE_GAP = Code(
+    "inverse.gap", "out of reach: within its limits the tool stays at least {distance} from this position"
+)
+INVERSE_ORIENTATION = Code(
+    "inverse.orientation",
+    "not this orientation: at this position, the tool's orientation is at least {angle} off",
+)
+INVERSE_AXIS = Code(
+    "inverse.axis", "not this orientation: at this position, the tool's axis is at least {angle} off"
+)
+POSE_NOT_NUMBERS = Code("pose.not_numbers", "the pose takes 16 numbers, 4 rows of 4, tool to base in metres")
+POSE_SIZE = Code("pose.size", "the pose has {count} numbers; 16 are right, 4 rows of 4")
+POSE_SHAPE = Code("pose.shape", "the pose has numbers of shape {shape}; 16 are right, 4 rows of 4")
+POSE_NOT_FINITE = Code("pose.not_finite", "the pose holds {value}; every number must be finite")
+POSE_LAST_ROW = Code("pose.last_row", "the pose has the last row {row}; 0 0 0 1 is right")
+POSE_TOO_FAR = Code("pose.too_far", "the pose is {distance_m:.3g} m away; less than {limit_m:g} m is right")
+POSE_NO_ROTATION = Code(
+    "pose.no_rotation",
+    "the pose has no rotation in its first 3 rows and columns: the rows must have length 1 and be at right "
+    "angles, these have the lengths {lengths}",
+)
+POSE_MIRRORED = Code(
+    "pose.mirrored",
+    "the pose is mirrored: the determinant of its first 3 rows and columns is -1; 1 is right",
+)
+POSE_NEAR_NOT_FINITE = Code(
+    "pose.near_not_finite",
+    "the pose was requested near {positions}, which has a number that is not finite",
+)
 CHECK_START_UNKNOWN = Code("check.start_unknown", "the position of {robot} is unknown", "give `start`")
 JOINT_COUNT_OF_FIELD = Code(
     "joints.count_of_field", "{field} has {count} values, but {robot} has {joints} joints ({names})"
@@ -465,15 +628,32 @@ RECORDING_NAME = Code(
 )
 RECORDING_OPEN = Code("recording.open", "{robot} is already being recorded, as '{name}'")
 RECORDING_NOT_OPEN = Code("recording.not_open", "{robot} is not being recorded")
-RECORDING_FAILED = Code("recording.failed", "{detail}")
-RECORDING_UNREADABLE = Code("recording.unreadable", "{detail}")
+RECORDING_FAILED = Code("recording.failed", "{cause}")
+RECORDING_UNREADABLE = Code("recording.unreadable", "{cause}")
 RECORDING_UNKNOWN = Code(
     "recording.unknown", "no recording '{name}' here", "use a file name from recordings/list"
 )
+RECORDING_FILE = Code("recording.file", "{file}: cannot be read: {detail}")
+RECORDING_NOT_WRITABLE = Code("recording.not_writable", "{file}: cannot be written: {detail}")
+RECORDING_EMPTY = Code("recording.empty", "{file} is empty: the disk was full, or the recorder was killed")
+RECORDING_CUT = Code("recording.cut", "{file}: not a readable recording: it ends before its first message")
+RECORDING_NOT_MCAP = Code("recording.not_mcap", "{file}: not an MCAP file: its first bytes are wrong")
+RECORDING_DAMAGED = Code("recording.damaged", "{file}: damaged near byte {byte}")
+RECORDING_CHUNK = Code("recording.chunk", "a chunk has {mib} MiB: the limit is {most} MiB")
+RECORDING_ENDS = Code("recording.ends", "{file}: it ends before byte {byte}")
+RECORDING_NO_BYTE = Code("recording.no_byte", "{file}: no byte {byte}: it has {total}")
 RECORDING_NO_ATTACHMENT = Code(
     "recording.no_attachment", "{file} has no attachment '{name}'", "there are {attachments}"
 )
 RECORDING_NO_TOPIC = Code("recording.no_topic", "{file} has no topic '{topic}'", "there are {topics}")
+RECORDING_NO_VALUE = Code("recording.no_value", "{file}: no value '{name}'; topics with values: {topics}")
+RECORDING_TOO_MANY_VALUES = Code(
+    "recording.too_many_values", "{count} values are too many: request at most {most}"
+)
+RECORDING_TIMES = Code("recording.times", "the range ends before it begins")
+RECORDING_OUTSIDE = Code(
+    "recording.outside", "{file}: nothing from {start} to {end}: it goes from {first} to {last}"
+)
 RECORDING_NO_JOINTS = Code("recording.no_joints", "{file} contains no joint states")
 RECORDING_RANGE = Code("recording.range", "{range}: {file} has {bytes} bytes")
 RECORDING_TOO_MANY = Code(
@@ -508,8 +688,45 @@ REPLAY_SESSION = Code(
 
 VIEW_UNKNOWN = Code("view.unknown", "no view '{view}'; there are {views}")
 VIEW_UNKNOWN_OF = Code("view.unknown_of", "no view '{view}' of {robot}: there are {views}")
-VIEW_NO_ROOM = Code("view.no_room", "no capacity: {detail}")
-VIEW_INVALID = Code("view.invalid", "{detail}")
+VIEW_NO_ROOM = Code("view.no_room", "no capacity: {cause}")
+VIEWS_TOO_MANY = Code(
+    "view.too_many",
+    "{count} requested views exist, and {most} are possible (most_views in the site file's [renderer])",
+    "retry when some of them have ended",
+)
+VIEWS_TOO_COSTLY = Code(
+    "view.too_costly_now",
+    "{width} x {height} at {fps:g} a second counts for {megapixels:.1f} million pixels a second: "
+    "{left_megapixels:.1f} of {most_megapixels:.1f} million are left for requested views; request a "
+    "smaller or slower one",
+)
+VIEW_INVALID = Code("view.invalid", "{cause}")
+VIEW_TOO_COSTLY = Code(
+    "view.too_costly",
+    "{width} x {height} at {fps:g} a second counts for {megapixels:.1f} million pixels a second: "
+    "requested views may have {most_megapixels:.1f} million together; {possible} a second is possible, more "
+    "with a larger size, fps or most_views in the site file's [renderer]",
+)
+VIEW_OR_OF = Code("view.or_of", "a view request needs either `view`, a camera, or `of`, a view's name")
+VIEW_SIZE = Code(
+    "view.size",
+    "size {width} x {height}: must be even numbers from {least} to {most}, with at most as many pixels as "
+    "1920 x 1080",
+)
+VIEW_VALUE = Code("view.value", "{field} {value:g}: must be from {least:g} to {most:g}, or 0 for the default")
+VIEW_GHOST = Code("view.ghost", "the ghost has {count} joint positions: the robot has {joints} joints")
+VIEW_PATH = Code("view.path", "the path has {count} points: at most {most} are drawn")
+VIEW_NOT_FINITE = Code("view.not_finite", "the ghost or path has a number that is not finite")
+CAMERA_NO_DIRECTION = Code(
+    "camera.no_direction", "eye and target are both at ({place}) m: they must be different points"
+)
+CAMERA_HEIGHT = Code("camera.height", "height {value:g} m: must be from {least:g} to {most:g}")
+CAMERA_ANGLE = Code(
+    "camera.angle",
+    "field_of_view {value:g} rad: must be from {least:.3f} to {most:.3f} ({least_deg:g}° to {most_deg:g}°)",
+)
+CAMERA_MOUNT = Code("camera.mount", "mount '{mount}' is not a link or frame of the robot; use {names}")
+CAMERA_VECTOR = Code("camera.vector", "{field} ({numbers}): numbers must be from -{most:g} to {most:g}")
 VIEW_NO_ANSWER = Code("view.no_answer", "the answer to {key}/views contains no view")
 VIEW_NO_RENDERER = Code(
     "view.no_renderer",

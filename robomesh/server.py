@@ -20,7 +20,7 @@ from robomesh.errors import BusyError, KeyNameError, MessageError, QuotaError, R
 from robomesh.ignored import REQUEST, Ignored
 from robomesh.latencies import Latencies
 from robomesh.messages import JSON, PROTOBUF, TEXT, decode_request, encode, is_json
-from robomesh.reasons import RETRY, to_parameters
+from robomesh.reasons import RETRY, Reason, to_parameters
 from robomesh.request_queue import QUEUE, RING, Queue, RateLimit, RoundRobin, begin_now, read
 
 log = logging.getLogger(__name__)
@@ -74,7 +74,7 @@ class Request:
 
 Handler = Callable[[Request], Awaitable[Message | bytes]]
 # Called with the chunk in place of the row's `*`, and the reason why the handler was not called.
-OnRefused = Callable[[str, str], None]
+OnRefused = Callable[[str, Reason], None]
 
 
 class Answerer:
@@ -102,7 +102,7 @@ class Answerer:
         handler: Handler,
         *,
         scheduler: RoundRobin,
-        on_refused: OnRefused = lambda chunk, text: None,
+        on_refused: OnRefused = lambda chunk, reason: None,
         ignored: Ignored,
     ) -> None:
         self._ignored = ignored
@@ -235,7 +235,7 @@ class Answerer:
                 _refuse(query, error)
                 return
             except (MessageError, KeyNameError) as error:
-                _refuse(query, RefusedError(codes.INVALID(detail=error)))
+                _refuse(query, RefusedError(codes.INVALID(error.reason)))
                 return
             except Exception:
                 log.exception("%s: a request failed", key)
@@ -283,8 +283,12 @@ class Answerer:
             payload = query.payload.to_bytes() if query.payload is not None else b""
             message = self._message(payload, encoding)
             return Request(key, message, chunk, received_ns, _within_s(query))
-        except (RefusedError, MessageError, KeyNameError) as error:
-            self._on_refused(chunk, str(error))
+        except (MessageError, KeyNameError) as error:
+            reason = codes.INVALID(error.reason)
+            self._on_refused(chunk, reason)
+            raise RefusedError(reason) from None
+        except RefusedError as error:
+            self._on_refused(chunk, error.reason)
             raise
 
     def _check_key(self, key: keys.Key, asked: str) -> None:

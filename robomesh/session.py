@@ -169,7 +169,7 @@ class Session:
         name: str,
         handler: server.Handler,
         *,
-        on_refused: server.OnRefused = lambda chunk, text: None,
+        on_refused: server.OnRefused = lambda chunk, reason: None,
     ) -> server.Answerer:
         """Answer a request of the table: `stop`, `command/*`.
 
@@ -233,7 +233,7 @@ class Session:
         """Raise an error with the reason if the router would silently reject the act."""
         who = self.principal
         if who is not None and not access.may(who, who.site, act, key):
-            raise NoRightError(codes.NO_RIGHT(detail=access.refusal(who, act, key)))
+            raise NoRightError(codes.NO_RIGHT(access.refusal(who, act, key)))
 
     def measure(self, name: str, text: str, read: Callable[[], float | Mapping[str, float]]) -> None:
         """Add a number to the health and the metrics of this process; see `Measure`."""

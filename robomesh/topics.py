@@ -12,6 +12,7 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
+from robomesh import reason_codes as codes
 from robomesh.errors import KeyNameError, UnknownTopicError
 from robomesh.keys import check_chunk
 from robomesh.schemas import robomesh_pb2 as schema
@@ -414,7 +415,7 @@ def topic(name: str) -> Topic:
     """
     row = _row_name(name, TOPICS)
     if row is None:
-        raise UnknownTopicError(f"no topic {name!r}; there are {', '.join(TOPICS)}")
+        raise UnknownTopicError(codes.TOPIC_UNKNOWN(name=name, names=", ".join(TOPICS)))
     return TOPICS[row]
 
 
@@ -426,7 +427,7 @@ def request(name: str) -> Request:
     """
     row = _row_name(name, REQUESTS)
     if row is None:
-        raise UnknownTopicError(f"no request {name!r}; there are {', '.join(REQUESTS)}")
+        raise UnknownTopicError(codes.REQUEST_UNKNOWN(name=name, names=", ".join(REQUESTS)))
     return REQUESTS[row]
 
 
@@ -438,5 +439,5 @@ def check_operator(name: str) -> str:
             would match the operator's keys.
     """
     if name in REQUESTS:
-        raise KeyNameError(f"operator {name!r} cannot be used: it is the name of a request")
+        raise KeyNameError(codes.OPERATOR_RESERVED(name=name))
     return check_chunk(name)

@@ -18,7 +18,8 @@ import sys
 from collections.abc import Callable, Iterator
 from typing import Any, BinaryIO
 
-from robomesh.errors import BusError
+from robomesh import reason_codes as codes
+from robomesh.errors import BusError, CodedError
 from robomesh.memory_limit import MEMORY_BYTES, limit_memory
 
 _START_S = 60.0
@@ -29,7 +30,7 @@ _PR_SET_PDEATHSIG = 1
 _ANSWER, _ERROR, _REPORT = "answer", "error", "report"
 
 
-class WorkerError(BusError):
+class WorkerError(CodedError):
     """No answer: timeout, or the process did not start or crashed while handling the question."""
 
 
@@ -115,7 +116,7 @@ class Worker:
         except TimeoutError:
             if not deadline.expired():
                 raise  # an exception of the handler
-            raise WorkerTimeoutError(f"no answer within {timeout_s:g} s") from None
+            raise WorkerTimeoutError(codes.WORKER_TOO_SLOW(seconds=timeout_s)) from None
 
     async def close(self) -> None:
         """End the process and its children."""
@@ -144,13 +145,15 @@ class Worker:
                 start_new_session=True,  # for `killpg`; Ctrl-C must reach only the parent
             )
         except OSError as error:
-            raise WorkerError(f"{self._module} could not be started: {error.strerror}") from None
+            reason = codes.WORKER_NOT_STARTED(module=self._module, detail=error.strerror)
+            raise WorkerError(reason) from None
         try:
             async with asyncio.timeout(_START_S):
                 await self._answer(process, self._settings)
         except TimeoutError:
             await self.close()
-            raise WorkerError(f"{self._module} did not start within {_START_S:g} s") from None
+            reason = codes.WORKER_START_TOO_SLOW(module=self._module, seconds=_START_S)
+            raise WorkerError(reason) from None
         except WorkerError:
             raise
         except Exception as error:
@@ -176,7 +179,8 @@ class Worker:
                 kind, value = await self._receive(process.stdout)
         except (asyncio.IncompleteReadError, ConnectionError):
             await self.close()
-            raise WorkerError(f"{self._module} crashed (status {process.returncode})") from None
+            reason = codes.WORKER_CRASHED(module=self._module, status=process.returncode)
+            raise WorkerError(reason) from None
         except BaseException:
             # The caller was cancelled, or the answer is invalid; the next caller must not receive the rest.
             await self.close()
@@ -188,14 +192,15 @@ class Worker:
     async def _receive(self, answers: asyncio.StreamReader) -> tuple[str, Any]:
         (length,) = _LENGTH.unpack(await answers.readexactly(_LENGTH.size))
         if self._untrusted and length > _MOST_UNTRUSTED_BYTES:
-            raise WorkerError(
-                f"{self._module}: its answer has {length} bytes: {_MOST_UNTRUSTED_BYTES} at most"
+            reason = codes.WORKER_ANSWER_TOO_LONG(
+                module=self._module, count=length, most=_MOST_UNTRUSTED_BYTES
             )
+            raise WorkerError(reason)
         body = await answers.readexactly(length)
         try:
             kind, value = json.loads(body) if self._untrusted else pickle.loads(body)
         except (ValueError, TypeError, RecursionError) as error:
-            raise WorkerError(f"{self._module}: its answer is invalid: {error}") from None
+            raise WorkerError(codes.WORKER_ANSWER_INVALID(module=self._module, detail=error)) from None
         return kind, value
 
 

@@ -5,13 +5,17 @@ RobotError
 ├── MeshError           a mesh file cannot be read: file, place and what is wrong there
 ├── SaveError           a robot cannot be written to its folder
 │   └── RobotExistsError    a robot of that name exists
-├── JointCountError     joint positions do not have one value per joint
 ├── ProgramError        a teach program cannot be read: each line, word, value and what would be right
-└── PoseError           a tool pose is not valid
+└── CodedRobotError     an error with a reason of the table
+    ├── JointCountError joint positions do not have one value per joint
+    └── PoseError       a tool pose is not valid
 """
 
 from collections.abc import Sequence
 from pathlib import Path
+
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 
 
 class RobotError(Exception):
@@ -92,36 +96,35 @@ class ProgramError(RobotError):
     """A teach program that cannot be read.
 
     Attributes:
-        problems: Each problem's line, from 1, and a sentence; only the first of many.
+        problems: Each problem's line, from 1, and its reason; only the first of many.
         found: The number of all problems.
     """
 
-    def __init__(self, problems: Sequence[tuple[int, str]], *, found: int | None = None) -> None:
+    def __init__(self, problems: Sequence[tuple[int, Reason]], *, found: int | None = None) -> None:
         self.problems = tuple(problems)
         self.found = len(self.problems) if found is None else found
-        line, text = self.problems[0]
+        line, reason = self.problems[0]
         more = self.found - 1
         rest = f" (and {more} more problem{'s' if more > 1 else ''})" if more else ""
-        super().__init__(f"line {line}: {text}{rest}")
+        super().__init__(f"line {line}: {reason}{rest}")
 
 
-class JointCountError(RobotError):
+class CodedRobotError(RobotError):
+    """An error with a reason of the table."""
+
+    def __init__(self, reason: Reason) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
+class JointCountError(CodedRobotError):
     """Joint positions without one value per joint."""
 
-    def __init__(self, expected: int, got: tuple[int, ...]) -> None:
-        self.expected = expected
-        self.got = got
-        text = f"joint positions of shape {got}: this robot takes ({expected},), one value per joint"
-        super().__init__(text)
+
+class PoseError(CodedRobotError):
+    """A tool pose that is not valid."""
 
 
-class PoseError(RobotError):
-    """A tool pose that is not valid.
-
-    Attributes:
-        reason: The fault, as the end of a sentence that begins with "the pose".
-    """
-
-    def __init__(self, reason: str) -> None:
-        self.reason = reason
-        super().__init__(f"the pose {reason}")
+def reason_of(error: RobotError) -> Reason:
+    """Return an error's reason; files have too many problems for codes, so theirs is the text."""
+    return error.reason if isinstance(error, CodedRobotError) else codes.OTHER(detail=error)

@@ -167,7 +167,7 @@ def as_positions(joints: Joints, positions: ArrayLike) -> FloatArray:
     """
     array = np.asarray(positions, dtype=np.float64)
     if array.shape != (len(joints),):
-        raise JointCountError(len(joints), array.shape)
+        raise JointCountError(codes.JOINT_SHAPE(shape=array.shape, joints=len(joints)))
     return array
 
 

@@ -308,5 +308,10 @@ class UrdfDescription(RobotDescription):
 def nearest(name: str, names: Iterable[str]) -> str:
     """Return a hint for the end of an error text: the most similar known name, or all of them."""
     names = tuple(names)
-    close = difflib.get_close_matches(name, names, n=1)
-    return f"; did you mean {close[0]!r}?" if close else f"; there are {', '.join(names)}"
+    near = similar(name, names)
+    return f"; did you mean {near!r}?" if near else f"; there are {', '.join(names)}"
+
+
+def similar(name: str, names: Iterable[str]) -> str:
+    """Return the most similar known name; empty if none is similar."""
+    return next(iter(difflib.get_close_matches(name, tuple(names), n=1)), "")

@@ -166,7 +166,7 @@ class LatchFile:
                 self._allocate(state)
         except OSError as error:
             code = codes.LATCH_NOT_WRITABLE if self._allocated else codes.LATCH_NOT_ALLOCATED
-            self._failure = code(name=self.path.name, detail=disk_problem(error))
+            self._failure = code(disk_problem(error), name=self.path.name)
             return
         self._written, self._failure = state, None
         with self._lock:
@@ -205,19 +205,19 @@ class LatchFile:
                 if self._file is not None:
                     os.fdatasync(self._file)
             except OSError as error:
-                self._failure = codes.LATCH_NOT_WRITABLE(name=self.path.name, detail=disk_problem(error))
+                self._failure = codes.LATCH_NOT_WRITABLE(disk_problem(error), name=self.path.name)
             with self._lock:
                 if self._sequence == synced or self._failure:
                     self._syncing = False
                     return
 
 
-def disk_problem(error: Exception) -> str:
+def disk_problem(error: Exception) -> Reason:
     """Return why a write failed, and what to do."""
     if not isinstance(error, OSError):
-        return repr(error)
+        return codes.OTHER(detail=repr(error))
     full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-    return f"{error.strerror}: {'make space on its disk' if full else 'check its disk'}"
+    return (codes.DISK_FULL if full else codes.DISK_FAULT)(detail=error.strerror)
 
 
 def _owner(path: Path) -> str:

@@ -225,7 +225,7 @@ class AuditLog:
                 # In a thread: an fsync takes up to seconds, and the joint stream must not wait for it.
                 placed = await loop.run_in_executor(self._disk, self._write, [each.entry for each in batch])
             except Exception as error:
-                self.problem = codes.AUDIT_NOT_WRITABLE(file=self.path.name, detail=disk_problem(error))
+                self.problem = codes.AUDIT_NOT_WRITABLE(disk_problem(error), file=self.path.name)
                 self._dropped += dropped
                 new = bool(self._queue)
                 self._queue[:0] = self._fail(batch[:-1] if dropped else batch)

@@ -6,13 +6,13 @@ import logging
 import time
 from collections.abc import Collection, Mapping
 
-from protocol_gateway.checking.worker_messages import PENDING, Checked, CheckMotion, CheckProgram, Prepare
+from protocol_gateway.checking.worker_messages import Checked, CheckMotion, CheckProgram, Prepare, Prepared
 from protocol_gateway.errors import CheckError
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.worker import Worker, WorkerError
 from robots.cells import CellDescription
-from robots.errors import RobotError
+from robots.errors import RobotError, reason_of
 
 log = logging.getLogger(__name__)
 
@@ -48,7 +48,7 @@ class Checker:
         self._worker = Worker("protocol_gateway.checking.worker", dict(cells))
         self._problems: dict[str, Reason | None] = dict.fromkeys(cells, _STARTING)
         self._lock = asyncio.Lock()
-        self._failed = ""
+        self._failed: Reason | None = None
         self._process: int | None = None
         self._pending: tuple[str, ...] = ()
 
@@ -71,7 +71,7 @@ class Checker:
         try:
             while True:
                 if self._worker.pid is None or self._worker.pid != self._process:
-                    if not self._failed:
+                    if self._failed is None:
                         self._problems = dict.fromkeys(self._robots, _STARTING)
                     self._process = await self._start_worker()
                 elif self._pending:
@@ -89,33 +89,33 @@ class Checker:
             self._pending = self._robots
             await self._prepare()
         except Exception as error:
-            why = _error_text(error)
+            why = _reason_of(error)
             if why != self._failed:
                 log.error("motions cannot be checked: %s", why)
             self._failed = why
-            self._problems = dict.fromkeys(self._robots, codes.CHECK_BROKEN(detail=why))
+            self._problems = dict.fromkeys(self._robots, codes.CHECK_BROKEN(why))
             return None
-        self._failed = ""
+        self._failed = None
         return process
 
     async def _prepare(self) -> None:
         """Prepare the robots that are not ready; ask again while links are being processed."""
         for robot in self._pending:
-            text = await self._prepare_robot(robot)
-            if text != PENDING:
+            answer = await self._prepare_robot(robot)
+            if not answer.pending:
                 self._pending = tuple(each for each in self._pending if each != robot)
-                self._problems[robot] = codes.CHECK_IMPOSSIBLE(detail=text) if text else None
+                self._problems[robot] = answer.problem
 
-    async def _prepare_robot(self, robot: str) -> str:
+    async def _prepare_robot(self, robot: str) -> Prepared:
         try:
-            text: str = await self._worker.ask(Prepare(robot), timeout_s=_PREPARE_TIMEOUT_S)
+            answer: Prepared = await self._worker.ask(Prepare(robot), timeout_s=_PREPARE_TIMEOUT_S)
         except WorkerError:
             raise
         except Exception as error:
-            text = _error_text(error)
-        if text and text != PENDING:
-            log.warning("%s: its motions cannot be checked: %s", robot, text)
-        return text
+            answer = Prepared(problem=codes.CHECK_IMPOSSIBLE(_reason_of(error)))
+        if answer.problem is not None and not answer.pending:
+            log.warning("%s: its motions cannot be checked: %s", robot, answer.problem)
+        return answer
 
     async def motion(self, question: CheckMotion) -> Checked:
         """Check a motion.
@@ -161,7 +161,7 @@ class Checker:
         try:
             found: Checked = await self._worker.ask(question, timeout_s=hang_timeout_s)
         except Exception as error:
-            raise CheckError(codes.CHECK_FAILED(detail=_error_text(error))) from error
+            raise CheckError(codes.CHECK_FAILED(_reason_of(error))) from error
         return found
 
     def _on_done(self, asked: asyncio.Future[Checked]) -> None:
@@ -170,11 +170,15 @@ class Checker:
             asked.exception()  # retrieved, because the caller may have timed out
 
 
-def _error_text(error: Exception) -> str:
-    """Return an error's text, with its type if it is unexpected."""
-    if isinstance(error, (WorkerError, RobotError)):
-        return str(error)
-    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+def _reason_of(error: Exception) -> Reason:
+    """Return an error's reason; of an unexpected one its type and text."""
+    match error:
+        case WorkerError():
+            return error.reason
+        case RobotError():
+            return reason_of(error)
+    text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    return codes.OTHER(detail=text)
 
 
 def _log_late_failure(asked: asyncio.Future[Checked]) -> None:

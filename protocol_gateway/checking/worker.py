@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 from protocol_gateway.checking.worker_messages import (
-    PENDING,
     Cells,
     Checked,
     CheckMotion,
     CheckProgram,
     Positions,
     Prepare,
+    Prepared,
 )
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
@@ -40,11 +40,11 @@ def begin(cells: Cells) -> Callable[[Any], Any]:
             ready[names] = cell
         return ready[names]
 
-    def answer(question: Prepare | CheckMotion | CheckProgram) -> str | Checked:
+    def answer(question: Prepare | CheckMotion | CheckProgram) -> Prepared | Checked:
         cell = cell_of(question.robot)
         match question:
             case Prepare(robot):
-                return PENDING if pending(cell) else _why_not(cell, robot)
+                return Prepared(pending=bool(pending(cell)), problem=_why_not(cell, robot))
             case CheckMotion():
                 steps = [
                     Step(line=0, kind=StepKind.MOVE, target=np.array(target)) for target in question.targets
@@ -62,12 +62,12 @@ def begin(cells: Cells) -> Callable[[Any], Any]:
     return answer
 
 
-def _why_not(cell: Cell, robot: str) -> str:
-    """Return why a robot's motions cannot be checked; empty: they can."""
+def _why_not(cell: Cell, robot: str) -> Reason | None:
+    """Return why a robot's motions cannot be checked; None: they can."""
     links = cell.arms[robot].model.link_names
     if len(unshaped(cell, robot)) == len(links):
-        return "its description has no link with a shape, so nothing can be checked"
-    return ""
+        return codes.CHECK_IMPOSSIBLE(codes.CHECK_NOTHING())
+    return None
 
 
 def _coverage(cell: Cell) -> tuple[list[Reason], list[Reason]]:

@@ -10,18 +10,24 @@ from robots.programs.steps import Step
 Positions: TypeAlias = tuple[float, ...]
 
 
-# The answer to Prepare while links of the cell are being processed: ask again.
-PENDING = "pending"
-
-
 @dataclass(frozen=True)
 class Prepare:
-    """Request to prepare a robot's cell, with the shapes of everything in it.
-
-    The answer is why its motions cannot be checked (empty: they can), or PENDING.
-    """
+    """Request to prepare a robot's cell, with the shapes of everything in it."""
 
     robot: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prepared:
+    """Answer to Prepare.
+
+    Attributes:
+        pending: Links of the cell are being processed: ask again.
+        problem: Why the robot's motions cannot be checked; None: they can.
+    """
+
+    pending: bool = False
+    problem: Reason | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol, TypeAlias
 
+from robomesh.reasons import Reason
+
 # ------------------------------------------------------------ events from a controller
 
 
@@ -77,14 +79,14 @@ class MalformedReceived:
         offset: Position of their first byte in the connection's stream.
         text: The bytes as printable text, shortened.
         reason: Description of the error.
-        joint_count: The unit has another number of joints than the robot, so the controller's data are
-            unusable.
+        joint_count: Both numbers of joints, if the unit has another number than the robot, so the
+            controller's data are unusable.
     """
 
     offset: int
     text: str
     reason: str
-    joint_count: bool = False
+    joint_count: Reason | None = None
 
 
 @dataclass(frozen=True, slots=True)

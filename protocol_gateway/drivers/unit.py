@@ -47,6 +47,7 @@ from protocol_gateway.drivers.driver import (
     UnknownReceived,
 )
 from protocol_gateway.errors import CommandError, UnitFormatError
+from robomesh import reason_codes as codes
 from robomesh.texts import one_line
 from robots.joints import JointType
 
@@ -112,7 +113,7 @@ class UnitDriver:
         try:
             return write_unit([self._record(command) for command in commands], self._table)
         except UnitFormatError as error:
-            raise CommandError(f"cannot be sent: {error}") from None
+            raise CommandError(codes.COMMAND_NOT_A_UNIT(detail=error)) from None
 
     # -------------------------------------------------------------- from the controller
 
@@ -147,8 +148,8 @@ class UnitDriver:
             events.append(StatusReceived(controller_time_s=time_s))
 
     def _wrong_count(self, values: Sequence[float], unit: Unit) -> MalformedReceived:
-        reason = f"{len(values)} joint values, the description has {len(self._scales)}"
-        return MalformedReceived(unit.offset, printable(unit.data), reason, joint_count=True)
+        reason = codes.JOINT_VALUES(count=len(values), joints=len(self._scales))
+        return MalformedReceived(unit.offset, printable(unit.data), reason.text, joint_count=reason)
 
     # ---------------------------------------------------------------- to the controller
 
@@ -167,7 +168,7 @@ class UnitDriver:
 
     def _protocol_values(self, values: Sequence[float]) -> tuple[float, ...]:
         if len(values) != len(self._scales):
-            raise CommandError(f"{len(values)} values for {len(self._scales)} joints")
+            raise CommandError(codes.COMMAND_VALUES(count=len(values), joints=len(self._scales)))
         # Nine decimals are finer than any encoder, and pi/2 becomes 90.00.
         return tuple([round(value / scale, 9) for value, scale in zip(values, self._scales, strict=True)])
 

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from protocol_gateway.errors import LinkCloggedError, LinkDownError
 from protocol_gateway.sockets import configure
 from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 
 # A unit has some hundred bytes. With a small send buffer, a controller that does not read causes an error
 # immediately, instead of kilobytes of commands that it would execute late.
@@ -26,7 +27,7 @@ _ROUND_TRIP_AT = 68
 
 
 class Connection(asyncio.BufferedProtocol):
-    """One TCP connection; the future `lost` gets the reason as a sentence when it has ended."""
+    """One TCP connection; the future `lost` gets the reason when it has ended."""
 
     _transport: asyncio.Transport
 
@@ -36,7 +37,7 @@ class Connection(asyncio.BufferedProtocol):
         self._on_connected = on_connected
         self._receive = receive
         loop = asyncio.get_running_loop()
-        self.lost: asyncio.Future[str] = loop.create_future()
+        self.lost: asyncio.Future[Reason] = loop.create_future()
         self._closed: asyncio.Future[None] = loop.create_future()
         # Own buffer: otherwise asyncio maps 256 KiB of memory for each read, which costs more than all
         # processing of a unit.
@@ -64,7 +65,9 @@ class Connection(asyncio.BufferedProtocol):
 
     def connection_lost(self, error: Exception | None) -> None:
         """Set `lost` to the reason of the end (called by asyncio)."""
-        reason = reason_of(error) if isinstance(error, OSError) else "the controller closed the connection"
+        reason = codes.LINK_CLOSED_THERE()
+        if isinstance(error, OSError):
+            reason = codes.OTHER(detail=reason_of(error))
         if not self.lost.done():
             self.lost.set_result(reason)
         self._closed.set_result(None)
@@ -95,12 +98,6 @@ class Connection(asyncio.BufferedProtocol):
     def later(self, seconds: float, call: Callable[[], None]) -> asyncio.TimerHandle:
         """Schedule a call; an exception in it ends the link, as in `receive`."""
         return asyncio.get_running_loop().call_later(seconds, self._call_or_fail, call)
-
-    def give_up(self, why: str) -> None:
-        """Abort the connection for a reason of this end."""
-        if not self.lost.done():
-            self.lost.set_result(why)
-        self._transport.abort()
 
     @property
     def round_trip_s(self) -> float | None:

@@ -255,7 +255,7 @@ class ControllerLink:
         end = connection.lost.result()
         if self._refusal:
             return codes.LINK_REFUSED(where=self._where, detail=self._refusal)
-        return codes.LINK_LOST(where=self._where, detail=end)
+        return codes.LINK_LOST(end, where=self._where)
 
     def _on_connected(self, connection: Connection) -> None:
         self._driver.connected()
@@ -357,8 +357,8 @@ class ControllerLink:
                 self._response_timer.event_received(event, now_s)
             case MalformedReceived():
                 self._counts["units_malformed"] += 1
-                if event.joint_count:
-                    reason = codes.LINK_OTHER_JOINTS(where=self._where, detail=event.reason)
+                if event.joint_count is not None:
+                    reason = codes.LINK_OTHER_JOINTS(event.joint_count, where=self._where)
                     self._unusable = now_s, reason, JOINT_COUNT
             case UnknownReceived():
                 self._counts["records_unknown"] += 1
@@ -380,4 +380,6 @@ class ControllerLink:
 
 def _is_of_joints(event: ControllerEvent) -> bool:
     """Return whether an event holds joint positions, or reports a wrong joint count."""
-    return isinstance(event, JointsReceived) or (isinstance(event, MalformedReceived) and event.joint_count)
+    return isinstance(event, JointsReceived) or (
+        isinstance(event, MalformedReceived) and event.joint_count is not None
+    )

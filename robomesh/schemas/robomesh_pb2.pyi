@@ -809,7 +809,7 @@ class InverseRequest(_message.Message):
     def __init__(self, pose: _Optional[_Iterable[float]] = ..., task: _Optional[_Union[InverseRequest.Task, str]] = ..., near: _Optional[_Iterable[float]] = ..., all_solutions: _Optional[bool] = ..., seed: _Optional[int] = ...) -> None: ...
 
 class InverseAnswer(_message.Message):
-    __slots__ = ("solutions", "residual_m", "residual_rad", "reason", "analytic")
+    __slots__ = ("solutions", "residual_m", "residual_rad", "reason", "analytic", "cause")
     class Solution(_message.Message):
         __slots__ = ("joint_positions",)
         JOINT_POSITIONS_FIELD_NUMBER: _ClassVar[int]
@@ -820,12 +820,14 @@ class InverseAnswer(_message.Message):
     RESIDUAL_RAD_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
     ANALYTIC_FIELD_NUMBER: _ClassVar[int]
+    CAUSE_FIELD_NUMBER: _ClassVar[int]
     solutions: _containers.RepeatedCompositeFieldContainer[InverseAnswer.Solution]
     residual_m: float
     residual_rad: float
     reason: str
     analytic: bool
-    def __init__(self, solutions: _Optional[_Iterable[_Union[InverseAnswer.Solution, _Mapping]]] = ..., residual_m: _Optional[float] = ..., residual_rad: _Optional[float] = ..., reason: _Optional[str] = ..., analytic: _Optional[bool] = ...) -> None: ...
+    cause: Reason
+    def __init__(self, solutions: _Optional[_Iterable[_Union[InverseAnswer.Solution, _Mapping]]] = ..., residual_m: _Optional[float] = ..., residual_rad: _Optional[float] = ..., reason: _Optional[str] = ..., analytic: _Optional[bool] = ..., cause: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
 
 class CheckRequest(_message.Message):
     __slots__ = ("program", "start", "exact", "path")

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 from robots.inverse.chain import Chain, placement_misses
 from robots.inverse.numeric import Found, descend, starts
 from robots.inverse.tasks import TOLERANCE_M, Task
@@ -26,7 +28,7 @@ def reason_for_none(
     nearest: Found,
     around: FloatArray,
     seed: int,
-) -> tuple[str, Found]:
+) -> tuple[Reason, Found]:
     """Return why no joint positions put the tool at a target, in degrees and millimetres.
 
     Args:
@@ -39,16 +41,15 @@ def reason_for_none(
         The reason, and the nearest result with respect to it.
     """
     if beyond:
-        return f"limits: found only with {_violated_limits(chain, beyond, around)}", nearest
+        return codes.INVERSE_LIMITS(*_violated_limits(chain, beyond, around)), nearest
     if beyond_reach(chain, target):
         away, reach = _mm(_distance(chain, target)), _mm(chain.reach)
-        return f"out of reach: {away} from the first joint; the tool reaches at most {reach}", nearest
+        return codes.INVERSE_TOO_FAR(distance=away, reach=reach), nearest
     begins = [nearest.x, *islice(starts(chain, seed), _TRIES)]
     there = [descend(chain, target, Task.POSITION_3D.rows, begin) for begin in begins]
     closest = min(there, key=lambda each: each.residual_m)
     if not closest.near_enough:
-        gap = _mm(closest.residual_m)
-        return f"out of reach: within its limits the tool stays at least {gap} from this position", nearest
+        return codes.INVERSE_GAP(distance=_mm(closest.residual_m)), nearest
     posed = [
         Found(each.x, *placement_misses(chain, each.x, target, task.rows))
         for each in there
@@ -57,9 +58,8 @@ def reason_for_none(
     turned = [descend(chain, target, task.rows, each.x, place_first=True) for each in posed]
     at_place = [each for each in (*posed, *turned) if each.residual_m < _AT_PLACE_M]
     nearest = min(at_place, key=lambda each: each.residual_rad)
-    aspect = "orientation" if task is Task.POSE_6D else "axis"
-    off = f"{degrees(nearest.residual_rad):.2f}°"
-    return f"not this orientation: at this position, the tool's {aspect} is at least {off} off", nearest
+    code = codes.INVERSE_ORIENTATION if task is Task.POSE_6D else codes.INVERSE_AXIS
+    return code(angle=f"{degrees(nearest.residual_rad):.2f}°"), nearest
 
 
 def solutions_beyond(
@@ -100,7 +100,7 @@ def _nearest_turns(chain: Chain, x: FloatArray) -> FloatArray:
     return turned
 
 
-def _violated_limits(chain: Chain, solutions: Sequence[FloatArray], around: FloatArray) -> str:
+def _violated_limits(chain: Chain, solutions: Sequence[FloatArray], around: FloatArray) -> Sequence[Reason]:
     """Return the limits that the solution closest to them violates."""
 
     def excess(x: FloatArray) -> float:
@@ -113,13 +113,19 @@ def _violated_limits(chain: Chain, solutions: Sequence[FloatArray], around: Floa
         lower, upper = float(joints.lower[number]), float(joints.upper[number])
         if not lower <= position <= upper:
             of = joints.types[number]
-            limits = f"{_position(lower, of)} to {_position(upper, of)}"
-            violated.append(f"joint {joints.names[number]} at {_position(position, of)}, limits {limits}")
-    if not violated:
-        positions = around.copy()
-        positions[chain.moving] = x
-        violated = [str(each) for each in violations(joints, positions)]
-    return " and ".join(violated)
+            violated.append(
+                codes.JOINT_BEYOND(
+                    name=joints.names[number],
+                    value=_position(position, of),
+                    lower=_position(lower, of),
+                    upper=_position(upper, of),
+                )
+            )
+    if violated:
+        return violated
+    positions = around.copy()
+    positions[chain.moving] = x
+    return violations(joints, positions)
 
 
 def _position(position: float, of: JointType) -> str:

@@ -10,6 +10,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 from robots.errors import PoseError
 from robots.inverse.chain import Chain, build_chain, placement_misses
 from robots.inverse.closed_form import EXACT, ClosedForm, candidates, closed_form, windows, within_limits
@@ -54,14 +56,14 @@ class InverseResult:
         residual_m: The tool's distance from its target at the worst solution; without a solution, at the
             nearest position found.
         residual_rad: The same for the orientation or axis.
-        reason: The reason for no solution; empty with a solution.
+        reason: The reason for no solution; None with a solution.
         analytic: The solutions are in closed form and cover every branch, each at the nearest turns.
     """
 
     solutions: FloatArray
     residual_m: float
     residual_rad: float
-    reason: str
+    reason: Reason | None
     analytic: bool
 
 
@@ -160,7 +162,7 @@ def follow(
 def _clipped_start(chain: Chain, near: ArrayLike) -> FloatArray:
     positions = as_positions(chain.joints, near)
     if not np.isfinite(positions).all():
-        raise PoseError(f"was requested near {positions.tolist()}, which has a number that is not finite")
+        raise PoseError(codes.POSE_NEAR_NOT_FINITE(positions=positions.tolist()))
     return np.minimum(np.maximum(positions, chain.joints.lower), chain.joints.upper)
 
 
@@ -257,6 +259,6 @@ def _answer(chain: Chain, found: list[Found], around: FloatArray, *, analytic: b
         np.array([_positions(chain, each.x, around) for each in found]),
         max([each.residual_m for each in found]),
         max([each.residual_rad for each in found]),
-        "",
+        None,
         analytic,
     )

@@ -6,6 +6,7 @@ from math import atan2, hypot, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
+from robomesh import reason_codes as codes
 from robots.errors import PoseError
 from robots.joints import Joints
 from robots.poses import FloatArray, inverse
@@ -51,10 +52,10 @@ def tool_pose(values: ArrayLike) -> FloatArray:
     try:
         pose = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
-        raise PoseError("takes 16 numbers, 4 rows of 4, tool to base in metres") from None
+        raise PoseError(codes.POSE_NOT_NUMBERS()) from None
     if pose.shape not in ((4, 4), (16,)):
-        has = f"{pose.size} numbers" if pose.ndim == 1 else f"numbers of shape {pose.shape}"
-        raise PoseError(f"has {has}; 16 are right, 4 rows of 4")
+        shape = codes.POSE_SHAPE(shape=pose.shape)
+        raise PoseError(codes.POSE_SIZE(count=pose.size) if pose.ndim == 1 else shape)
     pose = pose.reshape(4, 4)
     # Most poses come from programs and are exact. The full validation would double the time of an answer.
     return pose if _exact(pose.ravel().tolist()) else _orthonormalized(pose)
@@ -77,20 +78,17 @@ def _exact(numbers: list[float]) -> bool:
 
 def _orthonormalized(pose: FloatArray) -> FloatArray:
     if not np.isfinite(pose).all():
-        raise PoseError(f"holds {pose[~np.isfinite(pose)][0]}; every number must be finite")
+        raise PoseError(codes.POSE_NOT_FINITE(value=pose[~np.isfinite(pose)][0]))
     if pose[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
-        raise PoseError(f"has the last row {' '.join(f'{x:g}' for x in pose[3])}; 0 0 0 1 is right")
+        raise PoseError(codes.POSE_LAST_ROW(row=" ".join(f"{x:g}" for x in pose[3])))
     if np.abs(pose[:3, 3]).sum() >= _FARTHEST_M:
-        raise PoseError(f"is {np.abs(pose[:3, 3]).max():.3g} m away; less than {_FARTHEST_M:g} m is right")
+        raise PoseError(codes.POSE_TOO_FAR(distance_m=np.abs(pose[:3, 3]).max(), limit_m=_FARTHEST_M))
     rotation = pose[:3, :3]
     if np.abs(rotation).max() > 2 or np.abs(rotation @ rotation.T - np.eye(3)).max() > _ROUNDING:
         lengths = " ".join(f"{length:.4g}" for length in np.hypot.reduce(rotation, axis=1))
-        raise PoseError(
-            "has no rotation in its first 3 rows and columns: the rows must have length 1 and be at right "
-            f"angles, these have the lengths {lengths}"
-        )
+        raise PoseError(codes.POSE_NO_ROTATION(lengths=lengths))
     if np.linalg.det(rotation) < 0:
-        raise PoseError("is mirrored: the determinant of its first 3 rows and columns is -1; 1 is right")
+        raise PoseError(codes.POSE_MIRRORED())
     left, _, right = np.linalg.svd(rotation)
     pose[:3, :3] = left @ right
     return pose

@@ -65,7 +65,7 @@ def check_program(
     plan = plan_program(program, arm, solver, start)
     # Every plan begins with a SPEED step.
     if not plan.violations and all(step.kind is StepKind.SPEED for step in plan.steps):
-        return _unreadable(ProgramError([(1, "the program has no statement that does anything")]), start)
+        return _unreadable(ProgramError([(1, codes.PROGRAM_EMPTY())]), start)
     return check_plan(cell, robot, start, plan, others={} if others is None else others, far=far)
 
 
@@ -282,9 +282,9 @@ def _unreadable(error: ProgramError, start: FloatArray) -> CheckResult:
             line=line,
             kind=ViolationKind.PROGRAM,
             points=np.zeros((0, 3)),
-            reason=codes.PROGRAM_UNREADABLE(detail=text),
+            reason=codes.PROGRAM_UNREADABLE(reason),
         )
-        for line, text in error.problems
+        for line, reason in error.problems
     )
     more = error.found - len(found)
     notes = (f"{more} more problems are not listed",) if more else ()

@@ -6,6 +6,8 @@ from math import radians
 
 import numpy as np
 
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 from robots.inverse import InverseSolver, Task, follow, solve
 from robots.inverse.tasks import tool_misses
 from robots.joints import FloatArray, violations
@@ -30,14 +32,14 @@ class UnreachableError(Exception):
     """A pose on a line that the arm cannot reach.
 
     Attributes:
-        reason: The reason, as text.
+        reason: The reason.
         place: (3,) its position in the base frame [m].
         done_m: Length of the line that can be followed.
     """
 
-    def __init__(self, reason: str, place: FloatArray, done_m: float) -> None:
+    def __init__(self, reason: Reason, place: FloatArray, done_m: float) -> None:
         self.reason, self.place, self.done_m = reason, place, done_m
-        super().__init__(reason)
+        super().__init__(reason.text)
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,16 +218,16 @@ def _unreachable(
 
 def _reason(
     model: RobotModel, solver: InverseSolver, line: Line, pose: FloatArray, stuck: _StuckError
-) -> str:
+) -> Reason:
     """Return why the arm cannot reach a pose of the line."""
     end = solve(solver, line.pose(1.0), task=line.task, near=stuck.at)
-    if not len(end.solutions):
-        return f"its end cannot be reached: {end.reason}"
+    if end.reason is not None:
+        return codes.LINE_END(end.reason)
     result = solve(solver, pose, task=line.task, near=stuck.at)
-    if len(result.solutions):
+    if result.reason is None:
         leaps = np.abs(result.solutions[0] - stuck.at) / (model.joints.upper - model.joints.lower)
         first = model.joints.names[int(leaps.argmax())]
-        return f"the arm would have to jump to another posture there, with joint {first} moving most"
+        return codes.LINE_JUMP(name=first)
     if line.task is Task.POSITION_AND_AXIS_5D:
         bent = _bent_problem(model, pose, nearest_axis(model, pose, stuck.at))
         return bent or result.reason
@@ -253,14 +255,14 @@ def nearest_axis(model: RobotModel, pose: FloatArray, near: FloatArray) -> Float
     return positions
 
 
-def _bent_problem(model: RobotModel, pose: FloatArray, positions: FloatArray) -> str:
-    """Return why joint positions do not fit a pose on a line with a deviating axis; empty if they do."""
+def _bent_problem(model: RobotModel, pose: FloatArray, positions: FloatArray) -> Reason | None:
+    """Return why joint positions do not fit a pose on a line with a deviating axis; None if they do."""
     beyond = violations(model.joints, positions)
     if beyond:
-        return "; ".join(map(str, beyond))
+        return codes.JOINTS_OUTSIDE(*beyond)
     away, off = tool_misses(tool_placement(model, positions), pose, Task.POSITION_AND_AXIS_5D)
     if away > LINE_M / 100:
-        return f"the tool stays {away * 1000:.1f} mm away from it"
+        return codes.LINE_AWAY(distance_mm=away * 1000)
     if off > radians(BENT_DEG):
-        return f"the arm cannot keep its tool's axis within {BENT_DEG:g}° of a uniform rotation there"
-    return ""
+        return codes.LINE_BENT(limit_deg=BENT_DEG)
+    return None

@@ -6,6 +6,7 @@ from math import degrees, radians
 import numpy as np
 
 from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 from robots.collision import Arm
 from robots.inverse import InverseSolver, natural_task, solve
 from robots.joints import FloatArray
@@ -112,10 +113,8 @@ class _Planner:
     def _add(self, step: Step) -> None:
         # One more than the limit, for the initial SPEED step.
         if len(self.steps) > MOST_STEPS:
-            text = (
-                f"the program has more than {MOST_STEPS} steps here, including those that lines are cut into"
-            )
-            raise _PlanEndsError(_violation(step.line, ViolationKind.PROGRAM, text))
+            reason = codes.PROGRAM_UNREADABLE(codes.PROGRAM_STEPS_OF_LINES(most=MOST_STEPS))
+            raise _PlanEndsError(_violation(step.line, ViolationKind.PROGRAM, reason))
         self.steps.append(step)
 
     def _move(
@@ -133,9 +132,9 @@ class _Planner:
         """Return the joint positions of a pose, nearest to the arm's position."""
         assert self._solver is not None
         result = solve(self._solver, target.tool_to_base, task=self._task, near=self._at)
-        if not len(result.solutions):
+        if result.reason is not None:
             place = target.tool_to_base[:3, 3]
-            raise self._unreachable(line, f"{_named(target)} cannot be reached", result.reason, place)
+            raise self._unreachable(line, _pose_unreachable(target, result.reason), place)
         return _rounded(result.solutions[0])
 
     def _pose(self, target: Target) -> FloatArray:
@@ -152,10 +151,11 @@ class _Planner:
         try:
             followed = follow_line(self._arm.model, self._solver, line, self._at)
         except UnreachableError as error:
-            problem = "the line cannot be followed"
+            reason = codes.LINE_NOT_FOLLOWED(error.reason)
             if line.length_m > 1e-6:
-                problem += f" beyond {error.done_m * 1000:.1f} of its {line.length_m * 1000:.1f} mm"
-            raise self._unreachable(number, problem, error.reason, error.place) from None
+                done_mm, length_mm = error.done_m * 1000, line.length_m * 1000
+                reason = codes.LINE_NOT_FOLLOWED_BEYOND(error.reason, done_mm=done_mm, length_mm=length_mm)
+            raise self._unreachable(number, reason, error.place) from None
         if followed.bent_rad > radians(LINE_DEG):
             self.bent[number] = max(followed.bent_rad, self.bent.get(number, 0.0))
         ends = [_rounded(each) for each in followed.ends]
@@ -163,20 +163,18 @@ class _Planner:
             self._cut[key] = ends
         return ends
 
-    def _unreachable(self, line: int, problem: str, reason: str, place: FloatArray) -> _PlanEndsError:
+    def _unreachable(self, line: int, reason: Reason, place: FloatArray) -> _PlanEndsError:
         in_site = self._arm.base_to_site[:3, :3] @ place + self._arm.base_to_site[:3, 3]
         return _PlanEndsError(
-            _violation(line, ViolationKind.UNREACHABLE, f"{problem}: {reason}", in_site[None])
+            _violation(
+                line, ViolationKind.UNREACHABLE, codes.PROGRAM_UNREACHABLE(reason), points=in_site[None]
+            )
         )
 
 
-def _violation(line: int, kind: ViolationKind, text: str, points: FloatArray | None = None) -> Violation:
-    code = codes.PROGRAM_UNREACHABLE if kind is ViolationKind.UNREACHABLE else codes.PROGRAM_UNREADABLE
+def _violation(line: int, kind: ViolationKind, reason: Reason, points: FloatArray | None = None) -> Violation:
     return Violation(
-        line=line,
-        kind=kind,
-        reason=code(detail=text),
-        points=np.zeros((0, 3)) if points is None else points,
+        line=line, kind=kind, reason=reason, points=np.zeros((0, 3)) if points is None else points
     )
 
 
@@ -185,8 +183,8 @@ def _rounded(positions: FloatArray) -> FloatArray:
     return rounded
 
 
-def _named(target: PoseTarget) -> str:
+def _pose_unreachable(target: PoseTarget, why: Reason) -> Reason:
     if target.name:
-        return f"point {target.name}"
+        return codes.POINT_UNREACHABLE(why, name=target.name)
     x, y, z = (target.tool_to_base[:3, 3] * 1000).tolist()
-    return f"the pose at {x:.1f} {y:.1f} {z:.1f} mm"
+    return codes.POSE_UNREACHABLE(why, place=f"{x:.1f} {y:.1f} {z:.1f}")

@@ -27,6 +27,8 @@ from math import radians
 
 import numpy as np
 
+from robomesh import reason_codes as codes
+from robomesh.reasons import Code, Reason
 from robots.errors import ProgramError
 from robots.joints import FloatArray, Joints, JointType
 from robots.poses import rpy_rotation
@@ -45,7 +47,7 @@ from robots.programs.statements import (
     Trace,
     Wait,
 )
-from robots.schema import nearest
+from robots.schema import similar
 
 MOST_BYTES = 64 * 1024
 MOST_LINES = 10_000
@@ -63,7 +65,11 @@ _POSE_WORDS = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
 class _LineError(Exception):
-    """A line that cannot be read; the text says why."""
+    """A line that cannot be read, with the reason."""
+
+    def __init__(self, reason: Reason) -> None:
+        super().__init__(reason.text)
+        self.reason = reason
 
 
 @dataclass
@@ -93,31 +99,30 @@ class _Parser:
         self._joints = joints
         self._points: dict[str, Target] = {}
         self._defined: dict[str, int] = {}
-        self._problems: list[tuple[int, str]] = []
+        self._problems: list[tuple[int, Reason]] = []
         self._blocks = [_Block(0, 1)]
 
     def program(self, text: str) -> Program:
         size = len(text.encode("utf-8", "replace"))
         if size > MOST_BYTES:
-            raise ProgramError([(1, f"the program has {size} bytes; up to {MOST_BYTES} are read")])
+            raise ProgramError([(1, codes.PROGRAM_BYTES(count=size, most=MOST_BYTES))])
         # Not str.splitlines(), which splits at characters that editors do not count as line breaks.
         lines = [
             line.partition("#")[0].split()
             for line in text.removeprefix("\ufeff").replace("\r\n", "\n").split("\n")
         ]
         if len(lines) > MOST_LINES:
-            raise ProgramError(
-                [(MOST_LINES, f"the program has {len(lines)} lines; up to {MOST_LINES} are read")]
-            )
+            raise ProgramError([(MOST_LINES, codes.PROGRAM_LINES(count=len(lines), most=MOST_LINES))])
         # Points first: a program may use one above its definition.
         for handle in (self._define, self._take):
             for number, words in enumerate(lines, start=1):
                 if words and (words[0] == "point") == (handle == self._define):
                     self._collect_problems(handle, number, words)
         for block in self._blocks[1:]:
-            self._problems.append((block.line, "'repeat' has no 'end'"))
+            self._problems.append((block.line, codes.REPEAT_NOT_CLOSED()))
         if self._problems:
-            raise ProgramError(sorted(self._problems)[:_MOST_PROBLEMS], found=len(self._problems))
+            by_line = sorted(self._problems, key=lambda each: (each[0], each[1].text))
+            raise ProgramError(by_line[:_MOST_PROBLEMS], found=len(by_line))
         return Program(tuple(self._blocks[0].body), self._points)
 
     def _collect_problems(
@@ -126,25 +131,22 @@ class _Parser:
         try:
             handle(number, words)
         except _LineError as wrong:
-            self._problems.append((number, str(wrong)))
+            self._problems.append((number, wrong.reason))
 
     # ----------------------------------------------------------------- definitions
 
     def _define(self, line: int, words: Sequence[str]) -> None:
         if len(words) < 4 or words[2] != "=" or words[3] not in ("joints", "pose"):
-            raise _LineError("write a definition as 'point NAME = joints ...' or 'point NAME = pose ...'")
+            raise _LineError(codes.POINT_FORM())
         name = words[1]
         if not _NAME.fullmatch(name) or len(name) > _LONGEST_NAME:
-            raise _LineError(
-                f"{_quoted(name)} is not a valid point name: small letters, digits, _ and -, a letter first, "
-                f"up to {_LONGEST_NAME}"
-            )
+            raise _LineError(codes.POINT_NAME(name=_short(name), most=_LONGEST_NAME))
         if name in (*_STATEMENTS, "end"):
-            raise _LineError(f"{name!r} is a statement and not a valid point name: choose another")
+            raise _LineError(codes.POINT_RESERVED(name=name))
         # A point with wrong numbers counts as defined, so that its uses are not reported too.
         before = self._defined.setdefault(name, line)
         if before != line:
-            raise _LineError(f"point {name!r} is already defined in line {before}")
+            raise _LineError(codes.POINT_TWICE(name=name, line=before))
         if words[3] == "joints":
             self._points[name] = replace(self._joint_target("joints", words[4:]), name=name)
         else:
@@ -185,24 +187,32 @@ class _Parser:
                 return Wait(line, _one_number(word, rest, 0.0, 3600.0, "seconds"))
             case "trace":
                 if list(rest) not in (["on"], ["off"]):
-                    found = _quoted(" ".join(rest)) if rest else "nothing"
-                    raise _LineError(f"'trace' takes on or off, not {found}")
+                    raise _LineError(codes.TRACE_FORM(given=_given(rest)))
                 return Trace(line, rest[0] == "on")
-        raise _LineError(f"{_quoted(word)} is not a statement{nearest(word.lower(), (*_STATEMENTS, 'end'))}")
+        if near := similar(word.lower(), (*_STATEMENTS, "end")):
+            raise _LineError(codes.STATEMENT_NEAR(word=_short(word), near=near))
+        raise _LineError(codes.STATEMENT_UNKNOWN(word=_short(word), names=", ".join((*_STATEMENTS, "end"))))
 
     def _target(self, word: str, rest: Sequence[str]) -> Target | None:
         if len(rest) == 1 and not _NUMBER.fullmatch(rest[0]):
             name = rest[0]
             if name not in self._defined:
-                hint = nearest(name.lower(), self._defined) if self._defined else "; none is defined"
-                raise _LineError(f"{word}: there is no point {_quoted(name)}{hint}")
+                raise _LineError(self._no_point(word, name))
             return self._points.get(name)
         if word == "move_joints":
             return self._joint_target(word, rest)
         return _pose_target(word, rest)
 
+    def _no_point(self, word: str, name: str) -> Reason:
+        shown, defined = _short(name), ", ".join(self._defined)
+        if not self._defined:
+            return codes.POINT_NONE(word=word, name=shown)
+        if near := similar(name.lower(), self._defined):
+            return codes.POINT_NEAR(word=word, name=shown, near=near)
+        return codes.POINT_UNKNOWN(word=word, name=shown, names=defined)
+
     def _joint_target(self, word: str, rest: Sequence[str]) -> JointTarget:
-        values = _numbers(word, rest, self._joints.names, "degrees, mm of a prismatic joint")
+        values = _numbers(word, rest, self._joints.names, codes.JOINT_NUMBERS)
         return JointTarget(np.array(values) * joint_scales(self._joints))
 
     # --------------------------------------------------------------------- repeats
@@ -211,9 +221,9 @@ class _Parser:
         try:
             count = _one_number("repeat", rest, 1, MOST_STEPS, "times")
             if count != int(count):
-                raise _LineError(f"'repeat' takes a whole number, not {rest[0]}")
+                raise _LineError(codes.REPEAT_NOT_WHOLE(given=rest[0]))
             if len(self._blocks) > MOST_DEPTH:
-                raise _LineError(f"'repeat' is nested more than {MOST_DEPTH} deep")
+                raise _LineError(codes.REPEAT_TOO_DEEP(most=MOST_DEPTH))
         except _LineError:
             self._blocks.append(_Block(line, 1))  # so that its 'end' is not reported
             raise
@@ -221,7 +231,7 @@ class _Parser:
 
     def _close(self) -> None:
         if len(self._blocks) == 1:
-            raise _LineError("'end' without an open 'repeat' above")
+            raise _LineError(codes.END_WITHOUT_REPEAT())
         block = self._blocks.pop()
         self._blocks[-1].body.append(Repeat(block.line, block.count, tuple(block.body)))
         self._count(self._blocks[-1], block.steps * block.count, block.line)
@@ -230,7 +240,7 @@ class _Parser:
         block.steps += steps
         if block.steps > MOST_STEPS:
             block.steps = 0  # report this once
-            raise _LineError(f"the program has more than {MOST_STEPS} steps here, including repeats")
+            raise _LineError(codes.PROGRAM_STEPS(most=MOST_STEPS))
 
 
 def joint_scales(joints: Joints) -> FloatArray:
@@ -239,7 +249,7 @@ def joint_scales(joints: Joints) -> FloatArray:
 
 
 def _pose_target(word: str, rest: Sequence[str]) -> PoseTarget:
-    x, y, z, roll, pitch, yaw = _numbers(word, rest, _POSE_WORDS, "mm and degrees")
+    x, y, z, roll, pitch, yaw = _numbers(word, rest, _POSE_WORDS, codes.POSE_NUMBERS)
     return PoseTarget(pose_of(x, y, z, roll, pitch, yaw))
 
 
@@ -251,40 +261,43 @@ def pose_of(x: float, y: float, z: float, roll: float, pitch: float, yaw: float)
     return pose
 
 
-def _numbers(word: str, rest: Sequence[str], names: Sequence[str], units: str) -> list[float]:
-    """Parse one number for each name."""
+def _numbers(word: str, rest: Sequence[str], names: Sequence[str], wrong_count: Code) -> list[float]:
+    """Parse one number for each name.
+
+    Args:
+        wrong_count: Reason for another number of numbers.
+    """
     wrong = [each for each in rest if not _NUMBER.fullmatch(each)]
     if wrong:
-        raise _LineError(f"'{word}': {_quoted(wrong[0])} is not a number")
+        raise _LineError(codes.NOT_A_NUMBER(word=word, given=_short(wrong[0])))
     if len(rest) != len(names):
-        raise _LineError(
-            f"'{word}' takes {len(names)} number{'s' if len(names) > 1 else ''} "
-            f"({' '.join(names)}: {units}), not {len(rest)}"
-        )
+        raise _LineError(wrong_count(word=word, count=len(names), names=" ".join(names), given=len(rest)))
     values = [float(each) for each in rest]
     for name, value, text in zip(names, values, rest, strict=True):
         if not abs(value) <= _FARTHEST:
-            raise _LineError(
-                f"'{word}': {name} is {text[:40]}; must be between -{_FARTHEST:.0f} and {_FARTHEST:.0f}"
-            )
+            raise _LineError(codes.NUMBER_TOO_LARGE(word=word, name=name, given=text[:40], most=_FARTHEST))
     return values
 
 
 def _one_number(word: str, rest: Sequence[str], lowest: float, highest: float, unit: str) -> float:
     if len(rest) != 1 or not _NUMBER.fullmatch(rest[0]):
-        raise _LineError(
-            f"'{word}' takes one number ({unit}), not {_quoted(' '.join(rest)) if rest else 'nothing'}"
-        )
+        raise _LineError(codes.ONE_NUMBER(word=word, unit=unit, given=_given(rest)))
     value = float(rest[0])
     if not lowest <= value <= highest:
-        raise _LineError(f"'{word}' is {rest[0][:40]}; must be between {lowest:g} and {highest:g} {unit}")
+        raise _LineError(
+            codes.NUMBER_OUTSIDE(word=word, given=rest[0][:40], least=lowest, most=highest, unit=unit)
+        )
     return value
 
 
 def _no_arguments(word: str, rest: Sequence[str]) -> None:
     if rest:
-        raise _LineError(f"'{word}' takes no argument, not {_quoted(' '.join(rest))}")
+        raise _LineError(codes.NO_ARGUMENT(word=word, given=_short(" ".join(rest))))
 
 
-def _quoted(words: str) -> str:
-    return repr(words if len(words) <= 40 else f"{words[:37]}...")
+def _given(rest: Sequence[str]) -> str:
+    return f"'{_short(' '.join(rest))}'" if rest else "nothing"
+
+
+def _short(words: str) -> str:
+    return words if len(words) <= 40 else f"{words[:37]}..."

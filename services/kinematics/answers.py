@@ -12,7 +12,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
 from robomesh.session import Session
 from robomesh.worker import Worker, WorkerError
-from robots.errors import RobotError
+from robots.errors import RobotError, reason_of
 from robots.joints import FloatArray
 from robots.model import RobotModel
 from services.kinematics.cell_state import CellState
@@ -125,6 +125,6 @@ async def _ask_worker(worker: Worker, question: Question, timeout_s: float) -> b
         answer: bytes = await worker.ask(question, timeout_s=timeout_s)
         return answer
     except WorkerError as error:
-        raise RefusedError(codes.WORKER_GAVE_UP(detail=error)) from None
+        raise RefusedError(codes.WORKER_GAVE_UP(error.reason)) from None
     except RobotError as error:
-        raise RefusedError(codes.INVALID(detail=error)) from None
+        raise RefusedError(codes.INVALID(reason_of(error))) from None

@@ -2,6 +2,7 @@
 
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
+from robomesh.messages import reason_message
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.errors import JointCountError, PoseError
 from robots.inverse import InverseSolver, Task, solve
@@ -31,15 +32,17 @@ def inverse_answer(solver: InverseSolver, request: schema.InverseRequest) -> sch
             seed=request.seed,
         )
     except PoseError as error:
-        raise RefusedError(codes.INVERSE_POSE(detail=error)) from None
+        raise RefusedError(codes.INVERSE_POSE(error.reason)) from None
     except JointCountError as error:
-        raise RefusedError(codes.INVERSE_NEAR(detail=error)) from None
+        raise RefusedError(codes.INVERSE_NEAR(error.reason)) from None
     answer = schema.InverseAnswer(
         residual_m=result.residual_m,
         residual_rad=result.residual_rad,
-        reason=result.reason,
         analytic=result.analytic,
     )
+    if result.reason is not None:
+        answer.reason = result.reason.text
+        answer.cause.CopyFrom(reason_message(result.reason))
     for positions in result.solutions.tolist():
         answer.solutions.add(joint_positions=positions)
     return answer

@@ -17,6 +17,7 @@ from mcap_files.folder import find_file
 from mcap_files.reading import RecordingFile
 from mcap_files.series import MOST_POINTS, POINTS, SeriesReader, known_values
 from mcap_files.video import holds_key_frame
+from robomesh import reason_codes as codes
 from robomesh.schemas import robomesh_pb2 as schema
 
 _MESSAGES, _MOST_MESSAGES, _MOST_BYTES = 1000, 10_000, 4 << 20
@@ -127,7 +128,9 @@ class Answers:
                 begin, answer.total = attached.offset, attached.length
                 answer.media_type = attached.media_type or answer.media_type
             if request.offset > answer.total:
-                raise RecordingError(f"{request.file}: no byte {request.offset}: it has {answer.total}")
+                raise RecordingError(
+                    codes.RECORDING_NO_BYTE(file=request.file, byte=request.offset, total=answer.total)
+                )
             stream.seek(begin + request.offset)
             answer.data = stream.read(min(length, answer.total - request.offset))
             return answer
@@ -154,11 +157,16 @@ def _times(file: RecordingFile, request: schema.RangeRequest | schema.SeriesRequ
     except ValueError as error:
         raise RecordingError(f"{file.path.name}: invalid time: {error}") from None
     if request.HasField("start") and request.HasField("end") and end_ns < start_ns:
-        raise RecordingError("the range ends before it begins")
+        raise RecordingError(codes.RECORDING_TIMES())
     if last and (start_ns > last or end_ns < first):
         raise RecordingError(
-            f"{file.path.name}: nothing from {_text(start_ns)} to {_text(end_ns)}: "
-            f"it goes from {_text(first)} to {_text(last)}"
+            codes.RECORDING_OUTSIDE(
+                file=file.path.name,
+                start=_text(start_ns),
+                end=_text(end_ns),
+                first=_text(first),
+                last=_text(last),
+            )
         )
     return max(start_ns, first), min(end_ns, last)
 

@@ -157,7 +157,7 @@ class RobotRecorder:
             try:
                 self.part = await self._files.open(self._path(name, 1), about, self._names)
             except CaptureError as error:
-                raise RefusedError(codes.RECORDING_FAILED(detail=error)) from None
+                raise RefusedError(codes.RECORDING_FAILED(error.reason)) from None
             log.info("%s/%s: recording %s", self._settings.site, self._robot, self.part.capture.path.name)
             return self.describe()
 
@@ -249,4 +249,4 @@ def _videos(views: tuple[str, ...]) -> frozenset[str]:
     try:
         return frozenset(f"video/{check_chunk(view, 'view')}" for view in views if view != _NO_VIEW)
     except KeyNameError as error:
-        raise RefusedError(codes.INVALID(detail=error)) from None
+        raise RefusedError(codes.INVALID(error.reason)) from None

@@ -151,7 +151,9 @@ class RecordingServer:
             answer = await worker.ask(Question(name, request.SerializeToString()), timeout_s=within_s)
         except RecordingError as error:
             raise RefusedError(error.reason) from None
-        except (WorkerError, OSError) as error:
-            raise RefusedError(codes.RECORDING_UNREADABLE(detail=error)) from None
+        except WorkerError as error:
+            raise RefusedError(codes.RECORDING_UNREADABLE(error.reason)) from None
+        except OSError as error:
+            raise RefusedError(codes.RECORDING_UNREADABLE(codes.OTHER(detail=error))) from None
         assert isinstance(answer, bytes)
         return answer

@@ -11,7 +11,7 @@ from robomesh.schemas.robomesh_pb2 import FaultAnswer, FaultRequest
 from robomesh.server import Request
 from robomesh.session import SessionSettings, open_session
 from robomesh.topics import Role
-from services.simulator.errors import SimulatorError
+from services.simulator.errors import FaultError
 from services.simulator.fault_table import FAULTS
 from services.simulator.faults import Faults
 
@@ -37,8 +37,8 @@ async def answer_requests(mesh: Mesh, faults: Faults) -> None:
                 faults.end(message.fault)
             elif message.fault:
                 faults.begin(message.fault, now_s)
-        except SimulatorError as error:
-            raise RefusedError(codes.INVALID(detail=error)) from None
+        except FaultError as error:
+            raise RefusedError(codes.INVALID(error.reason)) from None
         return FaultAnswer(active=sorted(faults.active(now_s)), known=list(FAULTS))
 
     served = Served(service=Role.SIMULATOR.value, present_for=((mesh.site, mesh.robot),))

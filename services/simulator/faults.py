@@ -10,7 +10,8 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from protocol_gateway.core.records import AbsolutePositions, Command, Error, Record, Status, Velocities
-from services.simulator.errors import SimulatorError
+from robomesh import reason_codes as codes
+from services.simulator.errors import FaultError
 from services.simulator.fault_table import COPIES, FAULTS, LEAP
 from services.simulator.unit_execution import FAULT, LOCAL, asks_to_stop
 
@@ -33,13 +34,13 @@ def parse_fault(text: str, *, begin_s: float | None = None) -> Span:
         begin_s: Default begin; None for the default of the fault's row.
 
     Raises:
-        SimulatorError: If the fault is unknown, or a time is invalid.
+        FaultError: If the fault is unknown, or a time is invalid.
     """
     head, plus, length = text.partition("+")
     name, at, begin = head.partition("@")
     row = FAULTS.get(name)
     if row is None:
-        raise SimulatorError(f"fault {text[:80]!r} is unknown; there are {', '.join(FAULTS)}")
+        raise FaultError(codes.FAULT_UNKNOWN(name=text[:80], names=", ".join(FAULTS)))
     try:
         span = Span(
             name,
@@ -49,9 +50,7 @@ def parse_fault(text: str, *, begin_s: float | None = None) -> Span:
     except ValueError:
         span = Span(name, math.nan, math.nan)
     if not (0.0 <= span.begin_s < math.inf and span.length_s > 0.0):
-        raise SimulatorError(
-            f"fault {text[:80]!r}: NAME@BEGIN+LENGTH is right, both in seconds, as in {name}@2.5+10"
-        )
+        raise FaultError(codes.FAULT_TIMES(given=text[:80], name=name))
     return span
 
 
@@ -62,7 +61,7 @@ class Faults:
         texts: Faults of the command line; their time starts with the first client's connection.
 
     Raises:
-        SimulatorError: If one is invalid.
+        FaultError: If one is invalid.
     """
 
     def __init__(self, texts: Sequence[str]) -> None:
@@ -79,7 +78,7 @@ class Faults:
         """Begin a fault now, or at its @BEGIN.
 
         Raises:
-            SimulatorError: If it is invalid.
+            FaultError: If it is invalid.
         """
         span = parse_fault(text, begin_s=0.0)
         self._spans[span.name] = replace(span, begin_s=now_s + span.begin_s)
@@ -88,7 +87,7 @@ class Faults:
         """End a fault, if it is active or waiting.
 
         Raises:
-            SimulatorError: If it is unknown.
+            FaultError: If it is unknown.
         """
         name = parse_fault(text).name
         self._spans.pop(name, None)

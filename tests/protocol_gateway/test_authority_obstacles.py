@@ -30,7 +30,7 @@ def in_state(**status):
 
 
 def linked(state):
-    return replace(READY, link=LinkStatus(state, codes.LINK_LOST(where="there", detail="the cable")))
+    return replace(READY, link=LinkStatus(state, codes.LINK_LOST(codes.LINK_CLOSED_THERE(), where="there")))
 
 
 def command(kind, **fields):

@@ -5,6 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 from robots.description import load
 from robots.errors import ProgramError
 from robots.joints import joints_of
@@ -76,55 +78,57 @@ def test_comments_blank_lines_and_the_place_of_a_point_do_not_matter() -> None:
 
 
 WRONG = (
-    ("mov_line 1 2 3 4 5 6", "'mov_line' is not a statement; did you mean 'move_line'?"),
-    ("Home", "'Home' is not a statement; did you mean 'home'?"),
-    ("speed 300", "'speed' is 300; must be between 1 and 100 percent"),
-    ("speed", "'speed' takes one number (percent), not nothing"),
-    ("speed fast", "'speed' takes one number (percent), not 'fast'"),
-    ("wait nan", "'wait' takes one number (seconds), not 'nan'"),
-    ("wait -1", "'wait' is -1; must be between 0 and 3600 seconds"),
-    ("wait 1e999", "'wait' is 1e999; must be between 0 and 3600 seconds"),
-    ("tool_speed 0", "'tool_speed' is 0; must be between 1 and 10000 mm/s"),
-    ("trace maybe", "'trace' takes on or off, not 'maybe'"),
-    ("trace", "'trace' takes on or off, not nothing"),
-    ("point home = joints 1 2 3 4 5", "'home' is a statement and not a valid point name: choose another"),
-    ("point end = pose 1 2 3 4 5 6", "'end' is a statement and not a valid point name: choose another"),
-    ("home now", "'home' takes no argument, not 'now'"),
-    ("move_joints abov", "move_joints: there is no point 'abov'; did you mean 'above'?"),
+    ("mov_line 1 2 3 4 5 6", codes.STATEMENT_NEAR(word="mov_line", near="move_line")),
+    ("Home", codes.STATEMENT_NEAR(word="Home", near="home")),
     (
-        "move_joints 1 2",
-        (
-            "'move_joints' takes 5 numbers (waist shoulder elbow wrist roll: degrees, mm of a prismatic "
-            "joint), not 2"
+        "jump",
+        codes.STATEMENT_UNKNOWN(
+            word="jump",
+            names="home, move_joints, move_line, point, speed, tool_speed, wait, trace, repeat, end",
         ),
     ),
-    ("move_joints 1 2 3 4 O", "'move_joints': 'O' is not a number"),
-    ("move_joints 1 2 3 4 1_0", "'move_joints': '1_0' is not a number"),
+    ("speed 300", codes.NUMBER_OUTSIDE(word="speed", given="300", least=1, most=100, unit="percent")),
+    ("speed", codes.ONE_NUMBER(word="speed", unit="percent", given="nothing")),
+    ("speed fast", codes.ONE_NUMBER(word="speed", unit="percent", given="'fast'")),
+    ("wait nan", codes.ONE_NUMBER(word="wait", unit="seconds", given="'nan'")),
+    ("wait -1", codes.NUMBER_OUTSIDE(word="wait", given="-1", least=0, most=3600, unit="seconds")),
+    ("wait 1e999", codes.NUMBER_OUTSIDE(word="wait", given="1e999", least=0, most=3600, unit="seconds")),
+    ("tool_speed 0", codes.NUMBER_OUTSIDE(word="tool_speed", given="0", least=1, most=10_000, unit="mm/s")),
+    ("trace maybe", codes.TRACE_FORM(given="'maybe'")),
+    ("trace", codes.TRACE_FORM(given="nothing")),
+    ("point home = joints 1 2 3 4 5", codes.POINT_RESERVED(name="home")),
+    ("point end = pose 1 2 3 4 5 6", codes.POINT_RESERVED(name="end")),
+    ("home now", codes.NO_ARGUMENT(word="home", given="now")),
+    ("move_joints abov", codes.POINT_NEAR(word="move_joints", name="abov", near="above")),
+    ("move_line zzz", codes.POINT_UNKNOWN(word="move_line", name="zzz", names="above, part")),
+    (
+        "move_joints 1 2",
+        codes.JOINT_NUMBERS(word="move_joints", count=5, names="waist shoulder elbow wrist roll", given=2),
+    ),
+    ("move_joints 1 2 3 4 O", codes.NOT_A_NUMBER(word="move_joints", given="O")),
+    ("move_joints 1 2 3 4 1_0", codes.NOT_A_NUMBER(word="move_joints", given="1_0")),
     (
         "move_line 1 2 3 4 5",
-        "'move_line' takes 6 numbers (x y z roll pitch yaw: mm and degrees), not 5",
+        codes.POSE_NUMBERS(word="move_line", count=6, names="x y z roll pitch yaw", given=5),
     ),
     (
         "move_line 1 2 3 4 5 1e300",
-        "'move_line': yaw is 1e300; must be between -100000 and 100000",
+        codes.NUMBER_TOO_LARGE(word="move_line", name="yaw", given="1e300", most=100_000),
     ),
-    (
-        "point A = pose 1 2 3 4 5 6",
-        "'A' is not a valid point name: small letters, digits, _ and -, a letter first, up to 64",
-    ),
-    ("point x pose 1", "write a definition as 'point NAME = joints ...' or 'point NAME = pose ...'"),
-    ("point above = joints 1 2 3 4 5", "point 'above' is already defined in line 1"),
-    ("repeat 0", "'repeat' is 0; must be between 1 and 100000 times"),
-    ("repeat 1.5", "'repeat' takes a whole number, not 1.5"),
-    ("end", "'end' without an open 'repeat' above"),
+    ("point A = pose 1 2 3 4 5 6", codes.POINT_NAME(name="A", most=64)),
+    ("point x pose 1", codes.POINT_FORM()),
+    ("point above = joints 1 2 3 4 5", codes.POINT_TWICE(name="above", line=1)),
+    ("repeat 0", codes.NUMBER_OUTSIDE(word="repeat", given="0", least=1, most=MOST_STEPS, unit="times")),
+    ("repeat 1.5", codes.REPEAT_NOT_WHOLE(given="1.5")),
+    ("end", codes.END_WITHOUT_REPEAT()),
 )
 
 
-@pytest.mark.parametrize(("line", "sentence"), WRONG)
-def test_unreadable_line_is_reported_with_word_value_and_range(line: str, sentence: str) -> None:
+@pytest.mark.parametrize(("line", "reason"), WRONG)
+def test_unreadable_line_is_reported_with_word_value_and_range(line: str, reason: Reason) -> None:
     with pytest.raises(ProgramError) as caught:
         parse_program(f"{HEAD}{line}\n{'end' if line.startswith('repeat') else ''}", JOINTS)
-    assert caught.value.problems == ((3, sentence),)
+    assert caught.value.problems == ((3, reason),)
 
 
 def test_all_problems_are_reported_by_line() -> None:
@@ -140,21 +144,20 @@ def test_use_of_an_unreadable_point_is_not_reported() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "sentence"),
+    ("text", "reason"),
     [
-        ("#" * (MOST_BYTES + 1), f"the program has {MOST_BYTES + 1} bytes; up to {MOST_BYTES} are read"),
-        ("\n" * MOST_LINES, f"the program has {MOST_LINES + 1} lines; up to {MOST_LINES} are read"),
-        (
-            "repeat 1000\nrepeat 101\nhome\nend\nend",
-            f"the program has more than {MOST_STEPS} steps here, including repeats",
-        ),
-        ("repeat 2\n" * 21 + "home\n" + "end\n" * 21, "'repeat' is nested more than 20 deep"),
+        ("#" * (MOST_BYTES + 1), codes.PROGRAM_BYTES(count=MOST_BYTES + 1, most=MOST_BYTES)),
+        ("\n" * MOST_LINES, codes.PROGRAM_LINES(count=MOST_LINES + 1, most=MOST_LINES)),
+        ("repeat 1000\nrepeat 101\nhome\nend\nend", codes.PROGRAM_STEPS(most=MOST_STEPS)),
+        ("repeat 2\n" * 21 + "home\n" + "end\n" * 21, codes.REPEAT_TOO_DEEP(most=20)),
+        ("move_joints above", codes.POINT_NONE(word="move_joints", name="above")),
+        ("repeat 2\nhome", codes.REPEAT_NOT_CLOSED()),
     ],
 )
-def test_too_large_program_is_refused_with_a_reason(text: str, sentence: str) -> None:
+def test_too_large_program_is_refused_with_a_reason(text: str, reason: Reason) -> None:
     with pytest.raises(ProgramError) as caught:
         parse_program(text, JOINTS)
-    assert sentence in [problem for _, problem in caught.value.problems]
+    assert reason in [problem for _, problem in caught.value.problems]
 
 
 WORDS = "home move_joints move_line point a = joints pose speed repeat end wait 1 -2.5 1e9 # trace on é"
@@ -169,8 +172,8 @@ def test_any_text_is_a_program_or_gets_problems_with_lines(text: str) -> None:
     except ProgramError as error:
         problems = error.problems
     else:
-        problems = ((1, "none"),)
+        problems = ((1, codes.PROGRAM_EMPTY()),)
         again = parse_program(program_text(program, JOINTS), JOINTS)
         assert program_text(again, JOINTS) == program_text(program, JOINTS)
     assert problems
-    assert all(line >= 1 and sentence for line, sentence in problems)
+    assert all(line >= 1 and reason.text for line, reason in problems)

@@ -65,7 +65,7 @@ async def rendered(mesh, page):  # noqa: F811
             if request.message == ViewRequest(of="front"):
                 return ViewAnswer(topic="video/front", image="image/front", width=160, height=90, fps=20)
             if request.message.width == 1920:
-                raise RefusedError(codes.VIEW_NO_ROOM(detail="1 requested views exist"))
+                raise RefusedError(codes.VIEW_NO_ROOM(codes.VIEWS_TOO_MANY(count=1, most=1)))
             return ViewAnswer(topic="video/free-1", image="image/free-1", width=160, height=90, fps=20)
 
         other.answer("s", "r", "views/*", views)

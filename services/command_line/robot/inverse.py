@@ -105,7 +105,7 @@ def _values(result: InverseResult) -> dict[str, Any]:
         "solutions": result.solutions.tolist(),
         "residual_m": result.residual_m,
         "residual_rad": result.residual_rad,
-        "reason": result.reason,
+        "reason": str(result.reason or ""),
         "analytic": result.analytic,
     }
 

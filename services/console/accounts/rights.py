@@ -4,7 +4,7 @@ from google.protobuf.message import DecodeError
 
 from robomesh import keys, topics
 from robomesh import reason_codes as codes
-from robomesh.errors import BusError, RefusedError
+from robomesh.errors import KeyNameError, RefusedError, UnknownTopicError
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import StopRequest
 from robomesh.topics import Role
@@ -35,8 +35,8 @@ def parse_request(text: str) -> tuple[keys.Key, topics.Request]:
         row = topics.request(key.topic)
         if row.in_name:
             topics.check_operator(_last_chunk(key))
-    except BusError as error:
-        raise RefusedError(codes.INVALID(detail=error)) from None
+    except (KeyNameError, UnknownTopicError) as error:
+        raise RefusedError(codes.INVALID(error.reason)) from None
     if Role.CONSOLE not in row.askers:
         raise RefusedError(codes.CONSOLE_NO_RIGHT(request=row.name))
     return key, row

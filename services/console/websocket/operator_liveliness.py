@@ -61,7 +61,7 @@ class OperatorPresence:
             try:
                 action = LeaseRequest.FromString(payload).action
             except DecodeError:
-                raise RefusedError(codes.INVALID(detail="this is no LeaseRequest")) from None
+                raise RefusedError(codes.INVALID(codes.NOT_LEASE_REQUEST())) from None
         new = (topic == _OPENS or action in _GIVES_CONTROL) and (site, robot) not in self._tokens
         if new:
             self._tokens[site, robot] = self._session.declare_presence_of(site, robot, OPERATOR, self.id)

@@ -1,7 +1,7 @@
 // Why a request is refused, control ended or a motion is not checked: reasons of the mesh in the page's language.
 
 import type { Reason } from "../gen/robomesh_pb";
-import { inLanguage, t } from "./texts";
+import { inLanguage, language, t } from "./texts";
 
 /** Sentences by code, English and Chinese, with the parameters of robomesh/reason_codes.py; {cause}: the causes. */
 const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]> = new Map([
@@ -17,14 +17,43 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     "request.failed",
     ["{request} failed with an internal error: see the log of its service", "{request} 在其服务处失败：详见其日志"],
   ],
-  ["request.invalid", ["{detail}", "{detail}"]],
+  ["request.invalid", ["{cause}", "{cause}"]],
   ["other", ["{detail}", "{detail}"]],
   ["several", ["{cause}", "{cause}"]],
   [
     "request.wildcard",
     ["{key} has a wildcard: ask one {request} by its whole key", "{key} 含通配符：请以完整键请求一个 {request}"],
   ],
-  ["request.no_right", ["{detail}", "{detail}"]],
+  ["request.no_right", ["{cause}", "{cause}"]],
+  ["right.key", ["{name} has the role {role}: it may not use {key}", "{name} 的角色是 {role}：无权使用 {key}"]],
+  [
+    "right.role",
+    [
+      "{name} has the role {role}: it may not {act} {topic}; only {roles} may",
+      "{name} 的角色是 {role}：无权{act} {topic}；有权的角色：{roles}",
+    ],
+  ],
+  [
+    "right.name",
+    [
+      "{name} has the role {role}: it may not {act} {topic}, which carries another name; it may {act} {own}",
+      "{name} 的角色是 {role}：无权{act} {topic}，因为它带有另一名称；有权{act} {own}",
+    ],
+  ],
+  [
+    "right.site",
+    [
+      "{name} has the role {role}: it may not {act} {topic} at site {site}, which is another site",
+      "{name} 的角色是 {role}：无权{act}另一站点 {site} 的 {topic}",
+    ],
+  ],
+  [
+    "right.robot",
+    [
+      "{name} has the role {role}: it may not {act} {topic} of {robot}; its robots are {robots}",
+      "{name} 的角色是 {role}：无权{act} {robot} 的 {topic}；其机器人为 {robots}",
+    ],
+  ],
   [
     "quota.rate",
     [
@@ -62,6 +91,62 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ["{request} has no field '{field}'; it takes {fields}", "{request} 没有字段“{field}”；可用：{fields}"],
   ],
   ["request.not_finite", ["{value} is not finite", "{value} 不是有限数值"]],
+  ["request.not_message", ["{count} bytes are not a {message}: {detail}", "{count} 字节不是 {message}：{detail}"]],
+  ["request.not_json_message", ["the JSON does not fit {message}: {detail}", "JSON 不符合 {message}：{detail}"]],
+  ["request.not_lease_request", ["this is no LeaseRequest", "这不是 LeaseRequest"]],
+  ["request.field_not_one_of", ["{field}: '{value}' is not one of {names}", "{field}：“{value}”无效；可用：{names}"]],
+  ["request.field_unset", ["{field}: set one of {names}", "{field}：请设为下列之一：{names}"]],
+  ["request.field_not_finite", ["{field}: {value} is not finite", "{field}：{value} 不是有限数值"]],
+  [
+    "request.field_time",
+    ["{field}: {seconds} s and {nanos} ns is not a valid time", "{field}：{seconds} 秒 {nanos} 纳秒不是有效时间"],
+  ],
+  ["request.unknown", ["no request '{name}'; there are {names}", "没有请求“{name}”；现有 {names}"]],
+  ["key.topic_unknown", ["no topic '{name}'; there are {names}", "没有主题“{name}”；现有 {names}"]],
+  [
+    "key.name",
+    [
+      "{what} '{name}' cannot be used: lower-case letters, digits, '_' and '-', beginning with a letter or digit, at most {most}",
+      "{what}“{name}”不可用：须为小写字母、数字、“_”和“-”，以字母或数字开头，最多 {most} 个字符",
+    ],
+  ],
+  [
+    "key.chunk",
+    [
+      "{what} '{name}' cannot be used: letters, digits, '_', '.' and '-', beginning with a letter or digit, at most {most} characters",
+      "{what}“{name}”不可用：须为字母、数字、“_”、“.”和“-”，以字母或数字开头，最多 {most} 个字符",
+    ],
+  ],
+  [
+    "key.other",
+    [
+      "'{key}' is not a key of the mesh: robomesh/<site>/<robot>/<topic>",
+      "“{key}”不是网络的键：robomesh/<site>/<robot>/<topic>",
+    ],
+  ],
+  [
+    "key.not_presence",
+    [
+      "'{key}' is not a presence key: robomesh/<site>/<robot>/alive/<service>/<id>",
+      "“{key}”不是在线键：robomesh/<site>/<robot>/alive/<service>/<id>",
+    ],
+  ],
+  [
+    "key.operator_reserved",
+    ["operator '{name}' cannot be used: it is the name of a request", "操作员“{name}”不可用：这是一个请求的名称"],
+  ],
+  [
+    "key.operator_too_long",
+    ["operator {name}: a name has at most {most} characters", "操作员 {name}：名称最多 {most} 个字符"],
+  ],
+  ["fault.unknown", ["fault '{name}' is unknown; there are {names}", "没有故障“{name}”；现有 {names}"]],
+  [
+    "fault.times",
+    [
+      "fault '{given}': NAME@BEGIN+LENGTH is right, both in seconds, as in {name}@2.5+10",
+      "故障“{given}”：应为 NAME@BEGIN+LENGTH，均以秒为单位，例如 {name}@2.5+10",
+    ],
+  ],
   [
     "request.key_too_long",
     ["the key has {count} characters: at most {most} are allowed", "键长 {count} 个字符：最多 {most}"],
@@ -120,7 +205,16 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ["'{key}' cannot be watched: the console has no right to {topic}", "不能监视“{key}”：控制台无权订阅 {topic}"],
   ],
   ["page.cannot_watch", ["'{key}' cannot be watched: {detail}", "不能监视“{key}”：{detail}"]],
-  ["request.worker_gave_up", ["aborted: {detail}", "已放弃：{detail}"]],
+  ["request.worker_gave_up", ["aborted: {cause}", "已放弃：{cause}"]],
+  ["worker.too_slow", ["no answer within {seconds} s", "{seconds} 秒内没有应答"]],
+  ["worker.not_started", ["{module} could not be started: {detail}", "{module} 无法启动：{detail}"]],
+  ["worker.start_too_slow", ["{module} did not start within {seconds} s", "{module} 未在 {seconds} 秒内启动"]],
+  ["worker.crashed", ["{module} crashed (status {status})", "{module} 崩溃（状态 {status}）"]],
+  [
+    "worker.answer_too_long",
+    ["{module}: its answer has {count} bytes: {most} at most", "{module}：其应答有 {count} 字节：最多 {most}"],
+  ],
+  ["worker.answer_invalid", ["{module}: its answer is invalid: {detail}", "{module}：其应答无效：{detail}"]],
   [
     "http.host",
     [
@@ -308,7 +402,9 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ["{cause}; a command that cannot be recorded is not executed", "{cause}；未写入审计日志的不执行"],
   ],
   ["command.changed", ["{cause} since the motion was checked", "检查之后{cause}"]],
-  ["command.unsupported", ["{detail}", "{detail}"]],
+  ["command.unsupported", ["{cause}", "{cause}"]],
+  ["command.not_a_unit", ["cannot be sent: {detail}", "无法发送：{detail}"]],
+  ["command.values", ["{count} values for {joints} joints", "给出 {count} 个值，而关节为 {joints} 个"]],
   ["command.not_latched", ["{cause}, so a restart would forget a stop", "{cause}；重新启动后会忘记停止"]],
   ["stop.not_latched", ["stop {id} is not latched; no stop is", "停止 {id} 未锁定，目前没有锁定的停止"]],
   [
@@ -386,7 +482,8 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ["link.failed", ["cannot connect to {where}: {detail}", "无法连接 {where}：{detail}"]],
   ["link.no_answer", ["{where} does not answer", "{where} 无应答"]],
   ["link.closed", ["the link was closed", "连接已关闭"]],
-  ["link.lost", ["{where}: {detail}", "{where}：{detail}"]],
+  ["link.lost", ["{where}: {cause}", "{where}：{cause}"]],
+  ["link.closed_there", ["the controller closed the connection", "控制器关闭了连接"]],
   ["link.refused", ["{where} refused the connection: {detail}", "{where} 拒绝连接：{detail}"]],
   ["link.no_data", ["{where} sends nothing", "{where} 无数据"]],
   ["link.reconnects", ["{where} sends nothing; connecting again", "{where} 无数据，正在重连"]],
@@ -394,7 +491,8 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     "link.deluge",
     ["{where} sends far too much data: all of it is discarded", "{where} 发送的数据远超上限：全部未采用"],
   ],
-  ["link.other_joints", ["{where} sends {detail}", "{where} 发送的关节数不符：{detail}"]],
+  ["link.other_joints", ["{where} sends {cause}", "{where} 发送的关节数不符：{cause}"]],
+  ["joints.values", ["{count} joint values, the description has {joints}", "{count} 个关节值，而描述中有 {joints} 个"]],
   ["link.just_ended", ["the connection has just ended", "连接刚刚断开"]],
   ["link.broke", ["the connection broke while it was written", "写入时连接中断"]],
   ["link.clogged", ["the controller does not read; connecting again", "控制器不读取数据；正在重连"]],
@@ -462,9 +560,138 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ["joints.outside", ["{cause}", "{cause}"]],
   ["joints.limit", ["joint {name} at {value} is beyond its limit {limit}", "关节 {name} 的 {value} 超出限位 {limit}"]],
   ["joints.not_finite", ["joint {name} at {value} is not a finite number", "关节 {name} 的 {value} 不是有限数值"]],
+  [
+    "joints.beyond",
+    ["joint {name} at {value}, limits {lower} to {upper}", "关节 {name} 为 {value}，限位 {lower} 至 {upper}"],
+  ],
+  [
+    "joints.shape",
+    [
+      "joint positions of shape {shape}: this robot takes ({joints},), one value per joint",
+      "关节位置的形状为 {shape}：此机器人应为 ({joints},)，每个关节一个值",
+    ],
+  ],
   ["joints.constraint", ["{terms} at {value} is beyond its limit {limit}", "{terms} 的 {value} 超出限位 {limit}"]],
-  ["program.unreadable", ["{detail}", "{detail}"]],
-  ["program.unreachable", ["{detail}", "{detail}"]],
+  ["program.unreadable", ["{cause}", "{cause}"]],
+  ["program.unreachable", ["{cause}", "{cause}"]],
+  ["program.empty", ["the program has no statement that does anything", "程序中没有任何有作用的语句"]],
+  ["program.bytes", ["the program has {count} bytes; up to {most} are read", "程序有 {count} 字节；最多读取 {most}"]],
+  ["program.lines", ["the program has {count} lines; up to {most} are read", "程序有 {count} 行；最多读取 {most}"]],
+  [
+    "program.steps",
+    ["the program has more than {most} steps here, including repeats", "程序到此处超过 {most} 步（含重复）"],
+  ],
+  [
+    "program.steps_of_lines",
+    [
+      "the program has more than {most} steps here, including those that lines are cut into",
+      "程序到此处超过 {most} 步（含直线的分段）",
+    ],
+  ],
+  [
+    "program.statement_near",
+    ["'{word}' is not a statement; did you mean '{near}'?", "“{word}”不是语句；是否为“{near}”？"],
+  ],
+  ["program.statement_unknown", ["'{word}' is not a statement; there are {names}", "“{word}”不是语句；可用：{names}"]],
+  [
+    "program.point_form",
+    [
+      "write a definition as 'point NAME = joints ...' or 'point NAME = pose ...'",
+      "请将定义写成“point NAME = joints ...”或“point NAME = pose ...”",
+    ],
+  ],
+  [
+    "program.point_name",
+    [
+      "'{name}' is not a valid point name: small letters, digits, _ and -, a letter first, up to {most}",
+      "“{name}”不是有效的点名：须为小写字母、数字、_ 和 -，以字母开头，最多 {most} 个字符",
+    ],
+  ],
+  [
+    "program.point_reserved",
+    ["'{name}' is a statement and not a valid point name: choose another", "“{name}”是语句，不能作为点名：请另选"],
+  ],
+  ["program.point_twice", ["point '{name}' is already defined in line {line}", "点“{name}”已在第 {line} 行定义"]],
+  [
+    "program.point_near",
+    ["{word}: there is no point '{name}'; did you mean '{near}'?", "{word}：没有点“{name}”；是否为“{near}”？"],
+  ],
+  [
+    "program.point_unknown",
+    ["{word}: there is no point '{name}'; there are {names}", "{word}：没有点“{name}”；现有 {names}"],
+  ],
+  [
+    "program.point_none",
+    ["{word}: there is no point '{name}'; none is defined", "{word}：没有点“{name}”；尚未定义任何点"],
+  ],
+  ["program.trace_form", ["'trace' takes on or off, not {given}", "“trace”须为 on 或 off，而不是 {given}"]],
+  ["program.repeat_not_closed", ["'repeat' has no 'end'", "“repeat”没有“end”"]],
+  ["program.repeat_not_whole", ["'repeat' takes a whole number, not {given}", "“repeat”须为整数，而不是 {given}"]],
+  ["program.repeat_too_deep", ["'repeat' is nested more than {most} deep", "“repeat”嵌套超过 {most} 层"]],
+  ["program.end_without_repeat", ["'end' without an open 'repeat' above", "“end”之前没有未结束的“repeat”"]],
+  ["program.not_a_number", ["'{word}': '{given}' is not a number", "“{word}”：“{given}”不是数字"]],
+  [
+    "program.joint_numbers",
+    [
+      "'{word}' takes {count} numbers ({names}: degrees, mm of a prismatic joint), not {given}",
+      "“{word}”须有 {count} 个数（{names}：度，移动关节为 mm），而不是 {given} 个",
+    ],
+  ],
+  [
+    "program.pose_numbers",
+    [
+      "'{word}' takes {count} numbers ({names}: mm and degrees), not {given}",
+      "“{word}”须有 {count} 个数（{names}：mm 和度），而不是 {given} 个",
+    ],
+  ],
+  [
+    "program.number_too_large",
+    [
+      "'{word}': {name} is {given}; must be between -{most} and {most}",
+      "“{word}”：{name} 为 {given}；须在 -{most} 与 {most} 之间",
+    ],
+  ],
+  [
+    "program.one_number",
+    ["'{word}' takes one number ({unit}), not {given}", "“{word}”须有一个数（{unit}），而不是 {given}"],
+  ],
+  [
+    "program.number_outside",
+    [
+      "'{word}' is {given}; must be between {least} and {most} {unit}",
+      "“{word}”为 {given}；须在 {least} 与 {most} {unit}之间",
+    ],
+  ],
+  ["program.no_argument", ["'{word}' takes no argument, not '{given}'", "“{word}”不带参数，而不是“{given}”"]],
+  ["program.point_unreachable", ["point {name} cannot be reached: {cause}", "点 {name} 无法到达：{cause}"]],
+  [
+    "program.pose_unreachable",
+    ["the pose at {place} mm cannot be reached: {cause}", "位于 {place} mm 的位姿无法到达：{cause}"],
+  ],
+  ["program.line_not_followed", ["the line cannot be followed: {cause}", "无法沿直线运动：{cause}"]],
+  [
+    "program.line_not_followed_beyond",
+    [
+      "the line cannot be followed beyond {done_mm} of its {length_mm} mm: {cause}",
+      "沿直线运动 {done_mm} mm 后无法继续（全长 {length_mm} mm）：{cause}",
+    ],
+  ],
+  ["program.line_end", ["its end cannot be reached: {cause}", "其终点无法到达：{cause}"]],
+  [
+    "program.line_jump",
+    [
+      "the arm would have to jump to another posture there, with joint {name} moving most",
+      "机械臂须在此处跳到另一姿态，其中关节 {name} 变化最大",
+    ],
+  ],
+  ["program.line_away", ["the tool stays {distance_mm} mm away from it", "工具与它相距 {distance_mm} mm"]],
+  [
+    "program.line_bent",
+    [
+      "the arm cannot keep its tool's axis within {limit_deg}° of a uniform rotation there",
+      "机械臂在此处无法使工具轴保持在均匀转动的 {limit_deg}° 以内",
+    ],
+  ],
   ["program.start_outside", ["at the start: {cause}", "起始位置：{cause}"]],
   ["program.line", ["line {line}: {cause}", "第 {line} 行：{cause}"]],
   ["program.too_long", ["a program has at most {kib} KiB", "程序不得超过 {kib} KiB"]],
@@ -527,9 +754,13 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ],
   ["check.skipped", ["not checked: {cause}", "未检查：{cause}"]],
   ["check.starting", ["the check is still starting: try again in a few seconds", "检查仍在准备：请几秒后再试"]],
-  ["check.broken", ["the check does not work: {detail}", "检查无法工作：{detail}"]],
-  ["check.failed", ["the check failed: {detail}", "检查失败：{detail}"]],
-  ["check.impossible", ["{detail}", "{detail}"]],
+  ["check.broken", ["the check does not work: {cause}", "检查无法工作：{cause}"]],
+  ["check.failed", ["the check failed: {cause}", "检查失败：{cause}"]],
+  ["check.impossible", ["{cause}", "{cause}"]],
+  [
+    "check.nothing",
+    ["its description has no link with a shape, so nothing can be checked", "其描述中没有任何连杆有形状，无法检查"],
+  ],
   [
     "check.queued_too_long",
     ["the check waited longer than {seconds} s for other checks", "检查超过 {seconds} 秒：正在检查其他请求"],
@@ -569,7 +800,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ["not checked, because they have no shape: {links} of {name}", "{name} 的 {links} 没有形状，未检查"],
   ],
   ["audit.slow", ["the audit log's disk takes longer than {seconds} s", "审计日志所在磁盘超过 {seconds} 秒无响应"]],
-  ["audit.not_writable", ["the audit log {file} cannot be written ({detail})", "审计日志 {file} 无法写入（{detail}）"]],
+  ["audit.not_writable", ["the audit log {file} cannot be written ({cause})", "审计日志 {file} 无法写入（{cause}）"]],
   ["audit.queue_full", ["{count} entries wait for the disk", "{count} 条记录等待写入磁盘"]],
   [
     "latch.slow",
@@ -581,12 +812,14 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ],
   [
     "latch.not_writable",
-    ["the latch file {name} cannot be written ({detail})", "停止锁定文件 {name} 无法写入（{detail}）"],
+    ["the latch file {name} cannot be written ({cause})", "停止锁定文件 {name} 无法写入（{cause}）"],
   ],
   [
     "latch.not_allocated",
-    ["the latch file {name} cannot be allocated ({detail})", "停止锁定文件 {name} 无法分配（{detail}）"],
+    ["the latch file {name} cannot be allocated ({cause})", "停止锁定文件 {name} 无法分配（{cause}）"],
   ],
+  ["disk.full", ["{detail}: make space on its disk", "{detail}：请清理其磁盘空间"]],
+  ["disk.fault", ["{detail}: check its disk", "{detail}：请检查其磁盘"]],
   ["audit.last_of_many", ["{cause} (the last of many callers)", "{cause}（多个请求者中的最后一个）"]],
   ["audit.not_done", ["not done: {cause}", "未完成：{cause}"]],
   [
@@ -628,8 +861,85 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "task {task}：应为 POSE_6D 或 POSITION_AND_AXIS_5D",
     ],
   ],
-  ["inverse.pose", ["{detail}", "{detail}"]],
-  ["inverse.near", ["near: {detail}", "near（参考位置）：{detail}"]],
+  ["inverse.pose", ["{cause}", "{cause}"]],
+  ["inverse.near", ["near: {cause}", "near（参考位置）：{cause}"]],
+  ["inverse.limits", ["limits: found only with {cause}", "限位：只有超出限位的解：{cause}"]],
+  [
+    "inverse.too_far",
+    [
+      "out of reach: {distance} from the first joint; the tool reaches at most {reach}",
+      "够不到：距第一关节 {distance}；工具最远到达 {reach}",
+    ],
+  ],
+  [
+    "inverse.gap",
+    [
+      "out of reach: within its limits the tool stays at least {distance} from this position",
+      "够不到：在限位之内，工具与此位置至少相距 {distance}",
+    ],
+  ],
+  [
+    "inverse.orientation",
+    [
+      "not this orientation: at this position, the tool's orientation is at least {angle} off",
+      "姿态不可达：在此位置，工具的姿态至少偏差 {angle}",
+    ],
+  ],
+  [
+    "inverse.axis",
+    [
+      "not this orientation: at this position, the tool's axis is at least {angle} off",
+      "姿态不可达：在此位置，工具的轴至少偏差 {angle}",
+    ],
+  ],
+  [
+    "pose.not_numbers",
+    [
+      "the pose takes 16 numbers, 4 rows of 4, tool to base in metres",
+      "位姿须为 16 个数，4 行 4 列，工具到基座，以米为单位",
+    ],
+  ],
+  [
+    "pose.size",
+    ["the pose has {count} numbers; 16 are right, 4 rows of 4", "位姿有 {count} 个数；应为 16 个，4 行 4 列"],
+  ],
+  [
+    "pose.shape",
+    [
+      "the pose has numbers of shape {shape}; 16 are right, 4 rows of 4",
+      "位姿的形状为 {shape}；应为 16 个数，4 行 4 列",
+    ],
+  ],
+  ["pose.not_finite", ["the pose holds {value}; every number must be finite", "位姿含有 {value}；每个数须为有限数值"]],
+  ["pose.last_row", ["the pose has the last row {row}; 0 0 0 1 is right", "位姿的最后一行为 {row}；应为 0 0 0 1"]],
+  [
+    "pose.too_far",
+    [
+      "the pose is {distance_m} m away; less than {limit_m} m is right",
+      "位姿远在 {distance_m} m 处；应小于 {limit_m} m",
+    ],
+  ],
+  [
+    "pose.no_rotation",
+    [
+      "the pose has no rotation in its first 3 rows and columns: the rows must have length 1 and be at right angles, these have the lengths {lengths}",
+      "位姿的前 3 行 3 列不是旋转：各行长度须为 1 且互相垂直，而其长度为 {lengths}",
+    ],
+  ],
+  [
+    "pose.mirrored",
+    [
+      "the pose is mirrored: the determinant of its first 3 rows and columns is -1; 1 is right",
+      "位姿是镜像：前 3 行 3 列的行列式为 -1；应为 1",
+    ],
+  ],
+  [
+    "pose.near_not_finite",
+    [
+      "the pose was requested near {positions}, which has a number that is not finite",
+      "所给的参考位置 {positions} 含有非有限数值",
+    ],
+  ],
   [
     "check.start_unknown",
     ["the position of {robot} is unknown: give `start`", "start：{robot} 的当前位置未知；请给出"],
@@ -658,8 +968,8 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ],
   ["recording.open", ["{robot} is already being recorded, as '{name}'", "{robot} 已在录制，名称为“{name}”"]],
   ["recording.not_open", ["{robot} is not being recorded", "{robot} 未在录制"]],
-  ["recording.failed", ["{detail}", "{detail}"]],
-  ["recording.unreadable", ["{detail}", "{detail}"]],
+  ["recording.failed", ["{cause}", "{cause}"]],
+  ["recording.unreadable", ["{cause}", "{cause}"]],
   [
     "recording.unknown",
     [
@@ -667,6 +977,27 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "此处没有录制“{name}”：请使用 recordings/list 中的文件名",
     ],
   ],
+  ["recording.file", ["{file}: cannot be read: {detail}", "{file}：无法读取：{detail}"]],
+  ["recording.not_writable", ["{file}: cannot be written: {detail}", "{file}：无法写入：{detail}"]],
+  [
+    "recording.empty",
+    ["{file} is empty: the disk was full, or the recorder was killed", "{file} 为空：磁盘已满，或录制服务被强行结束"],
+  ],
+  [
+    "recording.cut",
+    [
+      "{file}: not a readable recording: it ends before its first message",
+      "{file}：不是可读的录制：在第一条消息之前结束",
+    ],
+  ],
+  [
+    "recording.not_mcap",
+    ["{file}: not an MCAP file: its first bytes are wrong", "{file}：不是 MCAP 文件：开头的字节不符"],
+  ],
+  ["recording.damaged", ["{file}: damaged near byte {byte}", "{file}：第 {byte} 字节附近损坏"]],
+  ["recording.chunk", ["a chunk has {mib} MiB: the limit is {most} MiB", "一个数据块有 {mib} MiB：上限为 {most} MiB"]],
+  ["recording.ends", ["{file}: it ends before byte {byte}", "{file}：在第 {byte} 字节之前结束"]],
+  ["recording.no_byte", ["{file}: no byte {byte}: it has {total}", "{file}：没有第 {byte} 字节：共 {total} 字节"]],
   [
     "recording.no_attachment",
     ["{file} has no attachment '{name}': there are {attachments}", "{file} 没有附件“{name}”：现有 {attachments}"],
@@ -674,6 +1005,22 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   [
     "recording.no_topic",
     ["{file} has no topic '{topic}': there are {topics}", "{file} 没有主题“{topic}”：现有 {topics}"],
+  ],
+  [
+    "recording.no_value",
+    ["{file}: no value '{name}'; topics with values: {topics}", "{file}：没有数值“{name}”；有数值的主题：{topics}"],
+  ],
+  [
+    "recording.too_many_values",
+    ["{count} values are too many: request at most {most}", "{count} 个数值过多：最多请求 {most} 个"],
+  ],
+  ["recording.times", ["the range ends before it begins", "时间范围的结束早于开始"]],
+  [
+    "recording.outside",
+    [
+      "{file}: nothing from {start} to {end}: it goes from {first} to {last}",
+      "{file}：{start} 至 {end} 没有数据：录制从 {first} 到 {last}",
+    ],
   ],
   ["recording.no_joints", ["{file} contains no joint states", "{file}：其中没有关节记录"]],
   ["recording.range", ["{range}: {file} has {bytes} bytes", "{range}：{file} 有 {bytes} 字节"]],
@@ -732,8 +1079,91 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ],
   ["view.unknown", ["no view '{view}'; there are {views}", "没有视图“{view}”；现有 {views}"]],
   ["view.unknown_of", ["no view '{view}' of {robot}: there are {views}", "{robot} 没有视图“{view}”：现有 {views}"]],
-  ["view.no_room", ["no capacity: {detail}", "没有余量：{detail}"]],
-  ["view.invalid", ["{detail}", "{detail}"]],
+  ["view.no_room", ["no capacity: {cause}", "没有余量：{cause}"]],
+  [
+    "view.too_many",
+    [
+      "{count} requested views exist, and {most} are possible (most_views in the site file's [renderer]): retry when some of them have ended",
+      "已有 {count} 个请求的视图，最多 {most} 个（站点文件 [renderer] 的 most_views）：请在其中一些结束后再试",
+    ],
+  ],
+  [
+    "view.too_costly_now",
+    [
+      "{width} x {height} at {fps} a second counts for {megapixels} million pixels a second: {left_megapixels} of {most_megapixels} million are left for requested views; request a smaller or slower one",
+      "{width} x {height}、每秒 {fps} 帧相当于每秒 {megapixels} 百万像素：请求的视图还剩 {left_megapixels}，共 {most_megapixels} 百万；请求更小或更慢的视图",
+    ],
+  ],
+  ["view.invalid", ["{cause}", "{cause}"]],
+  [
+    "view.too_costly",
+    [
+      "{width} x {height} at {fps} a second counts for {megapixels} million pixels a second: requested views may have {most_megapixels} million together; {possible} a second is possible, more with a larger size, fps or most_views in the site file's [renderer]",
+      "{width} x {height}、每秒 {fps} 帧相当于每秒 {megapixels} 百万像素：请求的视图合计最多 {most_megapixels} 百万；每秒可有 {possible} 帧，在站点文件 [renderer] 中增大 size、fps 或 most_views 可更多",
+    ],
+  ],
+  [
+    "view.or_of",
+    [
+      "a view request needs either `view`, a camera, or `of`, a view's name",
+      "视图请求须有 `view`（相机）或 `of`（视图名称）之一",
+    ],
+  ],
+  [
+    "view.size",
+    [
+      "size {width} x {height}: must be even numbers from {least} to {most}, with at most as many pixels as 1920 x 1080",
+      "尺寸 {width} x {height}：须为 {least} 至 {most} 的偶数，像素总数不超过 1920 x 1080",
+    ],
+  ],
+  [
+    "view.value",
+    [
+      "{field} {value}: must be from {least} to {most}, or 0 for the default",
+      "{field} {value}：须在 {least} 至 {most} 之间，0 为默认值",
+    ],
+  ],
+  [
+    "view.ghost",
+    [
+      "the ghost has {count} joint positions: the robot has {joints} joints",
+      "虚影有 {count} 个关节位置：机器人有 {joints} 个关节",
+    ],
+  ],
+  ["view.path", ["the path has {count} points: at most {most} are drawn", "路径有 {count} 个点：最多绘制 {most} 个"]],
+  ["view.not_finite", ["the ghost or path has a number that is not finite", "虚影或路径含有非有限数值"]],
+  [
+    "camera.no_direction",
+    [
+      "eye and target are both at ({place}) m: they must be different points",
+      "eye 与 target 都位于 ({place}) m：须为不同的点",
+    ],
+  ],
+  [
+    "camera.height",
+    ["height {value} m: must be from {least} to {most}", "height {value} m：须在 {least} 至 {most} 之间"],
+  ],
+  [
+    "camera.angle",
+    [
+      "field_of_view {value} rad: must be from {least} to {most} ({least_deg}° to {most_deg}°)",
+      "field_of_view {value} rad：须在 {least} 至 {most} 之间（{least_deg}° 至 {most_deg}°）",
+    ],
+  ],
+  [
+    "camera.mount",
+    [
+      "mount '{mount}' is not a link or frame of the robot; use {names}",
+      "mount“{mount}”不是机器人的连杆或坐标系；可用 {names}",
+    ],
+  ],
+  [
+    "camera.vector",
+    [
+      "{field} ({numbers}): numbers must be from -{most} to {most}",
+      "{field} ({numbers})：各数须在 -{most} 至 {most} 之间",
+    ],
+  ],
   ["view.no_answer", ["the answer to {key}/views contains no view", "{key}/views 的应答中没有视图"]],
   [
     "view.no_renderer",
@@ -869,6 +1299,29 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ],
 ] as const);
 
+/** Chinese for parameters that are words of a program. */
+const WORDS: Readonly<Record<string, string>> = {
+  "act:publish": "发布",
+  "act:read": "读取",
+  "act:answer": "应答",
+  "act:ask": "请求",
+  "what:name": "名称",
+  "what:site": "站点",
+  "what:robot": "机器人",
+  "what:fixture": "固定物",
+  "what:account": "账户",
+  "what:operator": "操作员",
+  "what:view": "视图",
+  "what:mesh": "网格",
+  "what:service": "服务",
+  "what:chunk": "键的一段",
+  "what:id": "标识",
+  "given:nothing": "空",
+  "unit:percent": "%",
+  "unit:seconds": "秒",
+  "unit:times": "次",
+};
+
 /** A reason's sentence in the page's language; `text` where this page does not know the code. */
 export function reasonText(reason: Reason | undefined, text = reason?.text ?? ""): string {
   return (reason && sentence(reason)) ?? text;
@@ -884,7 +1337,10 @@ function sentence({ code, values, causes }: Reason): string | undefined {
   const pair = SENTENCES.get(code);
   if (!pair) return undefined;
   const known = causes.map((cause) => reasonText(cause));
-  const all = known.length > 0 && known.every(Boolean) ? { ...values, cause: known.join(t("list_separator")) } : values;
+  const shown = Object.fromEntries(Object.entries(values).map(([name, value]) => [name, word(name, value)]));
+  const all = known.length > 0 && known.every(Boolean) ? { ...shown, cause: known.join(t("list_separator")) } : shown;
   const names = [...pair[0].matchAll(/\{(\w+)\}/g)].map((found) => found[1] ?? "");
   return names.every((name) => all[name]) ? inLanguage(pair, all) : undefined;
 }
+
+const word = (name: string, value: string): string => (language.value === "zh" && WORDS[`${name}:${value}`]) || value;

@@ -80,7 +80,12 @@ export function AlarmLine(props: {
           </button>
         )}
         {state === State.SHELVED ? (
-          <button class="action" disabled={!able} aria-label={e("unshelve_of", { text: title ?? text })} onClick={props.unshelve}>
+          <button
+            class="action"
+            disabled={!able}
+            aria-label={e("unshelve_of", { text: title ?? text })}
+            onClick={props.unshelve}
+          >
             {e("unshelve")}
           </button>
         ) : (

@@ -3,6 +3,7 @@
 import { computed, signal } from "@preact/signals";
 import { InverseAnswerSchema, InverseRequestSchema, InverseRequest_Task as Task } from "../../gen/robomesh_pb";
 import { rollPitchYaw, toDegrees, toRadians } from "../../i18n/format";
+import { reasonText } from "../../i18n/reasons";
 import { ask } from "../../mesh/connection";
 import { reasonOf } from "../../mesh/control";
 import { robotKey, toolAt } from "./program-robot";
@@ -55,7 +56,7 @@ async function solve(): Promise<void> {
       const key = `${robotKey.value}/kinematics/inverse`;
       const answer = await ask(key, InverseRequestSchema, request, InverseAnswerSchema, TIMEOUT_S);
       found = answer.solutions[0]?.jointPositions;
-      problem = answer.reason;
+      problem = reasonText(answer.cause, answer.reason);
     } catch (error) {
       problem = reasonOf(error);
     }
