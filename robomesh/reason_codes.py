@@ -129,7 +129,7 @@ PAGE_WATCH_VIDEO = Code(
 PAGE_WATCH_NO_RIGHT = Code(
     "page.watch_no_right", "'{key}' cannot be watched: the console has no right to {topic}"
 )
-PAGE_CANNOT_WATCH = Code("page.cannot_watch", "'{key}' cannot be watched: {detail}")
+PAGE_CANNOT_WATCH = Code("page.cannot_watch", "'{key}' cannot be watched: {cause}")
 WORKER_GAVE_UP = Code("request.worker_gave_up", "aborted: {cause}")
 WORKER_TOO_SLOW = Code("worker.too_slow", "no answer within {seconds:g} s")
 WORKER_NOT_STARTED = Code("worker.not_started", "{module} could not be started: {detail}")

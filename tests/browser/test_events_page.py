@@ -129,6 +129,11 @@ def test_alarms_and_events_have_their_reason_in_chinese(open_page, raised):
     raised("lease.ended", "control ended: li", Event.INFO, released, holder="li")
     ended = page.locator(".journal-line").filter(has_text="的控制权已结束")
     expect(ended.first).to_contain_text("li 的控制权已结束：li 释放了控制权。")
+    number = codes.PROGRAM_UNREADABLE(codes.ONE_NUMBER(word="speed", unit="percent", given="nothing"))
+    raised("program.ended", "program weld ended", reason=number)
+    alarm = page.locator(".alarm-line").filter(has_text="program.ended")
+    expect(alarm.locator("strong")).to_have_text("程序提前结束：“speed”须有一个数（%），而不是 空")
+    alarm = page.locator(".alarm-line").filter(has_text="audit.failed")
     # An older publisher sends no reason.
     raised("audit.failed", "the audit log's disk")
     expect(alarm.locator("strong")).to_have_text("审计日志无法写入")

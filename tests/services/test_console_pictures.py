@@ -61,7 +61,9 @@ async def rendered(mesh, page):  # noqa: F811
             if request.message.width == 640:
                 raise QuotaError("li has had its views", again_s=30.5)
             if request.message.width > 1920:
-                raise RefusedError(codes.VIEW_INVALID(detail="2000 pixels: up to 1920 are possible"))
+                raise RefusedError(
+                    codes.VIEW_INVALID(codes.VIEW_SIZE(width=2000, height=90, least=64, most=1920))
+                )
             if request.message == ViewRequest(of="front"):
                 return ViewAnswer(topic="video/front", image="image/front", width=160, height=90, fps=20)
             if request.message.width == 1920:
@@ -227,7 +229,7 @@ def test_a_still_is_the_newest_picture_as_jpeg_or_png(mesh, page):  # noqa: F811
         ("image/s/r/back.jpg", 404, "view.unknown", "no view 'back'; there are front"),
         ("video/s/r/back.mjpeg", 404, "view.unknown", "no view 'back'; there are front"),
         ("video/s/r/back.mp4", 404, "view.unknown", "no view 'back'; there are front"),
-        ("image/s/r/front.jpg?width=2000&height=1000", 400, "view.invalid", "up to 1920 are possible"),
+        ("image/s/r/front.jpg?width=2000&height=1000", 400, "view.invalid", "even numbers from 64 to 1920"),
         ("image/s/r/front.jpg?width=wide", 400, "view.not_pixels", "width='wide' is not a number of pixels"),
         ("image/s/r/front.jpg?width=1920", 503, "view.no_room", "no capacity: 1 requested views exist"),
         ("image/s/r/front.jpg?width=640", 429, "other", "li has had its views"),

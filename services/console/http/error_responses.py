@@ -14,7 +14,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 
 from robomesh import reason_codes as codes
-from robomesh.errors import BusError, BusyError, NoAnswerError, QuotaError, RefusedError
+from robomesh.errors import BusError, BusyError, CodedError, NoAnswerError, QuotaError, RefusedError
 from robomesh.messages import reason_message, to_json
 from robomesh.reasons import to_parameters
 from services.console.errors import RefusedRequest
@@ -59,8 +59,10 @@ def refused_on_the_mesh(error: BusError) -> RefusedRequest:
             return RefusedRequest(404, error.reason)
         case NoAnswerError():
             return RefusedRequest(504, codes.NO_ANSWER(detail=error))
+        case CodedError():
+            return RefusedRequest(400, codes.INVALID(error.reason))
         case _:
-            return RefusedRequest(400, codes.INVALID(detail=error))
+            return RefusedRequest(400, codes.INVALID(codes.OTHER(detail=error)))
 
 
 def with_error_responses(

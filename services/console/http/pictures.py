@@ -148,7 +148,7 @@ class Pictures:
         try:
             robot, view = robot_key(path["site"], path["robot"]), keys.check_chunk(path["view"], "view")
         except KeyNameError as error:
-            raise RefusedRequest(404, codes.INVALID(detail=error)) from None
+            raise RefusedRequest(404, codes.INVALID(error.reason)) from None
         wanted = ViewRequest(of=view, width=size.width, height=size.height, fps=size.fps)
         try:
             answer = await self.views.ask(robot, wanted, self.asker(request.scope))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from robomesh import keys, topics
 from robomesh import reason_codes as codes
-from robomesh.errors import BusError
+from robomesh.errors import KeyNameError, UnknownTopicError
 from robomesh.session import Session
 from robomesh.subscription import Sample
 from robomesh.topics import History
@@ -155,8 +155,8 @@ def check_expression(expression: str) -> topics.Topic:
             raise WatchError(codes.PAGE_WATCH_VIDEO(key=expression))
         if row.name.endswith("/*") and not every_source:
             keys.check_chunk(key.topic.split("/", 1)[1], "view")
-    except BusError as error:
-        raise WatchError(codes.PAGE_CANNOT_WATCH(key=expression, detail=error)) from None
+    except (KeyNameError, UnknownTopicError) as error:
+        raise WatchError(codes.PAGE_CANNOT_WATCH(error.reason, key=expression)) from None
     if topics.Role.CONSOLE not in row.subscribers:
         raise WatchError(codes.PAGE_WATCH_NO_RIGHT(key=expression, topic=row.name))
     return row

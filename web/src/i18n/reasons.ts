@@ -204,7 +204,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     "page.watch_no_right",
     ["'{key}' cannot be watched: the console has no right to {topic}", "不能监视“{key}”：控制台无权订阅 {topic}"],
   ],
-  ["page.cannot_watch", ["'{key}' cannot be watched: {detail}", "不能监视“{key}”：{detail}"]],
+  ["page.cannot_watch", ["'{key}' cannot be watched: {cause}", "不能监视“{key}”：{cause}"]],
   ["request.worker_gave_up", ["aborted: {cause}", "已放弃：{cause}"]],
   ["worker.too_slow", ["no answer within {seconds} s", "{seconds} 秒内没有应答"]],
   ["worker.not_started", ["{module} could not be started: {detail}", "{module} 无法启动：{detail}"]],

@@ -7,6 +7,7 @@ import { signal } from "@preact/signals";
 import type { ReplayState } from "../gen/robomesh_pb";
 import { ReplayRequest_Action as Action, ReplayRequestSchema, ReplayStateSchema } from "../gen/robomesh_pb";
 import { ask, watch } from "./connection";
+import { reasonOf } from "./control";
 import { isStale, now } from "./topics";
 
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 20, 50, 100] as const;
@@ -115,7 +116,7 @@ export class Replay {
       this.problem.value = "";
       return true;
     } catch (error) {
-      this.problem.value = error instanceof Error ? error.message : String(error);
+      this.problem.value = reasonOf(error);
       return false;
     }
   }

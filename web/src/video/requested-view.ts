@@ -3,6 +3,7 @@
 import type { View } from "../gen/robomesh_pb";
 import { ViewAnswerSchema, ViewRequestSchema } from "../gen/robomesh_pb";
 import { ask, inOwnName } from "../mesh/connection";
+import { reasonOf } from "../mesh/control";
 
 /** The wanted picture; a width of 0: the renderer's standard size. */
 export interface RequestedView {
@@ -64,7 +65,7 @@ export function receiveView(
       take(answer.topic, answer.image);
     } catch (error) {
       if (ended) return;
-      refused(error instanceof Error ? error.message : String(error));
+      refused(reasonOf(error));
       if (!view && !attached) takeStandardView(); // a larger picture than wanted is better than none
     }
   };

@@ -6,6 +6,7 @@ import { useEffect, useState } from "preact/hooks";
 import { PlayRequestSchema, ReplayStateSchema } from "../../gen/robomesh_pb";
 import { r } from "../../i18n/recordings";
 import { AskError, ask, hello, presence } from "../../mesh/connection";
+import { reasonOf } from "../../mesh/control";
 import { Replay } from "../../mesh/replay";
 import type { RecordingName } from "../../ui/route";
 
@@ -49,7 +50,7 @@ export function useOpenReplay(name: RecordingName | null, paused = false): OpenR
       } catch (error) {
         if (!wanted) return;
         const silent = error instanceof AskError && error.noAnswer;
-        const text = error instanceof Error ? error.message : String(error);
+        const text = reasonOf(error);
         setProblem(silent ? r("no_player", { site: name.site }) : r("not_opened", { text }));
       }
     };

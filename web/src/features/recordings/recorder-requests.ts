@@ -20,6 +20,7 @@ import { entryText } from "../../i18n/audit-text";
 import { startMs, topicOf } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
 import { AskError, ask, inOwnName, lostAt } from "../../mesh/connection";
+import { reasonOf } from "../../mesh/control";
 import type { RecordingName } from "../../ui/route";
 
 const TIMEOUT_S = 20;
@@ -49,7 +50,7 @@ function useRequest<T>(question: (() => Promise<T>) | null, depends: readonly un
 
 function reason(error: unknown): string {
   if (error instanceof AskError && error.noAnswer) return r("record_no_answer");
-  return error instanceof Error ? error.message : String(error);
+  return reasonOf(error);
 }
 
 /** Return the facts of a recording. */

@@ -5,6 +5,7 @@ import { useEffect, useState } from "preact/hooks";
 import { sizeText, startMs } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
 import type { Notice } from "../../mesh/control";
+import { reasonOf } from "../../mesh/control";
 import { fleetRobots } from "../../mesh/known-robots";
 import { Action, askRecorder } from "../../mesh/recorder";
 import { NoticeLine } from "../../ui/notice-line";
@@ -124,7 +125,7 @@ function SiteLine({ site, answer: { list, problem }, named }: { site: string; an
     } catch (error) {
       setNotice({
         kind: "refused",
-        text: r("not_saved", { text: error instanceof Error ? error.message : String(error) }),
+        text: r("not_saved", { text: reasonOf(error) }),
       });
     }
   };

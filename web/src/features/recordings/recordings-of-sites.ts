@@ -8,6 +8,7 @@ import { RecordingListSchema, RecordingSchema } from "../../gen/robomesh_pb";
 import { startMs } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
 import { AskError, ask, hello, lostAt, presence } from "../../mesh/connection";
+import { reasonOf } from "../../mesh/control";
 import { ageOf, isStale, useTopics } from "../../mesh/topics";
 
 const REFRESH_INTERVAL_MS = 5000;
@@ -37,7 +38,7 @@ async function requestList(site: string): Promise<void> {
     now = { list: await ask(key, EmptySchema, {}, RecordingListSchema, TIMEOUT_S), problem: "" };
   } catch (error) {
     const silent = error instanceof AskError && error.noAnswer;
-    const text = error instanceof Error ? error.message : String(error);
+    const text = reasonOf(error);
     const problem = silent ? r("no_recorder", { site }) : r("list_refused", { site, text });
     now = { list: answers.value.get(site)?.list ?? null, problem };
   }

@@ -16,6 +16,7 @@ import { viewsOf } from "../../scene/scene-view";
 import { recordingsLink } from "../../ui/route";
 import "../../ui/replay.css";
 import "./record-panel.css";
+import { reasonOf } from "../../mesh/control";
 
 const NO_VIDEO = "-";
 const AS_THE_SITE = "";
@@ -68,7 +69,7 @@ export function RecordPanel({ robotKey, description }: { robotKey: string; descr
     } catch (error) {
       setNotice({
         kind: "refused",
-        text: r("record_refused", { text: error instanceof Error ? error.message : String(error) }),
+        text: r("record_refused", { text: reasonOf(error) }),
       });
     }
   };
