@@ -13,7 +13,7 @@ from typing import ParamSpec, TypeVar
 
 from renderer.cache import cache_folder
 from renderer.composition import Composition
-from renderer.errors import NoRoomError, UnknownViewError, ViewError
+from renderer.errors import NoRoomError, RendererError, UnknownViewError, ViewError
 from renderer.frame_scheduler import FrameScheduler, next_view
 from renderer.post_processing import EncodedPicture, PictureJob, PostProcessor
 from renderer.requested_views import FAR, ViewSpec, low_rate_view, requested_view, standard_view
