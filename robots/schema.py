@@ -70,7 +70,12 @@ class Units(_Table):
 
 
 class Pose(_Table):
-    """A placement: translation, then roll, pitch and yaw about the fixed x, y and z axes."""
+    """A placement: translation, then roll, pitch and yaw about the fixed x, y and z axes.
+
+    Attributes:
+        xyz: Translation along x, y and z, in the file's unit of length.
+        rpy: Roll, pitch and yaw, in the file's unit of angle.
+    """
 
     xyz: Triple = (0.0, 0.0, 0.0)
     rpy: Triple = (0.0, 0.0, 0.0)

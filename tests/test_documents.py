@@ -3,13 +3,17 @@
 import re
 from pathlib import Path
 
-from tests import make_topics
+from tests import make_site_file, make_topics
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
 def test_the_reference_of_topics_is_the_topic_table():
     assert make_topics.FILE.read_text(encoding="utf-8") == make_topics.document()
+
+
+def test_the_reference_of_the_site_file_is_its_models():
+    assert make_site_file.FILE.read_text(encoding="utf-8") == make_site_file.document()
 
 
 def test_architecture_is_short_and_names_folders_and_files_that_exist():

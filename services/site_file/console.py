@@ -8,7 +8,12 @@ from services.site_file.part import PART_CONFIG
 
 
 class ConsoleTls(BaseModel):
-    """The page's certificate with its chain, and its key (PEM)."""
+    """The page's certificate.
+
+    Attributes:
+        certificate: File of the certificate with its chain (PEM).
+        key: File of its private key (PEM).
+    """
 
     model_config = PART_CONFIG
     certificate: Path
@@ -16,13 +21,19 @@ class ConsoleTls(BaseModel):
 
 
 class Console(BaseModel):
-    """The console's address and access."""
+    """The console: the service that serves the page.
+
+    Attributes:
+        listen: Address of the page. Beyond loopback it needs `accounts` and `tls`.
+        hosts: Host names of the page, in addition to IP addresses and localhost.
+        accounts: File of accounts (`robomesh accounts`); absent: the page needs no sign-in.
+        tls: The page's certificate; absent: HTTP.
+        insecure: Accept an address that other machines reach without accounts or TLS.
+    """
 
     model_config = PART_CONFIG
     listen: str = "127.0.0.1:8080"
-    # Host names of the page, in addition to IP addresses and localhost.
     hosts: tuple[str, ...] = ()
-    # File of accounts (robomesh accounts); without it the page needs no sign-in.
     accounts: Path | None = None
     tls: ConsoleTls | None = None
     insecure: StrictBool = False

@@ -30,7 +30,12 @@ Distance = Annotated[float, Field(strict=True, ge=0, le=10_000)]
 
 
 class Clearance(BaseModel):
-    """Distances between an arm and its surroundings below which it gets a warning or a stop [mm]."""
+    """Distances between an arm and its surroundings.
+
+    Attributes:
+        warning: Below this distance a check warns [mm].
+        stop: Below this distance a check fails, and `check = "require"` refuses the motion [mm].
+    """
 
     model_config = PART_CONFIG
     warning: Distance = 50.0
@@ -46,11 +51,12 @@ class Clearance(BaseModel):
 
 
 class Floor(BaseModel):
-    """The floor below a cell [mm]: `floor = -250.0`, or a table with distances to it.
+    """The floor below a cell.
 
     Attributes:
-        height: In the site's frame; None: the height of the lowest base in the cell.
-        warning, stop: Clearances of an arm from it; by default only contact counts.
+        height: Height in the site's frame [mm]; absent: that of the lowest base in the cell.
+        warning: Below this distance of an arm from it a check warns [mm]. With 0 only contact counts.
+        stop: Below this distance a check fails [mm].
     """
 
     model_config = PART_CONFIG
@@ -68,17 +74,20 @@ class Floor(BaseModel):
 
 
 class Fixture(BaseModel):
-    """A static object in a cell: one shape, centred on the pose.
+    """A static object in a cell: exactly one shape, `box`, `cylinder`, `sphere` or `mesh`.
 
     Attributes:
+        cell: Name of its cell.
+        name: Name, unique at the site: its frame is `<site>/<fixture>`.
         box: Lengths along its x, y and z [mm].
         cylinder: Radius, and height along its z [mm].
         sphere: Radius [mm].
-        mesh: A file, relative to the site file; in its own axes about the pose.
-        mesh_scale: The mesh file's unit in metres.
-        pose: In the site's frame.
+        mesh: A mesh file.
+        mesh_scale: The mesh file's unit [m].
+        pose: Pose of its centre (of a mesh: of its origin) in the site's frame.
+        color: Colour, as in `"#8a8f94"`; absent: the mesh's own colours.
         exact: Checked as the mesh itself, not as its convex hull: slower, but an arm may reach into it.
-        ignore: Links that may touch it, as "<robot>/<link>".
+        ignore: Links that may touch it, as `"<robot>/<link>"`.
     """
 
     model_config = PART_CONFIG

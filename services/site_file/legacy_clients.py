@@ -14,7 +14,12 @@ from services.site_file.part import PART_CONFIG
 
 
 class Commander(BaseModel):
-    """An address from which legacy clients may command, and the operator's name for it."""
+    """An address from which legacy clients may command; in place of the table, the address alone.
+
+    Attributes:
+        address: IP address.
+        operator: The operator's name for its commands; empty: the address.
+    """
 
     model_config = PART_CONFIG
     address: str
@@ -50,7 +55,14 @@ class Commander(BaseModel):
 
 
 class LegacyClients(BaseModel):
-    """The address on which the gateway serves legacy clients as if it were the robot's controller."""
+    """The address on which the gateway serves legacy clients as if it were the robot's controller.
+
+    Attributes:
+        listen: Address, as in `127.0.0.1:5401`.
+        commanders: IP addresses from which programs may command; all others only read.
+        most: Largest number of clients.
+        insecure: Accept an address that other machines reach: the protocol has no TLS.
+    """
 
     model_config = PART_CONFIG
     listen: str

@@ -10,7 +10,7 @@ from services.site_file.part import PART_CONFIG
 
 
 class Quotas(BaseModel):
-    """Limits for each client; `robomesh/quotas.py` documents them."""
+    """Limits for each client's name; `robomesh/quotas.py` describes each."""
 
     model_config = PART_CONFIG
     views: Annotated[int, Field(ge=1, le=256)] = DEFAULT.views

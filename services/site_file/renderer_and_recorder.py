@@ -14,17 +14,27 @@ ALWAYS_RENDERED = ("close", "far")
 
 
 class FlightRecorder(BaseModel):
-    """The last minutes of every robot, saved after an event; minutes = 0 disables it."""
+    """The last minutes of every robot, saved after an event.
+
+    Attributes:
+        minutes: Time that is kept [min]; 0: no flight recorder.
+        severity: Least severity of an event that saves it.
+        after_s: Time after the event that is added [s].
+    """
 
     model_config = PART_CONFIG
     minutes: Annotated[float, Field(ge=0, le=120)] = 5
-    # Minimum severity of an event that saves them, and the time that is added after it.
     severity: Literal["warning", "error", "critical"] = "error"
     after_s: Annotated[float, Field(ge=0, le=600)] = 30
 
 
 class Split(BaseModel):
-    """Limits at which a recording continues in a new file."""
+    """Limits at which a recording continues in a new file.
+
+    Attributes:
+        mib: Size of a file [MiB].
+        minutes: Duration of a file [min].
+    """
 
     model_config = PART_CONFIG
     mib: Annotated[float, Field(ge=1, le=65536)] = 1024
@@ -32,7 +42,13 @@ class Split(BaseModel):
 
 
 class FreeSpace(BaseModel):
-    """Free space below which the recorder warns, drops video, and drops all but robot states."""
+    """Free space on the disk below which the recorder records less.
+
+    Attributes:
+        warn_mib: Below this the recorder publishes an event [MiB].
+        video_mib: Below this it records no video [MiB].
+        states_mib: Below this it records no values that can be computed from the joints again [MiB].
+    """
 
     model_config = PART_CONFIG
     warn_mib: Annotated[float, Field(ge=0)] = 2048
@@ -41,12 +57,19 @@ class FreeSpace(BaseModel):
 
 
 class Recorder(BaseModel):
-    """Folder and content of recordings."""
+    """Recordings.
+
+    Attributes:
+        folder: Folder of the recordings.
+        views: Views recorded by default; each keeps the renderer busy during a recording. Absent: one view
+            that shows the whole arm.
+        flight: The flight recorder.
+        split: Size and duration of a file.
+        free: Limits of the free space.
+    """
 
     model_config = PART_CONFIG
     folder: Path = Path("recordings")
-    # Views recorded by default; each keeps the renderer busy during a recording.
-    # None: one view that shows the whole arm.
     views: tuple[str, ...] | None = None
     flight: FlightRecorder = FlightRecorder()
     split: Split = Split()
@@ -54,17 +77,24 @@ class Recorder(BaseModel):
 
 
 class Renderer(BaseModel):
-    """Rendered views, their size and quality."""
+    """Rendered views, their size and quality.
+
+    Attributes:
+        views: Cameras of the robots' descriptions that every robot has as views.
+        size: Width and height, even numbers [px].
+        fps: Pictures a second.
+        anti_aliasing: Samples per pixel; 0: off.
+        shading: `full` also draws shadows on robots and fixtures.
+        device: Number of the EGL device, on a machine with several GPUs; absent: EGL's own choice.
+        most_views: Largest number of requested views, for all robots together.
+    """
 
     model_config = PART_CONFIG
     views: tuple[str, ...] = ("front", "top", "left", "free")
     # Even numbers: H.264 halves the resolution of colour.
     size: tuple[Pixels, Pixels] = (1280, 720)
     fps: Annotated[float, Field(ge=1, le=120)] = 30
-    # Samples per pixel; 0: off.
     anti_aliasing: Literal[0, 2, 4, 8] = 4
     shading: Literal["fast", "full"] = "fast"
-    # Index of the EGL device, on a machine with several GPUs.
     device: Annotated[int, Field(ge=0, le=63)] | None = None
-    # Maximum number of views on request, in total for all robots.
     most_views: Annotated[int, Field(ge=0, le=256)] = 32

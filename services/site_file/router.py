@@ -28,7 +28,13 @@ _SITE_LINK = re.compile(r"([a-z0-9][a-z0-9_-]*)(?:=(\S+))?")
 
 
 class TlsFiles(BaseModel):
-    """Certificates of this end (PEM), not made by `robomesh keys`."""
+    """Certificates of this end that `robomesh keys` did not make.
+
+    Attributes:
+        ca: File of the certificate authority's certificate (PEM).
+        certificate: File of the certificate (PEM).
+        key: File of its private key (PEM).
+    """
 
     model_config = PART_CONFIG
     ca: Path
@@ -40,13 +46,16 @@ class Router(BaseModel):
     """The site's router.
 
     Attributes:
-        public: Addresses for certificates that are handed over; default: the listening addresses.
-        connect: Other routers: an endpoint, or a site that accepts ours (`robomesh keys accept`).
-        access: File of access rules; default: that of the site's keys.
-        border: `slow` forwards to other sites only what a slow line can carry.
-        line_mbit: Bandwidth of the narrowest line to another site [Mbit/s], so that video queues here and not
-            in
-            front of joint states; None if unknown.
+        listen: Endpoints on which the router listens. Beyond loopback they need TLS.
+        public: Endpoints for other machines, which certificates contain; empty: the listening endpoints.
+        connect: Other routers: an endpoint as in `tcp/10.1.0.1:7447`, a site that accepts this one
+            (`robomesh keys accept`), or `SITE=ENDPOINT`.
+        tls: Certificates of another authority, for a site without `[keys]`.
+        access: File of access rules; absent: that of the site's keys.
+        border: `slow` forwards to other sites only topics that a slow line can carry.
+        line_mbit: Bandwidth of the narrowest line to another site [Mbit/s], so that video waits in this
+            router's queue and not in front of joint states; absent: unknown.
+        insecure: Accept an endpoint that other machines reach without TLS.
     """
 
     model_config = PART_CONFIG
@@ -72,14 +81,24 @@ class Router(BaseModel):
 
 
 class Keys(BaseModel):
-    """The site's own certificates, made by `robomesh keys`; with them every connection uses TLS."""
+    """The site's own certificates, made by `robomesh keys`; with them every connection uses TLS.
+
+    Attributes:
+        folder: Folder of the certificates; absent: the site has none.
+    """
 
     model_config = PART_CONFIG
     folder: Path | None = None
 
 
 class RoutedSite(BaseModel):
-    """The parts of a site file that its router needs."""
+    """The parts of a site file that its router needs.
+
+    Attributes:
+        site: Name of the site in keys: lower-case letters, digits, `-` and `_`, at most 64 characters.
+        router: The router.
+        keys: The site's certificates.
+    """
 
     model_config = PART_CONFIG
     site: str

@@ -55,7 +55,34 @@ _MAX_PROBLEMS = 100
 
 
 class Robot(BaseModel):
-    """An arm and its controller."""
+    """An arm and its controller.
+
+    Attributes:
+        name: Name in keys: lower-case letters, digits, `-` and `_`, at most 64 characters.
+        model: A robot of the library or of the example robots by its name, or the path of a `robot.toml` or a
+            URDF.
+        pose: Pose of its base in the site's frame.
+        cell: Name of its cell; empty: alone in its cell. Robots of one cell are checked against each other.
+        controller: `simulated`: `robomesh up` starts a simulator; otherwise `tcp://HOST:PORT`.
+        protocol: The controller's protocol: the name of a driver in `protocol_gateway/drivers/registry.py`.
+        codes: Type codes of a controller that sends numbers, as in
+            `{ 2 = "ABSOLUTE.DEG", 101 = "COMMAND:home" }`; they replace the default codes. Empty: the gateway
+            sends types as names.
+        accept_unknown: States that the controller never reports; the gateway sends commands although they are
+            unknown.
+        check: The check of each motion for collisions: `require` refuses a motion that fails it or cannot
+            be checked, `warn` reports it, `off` checks nothing.
+        clearance: Distances to fixtures and other robots.
+        floor: The floor of its cell: its height [mm], a table, or `false` for none. In a cell of several
+            robots one robot's key applies to all.
+        stop_proven: The stop unit was tried on this controller (docs/safety.md); otherwise the robot is
+            read-only. Absent: `true` for a simulated controller, else `false`.
+        stale_after_s: The stale time [s]: without a unit of the controller for this long, the robot's state
+            is stale; without joint positions for this long, the gateway refuses motion. It reconnects after
+            twice this time, at least 4 s.
+        demo: The simulator moves the arm until the first command.
+        legacy_clients: Address for programs that use the unit protocol; absent: they cannot connect.
+    """
 
     model_config = PART_CONFIG
     name: str
@@ -68,9 +95,7 @@ class Robot(BaseModel):
     accept_unknown: tuple[Literal["mode", "homed"], ...] = ()
     check: Literal["require", "warn", "off"] = "warn"
     clearance: Clearance = Clearance()
-    # None: its cell has no floor (`floor = false`). A floor given for one robot applies to its whole cell.
     floor: Floor | None = Floor()
-    # True once the stop unit has been tried on this controller; the gateway sends nothing before that.
     stop_proven: StrictBool | None = None
     stale_after_s: Annotated[float, Field(gt=0.05, le=60)] = 1.0
     demo: StrictBool = False
@@ -151,30 +176,54 @@ class Robot(BaseModel):
 
 
 class Define(BaseModel):
-    """Folder of robots that were defined on the page."""
+    """Robots that are defined on the page.
+
+    Attributes:
+        folder: Folder of these robots.
+    """
 
     model_config = PART_CONFIG
     folder: Path = Path("robots")
 
 
 class Audit(BaseModel):
-    """Folder of the gateway's audit logs, one for each robot."""
+    """The gateway's audit logs, one for each robot.
+
+    Attributes:
+        folder: Folder of the logs.
+        rotate_mib: Size at which a log file becomes an older part, and a new file begins [MiB].
+    """
 
     model_config = PART_CONFIG
     folder: Path = Path("audit")
-    # At this size a log file becomes an older part, and a new file begins.
     rotate_mib: Annotated[float, Field(ge=0.01, le=1024)] = 16
 
 
 class Watch(BaseModel):
-    """Folder of the watch's alarms, so that a restart keeps acknowledgements."""
+    """The service that raises alarms.
+
+    Attributes:
+        folder: Folder of its alarms, so that a restart keeps acknowledgements.
+    """
 
     model_config = PART_CONFIG
     folder: Path = Path("watch")
 
 
 class Site(RoutedSite):
-    """A whole site."""
+    """A whole site.
+
+    Attributes:
+        robot: The robots.
+        fixture: Static objects in the robots' cells.
+        recorder: Recordings.
+        renderer: Rendered views.
+        console: The page.
+        define: Robots that are defined on the page.
+        audit: Audit logs.
+        watch: Alarms.
+        quotas: Limits for each client's name.
+    """
 
     robot: tuple[Robot, ...] = ()
     fixture: tuple[Fixture, ...] = ()
