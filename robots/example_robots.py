@@ -92,7 +92,7 @@ def example_robot(name: str) -> ExampleRobot:
     folder = example_folder()
     if folder is None:
         text = (
-            f"is one of the example robots, which are not installed (130 MB). Run ./dev example-robots "
+            f"is one of the example robots, which are not installed (131 MB). Run ./dev example-robots "
             f"or pip install {_PACKAGE}"
         )
         raise DescriptionError(name, [text])
