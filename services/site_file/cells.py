@@ -7,7 +7,8 @@ from robots.cells import CellDescription, CellRobot, Fixture, Floor
 from robots.poses import pose_matrix
 from robots.schema import Units
 from services.site_file import fixtures
-from services.site_file.site import Robot, Site
+from services.site_file.robot import Robot
+from services.site_file.site import Site
 
 _MILLIMETRE = 1e-3
 

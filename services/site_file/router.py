@@ -19,7 +19,7 @@ from services.site_file.part import PART_CONFIG
 
 # A robot's page is #/<site>/<robot>: a site with one of these names would collide with a page of the console.
 _PAGES = ("define", "events", "program", "recordings", "settings", "wall")
-# The other parts of a site file; `services/site_file/site.py` has their models.
+# The other parts of a site file; `services/site_file/site.py` has them.
 OTHER_PARTS = frozenset(
     {"robot", "fixture", "recorder", "renderer", "console", "define", "audit", "watch", "quotas"}
 )
@@ -136,7 +136,7 @@ def read_routed(path: Path) -> RoutedSite | None:
     A router's restart must end before a lease expires, and parsing the robots takes half of the time.
 
     Returns:
-    None if the file is invalid; `services.site_file.site.load` reports why.
+        None if the file is invalid; `services.site_file.site.load` reports why.
     """
     try:
         values = read_toml(path)

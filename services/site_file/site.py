@@ -8,34 +8,25 @@ import tomllib
 from collections.abc import Mapping
 from itertools import combinations, product
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated
 
 from pydantic import (
     BaseModel,
     Field,
-    StrictBool,
     ValidationError,
     field_validator,
     model_validator,
 )
 
-from protocol_gateway.core.codes import code_table
-from protocol_gateway.drivers.registry import DRIVERS
-from protocol_gateway.errors import CodeTableError
-from robomesh import keys
-from robomesh.access import PROBE_ROBOT
-from robomesh.errors import KeyNameError
 from robots import description
 from robots.bounded_toml import read_toml
-from robots.description import Pose
 from robots.errors import DescriptionError
 from robots.kinematic_tree import BASE, bare_links, tree_of
 from robots.schema import UrdfDescription
 from services.errors import ListenError, SiteFileError
 from services.site_file.console import Console
 from services.site_file.console import resolve_paths as resolve_console_paths
-from services.site_file.fixtures import Clearance, Fixture, Floor, fixture_problem, name_problem
-from services.site_file.legacy_clients import LegacyClients
+from services.site_file.fixtures import Fixture, fixture_problem, name_problem
 from services.site_file.listen_address import (
     cannot_both_listen,
     check_page_reach,
@@ -46,133 +37,12 @@ from services.site_file.listen_address import (
 from services.site_file.part import PART_CONFIG
 from services.site_file.quotas import Quotas
 from services.site_file.renderer_and_recorder import ALWAYS_RENDERED, Recorder, Renderer
+from services.site_file.robot import Robot
 from services.site_file.router import RoutedSite, resolve_paths
 from services.site_file.validation_errors import sentence
 
-Triple = tuple[float, float, float]
 # Maximum number of problems that an error lists.
 _MAX_PROBLEMS = 100
-
-
-class Robot(BaseModel):
-    """An arm and its controller.
-
-    Attributes:
-        name: Name in keys: lower-case letters, digits, `-` and `_`, at most 64 characters.
-        model: A robot of the library or of the example robots by its name, or the path of a `robot.toml` or a
-            URDF.
-        pose: Pose of its base in the site's frame.
-        cell: Name of its cell; empty: alone in its cell. Robots of one cell are checked against each other.
-        controller: `simulated`: `robomesh up` starts a simulator; otherwise `tcp://HOST:PORT`.
-        protocol: The controller's protocol: the name of a driver in `protocol_gateway/drivers/registry.py`.
-        codes: Type codes of a controller that sends numbers, as in
-            `{ 2 = "ABSOLUTE.DEG", 101 = "COMMAND:home" }`; they replace the default codes. Empty: the gateway
-            sends types as names.
-        accept_unknown: States that the controller never reports; the gateway sends commands although they are
-            unknown.
-        check: The check of each motion for collisions: `require` refuses a motion that fails it or cannot
-            be checked, `warn` reports it, `off` checks nothing.
-        clearance: Distances to fixtures and other robots.
-        floor: The floor of its cell: its height [mm], a table, or `false` for none. In a cell of several
-            robots one robot's key applies to all.
-        stop_proven: The stop unit was tried on this controller (docs/safety.md); otherwise the robot is
-            read-only. Absent: `true` for a simulated controller, else `false`.
-        stale_after_s: The stale time [s]: without a unit of the controller for this long, the robot's state
-            is stale; without joint positions for this long, the gateway refuses motion. It reconnects after
-            twice this time, at least 4 s.
-        demo: The simulator moves the arm until the first command.
-        legacy_clients: Address for programs that use the unit protocol; absent: they cannot connect.
-    """
-
-    model_config = PART_CONFIG
-    name: str
-    model: str
-    pose: Pose = Pose()
-    cell: str = ""
-    controller: str = "simulated"
-    protocol: str = "unit"
-    codes: dict[int, str] = Field(default_factory=dict)
-    accept_unknown: tuple[Literal["mode", "homed"], ...] = ()
-    check: Literal["require", "warn", "off"] = "warn"
-    clearance: Clearance = Clearance()
-    floor: Floor | None = Floor()
-    stop_proven: StrictBool | None = None
-    stale_after_s: Annotated[float, Field(gt=0.05, le=60)] = 1.0
-    demo: StrictBool = False
-    legacy_clients: LegacyClients | None = None
-
-    @field_validator("name")
-    @classmethod
-    def _name(cls, name: str) -> str:
-        if keys.is_replay(name):
-            raise ValueError('names that begin with "replay-" are reserved for replays: choose another name')
-        if name == PROBE_ROBOT:
-            raise ValueError("this name is reserved for testing rights: choose another name")
-        return _checked_name(name, "robot")
-
-    @field_validator("protocol")
-    @classmethod
-    def _protocol(cls, protocol: str) -> str:
-        if protocol not in DRIVERS:
-            raise ValueError(f"should be {' or '.join(map(repr, DRIVERS))}")
-        return protocol
-
-    @field_validator("floor", mode="before")
-    @classmethod
-    def _floor(cls, floor: Any) -> Any:
-        if floor is False:
-            return None
-        if isinstance(floor, dict | Floor):
-            return floor
-        if isinstance(floor, bool) or not isinstance(floor, int | float):
-            raise ValueError(
-                "should be its height in mm, false, or a table as { height = -250.0, warning = 50.0 }"
-            )
-        return {"height": floor}
-
-    @field_validator("codes", mode="before")
-    @classmethod
-    def _codes(cls, codes: Any) -> Any:
-        if not isinstance(codes, dict):
-            return codes
-        try:
-            # TOML keys are strings.
-            return {int(code): meaning for code, meaning in codes.items()}
-        except ValueError:
-            raise ValueError('a code is a number, as in { 2 = "ABSOLUTE.DEG" }') from None
-
-    @field_validator("codes")
-    @classmethod
-    def _table(cls, codes: dict[int, str]) -> dict[int, str]:
-        try:
-            code_table(codes)
-        except CodeTableError as error:
-            raise ValueError(str(error)) from None
-        return codes
-
-    @field_validator("controller")
-    @classmethod
-    def _controller(cls, controller: str) -> str:
-        if controller == "simulated":
-            return controller
-        scheme, _, address = controller.partition("://")
-        try:
-            _, port = split_address(address)
-        except ListenError:
-            port = 0
-        if scheme != "tcp" or not port:
-            raise ValueError("should be 'simulated' or tcp://HOST:PORT, as in tcp://10.0.0.7:5400")
-        return controller
-
-    @property
-    def simulated(self) -> bool:
-        """True if the controller is the simulator."""
-        return self.controller == "simulated"
-
-    @property
-    def can_be_stopped(self) -> bool:
-        """True if the stop unit is proven: `stop_proven` says so, or the controller is simulated."""
-        return self.simulated if self.stop_proven is None else self.stop_proven
 
 
 class Define(BaseModel):
@@ -422,13 +292,6 @@ def _tcp_address(endpoint: str) -> str:
     """Return the HOST:PORT of a router endpoint; empty if it is not TCP."""
     protocol, _, rest = endpoint.partition("/")
     return re.split("[?#]", rest)[0] if protocol in ("tcp", "tls") else ""
-
-
-def _checked_name(name: str, what: str) -> str:
-    try:
-        return keys.check_name(name, what)
-    except KeyNameError as error:
-        raise ValueError(str(error)) from None
 
 
 # The site without a file. In a checkout the folder robots/ is the program's own, hence my-robots/.

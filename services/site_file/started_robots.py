@@ -12,7 +12,8 @@ from robomesh.atomic_write import write_atomically
 from robots.bounded_toml import read_toml
 from robots.description import DESCRIPTION_FILE, library_names
 from services.errors import SiteFileError
-from services.site_file.site import Robot, Site
+from services.site_file.robot import Robot
+from services.site_file.site import Site
 from services.site_file.validation_errors import problem_text
 
 STARTED_FILE = "started.toml"
@@ -67,7 +68,7 @@ def may_start(site: Site) -> tuple[str, ...]:
     Robots of the site file are excluded.
 
     Raises:
-    SiteFileError: If the file of started robots is invalid.
+        SiteFileError: If the file of started robots is invalid.
     """
     started = {robot.name for robot in read_started(site)}
     saved = {file.parent.name for file in site.define.folder.glob(f"[!.]*/{DESCRIPTION_FILE}")}

@@ -14,7 +14,8 @@ from typing import Any
 from robomesh.session import SessionSettings, open_session
 from services.console.app import Settings, serve
 from services.console.define.settings import DefineSettings
-from services.site_file.site import Define, Robot, Site
+from services.site_file.robot import Robot
+from services.site_file.site import Define, Site
 from tests.services.http_refusals import read_refusal
 
 

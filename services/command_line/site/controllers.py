@@ -7,7 +7,8 @@ from itertools import combinations
 from protocol_gateway.legacy.settings import LegacySettings
 from services.errors import ServiceError
 from services.site_file.listen_address import same_address, split_address
-from services.site_file.site import Robot, Site
+from services.site_file.robot import Robot
+from services.site_file.site import Site
 
 logger = logging.getLogger(__name__)
 

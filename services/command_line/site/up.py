@@ -22,7 +22,8 @@ from services.pki import Folder
 from services.pki.errors import KeysError
 from services.site_file import site as site_file
 from services.site_file.listen_address import reachable, split_address
-from services.site_file.site import Robot, Site
+from services.site_file.robot import Robot
+from services.site_file.site import Site
 from services.site_file.started_robots import may_start, read_started
 from services.supervisor import ENDS_WITHIN_S, Program, supervise
 

@@ -3,7 +3,8 @@
 from robomesh import reason_codes as codes
 from services.console.errors import RefusedRequest
 from services.errors import SiteFileError
-from services.site_file.site import Robot, Site
+from services.site_file.robot import Robot
+from services.site_file.site import Site
 from services.site_file.started_robots import read_started, robot_to_start, write_started
 
 
