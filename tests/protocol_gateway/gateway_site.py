@@ -146,10 +146,10 @@ async def gateway(mesh, folder, *ports, up=True, each=(), **robot):
                     "port": port,
                     "stop_proven": True,
                     **robot,
-                    **alone,
+                    **own_settings,
                 }
             )
-            for name, port, alone in zip(names, ports, each or [{}] * len(ports), strict=True)
+            for name, port, own_settings in zip(names, ports, each or [{}] * len(ports), strict=True)
         ),
     )
     async with open_session(mesh) as own, open_session(mesh) as monitor:

@@ -32,12 +32,12 @@ async def scripted_controller():
 async def repeated(say, text):
     """Send the result of `text()` 100 times a second."""
 
-    async def keep_saying():
+    async def send_periodically():
         while True:
             say(text())
             await asyncio.sleep(0.01)
 
-    task = asyncio.create_task(keep_saying())
+    task = asyncio.create_task(send_periodically())
     try:
         yield
     finally:

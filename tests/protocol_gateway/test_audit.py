@@ -67,9 +67,9 @@ def test_the_hash_covers_the_line_without_the_hash(tmp_path):
     path = tmp_path / "arm.jsonl"
     write(path, entry(id="1"))
     row = json.loads(path.read_text())
-    told = row.pop("hash")
+    recorded_hash = row.pop("hash")
     text = json.dumps(row, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
-    assert hashlib.sha256(text.encode()).hexdigest() == told
+    assert hashlib.sha256(text.encode()).hexdigest() == recorded_hash
 
 
 def three_lines(path):
@@ -212,12 +212,12 @@ def test_confirmed_entries_survive_kill_9(tmp_path):
     )
     with writer:
         for _ in range(20):
-            told = int(writer.stdout.readline())
+            reported = int(writer.stdout.readline())
         writer.kill()
         rest = writer.stdout.read().split(b"\n")[:-1]
-    told = int(rest[-1]) if rest else told
+    reported = int(rest[-1]) if rest else reported
     log, _ = write(path, entry())
-    assert log.head[0] > told
+    assert log.head[0] > reported
     assert verify(path).ok
 
 

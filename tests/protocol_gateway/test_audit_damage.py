@@ -47,8 +47,8 @@ def changed(*numbers):
     def damage(live):
         rows = lines(live)
         for number in numbers:
-            place = rows[number].index(b'"request":"') + 12
-            rows[number] = rows[number][:place] + b"~" + rows[number][place + 1 :]
+            offset = rows[number].index(b'"request":"') + 12
+            rows[number] = rows[number][:offset] + b"~" + rows[number][offset + 1 :]
         live.write_bytes(b"".join(rows))
 
     return damage
@@ -68,7 +68,7 @@ def unreadable(live):
     live.write_bytes(b"".join([first, b"\0" * 300 + b"\n", *rest]))
 
 
-def begun_anew(live):
+def restarted_log(live):
     live.unlink()
     write(live.with_name("new.jsonl"), entry(), entry())
     live.with_name("new.jsonl").rename(live)
@@ -114,7 +114,7 @@ def test_a_damaged_log_latches_a_stop_once(tmp_path, damage, more):
         lambda live: live.unlink(),
         lambda live: live.write_bytes(b""),
         lambda live: live.write_bytes(lines(live)[0][:-50]),
-        begun_anew,
+        restarted_log,
         put_back,
     ],
 )
@@ -267,7 +267,7 @@ def test_the_rest_of_an_incomplete_write_is_removed(tmp_path, monkeypatch):
         log = AuditLog(tmp_path / "arm.jsonl")
         await log.append(entry(id="1"))
         pwrite = os.pwrite
-        monkeypatch.setattr(os, "pwrite", lambda file, data, place: _half(pwrite, file, data, place))
+        monkeypatch.setattr(os, "pwrite", lambda file, data, offset: _half(pwrite, file, data, offset))
         with pytest.raises(AuditError, match="No space left"):
             await log.append(entry(text="x" * 2000))
         monkeypatch.undo()
@@ -279,8 +279,8 @@ def test_the_rest_of_an_incomplete_write_is_removed(tmp_path, monkeypatch):
     run(main())
 
 
-def _half(pwrite, file, data, place):
-    pwrite(file, data[: len(data) // 2], place)
+def _half(pwrite, file, data, offset):
+    pwrite(file, data[: len(data) // 2], offset)
     raise OSError(28, "No space left on device")
 
 

@@ -124,5 +124,5 @@ def test_every_request_is_counted_once_and_the_last_stop_is_remembered(asked):
     assert authority_after(written).last_stop_id == stop
     written += floods.counts(now_s)
     for request in ("STOP", "HOME"):
-        told = sum(1 + each.repeated for each in written if each.request == request)
-        assert told == sum(each[1] == request for each in asked)
+        counted = sum(1 + each.repeated for each in written if each.request == request)
+        assert counted == sum(each[1] == request for each in asked)

@@ -103,10 +103,10 @@ def test_every_changed_byte_of_every_file_is_detected(tmp_path):
     assert len(files) == 3
     for path in files:
         with path.open("r+b") as file:
-            for place, byte in enumerate(path.read_bytes()):
-                os.pwrite(file.fileno(), bytes([byte ^ 1]), place)
-                assert not verify(live).ok, (path.name, place)
-                os.pwrite(file.fileno(), bytes([byte]), place)
+            for offset, byte in enumerate(path.read_bytes()):
+                os.pwrite(file.fileno(), bytes([byte ^ 1]), offset)
+                assert not verify(live).ok, (path.name, offset)
+                os.pwrite(file.fileno(), bytes([byte]), offset)
     assert verify(live).ok
 
 
@@ -130,8 +130,8 @@ def test_archived_parts_are_no_break_and_are_reported(tmp_path):
     assert (found.first, found.entries) == (gone + 1, len(everything) - gone)
     assert f"entries 1 to {gone} are not here" in found.text
     # The archived part can also be verified alone.
-    alone = verify(tmp_path / "elsewhere.jsonl")
-    assert (alone.ok, alone.entries, alone.last_hash) == (True, gone, everything[gone].previous)
+    moved = verify(tmp_path / "elsewhere.jsonl")
+    assert (moved.ok, moved.entries, moved.last_hash) == (True, gone, everything[gone].previous)
 
 
 def test_a_file_that_begins_in_the_middle_without_rotate_is_a_break(tmp_path):
@@ -179,9 +179,9 @@ def killed(*arguments, **named):
 async def main():
     global real
     log = AuditLog(pathlib.Path(sys.argv[1]), rotate_bytes=1)
-    place = {"link": os, "fsync": os, "rename": pathlib.Path}[sys.argv[2]]
-    real = getattr(place, sys.argv[2])
-    setattr(place, sys.argv[2], killed)
+    owner = {"link": os, "fsync": os, "rename": pathlib.Path}[sys.argv[2]]
+    real = getattr(owner, sys.argv[2])
+    setattr(owner, sys.argv[2], killed)
     await log.append(Entry(time_ns=1, operator="li", source="mesh", request="HOME", outcome=Outcome.ACCEPTED))
 
 asyncio.run(main())

@@ -74,11 +74,11 @@ def test_a_flood_of_refusals_is_written_as_a_count(mesh, tmp_path):
             counted = await until(
                 lambda: [e for e in site.seen["audit"] if e.repeated_count and e.request == "HOME"]
             )
-        told = [entry for entry in read_entries(site.audit) if entry.request == "HOME"]
-        assert sum(1 + entry.repeated for entry in told) == flood
-        assert len(told) < 40
-        (logged,) = [entry for entry in told if entry.number == counted[0].number]
-        assert (logged.repeated, logged.text) == (counted[0].repeated_count, told[0].text)
+        entries = [entry for entry in read_entries(site.audit) if entry.request == "HOME"]
+        assert sum(1 + entry.repeated for entry in entries) == flood
+        assert len(entries) < 40
+        (logged,) = [entry for entry in entries if entry.number == counted[0].number]
+        assert (logged.repeated, logged.text) == (counted[0].repeated_count, entries[0].text)
         assert verify(site.audit).ok
 
     run(main())
@@ -102,9 +102,9 @@ def test_after_a_flood_of_stops_a_restart_restores_the_last(mesh, tmp_path):
                 assert controller.stops < flood
                 last = max(answer.stop_id for answer in answers)
                 assert last > flood // 2
-            told = [entry for entry in read_entries(site.audit) if entry.request == "STOP"]
-            assert sum(1 + entry.repeated for entry in told) == flood
-            assert len(told) < 40
+            entries = [entry for entry in read_entries(site.audit) if entry.request == "STOP"]
+            assert sum(1 + entry.repeated for entry in entries) == flood
+            assert len(entries) < 40
             async with gateway(mesh, tmp_path, port) as site:
                 assert site.controller.stop.id == last
                 await site.lease(A.ACQUIRE, ttl_s=5)
@@ -346,8 +346,8 @@ def test_a_disk_that_hangs_delays_no_stop(mesh, tmp_path, monkeypatch):
             finally:
                 answers_again.set()
             await until(lambda: site.events("audit.mended"))
-        told = [(entry.request, entry.outcome) for entry in read_entries(site.audit)]
-        assert told[2:6] == [
+        outcomes = [(entry.request, entry.outcome) for entry in read_entries(site.audit)]
+        assert outcomes[2:6] == [
             ("TRACE_ON", "ACCEPTED"),
             ("TRACE_ON", "FAILED"),
             ("STOP", "ACCEPTED"),

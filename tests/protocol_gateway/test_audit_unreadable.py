@@ -72,8 +72,8 @@ def test_a_flood_of_unreadable_requests_is_counted(mesh, tmp_path):
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             for _ in range(flood):
                 await asyncio.to_thread(asked, site, "command/li", b"{")
-        told = [entry for entry in read_entries(site.audit) if entry.request == "COMMAND"]
-        assert sum(1 + entry.repeated for entry in told) == flood
-        assert len(told) < 40
+        entries = [entry for entry in read_entries(site.audit) if entry.request == "COMMAND"]
+        assert sum(1 + entry.repeated for entry in entries) == flood
+        assert len(entries) < 40
 
     run(main())

@@ -52,7 +52,7 @@ async def ready(checker, robot):
             await asyncio.sleep(0.02)
 
 
-def alone(name, model, *fixtures):
+def one_robot_cell(name, model, *fixtures):
     return CellDescription((CellRobot(name, model, placed(0.0)),), fixtures)
 
 
@@ -62,7 +62,7 @@ def test_robots_of_a_cell_share_a_process_and_single_robots_share_one():
         for n in range(MOST_PROCESSES + 3)
     ]
     surroundings = {robot.name: pair for pair in pairs for robot in pair.robots}
-    surroundings |= {f"a{n}": alone(f"a{n}", "pt600") for n in range(100)}
+    surroundings |= {f"a{n}": one_robot_cell(f"a{n}", "pt600") for n in range(100)}
     checkers = make_checkers(surroundings, start_now=["a7"])
     assert checkers.keys() == surroundings.keys()
     assert len(set(checkers.values())) == MOST_PROCESSES + 1
@@ -75,7 +75,7 @@ def test_robots_of_a_cell_share_a_process_and_single_robots_share_one():
 @pytest.mark.slow
 def test_a_query_is_not_started_after_its_timeout(tmp_path, monkeypatch):
     async def main():
-        checker = Checker({"arm": alone("arm", bar_arm(tmp_path))}, start_now=True)
+        checker = Checker({"arm": one_robot_cell("arm", bar_arm(tmp_path))}, start_now=True)
         begun = []
         ask = checker._worker.ask
 
@@ -105,7 +105,7 @@ def test_a_query_is_not_started_after_its_timeout(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_a_worker_that_is_killed_while_idle_is_prepared_again_before_the_next_motion(tmp_path):
     async def main():
-        checker = Checker({"arm": alone("arm", bar_arm(tmp_path))}, start_now=True)
+        checker = Checker({"arm": one_robot_cell("arm", bar_arm(tmp_path))}, start_now=True)
         async with running(checker):
             await ready(checker, "arm")
             first = checker.pid
@@ -128,8 +128,8 @@ def test_an_unexpected_error_is_reported_and_the_worker_goes_on(tmp_path):
 
     async def main():
         cells = {
-            "bad": alone("bad", model, Fixture("odd", (shape,), np.eye(4))),
-            "good": alone("good", model),
+            "bad": one_robot_cell("bad", model, Fixture("odd", (shape,), np.eye(4))),
+            "good": one_robot_cell("good", model),
         }
         checker = Checker(cells, start_now=True)
         async with running(checker) as task:
@@ -165,8 +165,8 @@ def test_a_moving_link_without_a_shape_is_uncovered(tmp_path):
     for arm, mate in ((half, whole), (whole, half)):
         cell = CellDescription((CellRobot("arm", arm, placed(0.0)), CellRobot("mate", mate, placed(5.0))))
         checked = begin({"arm": cell})(motion("arm", others={"mate": (STANDING,)}))
-        whose = "arm" if arm is half else "mate"
-        assert checked.uncovered == (codes.LINK_WITHOUT_SHAPE(name=whose, links="elbow"),)
+        robot = "arm" if arm is half else "mate"
+        assert checked.uncovered == (codes.LINK_WITHOUT_SHAPE(name=robot, links="elbow"),)
         assert checked.refusals == checked.warnings == ()
 
 

@@ -31,18 +31,18 @@ def fixture(each):
     return Fixture(each.name, (shape,), fixtures.fixture_to_site(each))
 
 
-def place_of(x_mm=0.0, turn_deg=0.0):
+def base_pose(x_mm=0.0, turn_deg=0.0):
     return pose_matrix(Pose(xyz=(x_mm, 0.0, 0.0), rpy=(0.0, 0.0, turn_deg)), Units())
 
 
-def alone(*fixtures):
+def one_robot_cell(*fixtures):
     return CellDescription((CellRobot("arm", "pt600", np.eye(4)),), tuple(map(fixture, fixtures)))
 
 
 OUT = [0, 0, 0, 0, 0]
 # The second is a metre in front of the first, and crosses its path at home.
 TWO = CellDescription(
-    (CellRobot("arm", "pt600", np.eye(4)), CellRobot("arm-2", "pt600", place_of(1000.0, 90.0)))
+    (CellRobot("arm", "pt600", np.eye(4)), CellRobot("arm-2", "pt600", base_pose(1000.0, 90.0)))
 )
 
 
@@ -83,7 +83,7 @@ def test_required_a_collision_is_refused_without_motion(mesh, tmp_path):
     async def main():
         async with (
             simulator() as port,
-            gateway(mesh, tmp_path, port, check="require", cell=alone(POST)) as site,
+            gateway(mesh, tmp_path, port, check="require", cell=one_robot_cell(POST)) as site,
         ):
             assert site.controller.check == STATE.REQUIRE
             await checked(site)
@@ -106,7 +106,10 @@ def test_required_a_collision_is_refused_without_motion(mesh, tmp_path):
 
 def test_required_a_motion_below_the_floor_is_refused(mesh, tmp_path):
     async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port, check="require", cell=alone()) as site:
+        async with (
+            simulator() as port,
+            gateway(mesh, tmp_path, port, check="require", cell=one_robot_cell()) as site,
+        ):
             await checked(site)
             text = await refusal(move(site, [0, 0, radians(-60), 0, 0]))
             assert "mm below the floor" in text
@@ -119,7 +122,7 @@ def test_warned_a_collision_is_sent_with_a_warning(mesh, tmp_path):
     async def main():
         async with (
             simulator() as port,
-            gateway(mesh, tmp_path, port, check="warn", cell=alone(POST)) as site,
+            gateway(mesh, tmp_path, port, check="warn", cell=one_robot_cell(POST)) as site,
         ):
             assert site.controller.check == STATE.WARN
             await checked(site)
@@ -138,7 +141,7 @@ def test_required_motion_waits_for_a_killed_worker(mesh, tmp_path):
     async def main():
         async with (
             simulator() as port,
-            gateway(mesh, tmp_path, port, check="require", cell=alone(POST)) as site,
+            gateway(mesh, tmp_path, port, check="require", cell=one_robot_cell(POST)) as site,
         ):
             await checked(site)
             os.kill(worker_of(os.getpid()), signal.SIGKILL)

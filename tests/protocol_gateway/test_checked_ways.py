@@ -56,8 +56,8 @@ def test_a_unit_of_two_motions_occupies_both_paths(tmp_path, second, path):
             await bench.lease(A.ACQUIRE)
             bench.status = READY
             await bench.commands((C.MOVE_ABSOLUTE, {"joint_positions": FAR}), second)
-            told = occupied_path(bench)
-            assert [tuple(round(value, 9) for value in each) for each in told] == list(path)
+            path_of_commands = occupied_path(bench)
+            assert [tuple(round(value, 9) for value in each) for each in path_of_commands] == list(path)
 
     run(main())
 

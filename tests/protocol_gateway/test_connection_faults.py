@@ -122,24 +122,24 @@ def ip(*words):
 def another_host():
     """Create a network namespace with a virtual cable; yield its name and its end of the cable."""
     name = f"mesh-{os.getpid()}"
-    here, there = f"mh{os.getpid() % 10**6}", f"mt{os.getpid() % 10**6}"
+    near_end, far_end = f"mh{os.getpid() % 10**6}", f"mt{os.getpid() % 10**6}"
     try:
         ip("netns", "add", name)
     except (SimulatorError, FileNotFoundError) as error:
         pytest.skip(f"no network namespace may be made here: {error}")
     try:
-        ip("link", "add", here, "type", "veth", "peer", "name", there, "netns", name)
-        ip("addr", "add", "10.219.77.1/30", "dev", here)
-        ip("link", "set", here, "up")
-        ip("-n", name, "addr", "add", "10.219.77.2/30", "dev", there)
-        ip("-n", name, "link", "set", there, "up")
-        yield name, there
+        ip("link", "add", near_end, "type", "veth", "peer", "name", far_end, "netns", name)
+        ip("addr", "add", "10.219.77.1/30", "dev", near_end)
+        ip("link", "set", near_end, "up")
+        ip("-n", name, "addr", "add", "10.219.77.2/30", "dev", far_end)
+        ip("-n", name, "link", "set", far_end, "up")
+        yield name, far_end
     finally:
         ip("netns", "del", name)
 
 
 @contextlib.asynccontextmanager
-async def simulator_there(name):
+async def simulator_in_namespace(name):
     process = await asyncio.create_subprocess_exec(
         "ip",
         *("netns", "exec", name, sys.executable, "-c", SIMULATOR),
@@ -159,7 +159,7 @@ def test_a_vanished_host_is_detected_in_seconds_and_reconnected(mesh, tmp_path):
     async def main():
         with another_host() as (name, cable):
             async with (
-                simulator_there(name),
+                simulator_in_namespace(name),
                 gateway(mesh, tmp_path, 5400, host="10.219.77.2") as site,
             ):
                 ip("-n", name, "link", "set", cable, "down")

@@ -124,7 +124,7 @@ UNIT = "1#ABSOLUTE.DEG*%.2f;0;0;0;0@"
 async def flooding(say):
     """Send 8,000 positions a second, also on a slow machine."""
 
-    async def keep_saying():
+    async def send_periodically():
         said_s = time.monotonic()
         while True:
             await asyncio.sleep(0.001)
@@ -132,7 +132,7 @@ async def flooding(say):
             say(UNIT % 1.0 * min(1000, round(8000 * (now_s - said_s))))
             said_s = now_s
 
-    task = asyncio.create_task(keep_saying())
+    task = asyncio.create_task(send_periodically())
     try:
         yield
     finally:
@@ -180,11 +180,11 @@ def test_of_a_flood_the_newest_is_published_200_times_a_second(mesh, tmp_path):
                 await until(lambda: site.controller.health.flooding)
                 rates: tuple[list[float], list[float]] = ([], [])
                 for _ in range(5):
-                    before, told, begin_s = len(site.seen["joints"]), len(old.units), time.monotonic()
+                    before, units_before, begin_s = len(site.seen["joints"]), len(old.units), time.monotonic()
                     await asyncio.sleep(0.5)
                     elapsed_s = time.monotonic() - begin_s
                     rates[0].append((len(site.seen["joints"]) - before) / elapsed_s)
-                    rates[1].append((len(old.units) - told) / elapsed_s)
+                    rates[1].append((len(old.units) - units_before) / elapsed_s)
                 # A busy machine may read data in the half second after their sending.
                 for each in rates:
                     assert max(each) > 0

@@ -284,9 +284,9 @@ def test_a_shutdown_stops_motion_and_a_start_restores_the_stop(mesh, tmp_path):
                 # The stop was sent again, and that is the log's last entry.
                 await until(lambda: [e.request for e in read_entries(site.audit)][-1] == "STOP_AGAIN")
                 await until(lambda: site.seen["audit"] and site.seen["audit"][-1].request == "STOP_AGAIN")
-                told = await last_value(site.session, site.key("audit"))
+                head = await last_value(site.session, site.key("audit"))
                 written = [entry.hash for entry in read_entries(site.audit)]
-                assert [entry.hash.hex() for entry in told.entries] == written
+                assert [entry.hash.hex() for entry in head.entries] == written
                 assert site.joints[0] < 2.0
                 assert site.controller.stop.id == 1
                 await site.lease(A.ACQUIRE)

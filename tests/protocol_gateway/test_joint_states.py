@@ -14,7 +14,7 @@ _NUMBERS = st.tuples(*[st.floats(allow_nan=False, allow_infinity=False)] * len(N
 def test_a_reused_message_equals_a_new_one(units):
     message = JointStatesMessage(NAMES)
     for positions, velocities, wall_ns in units:
-        anew = JointStates(
+        expected = JointStates(
             timestamp=timestamp(wall_ns),
             joints=[
                 JointState(name=name, position=position, velocity=velocity)
@@ -22,4 +22,4 @@ def test_a_reused_message_equals_a_new_one(units):
             ],
         )
         filled = message.fill(JointsReceived(positions, velocities), wall_ns)
-        assert filled.SerializeToString() == anew.SerializeToString()
+        assert filled.SerializeToString() == expected.SerializeToString()

@@ -86,10 +86,10 @@ def test_a_number_that_no_disk_reserves_is_the_time(path, monkeypatch):
 
 
 @pytest.mark.parametrize("slot", [0, 1])
-@pytest.mark.parametrize("place", [0, 40, 100, 2000, SLOT_BYTES - 1])
-def test_a_damaged_slot_may_have_held_a_stop(path, slot, place):
+@pytest.mark.parametrize("offset", [0, 40, 100, 2000, SLOT_BYTES - 1])
+def test_a_damaged_slot_may_have_held_a_stop(path, slot, offset):
     data = bytearray(killed(path, (stop(1), 1), (None, 1)))
-    data[slot * SLOT_BYTES + place] ^= 1
+    data[slot * SLOT_BYTES + offset] ^= 1
     path.write_bytes(data)
     assert LatchFile(path).damage == "its latch file arm.latch is damaged"
 

@@ -43,11 +43,11 @@ async def test_the_papers_unit_homes_and_moves_the_robot(mesh, tmp_path):
         await until(lambda: site.seen["lease"][-1].holder == "li")
         await until(lambda: "homing" in one.words)
 
-        def there():
+        def is_at_sample():
             one.say(b"1#TIME*1@")
             return [round(value, 2) for value in degrees(site)] == SAMPLE
 
-        await until(there, timeout_s=30)
+        await until(is_at_sample, timeout_s=30)
         assert site.controller.homed == STATE.YES
         assert site.controller.trace == STATE.YES
         source = "legacy {}:{}".format(*one.writer.get_extra_info("sockname"))
@@ -64,11 +64,11 @@ async def homed_by_li(site, one):
     """Home a robot with an old program of li, which keeps control."""
     one.say(b"1#COMMAND*home@")
 
-    def there():
+    def is_homed():
         one.say(b"1#TIME*1@")
         return "homed" in one.words and "idle" in one.words
 
-    await until(there, timeout_s=30)
+    await until(is_homed, timeout_s=30)
 
 
 @in_loop

@@ -107,12 +107,12 @@ async def test_garbage_is_counted_and_answered(mesh, tmp_path):
         one.say(b"1#COMMAND*dance@", b"1#MOOD*fine@")
         await until(lambda: len(one.errors) >= 4)
         await until(lambda: len([e for e in site.seen["audit"] if e.request == "UNIT"]) >= 4)
-        told = [e for e in site.seen["audit"] if e.request == "UNIT"]
-        assert [(e.operator, e.outcome, e.values["unit"]) for e in told] == [
+        entries = [e for e in site.seen["audit"] if e.request == "UNIT"]
+        assert [(e.operator, e.outcome, e.values["unit"]) for e in entries] == [
             ("li", schema.AuditEntry.REFUSED, unit)
             for unit in ("\\xff\\x00#", "hello\\x0d\\x0a", "1#COMMAND*dance", "1#MOOD*fine")
         ]
-        assert told[0].text == f"Not sent: {one.errors[0].text}."
+        assert entries[0].text == f"Not sent: {one.errors[0].text}."
 
 
 @in_loop
@@ -152,12 +152,12 @@ def cable():
         """Create a socket in the other network."""
         libc = ctypes.CDLL(None, use_errno=True)
         own, other = Path("/proc/thread-self/ns/net"), Path("/run/netns", name)
-        with own.open() as here, other.open() as there:
-            assert libc.setns(there.fileno(), 0x40000000) == 0
+        with own.open() as own_namespace, other.open() as other_namespace:
+            assert libc.setns(other_namespace.fileno(), 0x40000000) == 0
             try:
                 return socket.create_connection((f"{address}.1", port), timeout=5)
             finally:
-                assert libc.setns(here.fileno(), 0x40000000) == 0
+                assert libc.setns(own_namespace.fileno(), 0x40000000) == 0
 
     try:
         networks(
@@ -176,8 +176,8 @@ def cable():
 
 @in_loop
 async def test_a_pulled_cable_ends_control_in_seconds(mesh, tmp_path, cable):
-    here, far, connect, pull_out = cable
-    settings = legacy(host=here, commanders={far: "li"})
+    address, far, connect, pull_out = cable
+    settings = legacy(host=address, commanders={far: "li"})
     async with legacy_site(mesh, tmp_path, settings) as site:
         far_socket = await asyncio.to_thread(connect, settings.port)
         far_program = Program(*await asyncio.open_connection(sock=far_socket))

@@ -53,7 +53,7 @@ async def refused(bench, unit, *, first_id=1, **fields):
     return number_of(answer)
 
 
-def told(**changes):
+def with_status(**changes):
     return replace(READY, status=replace(READY.status, **changes))
 
 
@@ -117,18 +117,18 @@ def test_a_refused_unit_has_one_error_number(unit, number):
         ("1#COMMAND*home", replace(READY, read_only=codes.STOP_NOT_PROVEN()), 7),
         ("1#COMMAND*home", replace(READY, link=LinkStatus(LinkState.DOWN, codes.LINK_CLOSED())), 9),
         ("1#COMMAND*home", replace(READY, link=LinkStatus(LinkState.SILENT, codes.LINK_CLOSED())), 9),
-        ("1#COMMAND*home", told(mode=Mode.LOCAL), 6),
-        ("1#COMMAND*home", told(mode=None), 6),
-        ("1#COMMAND*home", told(activity=Activity.STOPPED), 8),
-        ("1#ABSOLUTE.DEG*0;0;0;0;0", told(activity=Activity.HOLDING), 8),
-        ("1#COMMAND*home", told(activity=Activity.FAULT), 9),
-        ("1#ABSOLUTE.DEG*0;0;0;0;0", told(homed=False), 9),
-        ("1#ABSOLUTE.DEG*999;0;0;0;0", told(homed=False), 9),
+        ("1#COMMAND*home", with_status(mode=Mode.LOCAL), 6),
+        ("1#COMMAND*home", with_status(mode=None), 6),
+        ("1#COMMAND*home", with_status(activity=Activity.STOPPED), 8),
+        ("1#ABSOLUTE.DEG*0;0;0;0;0", with_status(activity=Activity.HOLDING), 8),
+        ("1#COMMAND*home", with_status(activity=Activity.FAULT), 9),
+        ("1#ABSOLUTE.DEG*0;0;0;0;0", with_status(homed=False), 9),
+        ("1#ABSOLUTE.DEG*999;0;0;0;0", with_status(homed=False), 9),
         ("1#ABSOLUTE.DEG*999;0;0;0;0", READY, 5),
         ("1#COMMAND*speed=0", READY, 5),
         # Evaluated after the previous ones.
-        ("2#COMMAND*home&ABSOLUTE.DEG*999;0;0;0;0", told(homed=False), 5),
-        ("2#COMMAND*reset&ABSOLUTE.DEG*999;0;0;0;0", told(activity=Activity.STOPPED), 5),
+        ("2#COMMAND*home&ABSOLUTE.DEG*999;0;0;0;0", with_status(homed=False), 5),
+        ("2#COMMAND*reset&ABSOLUTE.DEG*999;0;0;0;0", with_status(activity=Activity.STOPPED), 5),
         ("1#COMMAND*hold;home", READY, 8),
     ],
 )

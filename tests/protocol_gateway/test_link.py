@@ -373,23 +373,23 @@ def test_the_rate_is_known_after_a_second_and_0_without_units():
 
 
 def test_delayed_units_are_not_stamped_as_new():
-    def told(clock_s):
+    def unit_at(clock_s):
         return b"2#ABSOLUTE.DEG*10.00;20.00&TIME*%.2f@" % clock_s
 
     async def main():
         async with controller() as arm, link(arm.port, stale_after_s=0.4) as (arm_link, seen):
             _, writer = await arm.next()
-            writer.write(told(50.0))
+            writer.write(unit_at(50.0))
             await until(lambda: arm_link.status.state is LinkState.UP)
             begin = seen.received[0]
             await until(lambda: arm_link.status.state is LinkState.SILENT)
             await asyncio.sleep(0.6)
-            writer.write(told(50.1) + told(50.2))
+            writer.write(unit_at(50.1) + unit_at(50.2))
             await until(lambda: len(seen.events) >= 3)
             assert arm_link.status.state is LinkState.SILENT
             assert seen.received[2].monotonic_s == pytest.approx(begin.monotonic_s + 0.2)
             assert seen.received[2].wall_ns == pytest.approx(begin.wall_ns + 2e8, abs=5e6)
-            writer.write(told(50.0 + time.monotonic() - begin.monotonic_s))
+            writer.write(unit_at(50.0 + time.monotonic() - begin.monotonic_s))
             await until(lambda: arm_link.status.state is LinkState.UP)
             await end(writer)
 
@@ -397,7 +397,7 @@ def test_delayed_units_are_not_stamped_as_new():
 
 
 def test_the_link_reports_round_trip_answers_and_losses():
-    def told(clock_s, activity):
+    def unit_at(clock_s, activity):
         return b"3#ABSOLUTE.DEG*10.00;20.00&STATUS*%b;remote&TIME*%.2f@" % (activity, clock_s)
 
     async def main():
@@ -405,7 +405,7 @@ def test_the_link_reports_round_trip_answers_and_losses():
             reader, writer = await arm.next()
             for number in range(60):
                 if number not in (20, 21):
-                    writer.write(told(50.0 + 0.01 * number, b"idle"))
+                    writer.write(unit_at(50.0 + 0.01 * number, b"idle"))
                     await asyncio.sleep(0.005)
             await until(lambda: len(seen.events) >= 2 * 58)
             assert arm_link.counters.units_lost == 2
@@ -415,7 +415,7 @@ def test_the_link_reports_round_trip_answers_and_losses():
             arm_link.send(STOP)
             await reader.readexactly(len(STOP))
             await asyncio.sleep(0.1)
-            writer.write(told(51.0, b"stopped"))
+            writer.write(unit_at(51.0, b"stopped"))
             await until(lambda: arm_link.health.answer_s is not None)
             assert 0.1 <= arm_link.health.answer_s < 2.0
             await end(writer)

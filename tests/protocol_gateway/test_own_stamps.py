@@ -91,7 +91,7 @@ def test_units_of_one_read_are_spaced_like_time(mesh, tmp_path):
 
 
 def test_units_of_one_read_without_time_have_the_measured_rate(mesh, tmp_path):
-    came = []
+    arrivals_ns = []
 
     async def say(writer):
         begin_s, number = time.monotonic(), 0
@@ -99,7 +99,7 @@ def test_units_of_one_read_without_time_have_the_measured_rate(mesh, tmp_path):
             number += SEVERAL
             await asyncio.sleep(max(begin_s + number * 0.01 - time.monotonic(), 0.0))
             writer.write(b"".join(UNIT % ((number - SEVERAL + each) * 0.1) for each in range(SEVERAL)))
-            came.append(time.time_ns())
+            arrivals_ns.append(time.time_ns())
         return number
 
     samples = run(seen_of(mesh, tmp_path, say))

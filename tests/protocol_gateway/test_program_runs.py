@@ -20,7 +20,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, simulator, until
-from tests.protocol_gateway.test_checked_motion import POST, alone, checked, standing
+from tests.protocol_gateway.test_checked_motion import POST, checked, one_robot_cell, standing
 
 RUN, REFUSED = schema.ProgramState, schema.AuditEntry.REFUSED
 GOOD = """home
@@ -84,7 +84,7 @@ def test_a_step_with_a_late_check_is_checked_again(mesh, tmp_path, monkeypatch):
     async def main():
         async with (
             simulator() as port,
-            gateway(mesh, tmp_path, port, check="require", cell=alone(POST)) as site,
+            gateway(mesh, tmp_path, port, check="require", cell=one_robot_cell(POST)) as site,
         ):
             await until(lambda: not site.controller.check_text, timeout_s=60)
             monkeypatch.setattr(Checker, "motion", slow)
@@ -103,7 +103,7 @@ def test_a_program_runs_to_its_end_and_publishes_its_steps(mesh, tmp_path, check
     async def main():
         async with (
             simulator() as port,
-            gateway(mesh, tmp_path, port, check=check, cell=alone(POST)) as site,
+            gateway(mesh, tmp_path, port, check=check, cell=one_robot_cell(POST)) as site,
         ):
             await until(lambda: not site.controller.check_text, timeout_s=60)
             await site.lease(A.ACQUIRE, ttl_s=5)
@@ -133,7 +133,7 @@ def test_required_a_colliding_program_is_refused_with_its_line(mesh, tmp_path):
     async def main():
         async with (
             simulator() as port,
-            gateway(mesh, tmp_path, port, check="require", cell=alone(POST)) as site,
+            gateway(mesh, tmp_path, port, check="require", cell=one_robot_cell(POST)) as site,
         ):
             await checked(site)
             units, before = site.controller.counters.units_sent, list(site.joints)
@@ -303,15 +303,15 @@ async def plain_run(site, timeout_s, **fields):
     return await asyncio.to_thread(lambda: list(get(key, payload=payload, timeout=timeout_s)))
 
 
-@pytest.mark.parametrize("told", [True, False])
-def test_a_program_is_not_run_after_its_senders_timeout(mesh, tmp_path, told):
+@pytest.mark.parametrize("has_timeout", [True, False])
+def test_a_program_is_not_run_after_its_senders_timeout(mesh, tmp_path, has_timeout):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as site:
             lease = await site.lease(A.ACQUIRE, ttl_s=5)
             await planned(site)
             lease = await in_control(site)
             with slow_check():
-                if told:
+                if has_timeout:
                     until_ns = lease.now.ToNanoseconds() + 1_000_000_000
                     not_after = Timestamp(seconds=until_ns // 10**9, nanos=until_ns % 10**9)
                     words = await refusal(start(site, "home\n", not_after=not_after))
@@ -432,7 +432,7 @@ def test_a_programs_warning_is_in_the_answer(mesh, tmp_path):
     async def main():
         async with (
             simulator() as port,
-            gateway(mesh, tmp_path, port, check="warn", cell=alone(POST)) as site,
+            gateway(mesh, tmp_path, port, check="warn", cell=one_robot_cell(POST)) as site,
         ):
             await checked(site)
             answer = await start(site, "move_joints 90 45 -45 0 0\n")

@@ -41,10 +41,10 @@ def test_in_a_flood_of_requests_a_stop_works_and_all_are_counted(mesh, tmp_path)
             answers = await asyncio.gather(*flood)
             assert all(error is not None for [(_, _, error)] in answers)
 
-            def told():
+            def entries():
                 return [e for e in read_entries(site.audit) if e.operator == "eve" or e.request == "REQUESTS"]
 
-            await until(lambda: sum(1 + entry.repeated for entry in told()) == ASKED)
-            assert len(told()) < 100
+            await until(lambda: sum(1 + entry.repeated for entry in entries()) == ASKED)
+            assert len(entries()) < 100
 
     run(main())

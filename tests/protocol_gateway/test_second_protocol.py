@@ -53,19 +53,19 @@ class JsonLines:
     def _events(self, line):
         offset, self._offset = self._offset, self._offset + len(line) + 1
         try:
-            told = json.loads(line)
-            if "no" in told:
+            fields = json.loads(line)
+            if "no" in fields:
                 self.refusals_received += 1
-                events = [Refused(0, told["no"])]
+                events = [Refused(0, fields["no"])]
             else:
-                if len(told["q"]) != self._joints:
+                if len(fields["q"]) != self._joints:
                     raise ValueError
                 events = [
-                    JointsReceived(tuple(told["q"])),
+                    JointsReceived(tuple(fields["q"])),
                     StatusReceived(
-                        activity=Activity(told["state"]),
-                        mode=Mode.REMOTE if told["remote"] else Mode.LOCAL,
-                        homed=told["homed"],
+                        activity=Activity(fields["state"]),
+                        mode=Mode.REMOTE if fields["remote"] else Mode.LOCAL,
+                        homed=fields["homed"],
                     ),
                 ]
         except (ValueError, KeyError, TypeError):

@@ -16,12 +16,12 @@ class Desk:
     def __init__(self):
         self.now_s = 100.0
         self.codes = []
-        nobody = SimpleNamespace(put=lambda message, **_: None)
+        publisher = SimpleNamespace(put=lambda message, **_: None)
         self.telemetry = Telemetry(
             joints_of(load("pt600")),
-            fast=nobody,
-            slow=nobody,
-            raw=nobody,
+            fast=publisher,
+            slow=publisher,
+            raw=publisher,
             journal=Journal(self, "arm", monotonic_s=lambda: self.now_s),
             stale_after_s=1.0,
             on_status=lambda: None,

@@ -143,8 +143,8 @@ def test_a_flood_does_not_reach_old_client_programs(mesh, tmp_path):
             await until(lambda: site.events("link.flooding"))
             begin_s, before = time.monotonic(), len(one.units)
             await asyncio.sleep(1.0)
-            told = len(one.units) - before
-            assert 0 < told < 400 * (time.monotonic() - begin_s)
+            sent = len(one.units) - before
+            assert 0 < sent < 400 * (time.monotonic() - begin_s)
 
     run(main())
 
@@ -183,10 +183,10 @@ def test_garbage_between_units_is_reported_at_a_limited_rate_and_counted(mesh, t
         async with faulty_site(mesh, tmp_path) as (site, fault):
             await fault("garbage")
             await until(lambda: site.controller.counters.units_malformed > 25)
-            told = site.events("unit.malformed")
-            assert 5 <= len(told) < site.controller.counters.units_malformed
-            assert told[0].values["offset"]
-            assert all(len(event.values["bytes"]) <= 260 for event in told)
+            events = site.events("unit.malformed")
+            assert 5 <= len(events) < site.controller.counters.units_malformed
+            assert events[0].values["offset"]
+            assert all(len(event.values["bytes"]) <= 260 for event in events)
             assert len(site.seen["joints"]) > 20
             await fault("garbage", off=True)
             await until(lambda: site.controller.link == STATE.UP)

@@ -5,15 +5,15 @@ import pytest
 from protocol_gateway.watchdog import Watchdog
 
 
-def seen(*told_at):
+def seen(*reports):
     watchdog = Watchdog()
-    for told, time_s in told_at:
-        watchdog.reset(told, time_s)
+    for activity, time_s in reports:
+        watchdog.reset(activity, time_s)
     return watchdog
 
 
 @pytest.mark.parametrize(
-    ("told_at", "ceased"),
+    ("reports", "ceased"),
     [
         ([], False),
         ([("idle", t) for t in range(4)], True),
@@ -24,8 +24,8 @@ def seen(*told_at):
         ([*(("idle", t) for t in range(4)), ("moving", 5), ("fault", 6)], True),
     ],
 )
-def test_only_a_repeating_value_can_expire(told_at, ceased):
-    assert seen(*told_at).expired(1000.0) is ceased
+def test_only_a_repeating_value_can_expire(reports, ceased):
+    assert seen(*reports).expired(1000.0) is ceased
 
 
 def test_it_expires_after_three_seconds_and_recovers_immediately():
