@@ -59,16 +59,16 @@ def test_closed_file_is_complete_and_an_indexed_one_has_the_same_contents(tmp_pa
     path = tmp_path / "a.mcap"
     write(path, range(20_000), missed={JOINTS: 3, EVENTS: 0})
     assert state_of(path) is State.CLOSED
-    told = []
+    progress = []
     closed = (numbers_in(path), attached_to(path))
-    index(path, told.append)
+    index(path, progress.append)
     assert state_of(path) is State.INDEXED
     assert (numbers_in(path), attached_to(path)) == closed
     assert closed == (list(range(20_000)), {"robot.toml": b'name = "arm"'})
     (joints,) = describe_file(path).topics
     assert (joints.topic, joints.messages, joints.lost) == (JOINTS, 20_000, 3)
-    assert told == sorted(told)
-    assert told[-1] == 1.0
+    assert progress == sorted(progress)
+    assert progress[-1] == 1.0
     with path.open("rb") as stream:
         summary = make_reader(stream).get_summary()
     assert summary.statistics.chunk_count == 5

@@ -153,7 +153,7 @@ def test_names_never_lead_outside_the_folder(tmp_path):
             find_file(folder, name)
 
 
-def write_bomb(path, told, packed):
+def write_bomb(path, claimed_bytes, packed):
     """Write a file of one chunk with a false declared size."""
     chunk = Chunk(
         compression="zstd",
@@ -161,7 +161,7 @@ def write_bomb(path, told, packed):
         message_start_time=1,
         message_end_time=1,
         uncompressed_crc=0,
-        uncompressed_size=told,
+        uncompressed_size=claimed_bytes,
     )
     contents = records.Contents()
     contents.schemas[1] = Schema(id=1, data=b"", encoding="", name="text")
@@ -178,23 +178,23 @@ def write_bomb(path, told, packed):
             message_index_length=0,
             message_index_offsets={1: 0},
             message_start_time=1,
-            uncompressed_size=told,
+            uncompressed_size=claimed_bytes,
         )
     )
     path.write_bytes(start + data + contents.end(len(start) + len(data)))
 
 
-@pytest.mark.parametrize("told", [1 << 20, 32 << 20])
-def test_chunk_with_a_false_size_is_refused_and_takes_no_memory(tmp_path, told):
+@pytest.mark.parametrize("claimed_bytes", [1 << 20, 32 << 20])
+def test_chunk_with_a_false_size_is_refused_and_takes_no_memory(tmp_path, claimed_bytes):
     path = tmp_path / "bomb.mcap"
     packed = zstandard.ZstdCompressor().compress(bytes(32 << 20))
-    write_bomb(path, told, packed)
+    write_bomb(path, claimed_bytes, packed)
     assert path.stat().st_size < 10_000
     tracemalloc.start()
     try:
         with RecordingFile(path) as file, pytest.raises(RecordingError, match="damaged near byte"):
             list(file.messages())
-        assert tracemalloc.get_traced_memory()[1] < told + (8 << 20)
+        assert tracemalloc.get_traced_memory()[1] < claimed_bytes + (8 << 20)
     finally:
         tracemalloc.stop()
 

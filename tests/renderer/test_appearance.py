@@ -63,15 +63,15 @@ def test_a_view_shows_the_workspace_and_not_much_more(robot, view):
 
 def test_cameras_move_with_the_robots_base():
     base_to_site = np.array([[0.0, -1, 0, 5], [1, 0, 0, -2], [0, 0, 1, 0.4], [0, 0, 0, 1]])
-    here, there = (appearance_of(described("pt600", at)[0]) for at in (None, base_to_site))
-    home_here, home_there = home_placements(here), home_placements(there)
+    at_origin, moved = (appearance_of(described("pt600", at)[0]) for at in (None, base_to_site))
+    home_at_origin, home_moved = home_placements(at_origin), home_placements(moved)
     for view in ("front", "top", "left", "free"):
         points = [
             pixels(camera_of(appearance, view), SIZE, np.array([home["wrist"][:3, 3]]))
-            for appearance, home in ((here, home_here), (there, home_there))
+            for appearance, home in ((at_origin, home_at_origin), (moved, home_moved))
         ]
         assert points[0] == pytest.approx(points[1], abs=1e-6)
-    assert there.center == pytest.approx(base_to_site[:3, :3] @ here.center + base_to_site[:3, 3])
+    assert moved.center == pytest.approx(base_to_site[:3, :3] @ at_origin.center + base_to_site[:3, 3])
 
 
 def test_a_view_of_the_description_replaces_the_default_free_view():

@@ -31,13 +31,13 @@ def views(*askers, of=None):
 def test_the_largest_view_is_within_each_operators_share_and_a_second_one_is_not():
     largest = spec(1920, 1080, 30.0)
     budget().check([], largest, "li")
-    there = views(["li"], of=spec())
-    budget().check(there, spec(), "li")
+    existing = views(["li"], of=spec())
+    budget().check(existing, spec(), "li")
     with pytest.raises(
         QuotaError, match=r"li already has 1 views: .* together 55\.3 million pixels a second"
     ):
-        budget().check(there, largest, "li")
-    budget().check(there, spec(1280, 720, 30.0), "wang")
+        budget().check(existing, largest, "li")
+    budget().check(existing, spec(1280, 720, 30.0), "wang")
     with pytest.raises(NoRoomError, match=r"48\.4 of 110\.6 million are left"):
         budget().check(views(["li"], of=largest), largest, "wang")
 
@@ -53,18 +53,18 @@ def test_a_view_above_the_total_limit_is_rejected_with_a_possible_rate():
 
 
 def test_a_view_with_two_askers_is_reassigned_before_a_request_is_rejected():
-    there = views(["li", "wang"], ["li"])
+    existing = views(["li", "wang"], ["li"])
     small = budget(quota=2)
-    small.check(there, spec(), "li")
-    assert [view.askers for view in there] == [["wang", "li"], ["li"]]
-    there += views(["li"])
+    small.check(existing, spec(), "li")
+    assert [view.askers for view in existing] == [["wang", "li"], ["li"]]
+    existing += views(["li"])
     with pytest.raises(QuotaError, match="li already has 2 views: quota views = 2 for each name"):
-        small.check(there, spec(), "li")
+        small.check(existing, spec(), "li")
     # No view is reassigned to an operator with a used-up share.
-    there = views(["li", "wang"], ["li"], ["wang"], ["wang"])
+    existing = views(["li", "wang"], ["li"], ["wang"], ["wang"])
     with pytest.raises(QuotaError):
-        small.check(there, spec(), "li")
-    assert there[0].askers == ["li", "wang"]
+        small.check(existing, spec(), "li")
+    assert existing[0].askers == ["li", "wang"]
 
 
 def test_most_views_of_zero_rejects_every_request():
