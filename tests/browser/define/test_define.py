@@ -488,7 +488,10 @@ def test_each_pair_of_links_shows_how_it_is_checked_or_why_it_is_ignored(open_pa
 
 def test_a_plan_of_pairs_that_failed_says_why_and_is_asked_for_again(open_page):
     page = opened(open_page, "pt500", drawn=False, refused=True)
-    page.route("**/define/collisions", lambda route: route.fulfill(status=422, body="this took too long"))
+    page.route(
+        "**/define/collisions",
+        lambda route: route.fulfill(status=422, content_type="text/plain", body="this took too long"),
+    )
     tab(page, "Collisions")
     expect(page.locator(".plan-state")).to_contain_text("could not be worked out: this took too long")
     page.unroute("**/define/collisions")
