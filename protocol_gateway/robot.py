@@ -18,14 +18,26 @@ from protocol_gateway.authority.preconditions import Controller
 from protocol_gateway.checking.cell_occupancy import CellOccupancy
 from protocol_gateway.checking.checker import Checker
 from protocol_gateway.checking.policy import Policy
-from protocol_gateway.control.audit_trail import AuditTrail, entry_of
+from protocol_gateway.control.audit_trail import AuditTrail
 from protocol_gateway.control.checks import Checks
-from protocol_gateway.control.control import Control
+from protocol_gateway.control.control import Control, Ports
 from protocol_gateway.control.deadlines import set_deadline
+from protocol_gateway.control.entries import entry_of
+from protocol_gateway.control.events import (
+    LeaseEnded,
+    LinkLost,
+    LinkRestored,
+    MotionObserved,
+    SessionEnded,
+    StatusChanged,
+    StatusReported,
+    TimePassed,
+    UnitRefused,
+)
 from protocol_gateway.control.program import Programs
-from protocol_gateway.control.stop_handler import ControlContext
+from protocol_gateway.control.robot_authority import RobotAuthority
 from protocol_gateway.core.codes import code_table
-from protocol_gateway.drivers.driver import Driver
+from protocol_gateway.drivers.driver import Activity, Driver
 from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.journal import Journal
@@ -105,8 +117,8 @@ class Robot:
             journal=self._journal,
             stale_after_s=settings.stale_after_s,
             on_status=self._on_controller_status,
-            on_activity=lambda activity, dated_s: self._control.reported(activity, dated_s),
-            on_refused=lambda: self._control.refused(),
+            on_activity=self._on_activity,
+            on_refused=self._on_refused,
         )
         self._link = ControllerLink(
             LinkSettings(
@@ -122,16 +134,16 @@ class Robot:
         self._link_status = self._link.status
         self._audit = AuditLog(audit_path, on_written=self._on_written, rotate_bytes=rotate_bytes)
         self._audit_trail = AuditTrail(self._audit, self._journal)
-        context = ControlContext(
-            authority=self._persisted_authority(),
-            driver=driver,
+        self._robot_authority = RobotAuthority(
+            self._persisted_authority(), joints, driver.encode, orphan=self._audit.state.mover
+        )
+        ports = Ports(
             audit_trail=self._audit_trail,
             latch=self._audit.latch,
             journal=self._journal,
             send=self._link.send,
             controller=self._controller,
-            on_change=self._publish_state,
-            orphan=self._audit.state.mover,
+            publish=self._publish_state,
         )
         self._checks = Checks(
             settings.name,
@@ -141,13 +153,14 @@ class Robot:
             planner=planner,
             cell_occupancy=cell_occupancy,
             joints=joints,
-            context=context,
+            robot_authority=self._robot_authority,
+            controller=self._controller,
         )
-        self._control = Control(joints, context, self._checks)
-        self._programs = Programs(self._control, context, self._checks)
+        self._control = Control(self._robot_authority, ports, self._checks)
+        self._programs = Programs(self._control, self._robot_authority, ports, self._checks)
         if settings.legacy_clients is not None:
             table = code_table(settings.codes)
-            self._legacy = LegacyClients(settings.legacy_clients, table, joints, self._control, context)
+            self._legacy = LegacyClients(settings.legacy_clients, table, joints, self._control, ports)
         self._operators = session.watch_presence(presence_key(site, settings.name, Role.OPERATOR.value, "*"))
         self._stops = session.answer(site, settings.name, "stop", self._answer_stop)
 
@@ -208,7 +221,9 @@ class Robot:
 
     async def run(self) -> None:
         """Keep the link and the heartbeats until cancelled; then stop motion under a lease."""
-        self._control.send_latched_stop()  # no link yet, but the failed send makes it connect without pauses
+        self._control.handle(
+            LinkRestored()
+        )  # no link yet, but the failed send makes it connect without pauses
         link = asyncio.create_task(self._keep_running(self._link.run))
         sessions = asyncio.create_task(self._keep_running(self._watch_sessions))
         try:
@@ -216,7 +231,7 @@ class Robot:
         finally:
             try:
                 # Before the link ends, because the stop is sent over it.
-                self._control.leases.end(codes.ENDED_GATEWAY())
+                self._control.handle(LeaseEnded(codes.ENDED_GATEWAY()))
             finally:
                 link.cancel()
                 sessions.cancel()
@@ -249,7 +264,7 @@ class Robot:
         next_s = 0.0
         while True:
             await asyncio.sleep(_POLL_S)
-            self._control.leases.expire()
+            self._control.handle(TimePassed())
             now_s = time.monotonic()
             if self._link.status.state is LinkState.UP:
                 self._telemetry.check_timeouts(now_s)
@@ -267,7 +282,13 @@ class Robot:
             self._turned_away = turned_away
             why = codes.TURNED_AWAY()
             entry = entry_of(
-                "REQUESTS", operator="", source=MESH, outcome=Outcome.REFUSED, text=why.text, why=why
+                "REQUESTS",
+                time_ns=time.time_ns(),
+                operator="",
+                source=MESH,
+                outcome=Outcome.REFUSED,
+                text=why.text,
+                why=why,
             )
             self._audit_trail.write_later(replace(entry, repeated=more - 1))
 
@@ -275,7 +296,7 @@ class Robot:
         """End the lease of an operator's program or page when its session ends."""
         async for who, alive in self._operators:
             if not alive:
-                self._control.leases.end_session(who.id)
+                self._control.handle(SessionEnded(who.id))
 
     # --------------------------------------------------------------- requests
 
@@ -290,7 +311,7 @@ class Robot:
         message = request.message
         assert isinstance(message, schema.LeaseRequest)
         message.reason, message.to = one_line(message.reason), one_line(message.to)
-        return await self._control.leases.ask(message, operator=self._operator(_LEASE, request), source=MESH)
+        return await self._control.lease(message, operator=self._operator(_LEASE, request), source=MESH)
 
     async def _answer_command(self, request: Request) -> schema.CommandAnswer:
         message = request.message
@@ -299,7 +320,7 @@ class Robot:
         set_deadline(message, request)
         if message.command == schema.CommandRequest.RUN_PROGRAM:
             return await self._programs.run(message, operator=operator, source=MESH)
-        return await self._control.command(message, operator=operator, source=MESH)
+        return await self._control.commands([message], operator=operator, source=MESH)
 
     def _operator(self, what: str, request: Request) -> str:
         """Return the name of the operator who sends a request.
@@ -320,7 +341,15 @@ class Robot:
     def _record_unreadable(self, what: str, name: str, why: Reason) -> None:
         """Audit a request that was rejected before evaluation: unreadable, or with an invalid operator."""
         who, text = one_line(name, 40), one_line(why.text, LONGEST_SENTENCE)
-        entry = entry_of(what, operator=who, source=MESH, outcome=Outcome.REFUSED, text=text, why=why)
+        entry = entry_of(
+            what,
+            time_ns=time.time_ns(),
+            operator=who,
+            source=MESH,
+            outcome=Outcome.REFUSED,
+            text=text,
+            why=why,
+        )
         self._audit_trail.write_later(entry)
 
     # ------------------------------------------------------------------ state
@@ -342,17 +371,23 @@ class Robot:
             self._journal.report(event.severity, event.code, event.text, why=event.reason)
         if before.state is not status.state:
             if before.state is LinkState.UP:
-                self._control.link_lost(status.text)
+                self._control.handle(LinkLost(status.text))
             if status.state is LinkState.DOWN and self._legacy is not None:
                 self._legacy.link_is_down(status.text)
             if before.state is LinkState.DOWN:
-                self._control.send_latched_stop()
+                self._control.handle(LinkRestored())
         self._publish_state()
 
     def _on_controller_status(self) -> None:
-        self._control.status_changed()
+        self._control.handle(StatusChanged())
         self._observe()
         self._publish_state()
+
+    def _on_activity(self, activity: Activity | None, dated_s: float) -> None:
+        self._control.handle(StatusReported(activity, dated_s))
+
+    def _on_refused(self) -> None:
+        self._control.handle(UnitRefused())
 
     def _on_written(self, entry: Entry) -> None:
         self._audit_topic.put(audit_entry(entry), source_time_ns=entry.time_ns)
@@ -363,7 +398,9 @@ class Robot:
     def _observe(self) -> None:
         if self._link.status.state is not LinkState.UP:
             return
-        self._control.observe(moving=self._telemetry.moving(time.monotonic()))
+        moving = self._telemetry.moving(time.monotonic())
+        if moving is not None:
+            self._control.handle(MotionObserved(moving))
 
     def _controller(self) -> Controller:
         now_s = time.monotonic()
@@ -391,7 +428,7 @@ class Robot:
                 rate_hz=self._link.rate_hz,
                 controller_time_s=self._telemetry.controller_time_s,
                 audit_head=self._audit.head,
-                speed_percent=self._control.speed_percent,
+                speed_percent=self._robot_authority.speed_percent,
                 legacy_clients=None if self._legacy is None else self._legacy.counts,
                 policy=self._checks.policy,
                 unchecked=self._checks.problem,

@@ -266,7 +266,7 @@ COMMAND_PROGRAM_RUNS = Code(
 COMMAND_HELD = Code("command.held", "HOLD arrived before it could be sent")
 COMMAND_CONTROL_ENDED = Code("command.control_ended", "control ended")
 COMMAND_CONTROL_ENDED_MEANWHILE = Code(
-    "command.control_ended_meanwhile", "control ended while the command was being written to the audit log"
+    "command.control_ended_meanwhile", "control ended before the command was sent"
 )
 COMMAND_BROKEN_OFF = Code(
     "command.broken_off", "it was cancelled while it was being written to the audit log"

@@ -154,7 +154,7 @@ def observe(
 
 
 def _just_stopped(authority: Authority, now: Now) -> bool:
-    """Return whether motion may be the rest of a stopped one; if it goes on, `stop_handler` reports it."""
+    """Return whether motion may be the rest of a stopped one; if it goes on, `RobotAuthority` reports it."""
     return authority.stopping_s is not None and now.monotonic_s - authority.stopping_s < START_S
 
 

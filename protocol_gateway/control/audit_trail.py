@@ -4,19 +4,14 @@ import asyncio
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from hashlib import sha256
 
 from protocol_gateway.audit.flood_counter import STOP, FloodCounter
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome
 from protocol_gateway.authority.admission import LONGEST_WAIT_S
-from protocol_gateway.authority.lease_rules import Answer
 from protocol_gateway.errors import AuditError
 from protocol_gateway.journal import Journal
-from protocol_gateway.text_limits import LONGEST_SENTENCE
 from robomesh import reason_codes as codes
-from robomesh.reasons import Reason
-from robomesh.schemas.robomesh_pb2 import CommandRequest, Event, LeaseRequest
-from robomesh.texts import one_line
+from robomesh.schemas.robomesh_pb2 import Event
 
 
 class AuditTrail:
@@ -98,64 +93,3 @@ class AuditTrail:
         text = f"{error}: motion is refused until this is fixed; stop still works"
         why = error.reason if isinstance(error, AuditError) else None
         self._journal.report(Event.Severity.ERROR, "audit.failed", text, why=why)
-
-
-def entry_of(
-    request: str,
-    *,
-    operator: str,
-    source: str,
-    outcome: Outcome,
-    text: str,
-    why: Reason | None = None,
-    **values: object,
-) -> Entry:
-    """Create an entry with the present time; empty values are omitted, long ones shortened."""
-    return Entry(
-        time_ns=time.time_ns(),
-        operator=operator,
-        source=source,
-        request=request,
-        outcome=outcome,
-        text=text,
-        reason=why,
-        values={
-            name: one_line(str(value), LONGEST_SENTENCE)
-            for name, value in values.items()
-            if value not in ("", 0)
-        },
-    )
-
-
-def lease_entry(
-    request: LeaseRequest, outcome: Outcome, answer: Answer, *, operator: str, source: str
-) -> Entry:
-    """Create the entry of a lease request."""
-    return entry_of(
-        LeaseRequest.Action.Name(request.action),
-        operator=operator,
-        source=source,
-        outcome=outcome,
-        text=answer.text,
-        why=answer.reason,
-        ttl_s=request.ttl_s,
-        to=request.to,
-        reason=request.reason,
-    )
-
-
-def command_entry(request: CommandRequest, *, operator: str, source: str) -> Entry:
-    """Create the entry of an accepted command."""
-    return entry_of(
-        CommandRequest.Command.Name(request.command),
-        operator=operator,
-        source=source,
-        outcome=Outcome.ACCEPTED,
-        text="",
-        id=str(request.id),
-        joint_positions=" ".join(f"{value:.6g}" for value in request.joint_positions),
-        speed_percent=f"{request.speed_percent:g}" if request.HasField("speed_percent") else "",
-        stop_id=request.stop_id,
-        program_name=request.program_name,
-        program_sha256=sha256(request.program.encode()).hexdigest() if request.program else "",
-    )

@@ -11,9 +11,9 @@ its own links, and every other robot of the cell at its positions and along its 
 """
 
 import contextlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, not_sent, refused
 from protocol_gateway.authority.preconditions import Controller, predicted, target_of
@@ -21,7 +21,8 @@ from protocol_gateway.checking.cell_occupancy import CellOccupancy, Occupancy
 from protocol_gateway.checking.checker import Checker
 from protocol_gateway.checking.policy import Policy
 from protocol_gateway.checking.worker_messages import Checked, CheckMotion, CheckProgram, Positions
-from protocol_gateway.control.stop_handler import ControlContext
+from protocol_gateway.control.effects import Finding
+from protocol_gateway.control.robot_authority import RobotAuthority
 from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import CheckError
 from protocol_gateway.motion import has_arrived
@@ -34,31 +35,6 @@ _C = CommandRequest.Command
 _CLOSE, _FAILED, _SKIPPED = "check.warning", "check.failed", "check.skipped"
 # Noise in the positions of a robot at rest [rad] or [m].
 _REST_TOLERANCE = 1e-3
-
-
-@dataclass(frozen=True, kw_only=True)
-class Finding:
-    """Result of the check of commands.
-
-    Attributes:
-        refusal: Refusal of the commands; None: they may be sent.
-        warning: Warning about them; None: no warning.
-        code: Code of the warning's event. "check.warning": something is close; "check.failed": a failure that
-            "require" refuses; "check.skipped": something was not checked.
-        start: Positions at which the robot must still be when the commands are sent; None: anywhere.
-        others: Paths of the other robots, which must still be valid; None: not required.
-    """
-
-    refusal: Answer | None = None
-    warning: Reason | None = None
-    code: str = _CLOSE
-    start: Positions | None = None
-    others: Mapping[str, tuple[Positions, ...]] | None = None
-
-    @property
-    def is_violation(self) -> bool:
-        """True if the policy "require" would have refused the commands."""
-        return self.code != _CLOSE
 
 
 class Checks:
@@ -80,12 +56,13 @@ class Checks:
         planner: Checker,
         cell_occupancy: CellOccupancy,
         joints: Joints,
-        context: ControlContext,
+        robot_authority: RobotAuthority,
+        controller: Callable[[], Controller],
     ) -> None:
         self.policy = policy
         self._name, self._cell = name, tuple(cell)
         self._checker, self._planner, self._cell_occupancy = checker, planner, cell_occupancy
-        self._joints, self._context = joints, context
+        self._joints, self._robot_authority, self._controller = joints, robot_authority, controller
         cell_occupancy.add(name, self.occupancy)
 
     @property
@@ -140,12 +117,12 @@ class Checks:
 
     def occupancy(self) -> Occupancy:
         """Return the positions that this robot may occupy from now on."""
-        context = self._context
-        controller, authority = context.controller(), context.authority
+        controller, authority = self._controller(), self._robot_authority.authority
         if controller.positions is None:
             return Occupancy(unknown=codes.OTHER_NO_POSITION())
         motion = None if authority.lease is None else authority.lease.motion
-        ahead = () if context.program is None else context.program.ahead
+        program = self._robot_authority.program
+        ahead = () if program is None else program.ahead
         if motion is not None and motion.waypoints:
             ahead = (*motion.waypoints, *ahead)
         elif motion is not None or _moves(controller, authority.moving):
@@ -172,8 +149,8 @@ class Checks:
 
     def is_resting_at(self, start: Positions) -> bool:
         """Return whether the robot rests at the positions where its motion was checked."""
-        controller = self._context.controller()
-        resting = not _moves(controller, self._context.authority.moving)
+        controller = self._controller()
+        resting = not _moves(controller, self._robot_authority.authority.moving)
         return resting and has_arrived(start, controller.positions, self._joints.types)
 
     def _start(self, *, must_rest: bool) -> Positions:
@@ -185,7 +162,7 @@ class Checks:
         Raises:
             CheckError: If the positions are unknown, or the robot moves but must rest.
         """
-        controller, authority = self._context.controller(), self._context.authority
+        controller, authority = self._controller(), self._robot_authority.authority
         if controller.positions is None:
             raise CheckError(codes.CHECK_NO_POSITION())
         if must_rest:
@@ -207,10 +184,10 @@ class Checks:
             CheckError: If the path of a held motion is unknown.
         """
         targets: list[Positions] = []
-        controller = self._context.controller()
+        controller = self._controller()
         for request in requests:
             if request.command == _C.RESUME:
-                lease = self._context.authority.lease
+                lease = self._robot_authority.authority.lease
                 waypoints = () if lease is None or lease.motion is None else lease.motion.waypoints
                 if not waypoints:
                     raise CheckError(codes.CHECK_HELD_WAY_UNKNOWN())

@@ -14,16 +14,16 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from protocol_gateway.audit.log import Outcome
 from protocol_gateway.authority import lease_rules
 from protocol_gateway.authority.lease_rules import Answer, refused
 from protocol_gateway.checking.worker_messages import Checked
-from protocol_gateway.control.audit_trail import entry_of
 from protocol_gateway.control.checks import Checks
-from protocol_gateway.control.control import PROGRAM, Control, command_answer, refusal
-from protocol_gateway.control.stop_handler import ControlContext, RunningProgram
+from protocol_gateway.control.control import Control, Ports, command_answer, refusal
+from protocol_gateway.control.effects import Program
+from protocol_gateway.control.events import ProgramEnded
+from protocol_gateway.control.robot_authority import RobotAuthority
 from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import CheckError
 from protocol_gateway.state_messages import timestamp
@@ -79,12 +79,11 @@ class _Prepared:
     Attributes:
         refused: Refusal; None: it may run.
         warning: Warning of the check.
-        begin: Starts it.
     """
 
     refused: Answer | None = None
     warning: Reason | None = None
-    begin: Callable[[], None] | None = None
+    program: Program | None = None
 
 
 class Programs:
@@ -94,10 +93,20 @@ class Programs:
         state: State of the current or last program; its timestamp is set when it is published.
     """
 
-    def __init__(self, control: Control, context: ControlContext, checks: Checks) -> None:
-        self._control, self._context, self._checks = control, context, checks
+    def __init__(
+        self, control: Control, robot_authority: RobotAuthority, ports: Ports, checks: Checks
+    ) -> None:
+        self._control, self._robot_authority, self._ports, self._checks = (
+            control,
+            robot_authority,
+            ports,
+            checks,
+        )
+        ports.cancel_programs, ports.start_program = self._cancel_preparing, self._start
         self.state = _STATE()
         self._task: asyncio.Task[None] | None = None
+        # A future of each program that is being checked or audited; its result is the reason to cancel it.
+        self._preparing: set[asyncio.Future[Reason]] = set()
 
     async def run(
         self, request: schema.CommandRequest, *, operator: str, source: str
@@ -111,7 +120,7 @@ class Programs:
         try:
             return await self._begin(request, cancelled, operator=operator, source=source)
         finally:
-            self._context.preparing.discard(cancelled)
+            self._preparing.discard(cancelled)
 
     async def _begin(
         self, request: schema.CommandRequest, cancelled: asyncio.Future[Reason], *, operator: str, source: str
@@ -121,13 +130,13 @@ class Programs:
         # A refusal here is final, even if its reason disappears, because the program was not planned.
         prepared = _Prepared(None if verdict.answer.accepted else verdict.answer)
         if verdict.answer.accepted and not verdict.repeat:
-            self._context.preparing.add(cancelled)
+            self._preparing.add(cancelled)
             try:
                 prepared = await self._prepare_in_time(request, cancelled, name, operator)
             except CheckError as error:
                 prepared = _Prepared(refused(error.reason, what="Not run"))
         answer = await self._control.attempt(
-            [request], operator=operator, source=source, begin=prepared.begin, refused=prepared.refused
+            [request], operator=operator, source=source, program=prepared.program, refused=prepared.refused
         )
         if not answer.accepted:
             raise refusal(answer)
@@ -168,16 +177,16 @@ class Programs:
             raise CheckError(codes.PROGRAM_TOO_LONG(kib=MOST_BYTES // 1024))
         checked, finding = await self._checks.program(request.program)
         lines = tuple(request.program.split("\n"))
-        newest_stop = self._context.authority.last_stop_id
+        newest_stop = self._robot_authority.authority.last_stop_id
         run = _Run(name, operator, request.lease, newest_stop, lines, checked)
         if finding.refusal is not None:
             return _Prepared(finding.refusal)
         first = next((step for step in checked.steps if step.target is not None), None)
         # Refuse now if the present state (not homed, on hold) would refuse the first step.
-        if first is not None and (problem := self._control.current_obstacle(_request(first, ""))) is not None:
+        if first is not None and (problem := self._control.obstacle(_request(first, ""))) is not None:
             return _Prepared(problem)
         if finding.warning is not None:
-            self._context.journal.report(
+            self._ports.journal.report(
                 _S.WARNING,
                 finding.code,
                 f"program {name}: {finding.warning}",
@@ -185,22 +194,28 @@ class Programs:
                 program=name,
             )
         targets = tuple(tuple(each.target.tolist()) for each in checked.steps if each.target is not None)
+        program = Program(name=name, targets=targets, start=finding.start, run=run)
+        return _Prepared(None, finding.warning, program)
 
-        def begin() -> None:
-            if finding.start and not self._checks.is_resting_at(finding.start):
-                raise CheckError(codes.PROGRAM_MOVED())
-            self._context.program = RunningProgram(name, targets)
-            self.state = _STATE(
-                outcome=_STATE.RUNNING,
-                name=name,
-                operator=operator,
-                since=timestamp(time.time_ns()),
-                steps=len(checked.steps),
-                duration_s=checked.duration_s,
-            )
-            self._task = asyncio.create_task(self._run(run))
+    def _cancel_preparing(self, why: Reason) -> bool:
+        """Cancel the programs that have not started; return whether there were any."""
+        for each in self._preparing:
+            if not each.done():
+                each.set_result(why)
+        return bool(self._preparing)
 
-        return _Prepared(None, finding.warning, begin)
+    def _start(self, program: Program) -> None:
+        run = program.run
+        assert isinstance(run, _Run)
+        self.state = _STATE(
+            outcome=_STATE.RUNNING,
+            name=run.name,
+            operator=run.operator,
+            since=timestamp(time.time_ns()),
+            steps=len(run.checked.steps),
+            duration_s=run.checked.duration_s,
+        )
+        self._task = asyncio.create_task(self._run(run))
 
     async def close(self) -> None:
         """Cancel the program that runs."""
@@ -210,9 +225,7 @@ class Programs:
 
     async def _run(self, run: _Run) -> None:
         text = f"{run.operator} runs program {run.name}"
-        self._context.journal.report(
-            _S.INFO, "program.started", text, operator=run.operator, program=run.name
-        )
+        self._ports.journal.report(_S.INFO, "program.started", text, operator=run.operator, program=run.name)
         problem: Reason | None = codes.PROGRAM_FAILED()
         try:
             problem = await self._run_steps(run)
@@ -229,7 +242,7 @@ class Programs:
         for number, step in enumerate(run.checked.steps):
             self.state.step, self.state.line = number + 1, step.line
             self.state.statement = one_line(run.lines[step.line - 1].partition("#")[0].strip(), LONGEST_TEXT)
-            self._context.on_change()
+            self._ports.publish()
             problem = await self._step(run, step)
             if problem is not None:
                 return problem
@@ -250,12 +263,10 @@ class Programs:
             if answer.accepted or answer.reason is None or answer.reason.code != codes.COMMAND_HELD.name:
                 break
         if not answer.accepted:
-            return answer.reason or codes.OTHER(detail=answer.text)
+            # The end of control or a stop is the cause, rather than the refusal that followed from it.
+            return self._abort_reason(run) or answer.reason or codes.OTHER(detail=answer.text)
         if step.target is None:
             return None
-        # From now on the lease's motion holds this target.
-        if (running := self._context.program) is not None:
-            self._context.program = replace(running, done=running.done + 1)
         target = tuple(step.target.tolist())
         begun = not self._checks.is_resting_at(target)
 
@@ -274,53 +285,40 @@ class Programs:
                 return problem
             if done():
                 return None
-            lease = self._context.authority.lease
+            lease = self._robot_authority.authority.lease
             if moves and (lease is None or lease.motion is None):
                 return codes.PROGRAM_NOT_ARRIVED()
             await asyncio.sleep(_POLL_S)
 
     def _motion_is_over(self) -> bool:
-        lease = self._context.authority.lease
+        lease = self._robot_authority.authority.lease
         return lease is None or lease.motion is None
 
     def _not_held(self) -> bool:
-        program = self._context.program
-        holding = self._context.controller().status.activity is Activity.HOLDING
+        program = self._robot_authority.program
+        holding = self._ports.controller().status.activity is Activity.HOLDING
         return not holding and (program is None or not program.held)
 
     def _abort_reason(self, run: _Run) -> Reason | None:
-        authority = self._context.authority
+        authority = self._robot_authority.authority
         if authority.stop is not None:
             return codes.PROGRAM_STOPPED(by=authority.stop.by, reason=authority.stop.reason)
         if authority.last_stop_id != run.last_stop_id:
             return codes.PROGRAM_STOPPED_BY_NUMBER(id=authority.last_stop_id)
-        if self._context.program is not None and self._context.program.given_up:
+        program = self._robot_authority.program
+        if program is not None and program.given_up:
             return codes.PROGRAM_GIVEN_UP()
         if not lease_rules.holds(authority, run.operator, run.secret):
             return codes.PROGRAM_CONTROL_ENDED(authority.ended or codes.ENDED_UNKNOWN())
         return None
 
     def _end(self, run: _Run, problem: Reason | None) -> None:
-        self._context.program = None
         if problem is None:
-            self.state.outcome, outcome = _STATE.DONE, codes.PROGRAM_DONE(program=run.name)
+            self.state.outcome = _STATE.DONE
         else:
             self.state.outcome, self.state.text = _STATE.ENDED, problem.text
             self.state.reason.CopyFrom(reason_message(problem))
-            outcome = codes.PROGRAM_ENDED(problem, program=run.name, line=self.state.line)
-        severity = _S.INFO if problem is None else _S.WARNING
-        self._context.journal.report(severity, outcome.code, outcome.text, why=outcome, program=run.name)
-        self._context.audit_trail.write_later(
-            entry_of(
-                "PROGRAM_END",
-                operator=run.operator,
-                source=PROGRAM,
-                outcome=Outcome.ACCEPTED if problem is None else Outcome.FAILED,
-                text=outcome.text,
-                why=outcome,
-            )
-        )
-        self._context.on_change()
+        self._control.handle(ProgramEnded(run.name, run.operator, self.state.line, problem))
 
 
 def _checked_too_slowly(answer: Answer) -> bool:

@@ -12,11 +12,11 @@ Source: Chen, Zhang, Xue 2001, section 5, figures 7 and 8.
 
 import asyncio
 import os
+import time
 
 from protocol_gateway.audit.log import Outcome
-from protocol_gateway.control.audit_trail import entry_of
-from protocol_gateway.control.control import Control
-from protocol_gateway.control.stop_handler import ControlContext
+from protocol_gateway.control.control import Control, Ports
+from protocol_gateway.control.entries import entry_of
 from protocol_gateway.core.codes import CodeTable
 from protocol_gateway.core.records import Error, write_unit
 from protocol_gateway.core.stream import Malformed, StreamEvent, Unit, printable
@@ -50,14 +50,14 @@ class LegacyClients:
         table: CodeTable,
         joints: Joints,
         control: Control,
-        context: ControlContext,
+        ports: Ports,
     ) -> None:
         self._settings = settings
         self._table = table
         self._joints = joints
         self._control = control
-        self._context = context
-        self._journal = context.journal
+        self._ports = ports
+        self._journal = ports.journal
         self._clients: dict[Client, Commander | None] = {}
         self._rejected: set[Client] = set()
         self._ending: set[asyncio.Task[None]] = set()
@@ -148,7 +148,7 @@ class LegacyClients:
         may = f"may command as {operator}" if operator else "reads"
         text = f"an old client program connected: {client.name} {may}, {len(self._clients)} in all"
         self._journal.report(_S.INFO, "legacy.attached", text, client=client.name)
-        self._context.on_change()
+        self._ports.publish()
 
     def client_disconnected(self, client: Client) -> None:
         """Remove a client, and end its lease."""
@@ -163,7 +163,7 @@ class LegacyClients:
                 task.add_done_callback(self._ending.discard)
             text = f"an old client program disconnected: {client.name}, {len(self._clients)} are left"
             self._journal.report(_S.INFO, "legacy.gone", text, client=client.name)
-            self._context.on_change()
+            self._ports.publish()
         self._empty.set()
 
     def units_received(self, client: Client, events: list[StreamEvent]) -> None:
@@ -270,9 +270,10 @@ class LegacyClients:
 
     def _write_down(self, client: Client, operator: str, unit: str, error: Error) -> None:
         host, _ = client.address
-        self._context.audit_trail.write_later(
+        self._ports.audit_trail.write_later(
             entry_of(
                 "UNIT",
+                time_ns=time.time_ns(),
                 operator=operator or f"legacy {host}",
                 source=f"legacy {client.name}",
                 outcome=Outcome.REFUSED,

@@ -15,6 +15,7 @@ from contextlib import suppress
 from protocol_gateway.authority.admission import LONGEST_WAIT_S
 from protocol_gateway.authority.lease_rules import holds
 from protocol_gateway.control.control import Control
+from protocol_gateway.control.events import LeaseEnded
 from protocol_gateway.core.records import Error
 from protocol_gateway.core.stream import Unit
 from protocol_gateway.legacy.requests import FAULT, READ_ONLY, number_of, requests_of, stop_to_reset
@@ -86,7 +87,7 @@ class Commander:
         self._end_reason = why
         self._waiting.clear()
         if self.in_control:
-            self._control.leases.end(why)
+            self._control.handle(LeaseEnded(why))
 
     async def settle(self) -> None:
         """Wait until the current unit is executed or refused."""
@@ -140,6 +141,6 @@ class Commander:
 
     async def _lease(self, action: LeaseRequest.Action) -> None:
         request = LeaseRequest(action=action, lease=self._secret, ttl_s=_TTL_S)
-        answer = await self._control.leases.ask(request, operator=self.operator, source=self._source)
+        answer = await self._control.lease(request, operator=self.operator, source=self._source)
         self._secret = answer.lease
         self._renewed_s = time.monotonic()

@@ -5,7 +5,7 @@ import time
 import pytest
 
 from protocol_gateway.authority.lease_rules import Now
-from protocol_gateway.control import control, stop_handler
+from protocol_gateway.control import control
 
 
 class Clock:
@@ -22,6 +22,5 @@ class Clock:
 def clock(monkeypatch):
     """Replace both clocks of Control; the lease's timer and the disk use the real time."""
     clock = Clock()
-    for module in (control, stop_handler):
-        monkeypatch.setattr(module, "read_clocks", lambda: clock.now)
+    monkeypatch.setattr(control, "read_clocks", lambda: clock.now)
     return clock

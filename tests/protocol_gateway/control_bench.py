@@ -6,8 +6,8 @@ from protocol_gateway.audit.log import AuditLog, read_entries
 from protocol_gateway.authority.lease_rules import Authority
 from protocol_gateway.authority.preconditions import Controller
 from protocol_gateway.control.audit_trail import AuditTrail
-from protocol_gateway.control.control import Control
-from protocol_gateway.control.stop_handler import ControlContext
+from protocol_gateway.control.control import Control, Ports
+from protocol_gateway.control.robot_authority import RobotAuthority
 from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
 from protocol_gateway.drivers.unit import UnitDriver
 from protocol_gateway.errors import LinkDownError
@@ -31,22 +31,24 @@ class ControlBench:
         self.known = None  # overrides the controller's state
         self.broken = False
         self.secret = ""
-        joints = joints_of(load("pt600"))
+        self.joints = joints_of(load("pt600"))
+        self.driver = UnitDriver(self.joints.types)
         self.log = AuditLog(folder / "arm.jsonl", on_written=lambda entry: None)
         journal = Journal(self, "arm")
-        self.control = Control(
-            joints,
-            ControlContext(
-                authority=Authority(),
-                driver=UnitDriver(joints.types),
-                audit_trail=AuditTrail(self.log, journal),
-                latch=self.log.latch,
-                journal=journal,
-                send=self.send,
-                controller=self.controller,
-                on_change=self.changed,
-            ),
+        self.ports = Ports(
+            audit_trail=AuditTrail(self.log, journal),
+            latch=self.log.latch,
+            journal=journal,
+            send=self.send,
+            controller=self.controller,
+            publish=self.changed,
         )
+        self.restart()
+
+    def restart(self, orphan=""):
+        """Begin with no lease and no stop, as after a start of the gateway."""
+        self.robot_authority = RobotAuthority(Authority(), self.joints, self.driver.encode, orphan=orphan)
+        self.control = Control(self.robot_authority, self.ports)
 
     def changed(self):
         self.changes += 1
@@ -68,7 +70,7 @@ class ControlBench:
 
     async def lease(self, action, operator="li", **fields):
         request = schema.LeaseRequest(action=action, **fields)
-        answer = await self.control.leases.ask(request, operator=operator, source="test")
+        answer = await self.control.lease(request, operator=operator, source="test")
         self.secret = answer.lease or self.secret
         return answer
 

@@ -28,7 +28,6 @@ HERE, FAR, NEAR = (0.0,) * 5, (1.0, 0.0, 0.0, 0.0, 0.0), (0.1, 0.0, 0.0, 0.0, 0.
 
 def occupied_path(bench):
     """Return the path that the cell's other robots are checked against."""
-    context = bench.control._context
     cell_occupancy = CellOccupancy()
     Checks(
         "arm",
@@ -38,7 +37,8 @@ def occupied_path(bench):
         planner=None,
         cell_occupancy=cell_occupancy,
         joints=JOINTS,
-        context=context,
+        robot_authority=bench.robot_authority,
+        controller=bench.controller,
     )
     return cell_occupancy.others("arm-2", ("arm", "arm-2"))["arm"].path
 

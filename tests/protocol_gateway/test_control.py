@@ -5,7 +5,14 @@ from math import radians
 
 import pytest
 
-from protocol_gateway.authority.lease_rules import Authority
+from protocol_gateway.control.events import (
+    LeaseEnded,
+    LinkLost,
+    LinkRestored,
+    MotionObserved,
+    SessionEnded,
+    UnitRefused,
+)
 from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
@@ -124,11 +131,11 @@ def test_an_ended_session_ends_its_lease_and_stops_its_motion(tmp_path):
     async def main():
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE, session="s1")
-            bench.control.leases.end_session("s2")
-            bench.control.leases.end_session("")
+            bench.control.handle(SessionEnded("s2"))
+            bench.control.handle(SessionEnded(""))
             assert bench.control.authority.lease is not None
             await bench.commands((C.HOME, {}))
-            bench.control.leases.end_session("s1")
+            bench.control.handle(SessionEnded("s1"))
             assert bench.control.authority.lease is None
             assert bench.control.authority.ended.code == "lease.ended.session"
             assert bench.socket[-1] == b"1#COMMAND*stop@"
@@ -141,16 +148,16 @@ def test_a_lost_link_during_motion_is_a_stop(tmp_path):
     async def main():
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE)
-            bench.control.link_lost("the cable is cut")
+            bench.control.handle(LinkLost("the cable is cut"))
             assert bench.control.authority.stop is None
             await bench.commands((C.HOME, {}))
             bench.broken = True
-            bench.control.link_lost("the cable is cut")
+            bench.control.handle(LinkLost("the cable is cut"))
             assert bench.control.authority.stop.sent_s is None
             assert bench.control.authority.lease is not None
             assert len(bench.socket) == 1
             bench.broken = False
-            bench.control.send_latched_stop()
+            bench.control.handle(LinkRestored())
             assert bench.socket[1:] == [b"1#COMMAND*stop@"]
 
     run(main())
@@ -188,9 +195,10 @@ def test_a_lease_that_ends_during_the_audit_write_cancels_the_command(tmp_path):
             await bench.lease(A.ACQUIRE)
             command = asyncio.create_task(bench.commands((C.HOME, {})))
             await asyncio.sleep(0)  # the command waits for the disk now
-            bench.control.leases.end(codes.ENDED_GATEWAY())
-            with pytest.raises(RefusedError, match="control ended while"):
+            bench.control.handle(LeaseEnded(codes.ENDED_GATEWAY()))
+            with pytest.raises(RefusedError) as refused:
                 await command
+            assert refused.value.reason.code == "command.control_ended_meanwhile"
             assert bench.socket == []
 
     run(main())
@@ -231,7 +239,7 @@ def test_a_refusal_ends_a_motion_only_if_it_cannot_answer_another_unit(
             await bench.commands((C.HOME, {}), first_id=2)
             if behind:
                 await bench.commands(behind, first_id=3)
-            bench.control.refused()
+            bench.control.handle(UnitRefused())
             assert (bench.control.authority.lease.motion is None) == over
 
     run(main())
@@ -242,7 +250,7 @@ def test_a_refusal_of_a_unit_is_of_all_its_commands(tmp_path):
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE)
             await bench.commands((C.SPEED, {"speed_percent": 50}), (C.HOME, {}))
-            bench.control.refused()
+            bench.control.handle(UnitRefused())
             assert bench.control.authority.lease.motion is None
 
     run(main())
@@ -253,9 +261,8 @@ def test_motion_from_before_a_kill_is_stopped(tmp_path):
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE)
             await bench.commands((C.HOME, {}))
-            bench.control._context.authority = Authority()
-            bench.control._context.orphan = bench.log.state.mover
-            bench.control.observe(moving=True)
+            bench.restart(orphan=bench.log.state.mover)
+            bench.control.handle(MotionObserved(True))
             assert bench.control.authority.stop.reason == (
                 "dead-man: the gateway was killed while li had control, and the robot still moves"
             )
@@ -267,9 +274,9 @@ def test_motion_from_before_a_kill_is_stopped(tmp_path):
 def test_a_robot_at_rest_after_a_kill_is_not_stopped(tmp_path):
     async def main():
         async with control_bench(tmp_path) as bench:
-            bench.control._context.orphan = "li"
-            bench.control.observe(moving=False)
-            bench.control.observe(moving=True)
+            bench.restart(orphan="li")
+            bench.control.handle(MotionObserved(False))
+            bench.control.handle(MotionObserved(True))
             assert bench.control.authority.stop is None
             await bench.lease(A.ACQUIRE)
             await bench.commands((C.HOME, {}))

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from protocol_gateway.authority.lease_rules import Authority, Stop
 from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.control.events import LeaseEnded, MotionObserved
 from protocol_gateway.core.records import Error, read_records, write_unit
 from protocol_gateway.core.stream import Unit, UnitStream
 from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
@@ -150,7 +151,7 @@ def test_without_control_the_refusal_is_read_only(tmp_path):
             await bench.lease(A.ACQUIRE)
             asked = asyncio.create_task(refused(bench, "1#COMMAND*home"))
             await asyncio.sleep(0)  # the audit entry is being written now
-            bench.control.leases.end(codes.ENDED_GATEWAY())
+            bench.control.handle(LeaseEnded(codes.ENDED_GATEWAY()))
             assert await asked == 7
 
     run(main())
@@ -162,7 +163,7 @@ def test_motion_under_a_latched_stop_and_a_reset_while_the_robot_moves_are_refus
             await bench.lease(A.ACQUIRE)
             bench.control.stop(by="wang", reason="smoke", source="test")
             assert await refused(bench, "1#COMMAND*home", first_id=1) == 8
-            bench.control.observe(moving=True)
+            bench.control.handle(MotionObserved(True))
             assert await refused(bench, "1#COMMAND*reset", first_id=2, stop_id=1) == 8
 
     run(main())

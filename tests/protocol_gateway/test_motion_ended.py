@@ -7,6 +7,7 @@ import pytest
 from protocol_gateway.audit.log import GATEWAY
 from protocol_gateway.authority.lease_rules import Authority, Now, end_lease, request_lease
 from protocol_gateway.authority.motion_owner import command_sent, observe, reported
+from protocol_gateway.control.events import MotionObserved, StatusReported
 from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
@@ -156,17 +157,17 @@ def test_releasing_control_stops_motion_without_proof_of_its_end(
     async def main():
         async with control_bench(tmp_path) as bench:
             bench.status = StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=False)
-            bench.control.observe(moving=False)
+            bench.control.handle(MotionObserved(False))
             await bench.lease(A.ACQUIRE)
             await bench.commands((C.HOME, {}))
             clock.advance(0.1)
-            bench.control.observe(moving=True)
+            bench.control.handle(MotionObserved(True))
             bench.status, bench.positions = replace(bench.status, activity=activity, homed=True), positions
             clock.advance(0.1)
-            bench.control.observe(moving=False)
+            bench.control.handle(MotionObserved(False))
             for _ in range(2):
                 clock.advance(0.01)
-                bench.control.reported(activity, clock.now.monotonic_s - age_s)
+                bench.control.handle(StatusReported(activity, clock.now.monotonic_s - age_s))
             await bench.lease(A.RELEASE, lease=bench.secret)
             assert (bench.control.authority.stop is not None) is latched
             assert any(unit == b"1#COMMAND*stop@" for unit in bench.socket) is latched

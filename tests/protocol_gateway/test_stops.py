@@ -8,6 +8,7 @@ import zenoh
 
 from protocol_gateway.audit.log import Outcome, read_entries
 from protocol_gateway.audit.persisted_state import authority_after
+from protocol_gateway.control.events import LinkRestored, MotionObserved
 from robomesh.errors import NoAnswerError, RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
@@ -71,7 +72,7 @@ def test_a_stop_that_was_reset_or_not_sent_is_not_shared(tmp_path, clock):
             bench.broken = True
             assert [press(bench).sent, press(bench).sent] == [False, False]
             bench.broken = False
-            bench.control.send_latched_stop()
+            bench.control.handle(LinkRestored())
             # It is in transit now, but was not at the request.
             assert (press(bench).sent, bench.control.authority.stop.id) == (True, 5)
 
@@ -83,12 +84,12 @@ def test_a_repeated_stop_does_not_hide_that_the_robot_moves(tmp_path, clock):
         async with control_bench(tmp_path) as bench:
             for _ in range(5):
                 press(bench)
-                bench.control.observe(moving=True)
+                bench.control.handle(MotionObserved(True))
                 clock.advance(0.5)
             assert codes(bench).count("stop.disobeyed") == 1
             for _ in range(4):
                 press(bench)
-                bench.control.observe(moving=True)
+                bench.control.handle(MotionObserved(True))
                 clock.advance(0.5)
             assert codes(bench).count("stop.disobeyed") == 2
             assert bench.socket.count(STOP) == 9 + 2
@@ -99,11 +100,11 @@ def test_a_repeated_stop_does_not_hide_that_the_robot_moves(tmp_path, clock):
 def test_a_repeated_stop_does_not_hide_uncommanded_motion(tmp_path, clock):
     async def main():
         async with control_bench(tmp_path) as bench:
-            bench.control.observe(moving=False)
+            bench.control.handle(MotionObserved(False))
             for _ in range(5):
                 press(bench)
                 clock.advance(0.5)
-            bench.control.observe(moving=True)
+            bench.control.handle(MotionObserved(True))
             assert codes(bench).count("motion.foreign") == 1
 
     run(main())
@@ -117,14 +118,14 @@ def test_a_stop_has_its_full_time_after_a_reset_or_reconnection(tmp_path, clock)
             await bench.commands((C.RESET, {"stop_id": 1}))
             clock.advance(3.0)
             press(bench)
-            bench.control.observe(moving=True)
+            bench.control.handle(MotionObserved(True))
             clock.advance(1.9)
-            bench.control.send_latched_stop()
+            bench.control.handle(LinkRestored())
             clock.advance(1.9)
-            bench.control.observe(moving=True)
+            bench.control.handle(MotionObserved(True))
             assert "stop.disobeyed" not in codes(bench)
             clock.advance(0.2)
-            bench.control.observe(moving=True)
+            bench.control.handle(MotionObserved(True))
             assert "stop.disobeyed" in codes(bench)
 
     run(main())
@@ -136,12 +137,12 @@ def test_a_repeated_stop_unit_is_audited_and_latches_nothing(tmp_path, clock):
             bench.broken = True
             press(bench)
             bench.broken = False
-            bench.control.send_latched_stop()
+            bench.control.handle(LinkRestored())
             clock.advance(2.1)
-            bench.control.observe(moving=True)
+            bench.control.handle(MotionObserved(True))
             clock.advance(2.1)
             bench.broken = True
-            bench.control.observe(moving=True)
+            bench.control.handle(MotionObserved(True))
         entries = list(read_entries(bench.log.path))
         assert [(entry.request, entry.outcome) for entry in entries] == [
             ("STOP", Outcome.FAILED),
@@ -163,14 +164,14 @@ def test_a_stop_is_not_reset_while_the_robot_moves(tmp_path):
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE)
             await bench.commands((C.HOME, {}))
-            bench.control.observe(moving=True)
+            bench.control.handle(MotionObserved(True))
             press(bench)
             with pytest.raises(
                 RefusedError, match="still moving after stop 1: wait until it has stopped, then send RESET"
             ):
                 await bench.commands((C.RESET, {"stop_id": 1}), first_id=2)
             assert bench.control.authority.stop.id == 1
-            bench.control.observe(moving=False)
+            bench.control.handle(MotionObserved(False))
             await bench.commands((C.RESET, {"stop_id": 1}), first_id=3)
             assert bench.control.authority.stop is None
 

@@ -392,10 +392,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ],
   ["command.held", ["HOLD arrived before it could be sent", "保持命令先到，未发送"]],
   ["command.control_ended", ["control ended", "控制权已结束"]],
-  [
-    "command.control_ended_meanwhile",
-    ["control ended while the command was being written to the audit log", "写入审计日志期间控制权已结束"],
-  ],
+  ["command.control_ended_meanwhile", ["control ended before the command was sent", "命令发出前控制权已结束"]],
   ["command.broken_off", ["it was cancelled while it was being written to the audit log", "写入审计日志时中断"]],
   [
     "command.not_written",

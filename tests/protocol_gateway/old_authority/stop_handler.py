@@ -19,7 +19,7 @@ from protocol_gateway.audit.log import GATEWAY, Outcome
 from protocol_gateway.authority import lease_rules
 from protocol_gateway.authority.lease_rules import Authority, Now
 from protocol_gateway.authority.preconditions import Controller
-from protocol_gateway.control.audit_trail import AuditTrail, entry_of
+from protocol_gateway.control.audit_trail import AuditTrail
 from protocol_gateway.drivers.driver import Driver, Stop
 from protocol_gateway.errors import CommandError, LinkError
 from protocol_gateway.journal import Journal
@@ -28,6 +28,7 @@ from robomesh import reason_codes as codes
 from robomesh.messages import reason_message
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
+from tests.protocol_gateway.old_authority.entries import entry_of
 
 _S = schema.Event.Severity
 
@@ -89,6 +90,7 @@ class ControlContext:
     send: Callable[[bytes], None]
     controller: Callable[[], Controller]
     on_change: Callable[[], None]
+    set_timer: Callable[[float | None], None]
     program: RunningProgram | None = None
     preparing: set[asyncio.Future[Reason]] = field(default_factory=set)
     orphan: str = ""

@@ -7,21 +7,20 @@ RENEW                                   applied immediately; the end of the leas
 
 import asyncio
 import secrets
-import time
 from collections.abc import Callable
 from functools import partial
 
 from protocol_gateway.audit.log import GATEWAY, Entry, Outcome
 from protocol_gateway.authority import lease_rules
 from protocol_gateway.authority.lease_rules import Authority, LeaseEnd, LeaseOutcome, refused
-from protocol_gateway.control.audit_trail import entry_of, lease_entry
-from protocol_gateway.control.stop_handler import ControlContext, StopHandler, read_clocks
 from protocol_gateway.errors import AuditError
 from protocol_gateway.state_messages import lease_answer
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
+from tests.protocol_gateway.old_authority.entries import entry_of, lease_entry
+from tests.protocol_gateway.old_authority.stop_handler import ControlContext, StopHandler, read_clocks
 
 _A = schema.LeaseRequest.Action
 _S = schema.Event.Severity
@@ -41,7 +40,6 @@ class Leases:
         self._stop_handler = stop_handler
         self._command_lock = command_lock
         self._audit_trail, self._journal = context.audit_trail, context.journal
-        self._expiry: asyncio.TimerHandle | None = None
 
     async def ask(self, request: schema.LeaseRequest, *, operator: str, source: str) -> schema.LeaseAnswer:
         """Answer a lease request.
@@ -137,18 +135,9 @@ class Leases:
     def _set_authority(self, authority: Authority) -> None:
         """Set the state, and schedule the lease's expiry."""
         self._context.authority = authority
-        if self._expiry is not None:
-            self._expiry.cancel()
-            self._expiry = None
-        if authority.lease is not None:
-            loop = asyncio.get_running_loop()
-            left_s = authority.lease.until_s - time.monotonic()
-            # A millisecond late: an early timer would find an unexpired lease.
-            self._expiry = loop.call_later(max(0.0, left_s) + 0.001, self.expire)
+        self._context.set_timer(None if authority.lease is None else authority.lease.until_s)
         self._context.on_change()
 
     def close(self) -> None:
         """End the lease, if there is one."""
         self.end(codes.ENDED_GATEWAY())
-        if self._expiry is not None:
-            self._expiry.cancel()

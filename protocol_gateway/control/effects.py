@@ -1,0 +1,192 @@
+"""Effects of a robot's authority, performed by `control`.
+
+    effect                                            result
+    ------------------------------------------------  ---------------------------------------
+    Send, Recheck                                     (reason of a failure or None, Seen)
+    NumberStop, CancelPrograms                        number; whether a program was cancelled
+    EnterCell, CheckMotion, Append                    awaited: Seen, (Finding, Seen), (reason or None, Seen)
+    AppendLater, KeepLatch, Publish, Report,
+    SetTimer, StartProgram                            none
+
+Only commands and lease requests may yield an awaited effect. A stop yields none.
+"""
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias, TypeVar
+
+from protocol_gateway.audit.entry import Entry
+from protocol_gateway.authority.lease_rules import Answer, Now, Stop
+from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.checking.worker_messages import Positions
+from robomesh.reasons import Reason
+from robomesh.schemas.robomesh_pb2 import CommandRequest, Event
+
+
+@dataclass(frozen=True, kw_only=True)
+class Seen:
+    """Present time and state of the controller.
+
+    Attributes:
+        latch_problem: Reason why a restart would lose a stop now; None: it would not.
+    """
+
+    now: Now
+    controller: Controller
+    latch_problem: Reason | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """Result of the check of commands.
+
+    Attributes:
+        refusal: Refusal of the commands; None: they may be sent.
+        warning: Warning about them; None: no warning.
+        code: Code of the warning's event. "check.warning": something is close; "check.failed": a failure that
+            "require" refuses; "check.skipped": something was not checked.
+        start: Positions at which the robot must still be when the commands are sent; None: anywhere.
+        others: Paths of the other robots, which must still be valid; None: not required.
+    """
+
+    refusal: Answer | None = None
+    warning: Reason | None = None
+    code: str = "check.warning"
+    start: Positions | None = None
+    others: Mapping[str, tuple[Positions, ...]] | None = None
+
+    @property
+    def is_violation(self) -> bool:
+        """True if the policy "require" would have refused the commands."""
+        return self.code != "check.warning"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Program:
+    """A planned and checked program, ready to run.
+
+    Attributes:
+        targets: Its targets in order [rad] or [m].
+        start: Positions at which the robot must rest when it starts; None: anywhere.
+        run: What its runner needs; not read by the authority.
+    """
+
+    name: str
+    targets: tuple[Positions, ...]
+    start: Positions | None = None
+    run: Any = field(default=None, repr=False)
+
+
+@dataclass(frozen=True)
+class Send:
+    """Write a unit to the controller's socket now."""
+
+    unit: bytes
+    urgent: bool = False
+
+
+@dataclass(frozen=True)
+class Append:
+    """Write audit entries, and continue when they are on disk."""
+
+    entries: tuple[Entry, ...]
+
+
+@dataclass(frozen=True)
+class AppendLater:
+    """Write an audit entry, without waiting for the disk."""
+
+    entry: Entry
+
+
+@dataclass(frozen=True)
+class NumberStop:
+    """Return the number of the next stop, above `last`."""
+
+    last: int
+
+
+@dataclass(frozen=True)
+class KeepLatch:
+    """Write the latched stop and the newest number to the latch file soon."""
+
+    stop: Stop | None
+    last_stop_id: int
+
+
+@dataclass(frozen=True)
+class Publish:
+    """Publish the state of lease, stop and program."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """Publish an event."""
+
+    severity: Event.Severity
+    code: str
+    text: str
+    why: Reason | None = None
+    values: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class SetTimer:
+    """Hand over `TimePassed` at a monotonic time [s]; None: clear the timer."""
+
+    at_s: float | None
+
+
+@dataclass(frozen=True)
+class EnterCell:
+    """Wait until no other robot of the cell has a motion checked, if these commands move the robot."""
+
+    requests: Sequence[CommandRequest]
+
+
+@dataclass(frozen=True)
+class CheckMotion:
+    """Check the motions of commands against the present state of the cell."""
+
+    requests: Sequence[CommandRequest]
+
+
+@dataclass(frozen=True)
+class Recheck:
+    """Return the reason if the robot or its cell has changed since a check; None: unchanged."""
+
+    finding: Finding
+
+
+@dataclass(frozen=True)
+class CancelPrograms:
+    """Cancel the programs that have not started."""
+
+    why: Reason
+
+
+@dataclass(frozen=True)
+class StartProgram:
+    """Run a program's steps."""
+
+    program: Program
+
+
+Effect: TypeAlias = (
+    Send
+    | Append
+    | AppendLater
+    | NumberStop
+    | KeepLatch
+    | Publish
+    | Report
+    | SetTimer
+    | EnterCell
+    | CheckMotion
+    | Recheck
+    | CancelPrograms
+    | StartProgram
+)
+
+R = TypeVar("R")
+Effects: TypeAlias = Generator[Effect, Any, R]

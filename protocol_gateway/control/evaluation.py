@@ -1,0 +1,151 @@
+"""Evaluation of commands against lease, stop, program and the controller's state. No I/O."""
+
+from dataclasses import dataclass, replace
+
+from protocol_gateway.audit.entry import Entry
+from protocol_gateway.authority.admission import (
+    after_command,
+    deadline_refusal,
+    stop_refusal,
+    wait_refusal,
+)
+from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, Authority, not_sent
+from protocol_gateway.authority.preconditions import Controller, obstacle, predicted
+from protocol_gateway.control.effects import Program, Seen
+from protocol_gateway.drivers.driver import Activity
+from robomesh import reason_codes as codes
+from robomesh.schemas.robomesh_pb2 import CommandRequest
+from robots.joints import Joints
+
+_C = CommandRequest.Command
+
+# A controller may still report a stop for this long after its reset.
+RESET_SHOWS_WITHIN_S = 0.3
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunningProgram:
+    """Program that moves the robot.
+
+    Attributes:
+        targets: Its targets in order [rad] or [m].
+        done: Number of targets that were sent to the controller.
+        held: HOLD was sent, and no RESUME since.
+        given_up: RESET was sent while the program was held, so the rest of it must not run.
+    """
+
+    name: str
+    targets: tuple[tuple[float, ...], ...] = ()
+    done: int = 0
+    held: bool = False
+    given_up: bool = False
+
+    @property
+    def ahead(self) -> tuple[tuple[float, ...], ...]:
+        """Targets after the current motion."""
+        return self.targets[self.done :]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Attempt:
+    """Commands that go to the controller as one unit.
+
+    Attributes:
+        arrived_s: Time of arrival (monotonic).
+        id_used: Their ids are used by the holder, so the answer is kept for a repeat.
+        step: They are a step of the program that runs.
+        program: Program to start, instead of sending a unit.
+        nothing: Nothing is sent, because nothing is to be held.
+    """
+
+    requests: tuple[CommandRequest, ...]
+    entries: tuple[Entry, ...]
+    arrived_s: float
+    id_used: bool = False
+    step: bool = False
+    program: Program | None = None
+    nothing: bool = False
+
+    @property
+    def names(self) -> str:
+        """Names of the commands."""
+        return ", ".join(_C.Name(request.command) for request in self.requests)
+
+    @property
+    def moves(self) -> bool:
+        """True if a command moves the robot."""
+        return any(each.command in MOTION_COMMANDS for each in self.requests)
+
+
+def refusal_of(
+    attempt: Attempt,
+    authority: Authority,
+    program: RunningProgram | None,
+    seen: Seen,
+    joints: Joints,
+    *,
+    reset_s: float | None,
+) -> Answer | None:
+    """Return the refusal of commands, each evaluated after the previous ones; None: allowed.
+
+    Args:
+        program: Program that runs.
+        reset_s: Time of the last RESET that no status has followed (monotonic).
+    """
+    controller, refusal = seen.controller, wait_refusal(attempt.arrived_s, seen.now)
+    motions = [each.command for each in attempt.requests if each.command in MOTION_COMMANDS]
+    if len(motions) > 1 and _C.RESUME in motions:
+        # Some controllers resume the held motion first, others drop it, so the path would be unknown.
+        return not_sent(codes.COMMAND_TWO_UNITS())
+    for request in attempt.requests:
+        refusal = (
+            refusal
+            or deadline_refusal(request, seen.now)
+            or stop_refusal(authority, request)
+            or _latch_refusal(request, seen)
+            or (None if attempt.step else _program_refusal(request, program))
+            or controller_refusal(request, controller, seen, joints, reset_s=reset_s)
+        )
+        if refusal is not None:
+            return refusal
+        authority = after_command(authority, request)
+        controller = predicted(request, controller, joints)
+    return refusal
+
+
+def controller_refusal(
+    request: CommandRequest, controller: Controller, seen: Seen, joints: Joints, *, reset_s: float | None
+) -> Answer | None:
+    """Return the refusal of a command by the controller's state; None: allowed."""
+    status = controller.status
+    just_reset = reset_s is not None and seen.now.monotonic_s - reset_s < RESET_SHOWS_WITHIN_S
+    if just_reset and status.activity in (Activity.STOPPED, Activity.FAULT):
+        # The controller still reports the stop that was just reset. If it is stopped, it refuses itself.
+        controller = replace(controller, status=replace(status, activity=None))
+    return obstacle(request, controller, joints)
+
+
+def overtaken_by_hold(
+    attempt: Attempt, authority: Authority, program: RunningProgram | None
+) -> Answer | None:
+    """Return the refusal of a motion that a HOLD has overtaken; None: none has."""
+    if not attempt.moves:
+        return None
+    if attempt.step:
+        held = program is not None and (program.held or program.given_up)
+    else:
+        held = authority.lease is not None and authority.lease.last_id > attempt.requests[-1].id
+    return not_sent(codes.COMMAND_HELD()) if held else None
+
+
+def _latch_refusal(request: CommandRequest, seen: Seen) -> Answer | None:
+    if seen.latch_problem is None or request.command not in MOTION_COMMANDS:
+        return None
+    return not_sent(codes.COMMAND_NOT_LATCHED(seen.latch_problem))
+
+
+def _program_refusal(request: CommandRequest, program: RunningProgram | None) -> Answer | None:
+    # The check of a program holds only at its speed.
+    if program is None or request.command not in (MOTION_COMMANDS | {_C.SPEED}) - {_C.RESUME}:
+        return None
+    return not_sent(codes.COMMAND_PROGRAM_RUNS(name=program.name))

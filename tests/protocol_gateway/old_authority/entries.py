@@ -1,0 +1,9 @@
+"""Entries without their time, because both controls must write the same ones."""
+
+from functools import partial
+
+from protocol_gateway.control import entries
+
+entry_of = partial(entries.entry_of, time_ns=0)
+lease_entry = partial(entries.lease_entry, time_ns=0)
+command_entry = partial(entries.command_entry, time_ns=0)

@@ -1,0 +1,235 @@
+"""Order of the effects of a robot's authority, without sockets or disk; and its equality with the old one."""
+
+from dataclasses import replace
+
+import pytest
+
+from protocol_gateway.authority.lease_rules import Authority, Now
+from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.control import effects, events
+from protocol_gateway.control.control import Control, Ports
+from protocol_gateway.control.effects import Finding, Program, Seen
+from protocol_gateway.control.robot_authority import RobotAuthority
+from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
+from protocol_gateway.drivers.unit import UnitDriver
+from protocol_gateway.link.link import LinkState, LinkStatus
+from robomesh import reason_codes as codes
+from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
+from robots.description import load
+from robots.joints import joints_of
+from tests.protocol_gateway.authority_oracle import compare
+
+A, C = LeaseRequest.Action, CommandRequest.Command
+JOINTS = joints_of(load("pt600"))
+THERE = (0.4, 0.1, 0.0, 0.0, 0.0)
+BROKEN = codes.OTHER(detail="the cable is cut")
+NOW = Now(100.0, 1_700_000_000_000_000_000)
+SEEN = Seen(
+    now=NOW,
+    controller=Controller(
+        link=LinkStatus(LinkState.UP, codes.LINK_CONNECTED(where="there")),
+        status=StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=True),
+        positions=(0.0,) * 5,
+    ),
+)
+STOP = events.StopRequested(by="li", reason="smoke", source="test")
+
+
+class Bench:
+    """A robot's authority whose effects are only written down.
+
+    Attributes:
+        performed: Names of the effects since the last `clear`.
+        during: Events that are handed over while the effect of a name is performed.
+    """
+
+    def __init__(self):
+        self.robot_authority = RobotAuthority(Authority(), JOINTS, UnitDriver(JOINTS.types).encode)
+        self.seen = SEEN
+        self.performed = []
+        self.during = {}
+        self.finding = Finding()
+        self.link = self.disk = self.changed = None
+
+    def give(self, event):
+        """Hand over an event and perform its effects; return its result."""
+        handled, result = self.robot_authority.handle(event, self.seen), None
+        while True:
+            try:
+                effect = handled.send(result)
+            except StopIteration as done:
+                return done.value
+            name = type(effect).__name__
+            self.performed.append(name)
+            if name in self.during:
+                self.give(self.during.pop(name))
+            result = {
+                "Send": (self.link, self.seen),
+                "Append": (self.disk, self.seen),
+                "CheckMotion": (self.finding, self.seen),
+                "Recheck": (self.changed, self.seen),
+                "EnterCell": self.seen,
+                "NumberStop": self.robot_authority.authority.last_stop_id + 1,
+                "CancelPrograms": False,
+            }.get(name)
+
+    def lease(self, action, operator="li", secret="secret"):
+        request = LeaseRequest(action=action, lease=secret, ttl_s=5.0)
+        return self.give(
+            events.LeaseRequested(request=request, operator=operator, source="test", secret="secret")
+        )
+
+    def command(self, command, number=1, checked=None, **fields):
+        request = CommandRequest(command=command, id=number, lease="secret", **fields)
+        return self.give(
+            events.CommandsRequested(
+                requests=(request,), operator="li", source="test", arrived=self.seen.now, program=checked
+            )
+        )
+
+    def in_control(self):
+        self.lease(A.ACQUIRE)
+        self.performed.clear()
+        return self
+
+    def moving(self):
+        self.in_control().command(C.MOVE_ABSOLUTE, joint_positions=THERE)
+        self.performed.clear()
+        return self
+
+
+STOPPED = ["Send", "NumberStop", "KeepLatch", "CancelPrograms", "Publish", "Report", "AppendLater"]
+APPLIED = ["SetTimer", "Publish"]
+CHECKED = ["EnterCell", "CheckMotion", "Append", "Recheck"]
+
+
+@pytest.mark.parametrize(
+    ("begin", "event", "order"),
+    [
+        ("in_control", STOP, STOPPED),
+        ("in_control", events.LeaseEnded(codes.ENDED_GATEWAY()), [*APPLIED, "Report", "AppendLater"]),
+        (
+            "moving",
+            events.LeaseEnded(codes.ENDED_GATEWAY()),
+            [*APPLIED, *STOPPED, "Report", "AppendLater"],
+        ),
+        ("moving", events.LinkLost("the cable is cut"), STOPPED),
+        ("in_control", events.LinkLost("the cable is cut"), []),
+        ("in_control", events.LinkRestored(), []),
+        ("in_control", events.SessionEnded("another"), []),
+        ("moving", events.UnitRefused(), ["Publish"]),
+        ("in_control", events.MotionObserved(True), ["Report", *APPLIED, "Report", "AppendLater"]),
+    ],
+)
+def test_order_of_effects_that_wait_for_nothing(begin, event, order):
+    bench = getattr(Bench(), begin)()
+    bench.give(event)
+    assert bench.performed == order
+
+
+@pytest.mark.parametrize(
+    ("command", "fields", "order"),
+    [
+        (C.MOVE_ABSOLUTE, {"joint_positions": THERE}, [*CHECKED, "Send", "Publish"]),
+        (C.SPEED, {"speed_percent": 50.0}, [*CHECKED, "Send", "Publish"]),
+        (C.HOLD, {}, ["CancelPrograms", *CHECKED, "Send", "Publish"]),
+        (C.RUN_PROGRAM, {"program": "home"}, [*CHECKED, "Recheck", "StartProgram"]),
+    ],
+)
+def test_a_command_reaches_the_wire_only_after_its_audit_entry(command, fields, order):
+    bench = Bench().in_control()
+    checked = Program(name="p", targets=(THERE,)) if command == C.RUN_PROGRAM else None
+    assert bench.command(command, checked=checked, **fields).accepted
+    assert bench.performed == order
+
+
+@pytest.mark.parametrize(
+    ("fault", "order", "code"),
+    [
+        ({"disk": BROKEN}, ["EnterCell", "CheckMotion", "Append"], "command.not_written"),
+        ({"link": BROKEN}, [*CHECKED, "Send", "AppendLater"], "other"),
+        ({"changed": BROKEN}, [*CHECKED, "AppendLater"], "command.changed"),
+        (
+            {"during": {"Append": STOP}},
+            ["EnterCell", "CheckMotion", "Append", *STOPPED, "AppendLater"],
+            "stop.latched",
+        ),
+        (
+            {"during": {"Append": events.LeaseEnded(codes.ENDED_GATEWAY())}},
+            ["EnterCell", "CheckMotion", "Append", *APPLIED, "Report", "AppendLater", "AppendLater"],
+            "command.control_ended_meanwhile",
+        ),
+    ],
+    ids=["disk", "link", "cell", "stop", "end of control"],
+)
+def test_nothing_is_sent_if_something_comes_between(fault, order, code):
+    bench = Bench().in_control()
+    vars(bench).update(fault)
+    answer = bench.command(C.MOVE_ABSOLUTE, joint_positions=THERE)
+    assert (answer.accepted, answer.reason.code) == (False, code)
+    assert bench.performed == order
+    assert bench.robot_authority.authority.lease is None or not bench.robot_authority.authority.lease.motion
+
+
+def test_a_stop_never_waits():
+    """A stop at any point of a command yields no effect that must be awaited."""
+    for name in ("EnterCell", "CheckMotion", "Append", "Recheck", "Send"):
+        bench = Bench().in_control()
+        bench.during = {name: STOP}
+        bench.command(C.MOVE_ABSOLUTE, joint_positions=THERE)
+        at = bench.performed.index(name) + 1
+        assert bench.performed[at : at + len(STOPPED)] == STOPPED
+        assert bench.robot_authority.authority.stop.by == "li"
+
+
+def test_a_failed_stop_unit_is_latched_and_sent_when_the_link_is_back():
+    bench = Bench().in_control()
+    bench.link = BROKEN
+    assert not bench.give(STOP).sent
+    assert bench.performed == STOPPED
+    bench.performed.clear()
+    bench.link = None
+    bench.give(events.LinkRestored())
+    assert bench.performed == ["Send", "Publish", "Report", "AppendLater"]
+
+
+def test_an_awaited_effect_of_an_event_that_must_not_wait_is_an_error():
+    class Waits:
+        def handle(self, event, seen):
+            yield effects.Append(())
+
+    ports = Ports(
+        audit_trail=None,
+        latch=type("Latch", (), {"problem": None}),
+        journal=None,
+        send=None,
+        controller=lambda: SEEN.controller,
+        publish=None,
+    )
+    with pytest.raises(TypeError, match="Append cannot be performed without waiting"):
+        Control(Waits(), ports).handle(STOP)
+
+
+def test_a_lease_that_cannot_be_recorded_is_not_granted():
+    bench = Bench()
+    bench.disk = BROKEN
+    assert bench.lease(A.ACQUIRE).answer.reason.code == "lease.not_written"
+    assert bench.performed == ["Append"]
+    assert bench.robot_authority.authority.lease is None
+
+
+def test_a_release_waits_for_no_disk_and_stops_motion():
+    bench = Bench().moving()
+    assert bench.lease(A.RELEASE).answer.accepted
+    assert bench.performed == ["AppendLater", *APPLIED, *STOPPED, "Report"]
+
+
+def test_expired_control_ends_before_a_command_is_evaluated():
+    bench = Bench().moving()
+    bench.seen = replace(SEEN, now=Now(NOW.monotonic_s + 6.0, NOW.wall_ns + 6_000_000_000))
+    assert bench.command(C.HOME, 2).reason.code == "lease.none"
+    assert bench.performed[: len(STOPPED) + 2] == [*APPLIED, *STOPPED]
+
+
+def test_generated_sequences_give_equal_states_and_effects():
+    compare(200)
