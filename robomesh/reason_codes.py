@@ -506,7 +506,7 @@ CHECK_REQUIRED = Code(
     'it cannot be checked, and this robot\'s site says check = "require": {cause}',
 )
 CHECK_SKIPPED = Code("check.skipped", "not checked: {cause}")
-CHECK_STARTING = Code("check.starting", "the check is still starting", "try again in a few seconds")
+CHECK_STARTING = Code("check.starting", "the check is still starting", "it is ready in a few seconds")
 CHECK_BROKEN = Code("check.broken", "the check does not work: {cause}")
 CHECK_FAILED = Code("check.failed", "the check failed: {cause}")
 CHECK_IMPOSSIBLE = Code("check.impossible", "{cause}")

@@ -96,7 +96,8 @@ def root() -> TyperGroup:
         name="robomesh",
         help="A service mesh that puts industrial robot arms on the network.",
         commands={
-            name: TyperCommand(name=name, help=row.help, rich_markup_mode=None)
+            # Only a `short_help` wraps; typer cuts a `help` to one line.
+            name: TyperCommand(name=name, help=row.help, short_help=row.help, rich_markup_mode=None)
             for name, row in COMMANDS.items()
         },
         no_args_is_help=True,

@@ -78,8 +78,12 @@ async def find(session: Session, text: str) -> Robot:
 
 def print_json(value: Any) -> None:
     """Print one line of JSON, with direction characters escaped."""
-    line = json.dumps(value, ensure_ascii=False, allow_nan=False)
-    print(line.translate(_ESCAPED), flush=True)
+    print(json_line(value), flush=True)
+
+
+def json_line(value: Any) -> str:
+    """Return a value as one line of JSON, with direction characters escaped."""
+    return json.dumps(value, ensure_ascii=False, allow_nan=False).translate(_ESCAPED)
 
 
 def own_name() -> str:

@@ -11,7 +11,7 @@ from typing import Any
 import typer
 
 from services.command_line.commands import root
-from services.command_line.output import show_directions
+from services.command_line.output import discard, print_or_discard, show_directions
 from services.command_line.reading_limits import limit
 
 
@@ -25,7 +25,7 @@ def main() -> None:
         if sys.stdout is not None:
             sys.stdout.flush()
     except BrokenPipeError:
-        _discard_output()
+        discard(sys.stdout)
     sys.exit(status)
 
 
@@ -42,14 +42,14 @@ def run(arguments: list[str]) -> int:
         return _failed("not enough memory to read this: more than this machine has, or than 6 GB")
     except SystemExit:
         # Typer and rich exit this way when the reader of the output is gone.
-        _discard_output()
+        discard(sys.stdout)
         return 0
     except Exception as error:
         # Services run their robots in task groups.
         while isinstance(error, ExceptionGroup):
             error = error.exceptions[0]
         if isinstance(error, BrokenPipeError) and _reader_is_gone():
-            _discard_output()
+            discard(sys.stdout)
             return 0
         if isinstance(error, _known_errors()):
             return _failed(str(error))
@@ -65,13 +65,8 @@ def _reader_is_gone() -> bool:
     return any(event & select.POLLERR for _, event in output.poll(0))
 
 
-def _discard_output() -> None:
-    """Send the rest of standard output to /dev/null."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
 def _failed(text: str) -> int:
-    print(f"robomesh: {text}", file=sys.stderr)
+    print_or_discard(f"robomesh: {text}", sys.stderr)
     return 2
 
 

@@ -1,7 +1,9 @@
 """Standard output and error of a command, with direction characters of foreign texts made visible."""
 
 import io
+import os
 import sys
+from typing import IO
 
 from robomesh.texts import show_direction
 
@@ -12,6 +14,21 @@ class _VisibleDirections(io.TextIOWrapper):
     def write(self, text: str, /) -> int:
         super().write(show_direction(text))
         return len(text)
+
+
+def print_or_discard(text: str, stream: IO[str]) -> None:
+    """Print a line, for a command that must go on when the reader of its output is gone."""
+    try:
+        print(text, file=stream, flush=True)
+    except BrokenPipeError:
+        discard(stream)
+
+
+def discard(stream: IO[str]) -> None:
+    """Send the rest of a stream to /dev/null."""
+    nothing = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nothing, stream.fileno())
+    os.close(nothing)
 
 
 def show_directions() -> None:

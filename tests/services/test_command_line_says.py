@@ -6,7 +6,9 @@ import sys
 import threading
 
 import pytest
+from typer import Context
 
+from services.command_line.commands import COMMANDS, root
 from services.command_line.site.up import _console_url
 from services.site_file.console import Console
 from services.site_file.site import Site
@@ -40,6 +42,24 @@ def test_a_command_ends_quietly_when_the_reader_of_its_output_is_gone(arguments,
     finally:
         os.close(writer)
     assert (result.stderr, result.returncode) == ("", 0)
+
+
+@pytest.mark.slow
+def test_a_failure_keeps_its_status_when_the_reader_of_its_errors_is_gone():
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        result = subprocess.run(
+            [*ROBOMESH, "send", "arm", "jump"], stdout=writer, stderr=writer, check=False, timeout=60
+        )
+    finally:
+        os.close(writer)
+    assert result.returncode == 2
+
+
+def test_the_help_shows_each_commands_whole_sentence():
+    shown = " ".join(root().get_help(Context(root(), terminal_width=80)).split())
+    assert [row.help for row in COMMANDS.values() if row.help not in shown] == []
 
 
 @pytest.mark.slow

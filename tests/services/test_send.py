@@ -1,7 +1,9 @@
 """`robomesh send`: it renews its lease, and waits for the end of its motion or program."""
 
 import asyncio
+import os
 import signal
+import sys
 
 from robomesh import reason_codes as codes
 from robomesh.client import ask_all
@@ -111,7 +113,7 @@ def test_ctrl_c_stops_a_program_during_its_check(mesh):
             outcome = sent(li)
             await until(lambda: gateway.asked)
             signal.raise_signal(signal.SIGINT)
-            assert await outcome == (False, "interrupted: stop 1 is sent")
+            assert await outcome == (False, "interrupted: stop 1 is sent", "")
             assert gateway.stops == ["Ctrl-C in robomesh send"]
             gateway.ready.set()
 
@@ -131,18 +133,37 @@ def test_a_gateway_restart_is_reported_with_advice_and_warnings_are_printed_firs
             )
             gateway.ready.set()
             publishing = asyncio.create_task(gateway.publish_states())
-            accepted, text = await sent(li)
+            ended = await sent(li)
             publishing.cancel()
-            return accepted, text
+            return ended
 
-    accepted, text = run(main())
-    assert not accepted
+    accepted, text, warning = run(main())
+    assert (accepted, warning) == (False, "arm touches post")
     assert text.startswith("the gateway restarted, so the program no longer runs")
     assert "`robomesh send hall/arm stop`" in text
-    assert text.endswith("; warning: arm touches post")
+    # Printed once, before the motion.
+    assert "arm touches post" not in text
     first, *rest = capsys.readouterr().err.splitlines()
     assert first == "warning: arm touches post"
     assert all(line == "step 7 of 90, line 2: wait 1" for line in rest)
+
+
+def test_a_program_goes_on_when_the_reader_of_its_progress_is_gone(mesh, monkeypatch):
+    reader, writer = os.pipe()
+    os.close(reader)
+    with open(writer, "w") as progress:  # noqa: PTH123
+
+        async def main():
+            async with open_session(mesh) as session, open_session(mesh) as li:
+                gateway = Gateway(session, RUNNING, schema.ProgramState())
+                gateway.ready.set()
+                publishing = asyncio.create_task(gateway.publish_states())
+                ended = await sent(li)
+                publishing.cancel()
+                return ended
+
+        monkeypatch.setattr(sys, "stderr", progress)
+        assert run(main()).text.startswith("the gateway restarted")
 
 
 def test_the_advice_of_a_refusal_is_a_command():

@@ -10,6 +10,7 @@ from robomesh.keys import robot_key
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 from services.command_line import discovery
+from services.command_line.output import print_or_discard
 
 # The gateway publishes `lease` and `program` each second.
 _SILENCE_S = 5.0
@@ -154,7 +155,7 @@ async def _program_ended(session: Session, robot: discovery.Robot, operator: str
         if program.line != line:
             line = program.line
             step = f"step {program.step} of {program.steps}"
-            print(f"{step}, line {line}: {program.statement}", file=sys.stderr, flush=True)
+            print_or_discard(f"{step}, line {line}: {program.statement}", sys.stderr)
 
 
 def _restarted(robot: discovery.Robot, line: int) -> str:

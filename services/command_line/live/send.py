@@ -4,6 +4,7 @@ import asyncio
 import sys
 from math import radians
 from pathlib import Path
+from typing import NamedTuple
 
 import typer
 
@@ -22,6 +23,7 @@ from services.command_line.live.command_progress import (
     until_done,
     warning_of,
 )
+from services.command_line.output import print_or_discard
 from services.errors import ServiceError
 
 _Command = schema.CommandRequest
@@ -41,6 +43,14 @@ _PROGRAM_TIMEOUT_S = 60.0
 _RECORDER_TIMEOUT_S = 0.5
 
 
+class Sent(NamedTuple):
+    """The end of a command: whether it was accepted and done, its text, and the check's warning."""
+
+    accepted: bool
+    text: str
+    warning: str = ""
+
+
 class WordsError(ServiceError):
     """The words are not a command."""
 
@@ -49,24 +59,21 @@ def run(robot: str, words: list[str], router: str, operator: str, as_json: bool)
     """Send a command; exit status 1 when it is refused."""
     if words != ["stop"]:
         _parse(words, None)  # before any request
-    accepted, text = discovery.run(_send(robot, words, router, check_chunk(operator or discovery.own_name())))
-    if as_json:
-        discovery.print_json({"accepted": accepted, "text": text})
-    else:
-        print(text)
-    if not accepted:
+    sent = discovery.run(_send(robot, words, router, check_chunk(operator or discovery.own_name())))
+    print_or_discard(discovery.json_line(sent._asdict()) if as_json else sent.text, sys.stdout)
+    if not sent.accepted:
         raise typer.Exit(1)
 
 
-async def _send(name: str, words: list[str], router: str, operator: str) -> tuple[bool, str]:
+async def _send(name: str, words: list[str], router: str, operator: str) -> Sent:
     async with discovery.attached(router) as session:
         robot = await discovery.find(session, name)
         if words == ["stop"]:
-            return await stop(session, robot, operator, "robomesh send stop")
+            return Sent(*await stop(session, robot, operator, "robomesh send stop"))
         description = await session.last(robot_key(*robot, "description"))
         known = description if isinstance(description, schema.Description) else None
         if known is None and words[0] == "move":
-            return (
+            return Sent(
                 False,
                 f"{robot} has no description to convert degrees and mm with: start its kinematics",
             )
@@ -81,12 +88,12 @@ async def _send(name: str, words: list[str], router: str, operator: str) -> tupl
                 request.not_after.FromNanoseconds(own.now_ns + waits_ns)
                 if request.command == _Command.RESET:
                     request.stop_id = await _latched_stop(session, robot)
-                accepted, text = await _send_and_wait(session, robot, operator, request, own.renewing)
-                if accepted and request.command == _Command.TRACE_ON:
-                    text += await joined(session, robot)
+                sent = await _send_and_wait(session, robot, operator, request, own.renewing)
+                if sent.accepted and request.command == _Command.TRACE_ON:
+                    sent = sent._replace(text=sent.text + await joined(session, robot))
         except RefusedError as error:
-            accepted, text = False, with_commands(error, robot)
-        return accepted, text
+            sent = Sent(False, with_commands(error, robot))
+        return sent
 
 
 async def _send_and_wait(
@@ -95,24 +102,24 @@ async def _send_and_wait(
     operator: str,
     request: schema.CommandRequest,
     renewing: asyncio.Task[str],
-) -> tuple[bool, str]:
+) -> Sent:
     """Send a command and wait until its motion or program ends; Ctrl-C stops the robot."""
-    runs = request.command == _Command.RUN_PROGRAM
+    runs, warning = request.command == _Command.RUN_PROGRAM, ""
     with interrupt() as interrupted:
         try:
             key = robot_key(*robot, f"command/{operator}")
             timeout_s = _PROGRAM_TIMEOUT_S if runs else 2.0
             answer = await answered(session, key, request, interrupted, timeout_s=timeout_s)
             if not answer.accepted or not (runs or request.command in _MOTIONS):
-                return answer.accepted, answer.text
+                return Sent(answer.accepted, answer.text)
             warning = warning_of(answer)
             if warning:
-                print(f"warning: {warning}", file=sys.stderr, flush=True)
+                print_or_discard(f"warning: {warning}", sys.stderr)
             done, text = await until_done(session, robot, operator, renewing, interrupted, runs=runs)
-            return done, f"{text}; warning: {warning}" if warning else text
+            return Sent(done, text, warning)
         except Interrupted:
             _, said = await stop(session, robot, operator, "Ctrl-C in robomesh send")
-            return False, f"interrupted: {said}"
+            return Sent(False, f"interrupted: {said}", warning)
 
 
 async def joined(session: Session, robot: discovery.Robot) -> str:

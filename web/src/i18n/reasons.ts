@@ -750,7 +750,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ],
   ],
   ["check.skipped", ["not checked: {cause}", "未检查：{cause}"]],
-  ["check.starting", ["the check is still starting: try again in a few seconds", "检查仍在准备：请几秒后再试"]],
+  ["check.starting", ["the check is still starting: it is ready in a few seconds", "检查仍在准备：几秒后就绪"]],
   ["check.broken", ["the check does not work: {cause}", "检查无法工作：{cause}"]],
   ["check.failed", ["the check failed: {cause}", "检查失败：{cause}"]],
   ["check.impossible", ["{cause}", "{cause}"]],
