@@ -68,7 +68,7 @@ def ack(
     as_json: Json = False,
 ) -> None:
     """Acknowledge alarms."""
-    _ask(ids, _Request(action=_Request.ACKNOWLEDGE), connect, operator, as_json)
+    _ask(ids, _Request(action=_Request.ACKNOWLEDGE), connect, operator, as_json, "acknowledged")
 
 
 @app.command()
@@ -82,7 +82,7 @@ def shelve(
 ) -> None:
     """Shelve alarms for a while."""
     request = _Request(action=_Request.SHELVE, shelve_s=_seconds(for_), reason=reason)
-    _ask(ids, request, connect, operator, as_json)
+    _ask(ids, request, connect, operator, as_json, "shelved")
 
 
 @app.command()
@@ -90,7 +90,7 @@ def unshelve(
     ids: _Ids, connect: Connect = DEFAULT_ROUTER, operator: _Operator = "", as_json: Json = False
 ) -> None:
     """Take alarms back from the shelf."""
-    _ask(ids, _Request(action=_Request.UNSHELVE), connect, operator, as_json)
+    _ask(ids, _Request(action=_Request.UNSHELVE), connect, operator, as_json, "unshelved")
 
 
 def record(alarm: schema.Alarm) -> dict[str, Any]:
@@ -102,22 +102,27 @@ def record(alarm: schema.Alarm) -> dict[str, Any]:
     return values
 
 
-def _ask(ids: list[str], request: schema.AlarmRequest, router: str, operator: str, as_json: bool) -> None:
+def _ask(
+    ids: list[str], request: schema.AlarmRequest, router: str, operator: str, as_json: bool, done: str
+) -> None:
+    """Send a request about alarms, then print what was `done` to which alarms, and the remaining list."""
     by = check_chunk(operator or discovery.own_name())
 
-    async def ask() -> list[schema.AlarmList]:
+    async def ask() -> tuple[list[str], list[schema.AlarmList]]:
         async with discovery.attached(router) as session:
-            answers = []
+            changed, answers = [], []
             for site, names in _by_site(ids, await lists(session)).items():
                 request.ids[:] = names
                 key = robot_key(site, WHOLE_SITE, f"alarms/request/{by}")
                 answers.append(await session.ask(key, request))
-            return [each for each in answers if isinstance(each, schema.AlarmList)]
+                changed += [f"{site}/{name}" for name in names]
+            return changed, [each for each in answers if isinstance(each, schema.AlarmList)]
 
-    answers = discovery.run(ask())
+    changed, answers = discovery.run(ask())
     if as_json:
         discovery.print_json({"alarms": [record(alarm) for each in answers for alarm in each.alarms]})
         return
+    print(f"{done}: {', '.join(changed)}")
     _print(answers)
 
 

@@ -81,6 +81,23 @@ def test_an_ambiguous_alarm_name_is_refused_with_the_candidates():
         alarms._by_site(["nothing"], [both])
 
 
+def test_acknowledging_names_the_alarms_that_it_acknowledged(mesh, capsys):
+    async def main():
+        async with open_session(mesh) as watch, open_session(mesh) as monitor:
+            watch.declare_publisher("shanghai", "-", "alarms").put(SHANGHAI)
+            watch.answer("shanghai", "-", "alarms/request/*", acknowledge)
+            while not await lists(monitor):
+                await asyncio.sleep(0.02)
+            await asyncio.to_thread(alarms.ack, ["link.down"], mesh.connect[0], "li")
+
+    async def acknowledge(_):
+        return schema.AlarmList(site="shanghai")
+
+    run(main())
+    first, *_ = capsys.readouterr().out.splitlines()
+    assert first == "acknowledged: shanghai/arm:link"
+
+
 def test_an_alarms_name_is_not_wrapped_and_its_text_uses_the_full_width(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")
     text = "word " * 30
