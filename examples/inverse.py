@@ -43,7 +43,9 @@ async def main() -> int:
                 for joint, value in told
             )
         )
-    print(answer.reason or f"{len(answer.solutions)} solutions, the tool within {answer.residual_m:.1e} m")
+    count = len(answer.solutions)
+    solutions = "1 solution" if count == 1 else f"{count} solutions"
+    print(answer.reason or f"{solutions}, the tool within {answer.residual_m:.1e} m")
     return 0 if answer.solutions else 1
 
 

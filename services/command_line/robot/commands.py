@@ -67,7 +67,7 @@ def check(robot: _Robot, as_json: Json = False) -> None:
         for each in report.get("touch_elsewhere", []):
             print(f"{name}: {' and '.join(each['links'])} are apart at home; {each['reason']}")
         if not problems:
-            print(f"{name}: a right description")
+            print(f"{name}: the description is valid")
     if problems:
         raise typer.Exit(1)
 
