@@ -4,8 +4,10 @@ import asyncio
 
 import zenoh
 
+from robomesh.access import PROBE_ROBOT
 from robomesh.endpoints import client_config
 from robomesh.header import Header, pack
+from robomesh.ignored import PUBLICATION, Ignored
 from robomesh.last_values import last_values
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
@@ -77,3 +79,11 @@ def test_queryable_for_everything_does_not_answer_a_stop_for_its_owner(mesh):
                 assert [each.key for each in answers] == ["robomesh/site/arm/stop"]
 
     run(main())
+
+
+def test_probes_of_the_rules_are_not_reported_as_wrong_names():
+    ignored = Ignored()
+    assert ignored.key(PUBLICATION, f"robomesh/site/{PROBE_ROBOT}$*/joints") is None
+    assert (ignored.count, ignored.examples) == (0, {})
+    assert ignored.key(PUBLICATION, "robomesh/site/ar$*/joints") is None
+    assert ignored.count == 1
