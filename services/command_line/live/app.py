@@ -28,7 +28,13 @@ def monitor(
     robot: Robot,
     connect: Connect = DEFAULT_ROUTER,
     as_json: Json = False,
-    count: Annotated[int | None, typer.Option(metavar="N", help="End after N states.")] = None,
+    count: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            help="End after N live states. Without it, the first line may be the last value from before.",
+        ),
+    ] = None,
 ) -> None:
     """Watch a robot in the terminal."""
     from services.command_line.live import monitor as command

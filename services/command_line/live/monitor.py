@@ -47,7 +47,7 @@ _FIRST_S = 1.0
 
 
 def run(robot: str, router: str, as_json: bool, count: int | None) -> None:
-    """Watch until Ctrl-C, or for `count` states."""
+    """Watch until Ctrl-C, or for `count` live states."""
     with contextlib.suppress(KeyboardInterrupt):
         # The table needs a terminal.
         lines = as_json or not sys.stdout.isatty()
@@ -64,6 +64,8 @@ async def _json(name: str, router: str, count: int | None) -> None:
             await newest.wait_for_values()
             printed = 0
             async for sample in states:
+                if count is not None and not sample.live:
+                    continue
                 discovery.print_json(_record(sample, states) | newest.record())
                 printed += 1
                 if printed == count:
@@ -151,7 +153,7 @@ class _Newest:
     async def _follow(self, subscription: Subscription) -> None:
         async for sample in subscription:
             self._values[subscription.topic.name] = sample.message()
-            self.states += subscription.topic.name == "joints"
+            self.states += sample.live and subscription.topic.name == "joints"
 
     def age_s(self, name: str) -> float | None:
         """Return a topic's age [s]; of joints at least the age reported by a gateway whose link is down."""
