@@ -14,6 +14,7 @@ import pytest
 from services.command_line import main
 from services.command_line.commands import COMMANDS, load
 from services.command_line.main import run
+from services.command_line.site.services import SERVICES
 from tests.conftest import SHARED, free_port
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -172,6 +173,15 @@ def test_entry_point_restores_the_handler_of_ctrl_c(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(main, "main", lambda: None)
     start.main()
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_doctor_checks_the_packages_of_every_service_with_an_extra() -> None:
+    from services.command_line.doctor import machine
+
+    roles = {finding.what for finding in machine._extras()}
+    assert roles >= {f"role {name}" for name in (*SERVICES, "foxglove", "ros2")} - {"role router"}
+    # The names of the packages are right: this environment has them all.
+    assert all(finding.ok for finding in machine._extras())
 
 
 def test_doctor_distinguishes_a_running_site_from_another_program(router: str) -> None:

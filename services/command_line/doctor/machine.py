@@ -18,8 +18,10 @@ from services.command_line.site.services import SERVICES
 
 # Extra -> packages that it installs.
 _EXTRAS = {
-    **{name: row.packages for name, row in SERVICES.items() if row.packages},
+    **{name: row.packages for name, row in SERVICES.items() if name != "router"},
     "simulator": ("ruckig",),
+    "foxglove": ("foxglove",),
+    "ros2": ("rosbags",),
     "keys": ("cryptography",),
 }
 _FREE_BYTES = 1 << 30

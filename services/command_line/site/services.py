@@ -194,7 +194,12 @@ SERVICES = {
         finishes="closing its recordings",
         packages=("mcap", "mcap_protobuf"),
     ),
-    "player": Service(module="services.player", settings=_player, required=False),
+    "player": Service(
+        module="services.player",
+        settings=_player,
+        required=False,
+        packages=("mcap", "mcap_protobuf"),
+    ),
     "watch": Service(module="services.watch", settings=_watch, required=False),
     # Without OpenGL everything else runs.
     "renderer": Service(
