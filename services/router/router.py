@@ -10,7 +10,7 @@ import logging
 import os
 import shlex
 import ssl
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -28,6 +28,7 @@ from services.router.peer_audit import find_impostors, to_other_sites, without_r
 from services.router.rolling_restart import neighbours, wait_for_turn
 from services.router.status import StatusPublisher
 from services.site_file.listen_address import check_reach, reachable, split_address
+from services.used_ports import check_free
 
 log = logging.getLogger(__name__)
 
@@ -246,14 +247,28 @@ def check_listen(settings: Settings) -> None:
             log.warning(warning)
 
 
+def check_ports_free(endpoints: Iterable[str]) -> None:
+    """Check that no other program listens on the router's TCP ports.
+
+    Raises:
+        ListenError: If one does.
+    """
+    for endpoint in endpoints:
+        protocol, _, address = endpoint.partition("/")
+        if protocol in ("tcp", "tls"):
+            host, port = split_address(address.partition("?")[0])
+            check_free("the router", host, port, "choose another address with [router] listen")
+
+
 async def _open(settings: Settings, rules: Mapping[str, Any]) -> zenoh.Session:
     config = router_config(settings.listen, settings.connect, settings.tls, rules, settings.line_bps)
     try:
         return await asyncio.to_thread(zenoh.open, config)
     except zenoh.ZError as error:
+        await asyncio.to_thread(check_ports_free, settings.listen)
         raise ListenError(
             f"the router cannot listen on {', '.join(settings.listen)}: {first_line(error)}; "
-            "is another router running? Choose another address under [router] listen"
+            "choose another address under [router] listen"
         ) from None
 
 

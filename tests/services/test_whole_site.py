@@ -465,5 +465,7 @@ def test_a_taken_port_ends_up_with_one_line_and_exit_status_2(site, tmp_path):
     path = site_file(tmp_path, robots=ONE_ARM, router=site.router, console=f"127.0.0.1:{free_port()}")
     result = robomesh("up", str(path))
     assert result.returncode == 2
-    assert "is another router running" in result.stderr
-    assert "Traceback" not in result.stderr
+    user = f"process {site.process.pid} (robomesh up)"
+    assert f"cannot listen on {site.router.removeprefix('tcp/')}: {user} uses the port. " in result.stderr
+    assert result.stdout == ""
+    assert len(result.stderr.splitlines()) == 1

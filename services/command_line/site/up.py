@@ -20,12 +20,14 @@ from services.command_line.site.services import SERVICES
 from services.errors import SiteFileError
 from services.pki import Folder
 from services.pki.errors import KeysError
+from services.router.router import check_ports_free
 from services.site_file import site as site_file
 from services.site_file.listen_address import reachable, split_address
 from services.site_file.robot import Robot
 from services.site_file.site import Site
 from services.site_file.started_robots import may_start, read_started
 from services.supervisor import ENDS_WITHIN_S, Program, supervise
+from services.used_ports import check_free, is_used_by_child
 
 log = logging.getLogger(__name__)
 
@@ -44,6 +46,7 @@ def run(path: Path | None, metrics: str = "") -> None:
     site = site_file.load(path)
     endpoint = reachable(site.listened[0])
     metered = metrics_address(site, metrics)
+    _check_ports_free(site)
 
     async def ready() -> None:
         await _until_page_shows_robots(site, endpoint)
@@ -180,6 +183,17 @@ def _version(file: Path) -> tuple[int, int, int]:
     return stat.st_ino, stat.st_mtime_ns, stat.st_size
 
 
+def _check_ports_free(site: Site) -> None:
+    """Check the ports before anything starts: a second site's processes would reach those of the first.
+
+    Raises:
+        ListenError: If another program uses one.
+    """
+    check_ports_free(site.listened)
+    host, port = split_address(site.console.listen)
+    check_free("the console", host, port, "choose another address with [console] listen")
+
+
 async def _until_page_shows_robots(site: Site, endpoint: str) -> None:
     """Wait until the console serves, every robot is described, and the simulated robots publish frames."""
     async with open_session(SessionSettings(connect=(endpoint,), tls=site.tls_of("console"))) as session:
@@ -190,7 +204,7 @@ async def _until_page_shows_robots(site: Site, endpoint: str) -> None:
                 if sample.live or topic == "description":
                     break
             subscription.close()
-    while not await asyncio.to_thread(_answers, _console_url(site)):
+    while not await asyncio.to_thread(_own_console_answers, site):
         await asyncio.sleep(_CONSOLE_POLL_S)
 
 
@@ -198,6 +212,12 @@ def _console_url(site: Site) -> str:
     host, port = split_address(site.console.listen)
     host = "127.0.0.1" if host in ("0.0.0.0", "::") else host
     return f"{site.console.scheme}://{f'[{host}]' if ':' in host else host}:{port}/"
+
+
+def _own_console_answers(site: Site) -> bool:
+    """Return whether this site's console serves; another program may have taken its port since the check."""
+    _, port = split_address(site.console.listen)
+    return _answers(_console_url(site)) and is_used_by_child(port)
 
 
 def _answers(url: str) -> bool:

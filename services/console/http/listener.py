@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from services.errors import ListenError
+from services.used_ports import in_use
 
 # Send buffer of a connection: a second of state for a slow browser, not a minute.
 _SEND_BUFFER = 128 * 1024
@@ -93,8 +94,10 @@ def listening(host: str, port: int) -> Iterator[socket.socket]:
         try:
             listener.bind(address)
         except OSError as error:
+            remedy = "choose another address with [console] listen"
+            if error.errno == errno.EADDRINUSE:
+                raise in_use("the console", host, port, remedy) from None
             raise ListenError(
-                f"the console cannot listen on {host}:{port}: {error.strerror}; free it, or name another "
-                "with [console] listen"
+                f"the console cannot listen on {host}:{port}: {error.strerror}; {remedy}"
             ) from None
         yield listener

@@ -1,0 +1,71 @@
+"""Ports in use: the error names the program, and `up` is ready only when its own console answers."""
+
+import os
+import re
+import subprocess
+import sys
+import threading
+from http.server import HTTPServer, SimpleHTTPRequestHandler
+
+import pytest
+
+from services.command_line.site import up
+from services.errors import ListenError
+from services.router.router import check_ports_free
+from services.site_file.console import Console
+from services.site_file.site import Site
+from services.used_ports import check_free
+
+
+@pytest.fixture
+def foreign():
+    """Serve HTTP in this process, which is no child of a site."""
+    with HTTPServer(("127.0.0.1", 0), SimpleHTTPRequestHandler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield server.server_address[1]
+        server.shutdown()
+
+
+def site_of(port: int) -> Site:
+    return Site(site="hall", console=Console(listen=f"127.0.0.1:{port}"))
+
+
+def test_another_programs_answer_does_not_make_a_site_ready(foreign):
+    site = site_of(foreign)
+    assert up._answers(up._console_url(site))
+    assert not up._own_console_answers(site)
+
+
+@pytest.mark.slow
+def test_a_childs_answer_makes_a_site_ready():
+    program = (
+        "import http.server; http.server.test(http.server.SimpleHTTPRequestHandler, port=0, bind='127.0.0.1')"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-u", "-c", program], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as child:
+        try:
+            port = re.search(r"port (\d+)", child.stdout.readline())[1]
+            assert up._own_console_answers(site_of(int(port)))
+        finally:
+            child.kill()
+
+
+def test_the_error_for_a_used_port_names_its_program_and_the_remedy(foreign):
+    with pytest.raises(ListenError) as caught:
+        check_ports_free([f"tcp/127.0.0.1:{foreign}"])
+    assert re.fullmatch(
+        rf"the router cannot listen on 127.0.0.1:{foreign}: process {os.getpid()} \(.+\) uses the port. "
+        r"End it, or choose another address with \[router\] listen",
+        str(caught.value),
+    )
+
+
+def test_a_site_does_not_start_when_a_port_of_it_is_used(foreign, monkeypatch):
+    monkeypatch.setattr(up, "check_ports_free", lambda _: None)
+    with pytest.raises(ListenError, match="the console cannot listen"):
+        up._check_ports_free(site_of(foreign))
+
+
+def test_a_free_port_is_free():
+    check_free("the console", "127.0.0.1", 0, "")
