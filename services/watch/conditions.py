@@ -151,9 +151,8 @@ def robot_conditions(robot: str, state: ControllerState, age_s: float) -> Iterat
         )
     if state.HasField("stop"):
         stop = state.stop
-        yield condition(
-            "stop.latched", f"stop {stop.id} is latched: {stop.reason or 'no reason given'}, by {stop.by}"
-        )
+        reason = f'reason "{stop.reason}"' if stop.reason else "no reason given"
+        yield condition("stop.latched", f"stop {stop.id} is latched by {stop.by}: {reason}")
     if state.health.flooding:
         yield condition("link.flooding", "the controller sends far too much: only the newest is published")
     if state.check_text and not state.check_starting:

@@ -64,7 +64,7 @@ def test_an_alarm_is_shelved_with_a_reason_and_comes_back_when_it_is_asked_for(o
     expect(line(page, "no status comes").locator(".alarm-more")).to_contain_text("the cell is being cleaned")
     button(page, "Unshelve: no status comes from it").click()
     expect(line(page, "no status comes")).to_have_count(0)
-    page.get_by_role("button", name=re.compile("^Active")).click()
+    page.get_by_role("button", name=re.compile("^Active or unacknowledged 1")).click()
     expect(line(page, "no status comes")).to_have_count(1)
     raised("status.back", "status comes again", Event.INFO)
 

@@ -115,7 +115,17 @@ def test_stop_works_without_control_and_names_who_asked(open_page):
     page.get_by_label("Your name").fill("wang")
     page.locator("button.stop").click()
     expect(page.locator(".stopped")).to_contain_text("Stopped by wang")
+    expect(page.locator(".stopped p")).to_have_text(re.compile("^Reason: “the page”\\. "))
     expect(page.get_by_role("button", name="Reset stop")).to_be_disabled()
+
+
+def test_the_choice_of_a_program_says_where_it_is_and_its_stop_names_the_whole_fleet(open_page):
+    page = open_page("#/program", drawn=False)
+    expect(page.locator(".crumbs")).to_have_text(re.compile("Fleet.*Program"))
+    expect(page.locator(".crumbs strong")).to_have_text("Program")
+    expect(page.locator("button.stop")).to_have_attribute(
+        "title", re.compile("^Asks all robots of the fleet")
+    )
 
 
 def test_everybody_sees_who_is_in_control_and_when_nobody_is(open_page):

@@ -229,3 +229,15 @@ def test_a_link_that_is_down_for_a_new_reason_is_reported_with_it():
     assert changed(2.0) == []
     assert changed(13.0) == ["link to the controller: cannot connect to 10.0.0.7: Connection refused"]
     assert changed(14.0) == []
+
+
+@pytest.mark.parametrize(
+    ("reason", "text"),
+    [
+        ("robomesh send stop", 'stop 1 is latched by li: reason "robomesh send stop"'),
+        ("", "stop 1 is latched by li: no reason given"),
+    ],
+)
+def test_a_latched_stops_alarm_quotes_its_reason(reason, text):
+    state = ControllerState(link=ControllerState.UP, stop={"id": 1, "by": "li", "reason": reason})
+    assert [each.text for each in robot_conditions("arm", state, 0.0)] == [text]

@@ -14,6 +14,7 @@ import { mustSignIn } from "../mesh/account";
 import { hello, lostAt } from "../mesh/connection";
 import { heldLease, release } from "../mesh/control";
 import { fleetRobots } from "../mesh/known-robots";
+import type { RobotName } from "../mesh/robot-name";
 import { canBe, isReplay } from "../mesh/robot-name";
 import { stop, stopNotice } from "../mesh/stop";
 import { RobotNotFound } from "../panels/robot-not-found";
@@ -86,8 +87,8 @@ export function App() {
           <span>robomesh</span>
         </a>
         <nav class="crumbs" aria-label={t("pages")}>
-          {mustSignIn.value ? null : robot ? (
-            <Crumbs page={shown.page} {...robot} />
+          {mustSignIn.value ? null : robot || shown.page === "program" ? (
+            <Crumbs page={shown.page} robot={robot} />
           ) : (
             <PageLinks current={shown.page} />
           )}
@@ -147,22 +148,22 @@ function Page({ route, robotKey }: { route: Route; robotKey: string }) {
   }
 }
 
-function Crumbs({ page, site, robot }: { page: Route["page"]; site: string; robot: string }) {
+/** The way to a robot's page or its program; without a robot, to the choice of one to program. */
+function Crumbs({ page, robot }: { page: Route["page"]; robot: RobotName | null }) {
+  const program = page === "program";
   return (
     <>
       <a href="#/">{t("fleet")}</a>
       <span aria-hidden="true">/</span>
-      <span class="dim">{site}</span>
-      <span aria-hidden="true">/</span>
-      {page === "program" ? (
+      {robot && (
         <>
-          <a href={robotLink(site, robot)}>{robot}</a>
+          <span class="dim">{robot.site}</span>
           <span aria-hidden="true">/</span>
-          <strong>{t("program")}</strong>
+          {program ? <a href={robotLink(robot.site, robot.robot)}>{robot.robot}</a> : <strong>{robot.robot}</strong>}
+          {program && <span aria-hidden="true">/</span>}
         </>
-      ) : (
-        <strong>{robot}</strong>
       )}
+      {program && <strong>{t("program")}</strong>}
     </>
   );
 }

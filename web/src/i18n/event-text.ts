@@ -99,7 +99,7 @@ export function eventText(event: Event): string {
   switch (code) {
     case "stop.latched": {
       const text = t(values.sent === "True" ? "event_stop" : "event_stop_unsent", { by });
-      return reason && reason !== "console" ? `${text} ${reason}` : text;
+      return reason && reason !== "console" ? `${text} ${t("stop_reason", { reason })}` : text;
     }
     case "stop.sent":
       return t("event_stop_sent");

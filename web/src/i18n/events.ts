@@ -7,6 +7,7 @@ export const EVENTS_TEXTS = {
   badge: ["Unacknowledged alarms: {counts}", "未确认报警：{counts}"],
   badge_none: ["No unacknowledged alarm", "无未确认报警"],
   badge_calm: ["no alarms", "无报警"],
+  badge_stale: ["alarms stale", "报警已过期"],
   badge_dash: ["alarms –", "报警 –"],
   badge_unknown: ["No watch tells its alarms here: alarms are not known", "没有监视服务提供报警：报警情况未知"],
   badge_silent: [
@@ -26,7 +27,7 @@ export const EVENTS_TEXTS = {
   state_acknowledged: ["acknowledged", "已确认"],
   state_returned: ["over, not acknowledged", "已恢复，未确认"],
   state_shelved: ["shelved", "已搁置"],
-  show_all: ["Active", "活动"],
+  show_all: ["Active or unacknowledged", "活动或未确认"],
   show_unacknowledged: ["Unacknowledged", "未确认"],
   show_shelved: ["Shelved", "已搁置"],
   site: ["Site", "站点"],

@@ -61,6 +61,7 @@ export const SETTINGS_TEXTS = {
   hop: ["{sender} → {receiver}", "{sender} → {receiver}"],
   half: ["half within", "50% 以内"],
   most: ["99 % within", "99% 以内"],
+  value_one: ["1 more value", "另 1 项"],
   values_count: ["{count} more values", "另 {count} 项"],
   values: ["More of {name}", "{name} 的更多信息"],
   presence: ["Who watches", "在线监视"],

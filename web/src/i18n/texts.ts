@@ -57,8 +57,8 @@ const TEXTS = {
   ],
   stop_all: ["Stop request: all", "停止请求：全部"],
   stop_all_hint: [
-    "Asks every robot on this page to stop. Works without control. Not an emergency stop.",
-    "请求本页所有机器人停止。无需控制权。这不是急停。",
+    "Asks all robots of the fleet to stop, at every site, also those that this page does not show. Works without control. Not an emergency stop.",
+    "请求全部站点的所有机器人停止，包括本页未显示的。无需控制权。这不是急停。",
   ],
   stop_space: ["Space", "空格键"],
   stop_done: ["Stop sent to {robot} (stop {id}).", "已向 {robot} 发送停止（编号 {id}）。"],
@@ -306,6 +306,7 @@ const TEXTS = {
   let_go_sends: ["Not sent yet: let go to send {value}.", "尚未发送：松手发送 {value}。"],
   reset: ["Reset stop {id}", "复位停止 {id}"],
   stopped_by: ["Stopped by {by} at {time}", "{by} 于 {time} 停止"],
+  stop_reason: ["Reason: “{reason}”.", "原因：“{reason}”。"],
   stop_unsent_by: ["Stop asked for by {by} at {time}: NOT SENT", "{by} 于 {time} 请求停止：未送达"],
   stop_moving_by: ["Stop sent by {by} at {time}: the arm still moves", "{by} 于 {time} 发送停止：机械臂仍在运动"],
   stop_sent_by: ["Stop sent by {by} at {time}", "{by} 于 {time} 发送停止"],

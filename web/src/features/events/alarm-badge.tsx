@@ -33,7 +33,7 @@ export function AlarmBadge() {
             {count}
           </PriorityMark>
         ))}
-        {counted.length === 0 && e(anyWatch.value ? "badge_calm" : "badge_dash")}
+        {counted.length === 0 && e(silent.length ? "badge_stale" : anyWatch.value ? "badge_calm" : "badge_dash")}
       </span>
     </a>
   );

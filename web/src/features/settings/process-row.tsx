@@ -41,7 +41,7 @@ export function ProcessRow(props: { of: string; seen: Seen; latest: Latest<MeshS
         {values.length > 0 && (
           <details class="seen-values">
             <summary aria-label={s("values", { name: seen.service })}>
-              {s("values_count", { count: values.length })}
+              {values.length === 1 ? s("value_one") : s("values_count", { count: values.length })}
             </summary>
             <dl>
               {values.map(([name, value]) => (

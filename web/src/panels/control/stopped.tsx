@@ -30,7 +30,7 @@ export function Stopped(props: {
         </strong>
         <p>
           {stop && !stop.sent && `${t("stopped_unsent")} `}
-          {stop?.reason && stop.reason !== "console" && `${stop.reason}. `}
+          {stop?.reason && stop.reason !== "console" && `${t("stop_reason", { reason: stop.reason })} `}
           {!stop && state.fault && `${state.fault}. `}
           {needs}
         </p>
