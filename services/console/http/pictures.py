@@ -158,8 +158,7 @@ class Pictures:
         except (QuotaError, BusyError) as error:
             raise refused_on_the_mesh(error) from None
         except RefusedError as error:
-            # An earlier version of the renderer sends no code.
-            if error.reason.code == codes.VIEW_NO_ROOM.name or str(error).startswith("no room: "):
+            if error.reason.code == codes.VIEW_NO_ROOM.name:
                 raise RefusedRequest(503, error.reason) from None
             # Find out whether the view or the size was rejected.
             status = 404
