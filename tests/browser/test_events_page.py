@@ -24,6 +24,19 @@ def line(page, text):
     return page.locator(".alarm-line").filter(has_text=text)
 
 
+def test_the_badge_of_a_silent_watch_does_not_say_that_there_are_no_alarms(open_page, plant):
+    async def publish_once():
+        publisher = plant.session.declare_publisher("yard", WHOLE_SITE, "alarms")
+        publisher.put(schema.AlarmList(site="yard"))
+        return publisher
+
+    publisher = plant.call(publish_once())
+    badge = open_page(drawn=False).locator(".alarm-badge")
+    expect(badge.locator(".unseen")).to_contain_text("The watch of yard is silent")
+    expect(badge.locator(".badge-counts")).to_have_text("alarms stale")
+    plant.loop.call_soon_threadsafe(publisher.close)
+
+
 def test_who_acknowledges_an_alarm_on_one_page_has_done_so_on_every_page(open_page, raised):
     fleet, mine, other = (open_page(path, drawn=False) for path in ("", EVENTS, EVENTS))
     raised("joints.gone", "no positions come from it")
