@@ -44,8 +44,11 @@ def in_use(what: str, host: str, port: int, remedy: str) -> ListenError:
 
 def is_used_by_child(port: int) -> bool:
     """Return whether a child of this process listens on a port; True if the listener is unknown."""
-    found = _listeners(port)
-    return not found or any(process.ppid() == os.getpid() for process in found)
+    try:
+        parents = [process.ppid() for process in _listeners(port)]
+    except psutil.Error:
+        return False  # a listener has just ended
+    return not parents or os.getpid() in parents
 
 
 def _listeners(port: int) -> list[psutil.Process]:
