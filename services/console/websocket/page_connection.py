@@ -7,7 +7,6 @@ import asyncio
 import contextlib
 import logging
 import time
-from collections import deque
 from collections.abc import Callable, Coroutine
 from functools import partial
 from typing import Any
@@ -28,16 +27,9 @@ from services.console.accounts.sessions import SignedIn
 from services.console.errors import WatchError
 from services.console.requested_views import Views
 from services.console.websocket.adaptive_video import AdaptiveVideo
-from services.console.websocket.framing import (
-    MOST_BEHIND,
-    MOST_TOGETHER,
-    SampleBatch,
-    frame,
-    state_frame,
-    video_frame,
-)
+from services.console.websocket.framing import SampleBatch
 from services.console.websocket.operator_liveliness import OperatorPresence
-from services.console.websocket.send_queues import SendQueue, queue_for
+from services.console.websocket.send_order import MOST_UNREAD, SendOrder
 from services.console.websocket.shared_subscriptions import SharedSubscriptions, check_expression
 from services.console.websocket.websocket_transport import WebSocketTransport, transport_of
 
@@ -47,8 +39,6 @@ _MOST_WATCHES = 1024
 _MOST_ASKS = 64
 _MOST_STOPS = 1024
 _LONGEST_KEY = 200
-# Limit of unread messages to a page [bytes]: a large mesh's presence, and some large answers.
-_MOST_UNREAD = 4 << 20
 _CLOSED_WITHIN_S = 1.0
 _LONGEST_ASK_S = 30.0  # a collision check of a program
 _KEY_FRAME_EACH_S = 1.0
@@ -58,7 +48,7 @@ _NO_REQUEST = 0
 
 
 class Browser:
-    """One browser's watches, send queues and pending requests.
+    """One browser's watches and pending requests.
 
     Args:
         greet: Returns the greeting, which is sent again when it changes.
@@ -90,31 +80,26 @@ class Browser:
         self._subscriptions = subscriptions
         self._views = views
         self._watches: set[str] = set()
-        # Samples of state are sent as they arrive. When the connection accepts no more, they wait in send
-        # queues,
-        # until these are empty.
-        self._batches: deque[SampleBatch] = deque()
-        self._behind = False
-        self._queues: dict[str, SendQueue] = {}
+        self._order = SendOrder()
         self._video: dict[str, AdaptiveVideo] = {}
-        # Send queues and views with samples; each in turn sends one.
-        self._waiting: dict[str, SendQueue | AdaptiveVideo] = {}
         self._key_frame_asked: dict[str, float] = {}
-        self._messages: deque[bytes] = deque()
-        self._unread = 0
-        self._cut_off = False
         self._asks: set[asyncio.Task[None]] = set()
         self._websocket: WebSocket | None = None
         self._line: WebSocketTransport | None = None
         self._soon: asyncio.Handle | None = None
-        # Number of samples for this browser, and of those sent; newer ones replaced the rest.
-        self.offered = self.sent = 0
+        # Number of samples for this browser; newer ones replaced those that were not sent.
+        self.offered = 0
         self.greet()
 
     @property
     def in_control(self) -> bool:
         """True if the page got control and has not released it."""
         return self.operator.in_control
+
+    @property
+    def sent(self) -> int:
+        """Number of samples sent so far."""
+        return self._order.sent
 
     def greet(self) -> None:
         """Send the greeting."""
@@ -128,10 +113,8 @@ class Browser:
 
     def send_message(self, message: ToPage) -> None:
         """Queue a message ahead of samples (greeting, answer, presence); the page must read all of them."""
-        self._cut_off = self._cut_off or self._unread > _MOST_UNREAD
-        if not self._cut_off:
-            self._messages.append(message.SerializeToString())
-            self._unread += len(self._messages[-1])
+        self._order.add_message(message.SerializeToString())
+        if not self._order.overflowed:
             self._serve_soon()
 
     async def run(self, websocket: WebSocket) -> None:
@@ -164,8 +147,8 @@ class Browser:
     async def _receive(self, websocket: WebSocket) -> None:
         while True:
             message = FromPage.FromString(await _bytes(websocket))
-            if self._cut_off:
-                raise WatchError(codes.PAGE_READS_TOO_SLOWLY(bytes=_MOST_UNREAD))
+            if self._order.overflowed:
+                raise WatchError(codes.PAGE_READS_TOO_SLOWLY(bytes=MOST_UNREAD))
             match message.WhichOneof("message"):
                 case "watch":
                     self._watch(message.watch.key)
@@ -205,32 +188,18 @@ class Browser:
             video.close()
         else:
             self._subscriptions.leave(expression, self._offer)
-            self._queues.pop(expression, None)
-        self._waiting.pop(expression, None)
+        self._order.remove(expression)
 
     def _offer(self, batch: SampleBatch) -> None:
         self.offered += len(batch.samples) + batch.overtaken
-        if self._behind:
-            self._wait(batch)
-        else:
-            self._batches.append(batch)
+        self._order.add_batch(batch)
         self._subscriptions.scheduler.schedule(self._serve)
 
     def _queue_frame(self, expression: str) -> None:
         video = self._video.get(expression)
         if video is not None:  # None while the watch is being set up
-            self._waiting[expression] = video
+            self._order.add_video(expression, video)
             self._subscriptions.scheduler.schedule(self._serve)
-
-    def _wait(self, batch: SampleBatch) -> None:
-        """Put samples into send queues, where newer samples replace older ones."""
-        self._behind = True
-        for sample in batch.samples:
-            queue = self._queues.get(sample.key)
-            if queue is None:
-                queue = self._queues[sample.key] = queue_for(topics.topic(sample.parsed.topic))
-            queue.push(sample)
-            self._waiting[sample.key] = queue
 
     def _serve_soon(self) -> None:
         if self._soon is None:
@@ -242,47 +211,14 @@ class Browser:
         line = self._line
         if line is None:
             return
-        while line.ready and (frames := self._frames()):
-            line.write(frames)
-        while self._batches:
-            self._wait(self._batches.popleft())
-        if self._cut_off and not self._messages and self._websocket is not None:  # messages were dropped
+        while line.ready and (data := self._order.next_write()):
+            line.write(data)
+        self._order.hold()
+        if (
+            self._order.overflowed and not self._order.has_messages and self._websocket is not None
+        ):  # messages were dropped
             self._keep(self._websocket.close(_POLICY_VIOLATION, "read too slowly"))
             self._websocket = None
-
-    def _frames(self) -> bytes:
-        """Return the next write; empty if nothing is queued."""
-        frames: list[bytes] = []
-        size = 0
-        most = MOST_BEHIND if self._behind else MOST_TOGETHER
-        while size < most and (each := self._next()):
-            frames.append(each)
-            size += len(each)
-        return b"".join(frames)
-
-    def _next(self) -> bytes:
-        """Return the next frame: messages first, then current state, then send queues."""
-        if self._messages:
-            message = self._messages.popleft()
-            self._unread -= len(message)
-            return frame(message)
-        if self._batches:
-            batch = self._batches.popleft()
-            self.sent += len(batch.samples)
-            return batch.frames()
-        while self._waiting:
-            key = next(iter(self._waiting))
-            queue = self._waiting.pop(key)
-            sample = queue.pop()
-            if sample is None:
-                continue
-            self._waiting[key] = queue  # after the others
-            if isinstance(queue, AdaptiveVideo):
-                return video_frame(sample, key=key, step=queue.step)
-            self.sent += 1
-            return state_frame(sample)
-        self._behind = False
-        return b""
 
     def _want_key_frame(self, key: str) -> None:
         now = time.monotonic()
