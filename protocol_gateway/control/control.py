@@ -1,11 +1,13 @@
 """Control of one robot: hands events to its authority, and performs the effects.
 
 One command after the other is handed over, so that commands reach the controller in the order of the audit
-log. What does not wait (stops, HOLD, renewals, the controller's units) is performed in the caller's callback.
+log. A stop, and what the controller sends, is performed in the caller's callback. HOLD, RENEW, RELEASE and
+ASK do not wait for earlier commands.
 """
 
 import asyncio
 import contextlib
+import logging
 import secrets
 import time
 from collections.abc import Callable, Sequence
@@ -34,6 +36,7 @@ from protocol_gateway.control.effects import (
     Report,
     Seen,
     Send,
+    SendStop,
     SetTimer,
     StartProgram,
 )
@@ -57,6 +60,8 @@ from robomesh.errors import RefusedError
 from robomesh.messages import reason_message
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
+
+log = logging.getLogger(__name__)
 
 
 def read_clocks() -> Now:
@@ -192,13 +197,13 @@ class Control:
 
     def handle(self, event: Event) -> Any:
         """Hand over an event whose effects wait for nothing, and perform them; return its result."""
-        effects = self._robot_authority.handle(event, self._seen())
-        result = None
-        try:
-            while True:
-                result = self._perform(effects.send(result))
-        except StopIteration as done:
-            return done.value
+        effects, result = self._robot_authority.handle(event, self._seen()), None
+        while True:
+            try:
+                effect = effects.send(result)
+            except StopIteration as done:
+                return done.value
+            result = self._perform(effect)
 
     async def _handle_in_turn(self, event: LeaseRequested | CommandsRequested | StepRequested) -> Any:
         """Hand over a request after the earlier ones, unless it is immediate; return its result."""
@@ -208,22 +213,22 @@ class Control:
         ):
             effects = self._robot_authority.handle(event, self._seen())
             result: Any = None
-            try:
-                while True:
+            while True:
+                try:
                     effect = effects.send(result)
-                    match effect:
-                        case EnterCell():
-                            if self._checks is not None:
-                                await cell.enter_async_context(self._checks.motion_lock(effect.requests))
-                            result = self._seen()
-                        case CheckMotion():
-                            result = await self._check(effect), self._seen()
-                        case Append():
-                            result = await self._append(effect), self._seen()
-                        case _:
-                            result = self._perform(effect)
-            except StopIteration as done:
-                return done.value
+                except StopIteration as done:
+                    return done.value
+                match effect:
+                    case EnterCell():
+                        if self._checks is not None:
+                            await cell.enter_async_context(self._checks.motion_lock(effect.requests))
+                        result = self._seen()
+                    case CheckMotion():
+                        result = await self._check(effect)
+                    case Append():
+                        result = await self._append(effect), self._seen()
+                    case _:
+                        result = self._perform(effect)
 
     def _perform(self, effect: Effect) -> Any:
         """Perform an effect that waits for nothing, and return its result.
@@ -233,12 +238,32 @@ class Control:
         """
         ports = self._ports
         match effect:
+            case SendStop():
+                return self._send(effect.unit)
             case Send():
                 return self._send(effect.unit), self._seen()
-            case AppendLater():
-                ports.audit_trail.write_later(effect.entry)
             case NumberStop():
                 return ports.latch.next_number(effect.last, read_clocks().wall_ns)
+            case Recheck():
+                return None if self._checks is None else self._checks.changed(effect.finding)
+            case CancelPrograms():
+                return ports.cancel_programs(effect.why)
+            case StartProgram():
+                return ports.start_program(effect.program)
+            case EnterCell() | CheckMotion() | Append():
+                raise TypeError(f"{type(effect).__name__} cannot be performed without waiting")
+        try:
+            self._perform_rest(effect)
+        except Exception:
+            # A stop must be latched and audited, and a motion booked, whatever fails beside it.
+            log.exception("%s failed", type(effect).__name__)
+        return None
+
+    def _perform_rest(self, effect: AppendLater | KeepLatch | Publish | Report | SetTimer) -> None:
+        ports = self._ports
+        match effect:
+            case AppendLater():
+                ports.audit_trail.write_later(effect.entry)
             case KeepLatch():
                 ports.latch.keep(effect.stop, effect.last_stop_id)
             case Publish():
@@ -249,16 +274,6 @@ class Control:
                 )
             case SetTimer():
                 self._set_timer(effect.at_s)
-            case Recheck():
-                changed = None if self._checks is None else self._checks.changed(effect.finding)
-                return changed, self._seen()
-            case CancelPrograms():
-                return ports.cancel_programs(effect.why)
-            case StartProgram():
-                ports.start_program(effect.program)
-            case _:
-                raise TypeError(f"{type(effect).__name__} cannot be performed without waiting")
-        return None
 
     def _seen(self) -> Seen:
         return Seen(

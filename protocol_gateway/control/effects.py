@@ -1,12 +1,16 @@
 """Effects of a robot's authority, performed by `control`.
 
-    effect                                            result
-    ------------------------------------------------  ---------------------------------------
-    Send, Recheck                                     (reason of a failure or None, Seen)
-    NumberStop, CancelPrograms                        number; whether a program was cancelled
-    EnterCell, CheckMotion, Append                    awaited: Seen, (Finding, Seen), (reason or None, Seen)
-    AppendLater, KeepLatch, Publish, Report,
-    SetTimer, StartProgram                            none
+    effect                                result
+    ------------------------------------  ---------------------------------------------------
+    SendStop                              reason of a failure, or None
+    Send                                  (reason of a failure or None, Seen)
+    NumberStop                            number of the stop
+    CancelPrograms                        whether a program was cancelled
+    Recheck                               reason for a change, or None
+    EnterCell, CheckMotion, Append        awaited: Seen; Finding; (reason or None, Seen)
+    StartProgram                          none
+    AppendLater, KeepLatch, Publish,      none; a failure is logged, and the next effect is performed
+      Report, SetTimer
 
 Only commands and lease requests may yield an awaited effect. A stop yields none.
 """
@@ -82,7 +86,13 @@ class Send:
     """Write a unit to the controller's socket now."""
 
     unit: bytes
-    urgent: bool = False
+
+
+@dataclass(frozen=True)
+class SendStop:
+    """Write the stop unit to the controller's socket, before anything else."""
+
+    unit: bytes
 
 
 @dataclass(frozen=True)
@@ -174,6 +184,7 @@ class StartProgram:
 
 Effect: TypeAlias = (
     Send
+    | SendStop
     | Append
     | AppendLater
     | NumberStop

@@ -55,7 +55,7 @@ class Attempt:
         id_used: Their ids are used by the holder, so the answer is kept for a repeat.
         step: They are a step of the program that runs.
         program: Program to start, instead of sending a unit.
-        nothing: Nothing is sent, because nothing is to be held.
+        nothing_to_hold: Nothing is sent, because nothing is to be held.
     """
 
     requests: tuple[CommandRequest, ...]
@@ -64,7 +64,7 @@ class Attempt:
     id_used: bool = False
     step: bool = False
     program: Program | None = None
-    nothing: bool = False
+    nothing_to_hold: bool = False
 
     @property
     def names(self) -> str:

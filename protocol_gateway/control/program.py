@@ -313,12 +313,14 @@ class Programs:
         return None
 
     def _end(self, run: _Run, problem: Reason | None) -> None:
-        if problem is None:
-            self.state.outcome = _STATE.DONE
-        else:
-            self.state.outcome, self.state.text = _STATE.ENDED, problem.text
-            self.state.reason.CopyFrom(reason_message(problem))
-        self._control.handle(ProgramEnded(run.name, run.operator, self.state.line, problem))
+        self.state.outcome = _STATE.DONE if problem is None else _STATE.ENDED
+        try:
+            if problem is not None:
+                self.state.text = problem.text
+                self.state.reason.CopyFrom(reason_message(problem))
+        finally:
+            # While a program runs, other motion is refused.
+            self._control.handle(ProgramEnded(run.name, run.operator, self.state.line, problem))
 
 
 def _checked_too_slowly(answer: Answer) -> bool:

@@ -8,9 +8,9 @@
     command, step    admitted -> cell -> evaluated -> checked -> audit on disk -> evaluated again -> wire
     lease: ACQUIRE,  evaluated -> audit on disk -> evaluated again -> applied
       OFFER, ACCEPT, TAKE
-    lease: RENEW,    evaluated -> audit later -> applied
-      RELEASE, ASK
-    end of a lease   applied -> stop, if its motion may run -> audit later
+    lease: RELEASE,  evaluated -> audit later -> applied; RENEW and a repeated ASK are not audited
+      RENEW, ASK
+    end of a lease   stop, if its motion may run -> published -> audit later
     link restored    the latched stop on the wire -> audit later
 
 `control` performs the effects: it hands over one command after the other, so that they reach the controller
@@ -19,7 +19,7 @@ in the order of the audit log. Stops, HOLD, renewals and releases do not wait.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, assert_never
 
 from protocol_gateway.audit.entry import Entry, Outcome
 from protocol_gateway.audit.log import GATEWAY
@@ -61,6 +61,7 @@ from protocol_gateway.control.effects import (
     Report,
     Seen,
     Send,
+    SendStop,
     SetTimer,
     StartProgram,
 )
@@ -107,11 +108,6 @@ class RobotAuthority:
         authority: State of lease and stop at the start.
         encode: Encodes commands as one unit; raises CommandError.
         orphan: Operator of a motion that may still run from before the gateway was killed; empty: none.
-
-    Attributes:
-        authority: State of lease and stop.
-        program: Program that runs; None: none runs.
-        speed_percent: Speed last set by the gateway since the link came up; None: unknown.
     """
 
     def __init__(
@@ -122,9 +118,9 @@ class RobotAuthority:
         *,
         orphan: str = "",
     ) -> None:
-        self.authority = authority
-        self.program: RunningProgram | None = None
-        self.speed_percent: float | None = None
+        self._authority = authority
+        self._program: RunningProgram | None = None
+        self._speed_percent: float | None = None
         self._joints = joints
         self._encode = encode
         self._orphan = orphan
@@ -132,6 +128,21 @@ class RobotAuthority:
         self._last_unit_s = float("-inf")  # when the newest unit of commands was sent
         self._disobeyed_reported_s = 0.0
         self._last_stop: tuple[str, str, Reason, schema.StopAnswer] | None = None  # operator, source
+
+    @property
+    def authority(self) -> Authority:
+        """State of lease and stop."""
+        return self._authority
+
+    @property
+    def program(self) -> RunningProgram | None:
+        """Program that runs; None: none runs."""
+        return self._program
+
+    @property
+    def speed_percent(self) -> float | None:
+        """Speed last set by the gateway since the link came up; None: unknown."""
+        return self._speed_percent
 
     def handle(self, event: events.Event, seen: Seen) -> Effects[Any]:
         """Return the effects of an event, to be performed one after the other, each with its result.
@@ -154,7 +165,7 @@ class RobotAuthority:
             case events.TimePassed():
                 yield from self._expire(seen)
             case events.SessionEnded():
-                yield from self._session_ended(event.session, seen)
+                yield from self._end_session(event.session, seen)
             case events.LeaseEnded():
                 yield from self._end_lease(event.why, seen)
             case events.LinkLost():
@@ -169,6 +180,8 @@ class RobotAuthority:
                 yield from self._unit_refused()
             case events.MotionObserved():
                 yield from self._motion_observed(event.moving, seen)
+            case _:
+                assert_never(event)
         return None
 
     def obstacle(self, request: schema.CommandRequest, seen: Seen) -> Answer | None:
@@ -188,14 +201,16 @@ class RobotAuthority:
             )
             return answer
         problem = (yield from self._send_stop_unit()) if sent_s is None else None
-        number = yield NumberStop(self.authority.last_stop_id)
-        self.authority, latched = lease_rules.stop(
-            self.authority, by=by, reason=reason, now=seen.now, number=number
+        number = yield NumberStop(self._authority.last_stop_id)
+        self._authority, latched = lease_rules.stop(
+            self._authority, by=by, reason=reason, now=seen.now, number=number
         )
-        yield KeepLatch(self.authority.stop, self.authority.last_stop_id)
+        yield KeepLatch(self._authority.stop, self._authority.last_stop_id)
         yield CancelPrograms(codes.PROGRAM_STOPPED(by=by, reason=latched.reason))
         if problem is None:
-            self.authority = lease_rules.stop_sent(self.authority, latched.id, sent_s or seen.now.monotonic_s)
+            self._authority = lease_rules.stop_sent(
+                self._authority, latched.id, sent_s or seen.now.monotonic_s
+            )
             result = codes.STOP_SENT(id=latched.id)
         else:
             result = codes.STOP_NOT_SENT(problem, id=latched.id)
@@ -233,12 +248,12 @@ class RobotAuthority:
 
     def _send_latched_stop(self, seen: Seen) -> Effects[None]:
         """Send the latched stop, if there is one, again: the controller may have missed it."""
-        latched = self.authority.stop
+        latched = self._authority.stop
         if latched is None or seen.controller.read_only:
             return
         if (yield from self._send_stop_unit()) is None:
-            self.authority = lease_rules.stop_sent(
-                self.authority, latched.id, seen.now.monotonic_s, first=True
+            self._authority = lease_rules.stop_sent(
+                self._authority, latched.id, seen.now.monotonic_s, first=True
             )
             yield Publish()
             result = codes.STOP_SENT_AGAIN(id=latched.id)
@@ -247,7 +262,7 @@ class RobotAuthority:
 
     def _check_heeded(self, moving: bool, seen: Seen) -> Effects[None]:
         """Report a robot that still moves after its stop, and send the stop again."""
-        latched, first_s = self.authority.stop, self.authority.stopping_s
+        latched, first_s = self._authority.stop, self._authority.stopping_s
         if not moving or latched is None or first_s is None:
             return
         if seen.now.monotonic_s - max(first_s, self._disobeyed_reported_s) < HEED_TIMEOUT_S:
@@ -262,7 +277,7 @@ class RobotAuthority:
 
     def _in_transit_since(self, seen: Seen) -> float | None:
         """Return the time at which the latched stop's unit was sent (monotonic), if just now."""
-        latched = self.authority.stop
+        latched = self._authority.stop
         if latched is None or latched.sent_s is None or seen.controller.link.state is not LinkState.UP:
             return None
         return latched.sent_s if seen.now.monotonic_s - latched.sent_s < IN_TRANSIT_S else None
@@ -273,14 +288,14 @@ class RobotAuthority:
             unit = self._encode(Stop())
         except CommandError as error:
             return codes.STOP_SENT_LATER(error.reason)
-        problem, _ = yield Send(unit, urgent=True)
+        problem = yield SendStop(unit)
         return None if problem is None else codes.STOP_SENT_LATER(problem)
 
     # ----------------------------------------------------------------- leases
 
     def _lease_requested(self, event: events.LeaseRequested, seen: Seen) -> Effects[events.LeaseResult]:
         request, operator = event.request, event.operator
-        asked_before = any(each.operator == operator for each in self.authority.asked_by)
+        asked_before = any(each.operator == operator for each in self._authority.asked_by)
         outcome = yield from self._evaluate_lease(event, seen)
         if outcome.answer.accepted:
             entry = _lease_entry(event, Outcome.ACCEPTED, outcome.answer, seen.now)
@@ -295,32 +310,30 @@ class RobotAuthority:
         if not outcome.answer.accepted:
             yield AppendLater(_lease_entry(event, Outcome.REFUSED, outcome.answer, seen.now))
             return events.LeaseResult(outcome.answer)
-        yield from self._set_authority(outcome.authority)
-        if outcome.ended is not None:
-            yield from self._after_lease_end(outcome.ended, seen)
+        yield from self._set_authority(outcome.authority, seen, ended=outcome.ended)
         return events.LeaseResult(outcome.answer, outcome.granted)
 
     def _evaluate_lease(self, event: events.LeaseRequested, seen: Seen) -> Effects[LeaseOutcome]:
         yield from self._expire(seen)
         read_only = seen.controller.read_only
         if read_only is not None and event.request.action in (_A.ACQUIRE, _A.TAKE):
-            return LeaseOutcome(self.authority, refused(codes.ROBOT_READ_ONLY(read_only)))
+            return LeaseOutcome(self._authority, refused(codes.ROBOT_READ_ONLY(read_only)))
         return lease_rules.request_lease(
-            self.authority, event.request, operator=event.operator, now=seen.now, secret=event.secret
+            self._authority, event.request, operator=event.operator, now=seen.now, secret=event.secret
         )
 
     def _expire(self, seen: Seen) -> Effects[None]:
         """End the lease if it has expired."""
-        authority, ended = lease_rules.expire(self.authority, seen.now)
+        authority, ended = lease_rules.expire(self._authority, seen.now)
         if ended is not None:
-            yield from self._after_end(authority, ended, "EXPIRE", seen)
-        elif authority is not self.authority:
-            yield from self._set_authority(authority)
+            yield from self._lease_ended("EXPIRE", authority, ended, seen)
+        elif authority is not self._authority:
+            yield from self._set_authority(authority, seen)
 
-    def _session_ended(self, session: str, seen: Seen) -> Effects[None]:
-        authority, ended = lease_rules.end_session(self.authority, session)
+    def _end_session(self, session: str, seen: Seen) -> Effects[None]:
+        authority, ended = lease_rules.end_session(self._authority, session)
         if ended is not None:
-            yield from self._after_end(authority, ended, "REVOKE", seen)
+            yield from self._lease_ended("REVOKE", authority, ended, seen)
 
     def _end_lease(self, why: Reason, seen: Seen, *, uncommanded: bool = False) -> Effects[None]:
         """End the lease, if there is one.
@@ -328,31 +341,31 @@ class RobotAuthority:
         Args:
             uncommanded: The lease ends because of uncommanded motion.
         """
-        authority, ended = lease_rules.end_lease(self.authority, why, uncommanded=uncommanded)
+        authority, ended = lease_rules.end_lease(self._authority, why, uncommanded=uncommanded)
         if ended is not None:
-            yield from self._after_end(authority, ended, "REVOKE", seen)
+            yield from self._lease_ended("REVOKE", authority, ended, seen)
 
-    def _after_end(self, authority: Authority, ended: LeaseEnd, request: str, seen: Seen) -> Effects[None]:
-        yield from self._set_authority(authority)
-        yield from self._after_lease_end(ended, seen)
+    def _lease_ended(self, request: str, authority: Authority, ended: LeaseEnd, seen: Seen) -> Effects[None]:
+        yield from self._set_authority(authority, seen, ended=ended)
         yield AppendLater(lease_end_entry(request, ended, time_ns=seen.now.wall_ns))
 
-    def _after_lease_end(self, ended: LeaseEnd, seen: Seen) -> Effects[None]:
-        if ended.stop:
+    def _set_authority(
+        self, authority: Authority, seen: Seen, *, ended: LeaseEnd | None = None
+    ) -> Effects[None]:
+        """Set the state; stop the motion of a lease that has ended, before anything else."""
+        self._authority = authority
+        if ended is not None and ended.stop:
             yield from self._stop(seen, by=GATEWAY, reason=f"dead-man: {ended.why}", source=GATEWAY)
-        yield Report(
-            _S.WARNING if ended.stop else _S.INFO,
-            "lease.ended",
-            f"control ended: {ended.why}{', its motion was stopped' if ended.stop else ''}",
-            why=ended.why,
-            values={"holder": ended.holder},
-        )
-
-    def _set_authority(self, authority: Authority) -> Effects[None]:
-        """Set the state, and the timer of the lease's expiry."""
-        self.authority = authority
         yield SetTimer(None if authority.lease is None else authority.lease.until_s)
         yield Publish()
+        if ended is not None:
+            yield Report(
+                _S.WARNING if ended.stop else _S.INFO,
+                "lease.ended",
+                f"control ended: {ended.why}{', its motion was stopped' if ended.stop else ''}",
+                why=ended.why,
+                values={"holder": ended.holder},
+            )
 
     # --------------------------------------------------------------- commands
 
@@ -384,11 +397,11 @@ class RobotAuthority:
         A HOLD sent to an arm at rest would make the controller refuse every motion.
         """
         cancelled = yield CancelPrograms(codes.PROGRAM_HOLD())
-        lease = self.authority.lease
-        rests = self.authority.moving is False and (lease is None or lease.motion is None)
-        if not cancelled or not rests or self.program is not None:
+        lease = self._authority.lease
+        rests = self._authority.moving is False and (lease is None or lease.motion is None)
+        if not cancelled or not rests or self._program is not None:
             return hold
-        return replace(hold, nothing=True)
+        return replace(hold, nothing_to_hold=True)
 
     def _step_requested(self, event: events.StepRequested, seen: Seen) -> Effects[Answer]:
         """Execute a step of the holder's program: evaluated like a command, except for its id."""
@@ -397,15 +410,15 @@ class RobotAuthority:
         )
         yield from self._expire(seen)
         problem = None
-        if not lease_rules.holds(self.authority, event.operator, event.request.lease):
+        if not lease_rules.holds(self._authority, event.operator, event.request.lease):
             problem = not_sent(codes.COMMAND_CONTROL_ENDED())
         attempt = Attempt(
             requests=(event.request,), entries=(entry,), arrived_s=event.arrived.monotonic_s, step=True
         )
         answer: Answer = yield from self._attempt(attempt, problem, seen)
-        if answer.accepted and attempt.moves and self.program is not None:
+        if answer.accepted and attempt.moves and self._program is not None:
             # From now on the lease's motion holds this target.
-            self.program = replace(self.program, done=self.program.done + 1)
+            self._program = replace(self._program, done=self._program.done + 1)
         return answer
 
     def _admit(
@@ -413,7 +426,7 @@ class RobotAuthority:
     ) -> Effects[Verdict]:
         """Evaluate whether commands are the holder's, in time and new, and no stop forbids them."""
         yield from self._expire(seen)
-        authority = self.authority
+        authority = self._authority
         for request in requests:
             verdict = admit(authority, request, operator=operator, now=seen.now)
             if verdict.repeat or not verdict.answer.accepted:
@@ -422,16 +435,17 @@ class RobotAuthority:
         return verdict
 
     def _attempt(self, attempt: Attempt, problem: Answer | None, seen: Seen) -> Effects[Answer]:
-        seen = yield EnterCell(attempt.requests)
-        problem = problem or self._refusal_of(attempt, seen)
-        unit, finding = b"", Finding()
-        if problem is None and not attempt.nothing and attempt.program is None:
+        if problem is None:
+            seen = yield EnterCell(attempt.requests)
+            problem = self._refusal_of(attempt, seen)
+        unit, finding = b"", Finding(start=None if attempt.program is None else attempt.program.start)
+        if problem is None and not attempt.nothing_to_hold and attempt.program is None:
             try:
                 unit = self._encode(*map(controller_command, attempt.requests))
             except CommandError as error:
                 problem = not_sent(error.reason)
-        if problem is None:
-            finding, seen = yield CheckMotion(attempt.requests)
+        if problem is None and attempt.program is None:
+            finding = yield CheckMotion(attempt.requests)
             problem = finding.refusal
         if problem is not None:
             self._keep_answer(attempt, problem)
@@ -452,17 +466,13 @@ class RobotAuthority:
         if unwritten is not None:
             return not_sent(codes.COMMAND_NOT_WRITTEN(unwritten))
         problem = yield from self._recheck(attempt, finding, seen)
-        if problem is None and attempt.program is not None:
-            moved, seen = yield Recheck(Finding(start=attempt.program.start))
-            if moved is not None:
-                problem = not_sent(codes.PROGRAM_MOVED())
-        elif problem is None and not attempt.nothing:
+        if problem is None and attempt.program is None and not attempt.nothing_to_hold:
             failure, seen = yield Send(unit)
             problem = None if failure is None else not_sent(failure)
         if problem is not None:
             yield from _record(attempt.entries, Outcome.FAILED, problem)
             return problem
-        text = yield from self._done(attempt, seen)
+        text = yield from self._book(attempt, seen)
         if warning is not None and (finding.is_violation or not attempt.step):
             yield Report(
                 _S.WARNING,
@@ -478,68 +488,70 @@ class RobotAuthority:
     def _recheck(self, attempt: Attempt, finding: Finding, seen: Seen) -> Effects[Answer | None]:
         """Evaluate again after the audit entry was written; return the refusal, None: send it."""
         yield from self._expire(seen)
-        if not lease_rules.holds(self.authority, attempt.entries[0].operator, attempt.requests[0].lease):
+        if not lease_rules.holds(self._authority, attempt.entries[0].operator, attempt.requests[0].lease):
             return not_sent(codes.COMMAND_CONTROL_ENDED_MEANWHILE())
-        overtaken = overtaken_by_hold(attempt, self.authority, self.program)
+        overtaken = overtaken_by_hold(attempt, self._authority, self._program)
         if problem := overtaken or self._refusal_of(attempt, seen):
             return problem
-        changed, _ = yield Recheck(finding)
-        return None if changed is None else not_sent(codes.COMMAND_CHANGED(changed))
+        changed = yield Recheck(finding)
+        if changed is None:
+            return None
+        return not_sent(codes.COMMAND_CHANGED(changed) if attempt.program is None else codes.PROGRAM_MOVED())
 
-    def _done(self, attempt: Attempt, seen: Seen) -> Effects[str]:
+    def _book(self, attempt: Attempt, seen: Seen) -> Effects[str]:
         """Apply commands after their unit was sent; return the answer's text."""
         isolated = seen.now.monotonic_s - self._last_unit_s >= motion_owner.ANSWERED_WITHIN_S
         self._last_unit_s = seen.now.monotonic_s
-        if attempt.nothing:
+        if attempt.nothing_to_hold:
             return f"{attempt.names}: the program was not started, and nothing is on hold"
         if attempt.program is not None:
-            self.program = RunningProgram(name=attempt.program.name, targets=attempt.program.targets)
+            self._program = RunningProgram(name=attempt.program.name, targets=attempt.program.targets)
             yield StartProgram(attempt.program)
             return f"{attempt.names}: it runs"
         controller = seen.controller
         for request in attempt.requests:
             # Each command starts from the state after the previous one.
-            yield from self._sent(request, controller, seen, isolated=isolated)
+            yield from self._book_one(request, controller, seen, isolated=isolated)
             controller = predicted(request, controller, self._joints)
         return f"{attempt.names} {'is' if len(attempt.requests) == 1 else 'are'} on the controller's socket"
 
-    def _sent(
+    def _book_one(
         self, request: schema.CommandRequest, controller: Controller, seen: Seen, *, isolated: bool
     ) -> Effects[None]:
-        latched = self.authority.stop
+        latched = self._authority.stop
         target = target_of(request, controller, self._joints)
-        self.authority = motion_owner.command_sent(
-            self.authority,
+        self._authority = motion_owner.command_sent(
+            self._authority,
             request,
             seen.now,
             waypoints=() if target is None else (target,),
             arrived=self._has_arrived(seen.controller),
             isolated=isolated,
         )
-        if self.program is not None and request.command in (_C.HOLD, _C.RESUME):
-            self.program = replace(self.program, held=request.command == _C.HOLD)
-        if self.program is not None and request.command == _C.RESET:
-            given_up = self.program.held or controller.status.activity is Activity.HOLDING
-            self.program = replace(self.program, given_up=given_up)
+        if self._program is not None and request.command in (_C.HOLD, _C.RESUME):
+            self._program = replace(self._program, held=request.command == _C.HOLD)
+        if self._program is not None and request.command == _C.RESET:
+            given_up = self._program.held or controller.status.activity is Activity.HOLDING
+            self._program = replace(self._program, given_up=given_up)
         if request.command == _C.SPEED:
-            self.speed_percent = request.speed_percent
+            self._speed_percent = request.speed_percent
         if request.command == _C.RESET:
             self._reset_s = seen.now.monotonic_s
             if latched is not None:
-                yield KeepLatch(self.authority.stop, self.authority.last_stop_id)
+                yield KeepLatch(self._authority.stop, self._authority.last_stop_id)
                 text = f"stop request {latched.id} was reset"
                 yield Report(_S.INFO, "stop.reset", text, values={"stop_id": latched.id})
         yield Publish()
 
     def _refusal_of(self, attempt: Attempt, seen: Seen) -> Answer | None:
-        return refusal_of(attempt, self.authority, self.program, seen, self._joints, reset_s=self._reset_s)
+        return refusal_of(attempt, self._authority, self._program, seen, self._joints, reset_s=self._reset_s)
 
     def _keep_answer(self, attempt: Attempt, answer: Answer) -> None:
         if attempt.id_used:
-            self.authority = keep_answer(self.authority, attempt.requests[-1], answer)
+            self._authority = keep_answer(self._authority, attempt.requests[-1], answer)
 
     def _program_ended(self, event: events.ProgramEnded, seen: Seen) -> Effects[None]:
-        self.program = None
+        self._program = None
         problem = event.problem
         if problem is None:
             outcome = codes.PROGRAM_DONE(program=event.name)
@@ -555,34 +567,34 @@ class RobotAuthority:
 
     def _link_lost(self, why: str, seen: Seen) -> Effects[None]:
         """Stop the robot if motion of the holder runs: its position is unknown now."""
-        self.speed_percent = None  # the next connection may reach another controller
-        lease = self.authority.lease
+        self._speed_percent = None  # the next connection may reach another controller
+        lease = self._authority.lease
         if lease is not None and lease.motion is not None:
             reason = f"{lease.holder}'s motion ran, and {why}"
             yield from self._stop(seen, by=GATEWAY, reason=reason, source=GATEWAY)
 
     def _status_reported(self, event: events.StatusReported, seen: Seen) -> None:
         resting = event.activity is Activity.IDLE and self._has_arrived(seen.controller)
-        self.authority = motion_owner.reported(self.authority, resting=resting, dated_s=event.dated_s)
+        self._authority = motion_owner.reported(self._authority, resting=resting, dated_s=event.dated_s)
 
     def _unit_refused(self) -> Effects[None]:
-        self.speed_percent = None  # the refused unit is unknown, and may have been the speed
-        before = self.authority
-        self.authority = motion_owner.refused(before)
-        if before is not self.authority:
+        self._speed_percent = None  # the refused unit is unknown, and may have been the speed
+        before = self._authority
+        self._authority = motion_owner.refused(before)
+        if before is not self._authority:
             yield Publish()
 
     def _motion_observed(self, moving: bool, seen: Seen) -> Effects[None]:
         yield from self._stop_orphan(moving, seen)
-        before = self.authority
-        self.authority, uncommanded = motion_owner.observe(
+        before = self._authority
+        self._authority, uncommanded = motion_owner.observe(
             before,
             moving=moving,
             pending=motion_may_be_held(seen.controller.status.activity),
             arrived=self._has_arrived(seen.controller),
             now=seen.now,
         )
-        lease = self.authority.lease
+        lease = self._authority.lease
         if uncommanded and not lease_rules.moved_recently(before, seen.now):
             yield Report(
                 _S.INFO if lease is None else _S.WARNING,
@@ -598,12 +610,12 @@ class RobotAuthority:
     def _stop_orphan(self, moving: bool, seen: Seen) -> Effects[None]:
         """Stop a motion that was commanded before the gateway was killed, and has no holder now."""
         mover, self._orphan = self._orphan, ""
-        if mover and moving and self.authority.lease is None:
+        if mover and moving and self._authority.lease is None:
             text = f"dead-man: the gateway was killed while {mover} had control, and the robot still moves"
             yield from self._stop(seen, by=GATEWAY, reason=text, source=GATEWAY)
 
     def _has_arrived(self, controller: Controller) -> bool:
-        lease = self.authority.lease
+        lease = self._authority.lease
         if lease is None or lease.motion is None or controller.status.homed is False:
             return False  # at its home position, but not homed yet
         return has_arrived(lease.motion.target, controller.positions, self._joints.types)

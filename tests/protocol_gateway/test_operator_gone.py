@@ -43,6 +43,7 @@ def test_a_killed_program_loses_control_with_its_session(mesh, tmp_path):
             await until(lambda: site.controller.activity == STATE.STOPPED)
             assert site.controller.homed == STATE.NO
             await until(lambda: site.seen["lease"][-1].ended == "wang's page or program has disconnected")
+            await until(lambda: any(entry.request == "REVOKE" for entry in read_entries(site.audit)))
             entries = {entry.request: entry for entry in read_entries(site.audit)}
             # The lease did not expire: it was ended.
             assert entries["REVOKE"].text == "wang's page or program has disconnected"

@@ -1,5 +1,6 @@
 """Order of the effects of a robot's authority, without sockets or disk; and its equality with the old one."""
 
+import asyncio
 from dataclasses import replace
 
 import pytest
@@ -18,6 +19,7 @@ from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from robots.description import load
 from robots.joints import joints_of
 from tests.protocol_gateway.authority_oracle import compare
+from tests.protocol_gateway.control_bench import control_bench
 
 A, C = LeaseRequest.Action, CommandRequest.Command
 JOINTS = joints_of(load("pt600"))
@@ -64,10 +66,11 @@ class Bench:
             if name in self.during:
                 self.give(self.during.pop(name))
             result = {
+                "SendStop": self.link,
                 "Send": (self.link, self.seen),
                 "Append": (self.disk, self.seen),
-                "CheckMotion": (self.finding, self.seen),
-                "Recheck": (self.changed, self.seen),
+                "CheckMotion": self.finding,
+                "Recheck": self.changed,
                 "EnterCell": self.seen,
                 "NumberStop": self.robot_authority.authority.last_stop_id + 1,
                 "CancelPrograms": False,
@@ -98,7 +101,7 @@ class Bench:
         return self
 
 
-STOPPED = ["Send", "NumberStop", "KeepLatch", "CancelPrograms", "Publish", "Report", "AppendLater"]
+STOPPED = ["SendStop", "NumberStop", "KeepLatch", "CancelPrograms", "Publish", "Report", "AppendLater"]
 APPLIED = ["SetTimer", "Publish"]
 CHECKED = ["EnterCell", "CheckMotion", "Append", "Recheck"]
 
@@ -111,7 +114,7 @@ CHECKED = ["EnterCell", "CheckMotion", "Append", "Recheck"]
         (
             "moving",
             events.LeaseEnded(codes.ENDED_GATEWAY()),
-            [*APPLIED, *STOPPED, "Report", "AppendLater"],
+            [*STOPPED, *APPLIED, "Report", "AppendLater"],
         ),
         ("moving", events.LinkLost("the cable is cut"), STOPPED),
         ("in_control", events.LinkLost("the cable is cut"), []),
@@ -133,7 +136,7 @@ def test_order_of_effects_that_wait_for_nothing(begin, event, order):
         (C.MOVE_ABSOLUTE, {"joint_positions": THERE}, [*CHECKED, "Send", "Publish"]),
         (C.SPEED, {"speed_percent": 50.0}, [*CHECKED, "Send", "Publish"]),
         (C.HOLD, {}, ["CancelPrograms", *CHECKED, "Send", "Publish"]),
-        (C.RUN_PROGRAM, {"program": "home"}, [*CHECKED, "Recheck", "StartProgram"]),
+        (C.RUN_PROGRAM, {"program": "home"}, ["EnterCell", "Append", "Recheck", "StartProgram"]),
     ],
 )
 def test_a_command_reaches_the_wire_only_after_its_audit_entry(command, fields, order):
@@ -190,7 +193,7 @@ def test_a_failed_stop_unit_is_latched_and_sent_when_the_link_is_back():
     bench.performed.clear()
     bench.link = None
     bench.give(events.LinkRestored())
-    assert bench.performed == ["Send", "Publish", "Report", "AppendLater"]
+    assert bench.performed == ["SendStop", "Publish", "Report", "AppendLater"]
 
 
 def test_an_awaited_effect_of_an_event_that_must_not_wait_is_an_error():
@@ -210,6 +213,25 @@ def test_an_awaited_effect_of_an_event_that_must_not_wait_is_an_error():
         Control(Waits(), ports).handle(STOP)
 
 
+def test_a_publication_that_fails_hides_no_stop(tmp_path, caplog):
+    async def main():
+        async with control_bench(tmp_path) as bench:
+            await bench.lease(A.ACQUIRE)
+            await bench.commands((C.HOME, {}))
+
+            def fail():
+                raise RuntimeError("the mesh has gone")
+
+            bench.ports.publish = fail
+            bench.control.handle(events.LeaseEnded(codes.ENDED_GATEWAY()))
+            assert bench.socket[-1] == b"1#COMMAND*stop@"
+            assert bench.control.authority.stop.reason == "dead-man: the gateway is shutting down"
+        assert [name for name, _ in bench.entries()][-2:] == ["STOP", "REVOKE"]
+
+    asyncio.run(main())
+    assert "Publish failed" in caplog.text
+
+
 def test_a_lease_that_cannot_be_recorded_is_not_granted():
     bench = Bench()
     bench.disk = BROKEN
@@ -221,14 +243,14 @@ def test_a_lease_that_cannot_be_recorded_is_not_granted():
 def test_a_release_waits_for_no_disk_and_stops_motion():
     bench = Bench().moving()
     assert bench.lease(A.RELEASE).answer.accepted
-    assert bench.performed == ["AppendLater", *APPLIED, *STOPPED, "Report"]
+    assert bench.performed == ["AppendLater", *STOPPED, *APPLIED, "Report"]
 
 
 def test_expired_control_ends_before_a_command_is_evaluated():
     bench = Bench().moving()
     bench.seen = replace(SEEN, now=Now(NOW.monotonic_s + 6.0, NOW.wall_ns + 6_000_000_000))
     assert bench.command(C.HOME, 2).reason.code == "lease.none"
-    assert bench.performed[: len(STOPPED) + 2] == [*APPLIED, *STOPPED]
+    assert bench.performed[: len(STOPPED) + 2] == [*STOPPED, *APPLIED]
 
 
 def test_generated_sequences_give_equal_states_and_effects():

@@ -207,7 +207,9 @@ class Control:
 
     async def _do(self, attempt: _Attempt, problem: Answer | None) -> Answer:
         async with (
-            contextlib.nullcontext() if self._checks is None else self._checks.motion_lock(attempt.requests)
+            contextlib.nullcontext()
+            if self._checks is None or problem
+            else self._checks.motion_lock(attempt.requests)
         ):
             problem = problem or self._refusal(attempt)
             send, finding = attempt.begin, Finding()

@@ -80,9 +80,7 @@ class Leases:
         if not outcome.answer.accepted:
             self._audit_trail.write_later(record(Outcome.REFUSED, outcome.answer))
             raise RefusedError(outcome.answer.reason or outcome.answer.text)
-        self._set_authority(outcome.authority)
-        if outcome.ended is not None:
-            self._after_lease_end(outcome.ended)
+        self._set_authority(outcome.authority, outcome.ended)
         return lease_answer(outcome.granted, read_clocks())
 
     def expire(self) -> None:
@@ -110,8 +108,7 @@ class Leases:
             self._end(authority, ended, "REVOKE")
 
     def _end(self, authority: Authority, ended: LeaseEnd, request: str) -> None:
-        self._set_authority(authority)
-        self._after_lease_end(ended)
+        self._set_authority(authority, ended)
         self._audit_trail.write_later(
             entry_of(
                 request,
@@ -125,18 +122,17 @@ class Leases:
             )
         )
 
-    def _after_lease_end(self, ended: LeaseEnd) -> None:
-        if ended.stop:
-            self._stop_handler.stop(by=GATEWAY, reason=f"dead-man: {ended.why}", source=GATEWAY)
-        severity = _S.WARNING if ended.stop else _S.INFO
-        text = f"control ended: {ended.why}{', its motion was stopped' if ended.stop else ''}"
-        self._journal.report(severity, "lease.ended", text, why=ended.why, holder=ended.holder)
-
-    def _set_authority(self, authority: Authority) -> None:
-        """Set the state, and schedule the lease's expiry."""
+    def _set_authority(self, authority: Authority, ended: LeaseEnd | None = None) -> None:
+        """Set the state; a stop of the motion comes before everything else, as in `RobotAuthority`."""
         self._context.authority = authority
+        if ended is not None and ended.stop:
+            self._stop_handler.stop(by=GATEWAY, reason=f"dead-man: {ended.why}", source=GATEWAY)
         self._context.set_timer(None if authority.lease is None else authority.lease.until_s)
         self._context.on_change()
+        if ended is not None:
+            severity = _S.WARNING if ended.stop else _S.INFO
+            text = f"control ended: {ended.why}{', its motion was stopped' if ended.stop else ''}"
+            self._journal.report(severity, "lease.ended", text, why=ended.why, holder=ended.holder)
 
     def close(self) -> None:
         """End the lease, if there is one."""
