@@ -45,13 +45,17 @@ async def present(
     """
     seen = Ignored() if ignored is None else ignored
     deadline = time.monotonic() + _TIMEOUT_S
+    was_empty = False
     while (left_s := deadline - time.monotonic()) > 0.0:
         found = await _tokens(session, key_expr, seen, left_s)
-        if not found:
-            # A lost link ends the reply early without an error; Zenoh reports the loss a moment later.
-            await asyncio.sleep(min(left_s, _RETRY_S))
-        if found is not None and session.info.routers_zid():
+        if found and session.info.routers_zid():
             return sorted(found)
+        # A lost link ends the reply early without an error, and Zenoh reports the loss a moment later.
+        # So only a second empty reply counts.
+        await asyncio.sleep(min(left_s, _RETRY_S))
+        if found is not None and was_empty and session.info.routers_zid():
+            return []
+        was_empty = found is not None
     raise NoAnswerError(f"the router did not list the live services within {_TIMEOUT_S:g} s: try again")
 
 

@@ -31,9 +31,15 @@ def stand_still(page, seconds):
 def take(page, name="li"):
     # A browser that was seen to be slow gets leases of 5 s: a busy machine may leave it no time within 2.
     stand_still(page, 0.6)
-    page.get_by_label("Your name").fill(name)
-    button(page, "Take control").click()
-    expect(page.locator(".holder")).to_have_text("You are in control")
+    holder = page.locator(".holder")
+    for _ in range(10):
+        # The gateway refuses control while a busy disk takes longer than a second for the audit log.
+        page.get_by_label("Your name").fill(name)
+        button(page, "Take control").click()
+        with suppress(AssertionError):
+            expect(holder).to_have_text("You are in control", timeout=6000)
+            return
+    expect(holder).to_have_text("You are in control")
 
 
 def ready(page, name="li"):
