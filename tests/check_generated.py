@@ -17,7 +17,7 @@ EXAMPLE_ROBOTS_LOCK = ROOT / "example-robots.lock"
 
 
 def generated_modules() -> list[str]:
-    """Problems with the modules that protoc writes."""
+    """Return problems with the modules that protoc writes."""
     with tempfile.TemporaryDirectory() as folder:
         protoc = [sys.executable, "-m", "grpc_tools.protoc", f"-I{SCHEMAS}"]
         outputs = [f"--python_out={folder}", f"--pyi_out={folder}"]
@@ -33,7 +33,7 @@ def generated_modules() -> list[str]:
 
 
 def requirements_lock(uv: str, arguments: list[str]) -> list[str]:
-    """Problems with requirements.lock: what it is made of asks for something else."""
+    """Return problems with requirements.lock: its sources require something else."""
     with tempfile.TemporaryDirectory() as folder:
         # With the old file as output, versions are kept where they still fit.
         again = Path(folder) / LOCK.name
@@ -45,7 +45,7 @@ def requirements_lock(uv: str, arguments: list[str]) -> list[str]:
 
 
 def addresses() -> list[str]:
-    """Problems with lock files that would work behind one mirror only."""
+    """Return problems with lock files that would work behind one mirror only."""
     return [
         f"{path.relative_to(ROOT)}:{number}: an address: {line.strip()}"
         for path in (LOCK, EXAMPLE_ROBOTS_LOCK, PACKAGE_LOCK)

@@ -1,4 +1,4 @@
-"""What all tests share: a router of their own, sessions, the files that came with the issue, `--quick`."""
+"""Shared fixtures of all tests: a router for each test, sessions, reference files, `--quick`."""
 
 import asyncio
 import contextlib
@@ -35,7 +35,7 @@ _FIRST, _PORTS_A_BLOCK, _BLOCKS = 12_000, 100, 200
 
 
 def _ports() -> Iterator[int]:
-    """Ports that no connection gets by itself, in blocks that other test processes leave alone."""
+    """Yield ports outside the ephemeral range, in blocks that other test processes do not use."""
     folder = Path(tempfile.gettempdir()) / "robomesh-test-ports"
     folder.mkdir(exist_ok=True)
     while True:
@@ -57,7 +57,7 @@ _PORTS = _ports()
 
 
 def free_port() -> int:
-    """A port that was free a moment ago; Zenoh does not tell which one it took for 0."""
+    """Return a port that was free a moment ago; Zenoh does not report which port it chose for 0."""
     for port in _PORTS:
         with socket.socket() as probe, contextlib.suppress(OSError):
             probe.bind(("127.0.0.1", port))
@@ -83,7 +83,7 @@ async def last_value(session: Session, key: str) -> Any:
 
 
 def put_unheard(publisher: Publisher, message: Message) -> None:
-    """Publish a message that reaches nobody, as in an outage; only the publisher's history has it."""
+    """Publish a message without a subscriber, as in an outage; only the publisher's history has it."""
     publisher._sequence += 1
     header = publisher._history[-1][0]._replace(sequence=publisher._sequence)
     publisher._history.append((header, message.SerializeToString()))
@@ -91,7 +91,7 @@ def put_unheard(publisher: Publisher, message: Message) -> None:
 
 @pytest.fixture(autouse=True)
 def _log_levels() -> Iterator[None]:
-    """A command that a test runs in its own process sets what is logged: not for the tests after it."""
+    """Restore the log levels that a command in the test's process changed."""
     levels = [(logger, logger.level) for logger in (logging.root, logging.getLogger("robomesh"))]
     yield
     for logger, level in levels:
@@ -100,7 +100,7 @@ def _log_levels() -> Iterator[None]:
 
 @pytest.fixture
 def router() -> Iterator[str]:
-    """The endpoint of a running router of this test's own."""
+    """Yield the endpoint of a running router for this test."""
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     with zenoh.open(router_config((endpoint,))):
         yield endpoint
@@ -108,13 +108,13 @@ def router() -> Iterator[str]:
 
 @pytest.fixture
 def mesh(router: str) -> SessionSettings:
-    """Session settings towards this test's router."""
+    """Return session settings for this test's router."""
     return SessionSettings(connect=(router,), wait_s=5.0)
 
 
 @pytest.fixture(scope="session")
 def shared() -> Path:
-    """The folder of reference files that lies beside the checkout here."""
+    """Return the folder of reference files next to the checkout."""
     if not SHARED.is_dir():
         pytest.skip("the reference files (../shared) are not beside this checkout")
     return SHARED

@@ -69,7 +69,7 @@ def plain(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
 
 
 def table_of(annotation: Any) -> type[BaseModel] | None:
-    """Return the table that a key holds, alone or in a list; None: it holds a value."""
+    """Return the table that a key holds, directly or in a list; None: it holds a value."""
     inner, _ = plain(annotation)
     if get_origin(inner) is tuple:
         inner, _ = plain(get_args(inner)[0])

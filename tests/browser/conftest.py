@@ -59,13 +59,13 @@ class Plant:
     """A running site.
 
     Attributes:
-        fixtures: What stands around each arm.
-        console: Settings of the console beyond where it listens.
-        address: Of the console.
-        endpoint: Of the router.
-        rate_hz: States a second of each arm: as lively to a person as the 100 of real ones, and cheaper.
-        legacy_port: Where old client programs attach to `pt600`; to `arm` none may.
-        session: A session of the tests' own on the mesh; use it in the plant's thread, by `call`.
+        fixtures: The obstacles around each arm.
+        console: Settings of the console except its address.
+        address: Address of the console.
+        endpoint: Endpoint of the router.
+        rate_hz: States a second of each arm: as smooth to the eye as the 100 of real ones, and cheaper.
+        legacy_port: The port at which old client programs connect to `pt600`; `arm` accepts none.
+        session: The tests' session on the mesh; use it in the plant's thread, by `call`.
     """
 
     audit: Path
@@ -199,9 +199,9 @@ class Plant:
 
 @pytest.fixture(scope="module")
 def plant(request, tmp_path_factory) -> Iterator[Plant]:
-    """A site `hall` of two arms, a module's FIXTURES around them: `arm` rests, `pt600` moves by itself.
+    """Yield a site `hall` of two arms among a module's FIXTURES: `arm` rests, `pt600` moves.
 
-    A module that says ROBOTS has those alone.
+    If a module sets ROBOTS, the site has only those robots.
     """
     of_module = {
         name: getattr(request.module, name.upper())
@@ -212,7 +212,7 @@ def plant(request, tmp_path_factory) -> Iterator[Plant]:
 
 
 def run_plant(running: Plant) -> Iterator[Plant]:
-    """Runs a plant for as long as a fixture lasts."""
+    """Run a plant for as long as a fixture lasts."""
     if not CHROMIUM.exists():
         pytest.skip(f"no {CHROMIUM}: the page is not driven here")
     build_page.build()
@@ -237,7 +237,7 @@ def patient():
 
 @pytest.fixture(scope="module")
 def chromium(plant):
-    """A headless Chromium that draws 3-D in software; it ends before the site does."""
+    """Yield a headless Chromium that draws 3-D in software; it ends before the site does."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
@@ -247,14 +247,14 @@ def chromium(plant):
 
 
 class Contexts:
-    """Contexts of a browser, lent anew when they are as new: to make one costs more than to open a page."""
+    """Pool of browser contexts, reused after a reset because a new context costs more than a new page."""
 
     def __init__(self, browser):
         self._browser = browser
         self._idle = {}
 
     def lend(self, **settings):
-        """A context that knows nothing, and what it is to be given back with."""
+        """Return a context without stored data, and the value with which it is given back."""
         kind = tuple(sorted(settings.items()))
         if idle := self._idle.get(kind):
             return idle.pop(), kind
@@ -263,7 +263,7 @@ class Contexts:
         return context, kind
 
     def give_back(self, context, kind, address):
-        """Ends its pages and forgets what they kept; a context where that cannot be is not lent again."""
+        """Close its pages and clear its storage; do not reuse a context that cannot be cleared."""
         from playwright.sync_api import Error
 
         try:
@@ -286,7 +286,7 @@ def contexts(chromium):
 
 @pytest.fixture
 def open_page(contexts, plant):
-    """Opens the page at a robot (or the fleet), and at the end checks that nothing went wrong in it.
+    """Open the page at a robot (or the fleet), and check at the end that no error occurred in it.
 
     `drawn=False`: without 3-D, which the processor draws here, so that several pages at once have time
     to renew their leases. `refused=True`: the console refuses something, which a browser takes for an error.
@@ -330,7 +330,7 @@ def open_page(contexts, plant):
 
 @pytest.fixture(scope="module")
 def raised(plant, tmp_path_factory):
-    """Publishes an event of the arm that a watch of the plant hears."""
+    """Publish an event of the arm that a watch of the plant receives."""
     folder = tmp_path_factory.mktemp("watch")
 
     async def start():

@@ -1,6 +1,6 @@
-"""Many robots on the mesh, told of by one process: what a page of two hundred has to show.
+"""Many robots on the mesh, published by one process: the load for a page of two hundred robots.
 
-`crowd` runs this file as a process of its own, so that it takes no time of who tests or measures with it.
+`crowd` runs this file in a separate process, so that it takes no time from the test or the measurement.
 """
 
 import asyncio
@@ -36,10 +36,10 @@ STARTED_S = 60.0
 
 
 class Crowd:
-    """Robots `r000`, `r001`, ... of another process, which all move by themselves.
+    """Robots `r000`, `r001`, ... of another process, which all move.
 
     Attributes:
-        watched: `site/robot` of those whose slow joint states somebody takes now.
+        watched: `site/robot` of the robots with a subscriber of their slow joint states.
     """
 
     def __init__(self, process: "subprocess.Popen[str]") -> None:
@@ -59,7 +59,7 @@ class Crowd:
         assert self._told.wait(STARTED_S), "the crowd did not start: its traceback is above"
 
     def mark(self, state: str, names: Sequence[str]) -> None:
-        """Says which robots are `faulty` or `silent`; all others of the crowd are not."""
+        """Mark robots as `faulty` or `silent`; all others of the crowd are neither."""
         assert self._process.stdin
         print(json.dumps([state, list(names)]), file=self._process.stdin, flush=True)
 
@@ -78,7 +78,7 @@ class Crowd:
 
 @contextlib.contextmanager
 def crowd(endpoint: str, sites: Sequence[str], count: int) -> Iterator[Crowd]:
-    """A crowd for as long as it lasts, on the mesh of that router."""
+    """Yield a crowd on the mesh of that router."""
     command = [sys.executable, __file__, endpoint, str(count), *sites]
     held = Crowd(subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True))
     try:
@@ -89,7 +89,9 @@ def crowd(endpoint: str, sites: Sequence[str], count: int) -> Iterator[Crowd]:
 
 
 async def publish(session: Session, names: Sequence[str], said: dict[str, set[str]]) -> None:
-    """Says on stdout whose slow joint states are taken, as that changes; `said` is what `Crowd.mark` said."""
+    """Print the robots with a subscriber of slow joint states at each change; `said` is the text of
+    `Crowd.mark`.
+    """
     description = load("pt600")
     model = build_model(description)
     meshes = link_meshes(description)
@@ -164,7 +166,7 @@ def _joints(joints: Joints, seconds: float) -> JointStates:
 
 
 async def main(endpoint: str, count: str, *sites: str) -> None:
-    """Publishes until stdin ends."""
+    """Publish until stdin ends."""
     names = [f"{sites[i % len(sites)]}/r{i:03d}" for i in range(int(count))]
     said: dict[str, set[str]] = {"faulty": set(), "silent": set()}
     async with open_session(SessionSettings(connect=(endpoint,), wait_s=20.0)) as session:

@@ -11,7 +11,7 @@ from renderer.errors import NoEncoderError, NoOpenGLError
 
 @contextmanager
 def rendering(plant, folder, **settings):
-    """A renderer in the plant's thread; meshes are kept in the folder. Skips where nothing can be drawn."""
+    """Return a renderer in the plant's thread, with meshes in the folder; skip if it cannot draw."""
 
     async def start():
         chosen = service.Settings(site="hall", robots=("pt600",), folder=folder, **settings)

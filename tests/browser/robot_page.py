@@ -1,4 +1,4 @@
-"""Hands and eyes on a robot's page, for several test modules."""
+"""Actions and checks on a robot's page, for several test modules."""
 
 import re
 import time
@@ -18,7 +18,7 @@ def button(page, name):
 
 
 def stand_still(page, seconds):
-    """Nothing of the page goes on for so long, as in a browser that is too slow."""
+    """Block the page's scripts for so long, as in a browser that is too slow."""
 
     def close_later(dialog):
         time.sleep(seconds)
@@ -43,7 +43,7 @@ def take(page, name="li"):
 
 
 def ready(page, name="li"):
-    """Control taken, no stop latched, at home."""
+    """Acquire control, reset a latched stop, and home."""
     take(page, name)
     reset = page.get_by_role("button", name=re.compile("^Reset"))
     home, notice = button(page, "Home"), page.locator(".control .notice")
@@ -63,7 +63,9 @@ def ready(page, name="li"):
 
 
 def sent(page, do):
-    """Do what sends a command, again where a busy machine sends it after its not_after."""
+    """Execute an action that sends a command; repeat it if a slow machine sends the command after its
+    not_after.
+    """
     notice = page.locator(".control .notice")
     for _ in range(20):
         do()
@@ -82,7 +84,7 @@ def set_speed(page, percent):
 
 
 def move_slowly(page):
-    """A motion of many seconds runs: 5 degrees at 0.9 degrees a second, three times."""
+    """Start a motion of many seconds: 5 degrees at 0.9 degrees a second, three times."""
     set_speed(page, 1)
     button(page, "5").click()
     for _ in range(3):
@@ -99,7 +101,7 @@ def clear_stop(page):
 
 @contextmanager
 def fault(plant, name):
-    """The arm's simulated controller has a fault."""
+    """Set a fault in the arm's simulated controller."""
     key = "robomesh/hall/arm/simulator/fault"
     plant.call(plant.session.ask(key, FaultRequest(fault=name)))
     try:
@@ -147,9 +149,9 @@ def drag(page, joint, pixels, *, release=True):
 
 
 def serious(page, within="html"):
-    """What axe finds that keeps people from using the page, or a part of it.
+    """Return axe's serious findings on the page, or on a part of it.
 
-    Meanwhile the page stands still: a whole one longer than it keeps control, on a busy machine.
+    The page is blocked during the check. On a busy machine a whole page takes longer than a lease lasts.
     """
     if not page.evaluate("'axe' in window"):
         page.evaluate((build_page.MODULES / "axe-core" / "axe.min.js").read_text())

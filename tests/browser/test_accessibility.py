@@ -42,7 +42,7 @@ SMALL = """
 
 @pytest.fixture
 def alarmed(raised):
-    """There is an alarm to be shown."""
+    """Raise an alarm for the page to show."""
     raised("joints.gone", "no positions come from it")
     yield
     raised("joints.back", "positions come again", schema.Event.INFO)

@@ -61,7 +61,7 @@ def plant(tmp_path_factory):
 
 
 def told(plant, topic):
-    """The newest that the mesh says of the arm."""
+    """Return the newest message of the mesh about the arm."""
 
     async def heard():
         async with open_session(plant.site.mesh) as session:

@@ -1,4 +1,4 @@
-"""Alarms and the journal on the page, from a real watch; what one page does every page shows."""
+"""Alarms and the journal on the page, from a real watch; all pages show a change of one page."""
 
 import re
 
@@ -155,7 +155,7 @@ def test_alarms_and_events_have_their_reason_in_chinese(open_page, raised):
 
 
 def test_texts_of_others_change_the_order_of_nothing_beside_them(open_page, raised):
-    """Texts of another program with "Trojan Source" characters (CVE-2021-42574) and Hebrew."""
+    """Show texts of another program with "Trojan Source" characters (CVE-2021-42574) and Hebrew."""
     page = open_page(EVENTS, drawn=False)
     raised(
         "recorder.note", 'if access_level != "user\u202e \u2066// Check if admin\u2069 \u2066" {', Event.INFO

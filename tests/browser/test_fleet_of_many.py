@@ -15,7 +15,7 @@ FIRST, LAST = "yard/r000", f"yard/r{COUNT - 1:03d}"
 
 @pytest.fixture(scope="module")
 def many(plant):
-    """Robots of another site than the console's."""
+    """Yield robots of another site than the console's."""
     with crowd(plant.endpoint, ("yard",), COUNT) as held:
         yield held
 
@@ -25,7 +25,7 @@ def tile(page, name):
 
 
 def until(page, holds, *, seconds=30):
-    """Waits for what no locator sees."""
+    """Wait for a condition that no locator can see."""
     for _ in range(10 * seconds):
         if holds():
             return

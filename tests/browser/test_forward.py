@@ -1,4 +1,4 @@
-"""The page's own forward kinematics, in a real Chromium, against the robot model's."""
+"""The page's forward kinematics, in a real Chromium, compared with the robot model's."""
 
 import os
 import subprocess
@@ -57,7 +57,7 @@ def script():
 
 @pytest.fixture(scope="module")
 def page():
-    """An empty page that has the module at /forward.js."""
+    """Yield an empty page that has the module at /forward.js."""
     from playwright.sync_api import sync_playwright
 
     if not CHROMIUM.exists():

@@ -35,7 +35,7 @@ window.WebSocket = class extends WebSocket {
 
 
 def until(page, true):
-    """Waits for what the page's policy lets no locator evaluate."""
+    """Wait for a condition that the page's policy lets no locator evaluate."""
     for _ in range(400):
         if page.evaluate(true):
             return

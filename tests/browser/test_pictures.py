@@ -50,7 +50,7 @@ WANTED = os.environ.get("ROBOMESH_PICTURES") == "1"
 
 @pytest.fixture
 def rendered(plant, tmp_path):
-    """The plant's moving arm, rendered."""
+    """Yield the plant's moving arm, rendered."""
     with rendering(plant, tmp_path):
         yield
 

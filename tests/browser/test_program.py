@@ -1,4 +1,4 @@
-"""The program's page before a real site: written, taught, checked, run; and refused where it collides."""
+"""The program's page on a real site: written, taught, checked, run; and refused if it collides."""
 
 import json
 import re

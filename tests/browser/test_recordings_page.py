@@ -1,4 +1,4 @@
-"""Recordings on the page: begun at a robot, listed, played back; a replay is marked and takes no command."""
+"""Recordings on the page: started at a robot, listed, played; a replay is marked and accepts no command."""
 
 import asyncio
 import re
@@ -25,7 +25,7 @@ _Ask = schema.RecorderRequest
 
 @pytest.fixture(scope="module")
 def recorded(plant, tmp_path_factory):
-    """A recorder and a player of the plant, and the file of a recording of its moving arm."""
+    """Yield a recorder and a player of the plant, and the file of a recording of its moving arm."""
     folder = tmp_path_factory.mktemp("recordings")
 
     async def start():
@@ -90,7 +90,7 @@ def joints_in(recording):
 
 
 def play(page):
-    """Opens the recording from the list, and stops it where it is."""
+    """Open the recording from the list, and pause it."""
     page.get_by_role("link", name=f"Play {NAME}").click()
     expect(page.locator(".scene canvas[data-loaded=true]")).to_be_visible()
     expect(page.locator(".player")).to_have_attribute("data-replay", re.compile("^replay-"))
@@ -110,7 +110,7 @@ def moment_line(page):
 
 
 def until(page, condition):
-    """A condition, looked at until it holds."""
+    """Wait until a condition holds."""
     for _ in range(200):
         if condition():
             return

@@ -1,4 +1,4 @@
-"""The robot's page in a real Chromium before a real site: seeing, controlling, stopping."""
+"""The robot's page in a real Chromium on a real site: display, control, stop."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""The page of a console with accounts: signing in, what each role finds there, and how a session ends."""
+"""The page of a console with accounts: sign-in, the view of each role, and the end of a session."""
 
 import re
 
@@ -32,7 +32,9 @@ def plant(accounts, tmp_path_factory):
 
 @pytest.fixture
 def open_tab(contexts, plant):
-    """Opens tabs of one browser, which shares its cookies; nothing may go wrong in them."""
+    """Yield a function that opens tabs of one browser with shared cookies; check that no error occurs in
+    them.
+    """
     context, kind = contexts.lend(ignore_https_errors=True)
     wrong = []
 

@@ -102,7 +102,7 @@ def test_a_window_that_is_closed_has_not_given_control_back(open_page):
 
 
 def answers_of(page):
-    """From the next load on: whether the page gets what the console sends, `answers["come"]`."""
+    """Control, from the next load on, whether the page receives the console's messages: `answers["come"]`."""
     answers = {"come": True}
 
     def connect(socket):

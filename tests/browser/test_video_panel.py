@@ -19,7 +19,7 @@ WIDTH, HEIGHT = 320, 180
 
 
 class Encoder:
-    """Plain pictures as H.264, one frame a message, a key frame first."""
+    """H.264 encoder of plain pictures: one frame a message, a key frame first."""
 
     def __init__(self):
         self._codec = av.CodecContext.create("libx264", "w")

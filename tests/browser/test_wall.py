@@ -21,13 +21,13 @@ PIXELS = """
 
 @pytest.fixture(scope="module")
 def rendered(plant, tmp_path_factory):
-    """The plant's moving arm, rendered."""
+    """Yield the plant's moving arm, rendered."""
     with rendering(plant, tmp_path_factory.mktemp("meshes"), size=(640, 360), samples=0):
         yield
 
 
 def changes(page, place=".wall-tile"):
-    """Waits until the picture is another; how wide it is."""
+    """Wait until the picture changes; return its width."""
     before = page.evaluate(PIXELS, place)
     page.wait_for_function(f"([place, before]) => ({PIXELS})(place) !== before", arg=[place, before])
     return before.split()[0]

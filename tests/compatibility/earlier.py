@@ -64,7 +64,7 @@ class EarlierVersion:
 
 
 def end(process: subprocess.Popen[bytes]) -> None:
-    """End a process, by force if it does not end by itself."""
+    """End a process, by force if it does not exit after a signal."""
     process.terminate()
     try:
         process.wait(20.0)

@@ -1,4 +1,4 @@
-"""Services of an earlier version work beside those of this one, at one site."""
+"""Services of an earlier version work together with those of this one, at one site."""
 
 import asyncio
 import json
@@ -117,7 +117,7 @@ def plant(tmp_path_factory):
 
 @pytest.fixture(params=["now", "then"])
 def either(request, plant):
-    """The command line of each version."""
+    """Return the command line of each version."""
     return getattr(plant, request.param)
 
 

@@ -2,7 +2,7 @@
 
     python tests/fuzz/fuzz_readers.py [--inputs N] [--seconds S] [--seed N] [--reader 3ds] [--keep FOLDER]
 
-Only the documented errors may come of them, within seconds and a bounded memory. Anything else ends
+A reader may raise only the documented errors, within seconds and a bounded memory. Anything else ends
 the run with exit status 1 and its input in the folder.
 """
 
@@ -47,7 +47,7 @@ _COUNTS = (0, 1, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF)
 
 @dataclass(frozen=True)
 class Finding:
-    """An input that a reader cannot take."""
+    """Input that a reader cannot process."""
 
     reader: str
     data: bytes
@@ -55,7 +55,7 @@ class Finding:
 
 
 class HangError(BaseException):
-    """A reader that took too long; no Exception, for a reader may catch those."""
+    """Timeout of a reader; no Exception, because a reader may catch those."""
 
 
 def main() -> None:
@@ -85,7 +85,7 @@ def main() -> None:
 
 
 def fuzz(name: str, inputs: int, seconds: float, seed: int) -> tuple[int, Finding | None]:
-    """How many inputs one reader took, and the first that it could not."""
+    """Return how many inputs one reader accepted, and the first that it could not process."""
     chance = random.Random(f"{name} {seed}")
     corpus = list(READERS[name].corpus())
     before = signal.signal(signal.SIGPROF, _hang)
@@ -108,7 +108,7 @@ def fuzz(name: str, inputs: int, seconds: float, seed: int) -> tuple[int, Findin
 
 
 def _tried(read: Callable[[Path], object], path: Path) -> str:
-    """What was wrong with how a reader took a file; empty if nothing."""
+    """Return the reader's problem with a file; empty: none."""
     signal.setitimer(signal.ITIMER_PROF, SECONDS_AN_INPUT)  # its own time, not the machine's
     try:
         with warnings.catch_warnings():
@@ -135,7 +135,7 @@ def _hang(_signal: int, _frame: FrameType | None) -> None:
 
 
 def mutated(corpus: list[bytes], chance: random.Random) -> bytes:
-    """One of the files, changed in one to eight places."""
+    """Return one of the files, changed in one to eight places."""
     data = bytearray(chance.choice(corpus))
     for _ in range(chance.choice((1, 1, 1, 2, 4, 8))):
         if not data:
@@ -171,7 +171,9 @@ def mutated(corpus: list[bytes], chance: random.Random) -> bytes:
 
 
 def _grown(data: bytearray, at: int, chance: random.Random) -> bytearray:
-    """A block of a text repeated in itself, beside itself, or in all places of its like: structure grows."""
+    """Repeat a block of a text inside itself, after itself, or in all places of its kind: nesting or length
+    grows.
+    """
     opened = [place for place, byte in enumerate(data[: at + 1]) if byte in b"{["]
     begin = opened[-chance.choice((1, 2, 3))] if len(opened) > 2 else 0
     end = _closed(data, begin)
@@ -198,7 +200,7 @@ def _grown(data: bytearray, at: int, chance: random.Random) -> bytearray:
 
 
 def _closed(data: bytearray, begin: int) -> int:
-    """Where a block that is opened there is closed again, by its kind of bracket; the end if it is not."""
+    """Return the position at which a bracket that opens there closes; the end if it does not."""
     opening, depth = data[begin : begin + 1], 0
     closing = b"}" if opening == b"{" else b"]"
     for place in range(begin, len(data)):
@@ -210,7 +212,7 @@ def _closed(data: bytearray, begin: int) -> int:
 
 
 def _number(data: bytearray, at: int, chance: random.Random) -> None:
-    """The next number of a text becomes a strange one."""
+    """Replace the next number of a text with an unusual one."""
     digits = b"0123456789.-+eE"
     while at < len(data) and data[at] not in digits:
         at += 1
@@ -256,7 +258,7 @@ def _box() -> Mesh:
 
 @dataclass(frozen=True)
 class Reader:
-    """What reads a kind of file, and files of that kind."""
+    """Reader of a kind of file, and files of that kind."""
 
     read: Callable[[Path], object]
     corpus: Callable[[], Iterator[bytes]]

@@ -2,9 +2,9 @@
 
     python tests/fuzz/fuzz_units.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
-Real units, changed at random, some in one input, cut into pieces anywhere. No exception may come of them,
-no joint positions and no motion but those that a strict reading written apart from the gateway's gives,
-and no memory may stay. Anything else ends the run with exit status 1 and its input in the folder.
+Real units, changed at random, some in one input, cut into pieces anywhere. They may cause no exception and no
+leak. Joint positions and motions must equal those of a strict parser that is independent of the gateway's.
+Anything else ends the run with exit status 1 and its input in the folder.
 """
 
 import argparse
@@ -73,7 +73,7 @@ _NUMBER_AT = re.compile(rb"-? ?[0-9.]+")
 
 
 class Finding(NamedTuple):
-    """An input that the gateway does not take as it should."""
+    """Input that the gateway handles wrongly."""
 
     data: bytes
     problem: str
@@ -108,7 +108,7 @@ def main() -> None:
 
 
 def fuzz(inputs: int, seed: int) -> tuple[int, Finding | None]:
-    """How many inputs were taken, and the first that was not as it should be."""
+    """Return how many inputs the gateway accepted, and the first that it handled wrongly."""
     chance = random.Random(seed)
     gateways = [Gateway(codes) for codes in CODES]
     for count in range(inputs):
@@ -129,7 +129,7 @@ def fuzz(inputs: int, seed: int) -> tuple[int, Finding | None]:
 
 
 class Gateway:
-    """Both of a gateway's sides that read units, with all that follows of them but sockets and disk."""
+    """Both sides of a gateway that read units, with all of their effects except sockets and disk."""
 
     def __init__(self, codes: Mapping[int, str]) -> None:
         self._codes = dict(codes) or dict(enumerate(TYPES, start=1))
@@ -151,7 +151,7 @@ class Gateway:
         )
 
     def controller_sends(self, data: bytes, pieces: Sequence[bytes]) -> str:
-        """What was wrong with how the link's side took it; empty if nothing."""
+        """Return the problem on the link's side; empty: none."""
         self._now_s += 0.01
         events = [event for piece in pieces for event in self._driver.receive(piece)]
         now = Received(self._now_s, int(self._now_s * 1e9))
@@ -170,7 +170,7 @@ class Gateway:
         return "" if read == right else f"joints {read}, a strict reading gives {right}"
 
     def client_sends(self, data: bytes, pieces: Sequence[bytes]) -> str:
-        """What was wrong with how the side of old client programs took it; empty if nothing."""
+        """Return the problem on the side of old client programs; empty: none."""
         units = [
             event for piece in pieces for event in self._client.receive(piece) if isinstance(event, Unit)
         ]
@@ -190,7 +190,7 @@ class Gateway:
 
 
 class Sink:
-    """Publishes to nobody, but all of it."""
+    """Publisher without subscribers, which encodes every message."""
 
     def put(
         self, message: Message, *, source_time_ns: int | None = None, dated_by: int | None = None
@@ -214,7 +214,7 @@ StrictUnit = list[tuple[str, tuple[float, ...]]]
 
 
 def strict_units(data: bytes, codes: Mapping[int, str]) -> list[StrictUnit]:
-    """The well-formed units of what ends with "@": type and, where it has some, numbers of each record."""
+    """Return the well-formed units of a text that ends with "@": type and, if any, numbers of each record."""
     units = (strict(unit, codes) for unit in data.split(b"@")[:-1])
     return [unit for unit in units if unit is not None]
 
@@ -263,7 +263,7 @@ def strict_record(record: bytes, codes: Mapping[int, str]) -> tuple[str, tuple[f
 
 
 def mutated(chance: random.Random) -> bytes:
-    """Some units, most of them changed, ended by "@"; now and then one that is far too long."""
+    """Return some units, most of them changed, ended by "@"; a few are far too long."""
     if chance.random() < 0.0002:
         filling = chance.choice(SEEDS) + b";" + chance.choice(TOKENS)
         return filling * (chance.choice((65_000, 65_536, 140_000)) // len(filling)) + b"@"
@@ -300,13 +300,13 @@ def _changed(unit: bytes, chance: random.Random) -> bytes:
 
 
 def cut(data: bytes, chance: random.Random) -> list[bytes]:
-    """The same bytes as TCP may hand them over."""
+    """Split the same bytes as TCP may deliver them."""
     places = sorted(int(chance.random() * len(data)) for _ in range(chance.choice((0, 0, 1, 3))))
     return [data[begin:end] for begin, end in zip([0, *places], [*places, len(data)], strict=True)]
 
 
 def rss_mib() -> float:
-    """Memory of this process now."""
+    """Return the memory of this process now."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * 4096 / 2**20
 

@@ -2,7 +2,7 @@
 
     python tests/fuzz/hulls_and_meshes.py [--poses N] [--seed N] [--robots pt600,puma560,ur5]
 
-Random positions within limits and constraints, of each arm alone and among fixtures. A pair of links, or a
+Random positions within limits and constraints, of each arm without and with fixtures. A pair of links, or a
 link and a fixture, whose meshes touch and whose hulls do not ends the run with exit status 1.
 """
 
@@ -25,7 +25,7 @@ Pairs = set[tuple[str, str]]
 
 @dataclass
 class Count:
-    """What came of some poses; a touch is a pair in a pose.
+    """Results of some poses; a touch is a pair in a pose.
 
     Attributes:
         meshes, hulls: Touches.
@@ -41,7 +41,7 @@ class Count:
 
 
 def compare(robot: str, poses: int, seed: int) -> Count:
-    """An arm's touches by meshes and by hulls."""
+    """Compare an arm's touches by meshes with those by hulls."""
     arm = CellRobot("arm", robot, np.eye(4))
     bare = build_cell(CellDescription((arm,)))
     far = reach(bare.arms["arm"].description)
@@ -60,7 +60,7 @@ def compare(robot: str, poses: int, seed: int) -> Count:
 
 
 def around(far: float) -> tuple[Fixture, ...]:
-    """A table, a post and a ball, within an arm's reach [m]."""
+    """Return a table, a post and a ball, within an arm's reach [m]."""
     return (
         _fixture("table", box(np.array([0.3, -0.5, -0.05]) * far, np.array([0.9, 0.5, 0.0]) * far)),
         _fixture("post", box(np.array([-0.4, 0.4, 0.0]) * far, np.array([-0.3, 0.5, 1.0]) * far)),
@@ -77,7 +77,7 @@ def _fixture(name: str, solid: tuple[FloatArray, np.ndarray], at: FloatArray | N
 
 
 def touches(cell: Cell, positions: FloatArray) -> Pairs:
-    """Everything that touches."""
+    """Return all pairs that touch."""
     own = own_contacts(cell, "arm", positions)
     outside = outside_nearest(cell, "arm", positions, {}, within_m=0.0)
     return {each.pair for each in (*own, *outside)}

@@ -1,4 +1,4 @@
-"""A short run of the fuzzer: the long one is by hand, `python tests/fuzz/fuzz_readers.py`."""
+"""A short run of the fuzzer; run `python tests/fuzz/fuzz_readers.py` for a long one."""
 
 import importlib.util
 import sys

@@ -1,4 +1,4 @@
-"""A short run of the fuzzer of units: the long one is by hand, `python tests/fuzz/fuzz_units.py`."""
+"""A short run of the fuzzer of units; run `python tests/fuzz/fuzz_units.py` for a long one."""
 
 import importlib.util
 import sys

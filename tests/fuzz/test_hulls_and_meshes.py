@@ -1,4 +1,4 @@
-"""Some hundred poses of what is run by hand with 10,000: `python tests/fuzz/hulls_and_meshes.py`."""
+"""A run with some hundred poses; `python tests/fuzz/hulls_and_meshes.py` runs 10,000."""
 
 import pytest
 

@@ -68,7 +68,7 @@ FINDINGS = {
 
 @dataclass
 class Surroundings:
-    """What both controls see; the sequence changes it."""
+    """The environment of both controls; the sequence changes it."""
 
     now: Now
     link: LinkState = LinkState.UP
@@ -307,7 +307,7 @@ class Old(Side):
 
 
 class _Control(new_control.Control):
-    """Control that writes down its timer."""
+    """Control that records its timer."""
 
     def __init__(self, side: "New", ports: new_control.Ports) -> None:
         super().__init__(side.robot_authority, ports, side)
@@ -564,7 +564,7 @@ sequences = st.tuples(st.sampled_from([READY, READY, READY, []]), parts.map(join
 
 
 class Pair:
-    """Both sides, and what the sequence knows about them."""
+    """Both sides, and the sequence's knowledge about them."""
 
     def __init__(self) -> None:
         self.around = Surroundings(Now(1000.0, 1_700_000_000_000_000_000))

@@ -131,7 +131,7 @@ async def simulator(**settings):
 async def gateway(mesh, folder, *ports, up=True, each=(), **robot):
     """Run a gateway with one robot for each port, and a monitor; wait until the links are up.
 
-    `each`: settings of each robot alone; then every robot is watched.
+    `each`: settings of each robot; then every robot is watched.
     """
     names = ["arm", *(f"arm-{number}" for number in range(2, len(ports) + 1))]
     settings = Settings(

@@ -12,7 +12,7 @@ from web import build_page
 
 @pytest.fixture(scope="package")
 def plant(tmp_path_factory):
-    """A site of real processes: its page, the folder of its robots, the store of Define's files."""
+    """Yield a site of real processes: its page, the folder of its robots, the store of Define's files."""
     if not CHROMIUM.exists():
         pytest.skip(f"no {CHROMIUM}: the page is not driven here")
     build_page.build()

@@ -1,4 +1,4 @@
-"""Hands that work Define's page."""
+"""Actions on Define's page."""
 
 import base64
 import contextlib
@@ -13,7 +13,7 @@ SHAPES = LIBRARY / "pt500" / "meshes"
 
 
 def drop(page, *files):
-    """Files let go over the page, as from a file manager."""
+    """Drop files over the page, as from a file manager."""
     expect(page.locator(".define")).to_have_count(1)
     contents = [[name, base64.b64encode(content).decode()] for name, content in files]
     page.evaluate(
@@ -60,7 +60,7 @@ def opened(open_page, name, **settings):
 
 @contextlib.contextmanager
 def held(page, address):
-    """The first request to an address waits until the end of the block; others pass."""
+    """Delay the first request to an address until the end of the block; others pass."""
     waiting = []
 
     def hold(route):
@@ -82,7 +82,7 @@ def settled(page):
 
 
 def tools(page):
-    """The tool's placement (4, 4) [m]: as drawn, and as the server says."""
+    """Return the tool's placement (4, 4) [m]: as drawn, and as the server reports it."""
     settled(page)
     drawn = np.reshape(json.loads(page.locator(".define-scene canvas").get_attribute("data-tool")), (4, 4))
     return drawn, np.array(json.loads(page.locator(".tool-at").get_attribute("data-tool")))

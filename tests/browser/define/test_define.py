@@ -1,4 +1,4 @@
-"""Define, as a user does it: from files to a robot that moves, before a real site's page."""
+"""Define, as a user uses it: from files to a robot that moves, on the page of a real site."""
 
 import math
 import re

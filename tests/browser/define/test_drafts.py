@@ -1,4 +1,4 @@
-"""Define's drafts: what comes late, or from another tab, lands in no draft but its own."""
+"""Define's drafts: a late answer, or one from another tab, changes no other draft."""
 
 import shutil
 
