@@ -1,20 +1,20 @@
-"""Command: the dead man's stop, two operators racing for control, a stop under a flood of requests.
+"""Command latency: dead man's stop, two operators who race for control, stops during a flood of requests.
 
-A real router and gateway, each its own process, and a controller of this program's that notes when
-the stop unit is in its hands. All times are this machine's monotonic clock, so all must run here.
+A real router and gateway run as separate processes. A controller inside this program records the time of
+each stop unit. All times use this machine's monotonic clock, so all processes must run here.
 
     ./dev run python benchmarks/command.py [--dead-man 100] [--race 10000] [--stops 300]
         [--beside 120] [--json]
 
-dead man   an operator's process commands a long motion and is killed with -9, once with a session
-           that the mesh sees die, once without one, so that only the lease's end tells.
-           Reach: within the lease's time + 50 ms, always.
-race       two operators, each with a session of its own, ask for control at the same moment, again and
-           again. Reach: never two holders.
-beside     stops beside burners and floods, to both robots of a gateway, without keys and with them
-           (`stops_beside.py`). Reach: p95 beside a flood at most three times the p95 beside two burners.
-stops      requests of all kinds come as fast as the mesh takes them, 10,000 on their way at any time;
-           another session asks for stops. Reach: p99 on the controller's socket under 20 ms.
+dead man   an operator's process commands a long motion and is killed with -9. In one case the mesh sees
+           its session close; in the other only the expiry of the lease stops the robot.
+           Target: always within the lease's time + 50 ms.
+race       two operators with separate sessions ask for control at the same moment, again and again.
+           Target: never two holders.
+`beside`   stops to both robots of a gateway during CPU load and floods, without and with keys
+           (`stops_beside.py`). Target: p95 during a flood at most three times the p95 during CPU load.
+stops      one session sends requests of all kinds as fast as the mesh takes them, with 10,000 in flight;
+           another session asks for stops. Target: p99 on the controller's socket under 20 ms.
 """
 
 import argparse
@@ -35,7 +35,7 @@ from typing import Any
 import zenoh
 
 if __name__ == "__main__":
-    # A program beside this one has a room's name: what is imported is looked for from the root.
+    # Import from the root: a program in this folder has the same name as a package.
     sys.path[0] = str(Path(__file__).parents[1])
 
 from benchmarks.latency import free_port, process, service, summary, until_connectable
@@ -55,7 +55,7 @@ STOP_UNIT = b"COMMAND*stop@"
 
 
 class Controller:
-    """A controller that stands still, is homed and remote, and notes when each stop came [ns]."""
+    """A controller at rest, homed and remote, that records when each stop arrived [ns]."""
 
     def __init__(self) -> None:
         self._server = socket.create_server(("127.0.0.1", 0))
@@ -97,7 +97,7 @@ class Controller:
                         self.moving = True
 
     def wait_for_stop(self, number: int, timeout_s: float) -> int | None:
-        """When the stop of that number came [ns]; None: not in time."""
+        """Return when the stop with that number arrived [ns]; None after a timeout."""
         with self.came:
             self.came.wait_for(lambda: len(self.stops) > number, timeout_s)
             return self.stops[number] if len(self.stops) > number else None
@@ -107,7 +107,7 @@ class Controller:
 
 
 def dead_man(endpoint: str, controller: Controller, times: int, *, with_session: bool) -> dict[str, Any]:
-    """Kill operators in mid-motion; how long after the kill each stop was on the controller's socket."""
+    """Kill operators during a motion and return the delay until each stop reached the controller's socket."""
     delays, missing = [], 0
     for _ in range(times):
         before = len(controller.stops)
@@ -136,7 +136,7 @@ def dead_man(endpoint: str, controller: Controller, times: int, *, with_session:
 
 
 def operate(endpoint: str, with_session: bool, ready: Any) -> None:
-    """An operator who commands a motion and renews, until somebody kills him."""
+    """Command a motion and renew the lease until the parent kills this process."""
 
     async def main() -> None:
         async with open_session(SessionSettings(connect=(endpoint,), wait_s=20.0)) as session:
@@ -161,7 +161,7 @@ def operate(endpoint: str, with_session: bool, ready: Any) -> None:
 
 
 async def acquire(session: Session, operator: str, *, session_id: str = "", ttl_s: float = TTL_S) -> str:
-    """The secret of a lease, as soon as there is one to be had."""
+    """Return the secret of a lease as soon as the gateway grants one."""
     deadline = time.monotonic() + 10.0
     while True:
         try:
@@ -178,7 +178,7 @@ async def acquire(session: Session, operator: str, *, session_id: str = "", ttl_
 
 
 async def reset(endpoint: str) -> None:
-    """Clear the latched stop, and give control back."""
+    """Clear the latched stop and release control."""
     async with open_session(SessionSettings(connect=(endpoint,), wait_s=20.0)) as session:
         lease = await acquire(session, "wang", ttl_s=5.0)
         for number in range(1, 100):
@@ -199,7 +199,7 @@ async def reset(endpoint: str) -> None:
 
 
 async def race(endpoint: str, rounds: int) -> dict[str, Any]:
-    """Two operators ask at once; how often each was given control, and how often both were."""
+    """Let two operators ask at the same time; count the grants to each and the grants to both."""
     settings = SessionSettings(connect=(endpoint,), wait_s=20.0)
     won = {"li": 0, "wang": 0}
     both = nobody = 0
@@ -240,7 +240,7 @@ async def race(endpoint: str, rounds: int) -> dict[str, Any]:
 
 
 async def stops(endpoint: str, controller: Controller, number: int) -> dict[str, Any]:
-    """From asking for a stop to its unit in the controller's hands, in order."""
+    """Return the sorted delays from the request for a stop until its unit reaches the controller."""
     delays = []
     async with open_session(SessionSettings(connect=(endpoint,), wait_s=20.0)) as session:
         for _ in range(number):
@@ -261,7 +261,7 @@ async def stops(endpoint: str, controller: Controller, number: int) -> dict[str,
 
 
 def flood(endpoint: str, counts: Any, over: Any) -> None:
-    """Requests of all kinds, ten thousand on their way at once, until it is over."""
+    """Send requests of all kinds, with ten thousand in flight, until the measurement ends."""
     made = [
         ("command/eve", _COMMAND(lease="guess", id=1, command=_COMMAND.HOME).SerializeToString()),
         ("lease/request/eve", _LEASE(action=_LEASE.RENEW, lease="guess").SerializeToString()),
@@ -300,7 +300,7 @@ def flood(endpoint: str, counts: Any, over: Any) -> None:
 
 
 def stops_under_flood(endpoint: str, controller: Controller, number: int) -> dict[str, Any]:
-    """Stops alone, and stops beside the flood."""
+    """Measure stops without load, then stops during the flood."""
     quiet = asyncio.run(stops(endpoint, controller, number))
     counts = multiprocessing.RawArray("q", 2)
     over = multiprocessing.Event()
@@ -324,7 +324,7 @@ def stops_under_flood(endpoint: str, controller: Controller, number: int) -> dic
 
 @contextlib.contextmanager
 def bench_site() -> Iterator[tuple[str, Controller]]:
-    """A router, a gateway of one robot, and its controller."""
+    """Start a router, a gateway of one robot, and its controller."""
     controller, router = Controller(), free_port()
     with tempfile.TemporaryDirectory() as folder:
         site = Path(folder) / "site.toml"

@@ -1,4 +1,4 @@
-"""How soon Define's checks answer: the worker's start, then a check as one types.
+"""Response time of Define's checks: the worker's start, then one check for each keystroke.
 
 ./dev run python benchmarks/define.py [--robot puma560] [--checks 300] [--json]
 """
@@ -33,7 +33,7 @@ def main() -> None:
 
 
 async def measure(robot: str, checks: int) -> dict[str, float]:
-    """Times [ms] of the first check, with the worker's start, and of those that follow."""
+    """Return the times [ms] of the first check, with the worker's start, and of the later checks."""
     values, paths = read_robot(LIBRARY / robot)
     with tempfile.TemporaryDirectory() as folder:
         store = open_store(Path(folder) / "store")

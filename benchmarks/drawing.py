@@ -1,8 +1,8 @@
-"""How long a picture takes: drawing, overlay, H.264, JPEG; for each size and anti-aliasing.
+"""Time for one picture: drawing, overlay, H.264 and JPEG, for each size and anti-aliasing.
 
     ./dev run python benchmarks/drawing.py [--robot pt600] [--device N] [--pictures 60] [--json]
 
-Runs on software OpenGL and on a GPU alike, and says which it was, and which encoder.
+Runs on software OpenGL and on a GPU, and prints the device and the encoder.
 """
 
 import argparse
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 if __name__ == "__main__":
-    # A program beside this one has a room's name: what is imported is looked for from the root.
+    # Import from the root: a program in this folder has the same name as a package.
     sys.path[0] = str(Path(__file__).parents[1])
 
 from renderer.cameras import Camera, fitted
@@ -60,7 +60,7 @@ def main() -> None:
 
 
 def measure(robot: str, device: int | None, pictures: int) -> dict[str, Any]:
-    """Medians [ms] of each step for each size and anti-aliasing."""
+    """Return the medians [ms] of each step for each size and anti-aliasing."""
     description = load(robot)
     model = build_model(description)
     meshes = {name: prepared(glb) for name, glb in link_meshes(description).items()}

@@ -5,16 +5,16 @@
 
 Arms: `robomesh` (our publishers, our router, plain Zenoh clients), `zenoh` (a bare router, the same payloads
 without our code), `page` (our console, clients that speak the page's protocol), `pyzmq` (no broker), `nats`,
-`foxglove` (foxglove-sdk's server); `-plain` behind a name: without TLS, which all others have (pyzmq: CURVE).
+`foxglove` (foxglove-sdk's server). The suffix `-plain` switches TLS off (pyzmq: CURVE).
 The peers need a Python with pyzmq, nats-py and foxglove-sdk, and a nats-server. Each arm has the same
-publisher, at most four processes of monitors, and notes only the age of what came; the arms take turns,
-so that a busy machine is busy for all. A page is told the newest: what it was not sent because a newer state
-of the same robot was counts as overtaken. `--stopped`: beside each, the same with one more monitor, stopped.
-A peer that is not there is left out, what does not come up within a minute is told and passed over, and
-after `--minutes` nothing more is begun.
+publisher and at most four processes of monitors, which record only the age of each message. The arms take
+turns, so that other load on the machine affects all of them. The console sends a page the newest state; a
+state that a newer one of the same robot replaced counts as overtaken. `--stopped` repeats each measurement
+with one more monitor, which is stopped. The program skips a peer that is not installed, reports and skips
+an arm that does not start within a minute, and starts no measurement after `--minutes`.
 
-Reach: all delivered, or to a page overtaken; p99 at 64 at most 1.3 times the bare router's, and below NATS
-and foxglove-sdk; a stopped monitor changes the others' p99 by less than a fifth.
+Target: all messages delivered, or overtaken on a page; p99 at 64 monitors at most 1.3 times the bare
+router's, and below NATS and foxglove-sdk; a stopped monitor changes the others' p99 by less than a fifth.
 """
 
 import argparse
@@ -37,7 +37,7 @@ from typing import Any
 import numpy as np
 
 if __name__ == "__main__":
-    # A program beside this one has a room's name: what is imported is looked for from the root.
+    # Import from the root: a program in this folder has the same name as a package.
     sys.path[0] = str(Path(__file__).parents[1])
 
 from benchmarks.fanout_sent import prepared
@@ -48,12 +48,12 @@ ARMS = ("robomesh", "zenoh", "page", "pyzmq", "nats", "foxglove", "robomesh-plai
 MOST_PROCESSES = 4
 OUR_ROLES, PEERS_ROLES = HERE.with_name("fanout_ours.py"), HERE.with_name("fanout_peers.py")
 PEERS = {"pyzmq": "zmq", "nats": "nats", "foxglove": "foxglove"}
-# From its first process to its last word, beside the seconds that it measures.
+# Limit from the first process's start to the last line of output, plus the seconds that it measures.
 MOST_S = 60.0
 
 
 class NotMeasured(Exception):
-    """Why an arm has no figure."""
+    """An arm could not be measured."""
 
 
 def main() -> None:
@@ -100,7 +100,7 @@ def main() -> None:
 
 
 def missing_peer(kind: str, arguments: Any) -> str:
-    """What an arm needs and is not there, in words; nothing: it can run."""
+    """Return which requirement of an arm is missing; "" if it can run."""
     if kind not in PEERS:
         return ""
     if arguments.peers_python is None:
@@ -114,7 +114,7 @@ def missing_peer(kind: str, arguments: Any) -> str:
 
 
 class Cell:
-    """One arm with so many monitors, once."""
+    """A single measurement of one arm with a number of monitors."""
 
     def __init__(self, arm: str, count: int, stopped: bool, folder: Path, arguments: Any) -> None:
         self.arm, self.count, self.stopped, self.folder = arm, count, stopped, folder
@@ -128,17 +128,17 @@ class Cell:
         self.processes: list[subprocess.Popen[str]] = []
 
     def row(self) -> dict[str, Any]:
-        """What it is."""
+        """Return the parameters that identify this measurement."""
         return {"arm": self.arm, "monitors": self.count, "stopped": self.stopped}
 
     def measure(self) -> dict[str, Any]:
-        """Starts everything, lets it run, counts.
+        """Start all processes, run the measurement, and count.
 
         Raises:
-            NotMeasured: If something does not come up, or does not end in time.
+            NotMeasured: If a process does not start, or does not end in time.
         """
         with tempfile.TemporaryDirectory() as out, contextlib.ExitStack() as stack:
-            # Who is waited for in vain is killed, which its pipe tells.
+            # On a timeout, kill the process: the closed pipe then ends the wait.
             limit = threading.Timer(MOST_S + self.seconds, self.end)
             stack.callback(limit.cancel)
             limit.start()
@@ -173,7 +173,7 @@ class Cell:
             return {**self.summary(folder, sent), "cores": cores}
 
     def summary(self, folder: Path, sent: dict[str, int]) -> dict[str, Any]:
-        """Shares delivered, and ages [ms]."""
+        """Return the delivered shares and the ages [ms]."""
         ages = {
             what: np.concatenate([np.fromfile(file, dtype=np.int64) for file in folder.glob(f"{what}.*")])
             for what in ("joints", "pictures")
@@ -189,7 +189,7 @@ class Cell:
         }
 
     def role(self, role: str, folder: Path, count: int | None = None) -> Any:
-        """A process that publishes, or receives for so many monitors."""
+        """Start a process that publishes, or that receives for a number of monitors."""
         file = PEERS_ROLES if self.peers else OUR_ROLES
         address = self.page if self.kind == "page" and role == "receive" else self.address
         kind = "robomesh" if self.kind == "page" and role == "publish" else self.kind
@@ -197,7 +197,7 @@ class Cell:
         return self.started(words if count is None else [*words, str(count)])
 
     def started(self, words: list[str]) -> subprocess.Popen[str]:
-        """A process, which `end` ends."""
+        """Start a process, which `end` ends."""
         process = subprocess.Popen(
             words,
             stdin=subprocess.PIPE,
@@ -210,13 +210,13 @@ class Cell:
         return process
 
     def end(self) -> None:
-        """Ends all of them."""
+        """End all processes."""
         for process in self.processes:
             process.kill()
             process.wait()
 
     def servers(self, folder: Path) -> Iterator[list[str]]:
-        """What stands between publisher and monitors, started in this order."""
+        """Start the servers between publisher and monitors, in the order that they need."""
         if self.kind in ("robomesh", "page"):
             scheme = "tls" if self.tls else "tcp"
             site = folder / "site.toml"
@@ -252,23 +252,23 @@ CONSOLE_TLS_LINE = 'tls = {{ certificate = "{folder}/tls", key = "{folder}/key" 
 
 
 def shares(count: int) -> list[int]:
-    """So many monitors on at most four processes."""
+    """Divide the monitors among at most four processes."""
     processes = min(count, MOST_PROCESSES)
     return [count // processes + (number < count % processes) for number in range(processes)]
 
 
 def tell(process: Any, line: str) -> None:
-    """Gives a process a line; one that has ended is noticed when it is heard."""
+    """Send a line to a process; if the process has ended, `heard` reports it."""
     with contextlib.suppress(BrokenPipeError):
         process.stdin.write(f"{line}\n")
         process.stdin.flush()
 
 
 def heard(process: Any, word: str = "") -> str:
-    """A process's next line.
+    """Return a process's next line.
 
     Raises:
-        NotMeasured: If it says something else than that word, or nothing.
+        NotMeasured: If the line is missing or begins with another word.
     """
     line = str(process.stdout.readline()).strip()
     if not line or (word and line != word):
@@ -278,10 +278,10 @@ def heard(process: Any, word: str = "") -> str:
 
 
 def until_connectable(address: str) -> None:
-    """Waits until something listens there.
+    """Wait until a server listens at the address.
 
     Raises:
-        NotMeasured: If nothing does within a minute.
+        NotMeasured: If no server listens within a minute.
     """
     host, port = address.split(":")
     deadline = time.monotonic() + MOST_S
@@ -293,10 +293,10 @@ def until_connectable(address: str) -> None:
 
 
 def cpu_s(processes: list[Any]) -> float:
-    """Processor time that they have used [s].
+    """Return the processor time that the processes have used [s].
 
     Raises:
-        NotMeasured: If one was ended.
+        NotMeasured: If a process has ended.
     """
     ticks = 0
     for process in processes:
@@ -309,7 +309,7 @@ def cpu_s(processes: list[Any]) -> float:
 
 
 def summed(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Medians of the repeats; the p99's spread."""
+    """Return the medians of the repeats, and the spread of p99."""
     kinds: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
     for row in rows:
         kinds.setdefault((row["monitors"], row["arm"], row["stopped"]), []).append(row)

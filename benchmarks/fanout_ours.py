@@ -1,10 +1,10 @@
-"""Our own arms of `fanout.py`, and the bare router beside them.
+"""The project's own arms of `fanout.py`, and the bare router.
 
     python benchmarks/fanout_ours.py publish KIND ADDRESS FOLDER
     python benchmarks/fanout_ours.py receive KIND ADDRESS FOLDER COUNT
     python benchmarks/fanout_ours.py route ADDRESS FOLDER
 
-A file "tls" in the folder: secured.
+If the folder has a file "tls", the connections use TLS.
 """
 
 import asyncio
@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 if __name__ == "__main__":
-    # A program beside this one has a room's name: what is imported is looked for from the root.
+    # Import from the root: a program in this folder has the same name as a package.
     sys.path[0] = str(Path(__file__).parents[1])
 
 from benchmarks.fanout_parts import HEADER, ROBOTS, Ages, chosen, publish, told_when, watch_console
@@ -43,7 +43,7 @@ def endpoint_of(address: str, folder: Path) -> str:
 
 
 def bare_config(folder: Path, **values: Any) -> Any:
-    """A configuration with nothing of ours in it but the keys."""
+    """Return a Zenoh configuration without the project's settings, except the keys."""
     import zenoh
 
     config = zenoh.Config()
@@ -99,7 +99,7 @@ async def publish_robomesh(address: str, folder: Path) -> None:
 
 
 def payload_of_key_frame(folder: Path) -> int:
-    """The key frame's length: how it is told from the others."""
+    """Return the key frame's length, which distinguishes it from the other frames."""
     return int(struct.unpack("<I", (folder / "video").read_bytes()[:4])[0])
 
 

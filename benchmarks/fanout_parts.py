@@ -1,7 +1,7 @@
-"""What every arm of `fanout.py` does alike, in the standard library alone: the peers' Python runs it too.
+"""Parts common to all arms of `fanout.py`. Standard library only: the peers' Python runs them too.
 
-A process says "ready", is told when to begin and end, does its part, and says what it counted.
-Every message carries the 24 bytes of the mesh's header; the last 8 are the moment it was sent.
+A process prints "ready", reads when to begin and end, does its part, and prints its counts.
+Every message carries the 24 bytes of the mesh's header; the last 8 are the time at which it was sent.
 """
 
 import asyncio
@@ -20,25 +20,25 @@ from typing import NamedTuple
 ROBOTS = 10
 RATE_HZ, PICTURES_HZ = 100, 30
 HEADER = struct.Struct("<QQq")
-# What an arm puts: which robot, the header, the payload.
+# The arguments of an arm's put function: the robot's number, the header, the payload.
 Put = Callable[[int, bytes, bytes], None]
 
 
 class Window(NamedTuple):
-    """What is sent between these moments counts [ns since the Unix epoch]."""
+    """The interval in which sent messages count [ns since the Unix epoch]."""
 
     begin_ns: int
     end_ns: int
 
 
 def told_when() -> Window:
-    """Says that this process is ready, and waits for its parent's word."""
+    """Report that this process is ready, and wait for its parent's answer."""
     print("ready", flush=True)
     return Window(*(int(word) for word in sys.stdin.readline().split()))
 
 
 def payloads(folder: Path) -> tuple[bytes, list[bytes]]:
-    """A joints message, and the messages of a video's pictures; the first is a key frame."""
+    """Return a joints message and the messages of a video's pictures; the first is a key frame."""
     data = (folder / "video").read_bytes()
     pictures, at = [], 0
     while at < len(data):
@@ -49,7 +49,7 @@ def payloads(folder: Path) -> tuple[bytes, list[bytes]]:
 
 
 def publish(window: Window, folder: Path, put_joints: Put, put_picture: Put) -> None:
-    """Ten robots, evenly spread over each 10 ms, and one picture each 33 ms; says what was sent."""
+    """Publish ten robots, evenly within each 10 ms, and a picture each 33 ms; print the sent counts."""
     joints, pictures = payloads(folder)
     sent = {"joints": 0, "pictures": 0}
     began, tick, shown = time.monotonic(), 0, 0
@@ -70,36 +70,36 @@ def publish(window: Window, folder: Path, put_joints: Put, put_picture: Put) -> 
 
 
 class Ages:
-    """How old what came was, of all the subscribers of a process [ns]."""
+    """The ages of all messages that the subscribers of a process received [ns]."""
 
     def __init__(self) -> None:
-        # Empty until begun: what comes before is no part of the figures.
+        # Empty until the measurement begins: earlier messages do not count.
         self.window = Window(0, 0)
         self.joints, self.pictures = array("q"), array("q")
-        # States that did not come because a newer one of the same robot did.
+        # States that were not delivered because a newer state of the same robot replaced them.
         self.overtaken = 0
 
     def note(self, sent_ns: int, picture: bool) -> None:
-        """Takes one."""
+        """Record one message."""
         if self.window.begin_ns <= sent_ns < self.window.end_ns:
             (self.pictures if picture else self.joints).append(time.time_ns() - sent_ns)
 
     def write(self, folder: Path) -> None:
-        """Leaves them for the parent."""
+        """Write the ages to a file for the parent."""
         (folder / f"overtaken.{os.getpid()}").write_text(str(self.overtaken))
         for name in ("joints", "pictures"):
             with (folder / f"{name}.{os.getpid()}").open("wb") as file:
                 getattr(self, name).tofile(file)
 
     async def until_the_end(self, folder: Path) -> None:
-        """Waits for the parent's word and then for the end, on a loop that receives meanwhile."""
+        """Wait for the parent's answer and then for the end, on an event loop that continues to receive."""
         self.window = await asyncio.to_thread(told_when)
         await asyncio.sleep((self.window.end_ns - time.time_ns()) / 1e9 + 1.0)
         self.write(folder)
 
 
 class WebSocketReader(asyncio.Protocol):
-    """A WebSocket client that reads frames and does little else, so that a server is measured."""
+    """A WebSocket client that only reads frames, so that the measurement shows the server's cost."""
 
     def __init__(self, host: str, path: str, protocol: str, on_message: "Take") -> None:
         self._hello = (
@@ -113,7 +113,7 @@ class WebSocketReader(asyncio.Protocol):
         self.open = asyncio.get_running_loop().create_future()
 
     def with_protocol(self, name: str) -> "WebSocketReader":
-        """Asks for a sub-protocol."""
+        """Request a sub-protocol."""
         self._hello += f"Sec-WebSocket-Protocol: {name}\r\n"
         return self
 
@@ -122,7 +122,7 @@ class WebSocketReader(asyncio.Protocol):
         self.transport.write(f"{self._hello}\r\n".encode())  # type: ignore[union-attr]
 
     def send(self, payload: bytes, opcode: int = 2) -> None:
-        """One message; the mask is nought, which is one."""
+        """Send one message with a mask of zero bytes, which the protocol permits."""
         length = len(payload)
         size = bytes([0x80 | length]) if length < 126 else b"\xfe" + struct.pack(">H", length)
         assert self.transport is not None
@@ -161,9 +161,9 @@ Take = Callable[[WebSocketReader, int, bytes], None]
 
 
 async def watch_console(address: str, tls: bool, watches: list[str], count: int, folder: Path) -> None:
-    """So many pages' WebSockets, which watch the same; `watches` are messages of the page's protocol."""
+    """Open the pages' WebSockets with the same watches; `watches` are messages of the page's protocol."""
     ages = Ages()
-    # Of each page and robot the newest number.
+    # The newest number for each page and robot.
     newest: dict[tuple[WebSocketReader, int], int] = {}
 
     def take(reader: WebSocketReader, opcode: int, message: bytes) -> None:
@@ -188,7 +188,7 @@ async def watch_console(address: str, tls: bool, watches: list[str], count: int,
 
 
 async def connected(address: str, path: str, tls: bool, take: "Take", protocol: str = "") -> WebSocketReader:
-    """An open WebSocket."""
+    """Return an open WebSocket."""
     host, port = address.split(":")
 
     def made() -> WebSocketReader:
@@ -208,7 +208,7 @@ async def connected(address: str, path: str, tls: bool, take: "Take", protocol: 
 
 
 def unchecked() -> ssl.SSLContext:
-    """TLS with whoever is there: the benchmark's own certificates prove nothing."""
+    """Return a TLS context without verification: the benchmark's own certificates prove no identity."""
     context = ssl.create_default_context()
     context.check_hostname = False
     context.verify_mode = ssl.CERT_NONE
@@ -216,5 +216,5 @@ def unchecked() -> ssl.SSLContext:
 
 
 def chosen(**roles: Callable[..., None]) -> None:
-    """Runs the role that the command line names, with its other words as arguments."""
+    """Run the role that the command line names, with the remaining words as arguments."""
     roles[sys.argv[1]](*sys.argv[2:])

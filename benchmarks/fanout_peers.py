@@ -3,7 +3,7 @@
     python fanout_peers.py publish KIND ADDRESS FOLDER
     python fanout_peers.py receive KIND ADDRESS FOLDER COUNT
 
-A file "tls" in the folder: secured.
+If the folder has a file "tls", the connections use TLS.
 """
 
 import asyncio
@@ -92,7 +92,7 @@ async def receive_pyzmq(address: str, folder: Path, count: int) -> None:
 
 
 def publish_nats(address: str, folder: Path) -> None:
-    """With a plain socket, so that the client's Python costs nothing here: PUB is one line and the bytes."""
+    """Publish through a plain socket without the Python client: PUB is one line and the bytes."""
     import socket
     import threading
 
@@ -110,7 +110,7 @@ def publish_nats(address: str, folder: Path) -> None:
             if b"PING" in data:
                 line.sendall(b"PONG\r\n")
 
-    if not secured(folder):  # two threads of one TLS socket would meet
+    if not secured(folder):  # two threads must not use one TLS socket
         threading.Thread(target=answer_pings, daemon=True).start()
 
     def put(subject: str, header: bytes, payload: bytes) -> None:
@@ -156,7 +156,7 @@ def publish_foxglove(address: str, folder: Path) -> None:
         tls = {"tls_cert": (folder / "tls").read_bytes(), "tls_key": (folder / "key").read_bytes()}
     foxglove.start_server(host=host, port=int(port), **tls)
     names = [f"/arm-{number}/joints" for number in range(ROBOTS)] + ["/arm-0/video"]
-    schema = foxglove.Schema(name="bench", encoding="protobuf", data=b"-")  # which nobody reads
+    schema = foxglove.Schema(name="bench", encoding="protobuf", data=b"-")  # no client reads it
     channels = [foxglove.Channel(name, message_encoding="protobuf", schema=schema) for name in names]
 
     def put(number: int, header: bytes, payload: bytes) -> None:

@@ -1,4 +1,4 @@
-"""What `fanout.py` sends, and the keys that it is secured with."""
+"""The payloads that `fanout.py` sends, and the keys of its secured connections."""
 
 import struct
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ PICTURES = 60
 
 
 def prepared(folder: Path) -> tuple[Path, Path]:
-    """Payloads without and with keys; the pictures are drawn by our renderer."""
+    """Prepare payloads without and with keys; our renderer draws the pictures."""
     import trustme
     from cryptography.hazmat.primitives import serialization
 
@@ -32,7 +32,7 @@ def prepared(folder: Path) -> tuple[Path, Path]:
             serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
         )
     )
-    # A key pair of CurveZMQ's own documentation.
+    # The key pair of CurveZMQ's own documentation.
     (secured / "curve").write_bytes(
         b"Yne@$w-vo<fVvi]a<NY6T1ed:M$fCG*[IaLV{hID\nD:)Q[IlAW!ahhC2ac:9*A}h:p?([4%wOTJ%JR%cs"
     )
@@ -50,7 +50,7 @@ def joints() -> bytes:
 
 
 def pictures() -> Iterator[bytes]:
-    """Two seconds of a moving arm, 720p, H.264, as messages."""
+    """Return two seconds of a moving arm in 720p H.264, as messages."""
     from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
     from benchmarks.drawing import view

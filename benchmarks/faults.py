@@ -1,13 +1,13 @@
-"""Faults of a controller: what the gateway shows of each, how soon, and how soon all is well again.
+"""Faults of a controller: the state that the gateway shows, the delay until it does, and the recovery time.
 
     ./dev run python benchmarks/faults.py [--only freeze,flood] [--rounds 3] [--json]
 
-Router, gateway and simulator are processes of their own; each fault is begun and ended by request while
-they run. Times are this program's, a monitor's: from the answer to the request until the state and the
-event are here. `stale_s`, where the units cease: from the last joints message until the link is shown
-as silent or down.
+Router, gateway and simulator are separate processes; a request starts and ends each fault while
+they run. This program is a monitor and takes the times: from the answer to the request until the state and
+the event arrive. If the units stop, `stale_s` is the time from the last joints message until the link is
+shown as silent or down.
 
-Reach: stale within 1 s of the last unit; every fault shown, and recovered from by itself.
+Target: stale within 1 s of the last unit; every fault shown, and recovered from without an operator.
 """
 
 import argparse
@@ -39,7 +39,7 @@ Shown = Callable[["Seen"], bool]
 
 @dataclass
 class Seen:
-    """What the monitor has seen."""
+    """The states and events that the monitor received."""
 
     controller: STATE = field(default_factory=STATE)
     events: list[str] = field(default_factory=list)
@@ -50,12 +50,12 @@ class Seen:
 
 @dataclass(frozen=True)
 class Row:
-    """What a fault should show."""
+    """The state and event that a fault must show."""
 
     state: str
     shown: Shown
     event: str = ""
-    ceases: bool = False  # no more units of use come
+    ceases: bool = False  # no more usable units arrive
 
 
 def link(state: int, text: str = "") -> Shown:
@@ -108,7 +108,7 @@ def main() -> None:
 
 
 def measure(names: list[str], rounds: int) -> dict[str, Any]:
-    """Every fault, one after the other."""
+    """Measure every fault, one after the other."""
     router, port = free_port(), free_port()
     endpoint = f"tcp/127.0.0.1:{router}"
     with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
@@ -126,7 +126,7 @@ def measure(names: list[str], rounds: int) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def simulator(port: int, endpoint: str) -> Iterator[None]:
-    """A simulated controller that takes requests for faults."""
+    """Start a simulated controller that accepts requests for faults."""
     words = ("simulate", "--listen", f"127.0.0.1:{port}", "--for", "bench/arm", "--connect", endpoint)
     process = subprocess.Popen(
         [sys.executable, "-m", "services.command_line.main", *words],
@@ -155,7 +155,7 @@ async def watch(endpoint: str, names: list[str]) -> dict[str, Any]:
 
 @contextlib.asynccontextmanager
 async def seeing(session: Session) -> AsyncIterator[Seen]:
-    """A monitor of the robot."""
+    """Start a monitor of the robot."""
     seen = Seen()
 
     async def take(topic: str) -> None:
@@ -181,7 +181,7 @@ async def seeing(session: Session) -> AsyncIterator[Seen]:
 
 
 async def one(session: Session, seen: Seen, name: str) -> dict[str, Any]:
-    """Begin a fault, see it, end it, see that all is well."""
+    """Start a fault, wait until it shows, end it, and wait for the recovery."""
     row = ROWS[name]
     await until(lambda: well(seen), "well before")
     await asyncio.sleep(CALM_S)

@@ -1,12 +1,12 @@
 """The Fleet page with many robots: times between frames in Chromium, at rest and while it is scrolled.
 
-A crowd of robots in a process of its own, our router, our console. Chromium draws in software on the main
-processor, as it does without a GPU. Each round opens the page anew, at a phone's width and a control room's,
-with the arms' pictures and, in the same round, in a browser without WebGL: what the rest of the page costs.
+The robots run in a separate process, with our router and our console. Chromium draws in software on the main
+processor, as it does without a GPU. Each round reopens the page, at the width of a phone and of a control
+room. A browser without WebGL shows no pictures: in the same round it gives the cost of the rest of the page.
 
     ./dev run python benchmarks/fleet_page.py [--robots 200] [--rounds 3] [--seconds 5] [--json]
 
-Reach: p50 under 34 ms while the page is scrolled at 1440 px.
+Target: p50 under 34 ms while the page is scrolled at 1440 px.
 """
 
 import argparse
@@ -24,7 +24,7 @@ from latency import free_port, service, until_connectable
 from playwright.sync_api import Browser, sync_playwright
 
 if __name__ == "__main__":
-    # A program beside this one has a room's name: what is imported is looked for from the root.
+    # Import from the root: a program in this folder has the same name as a package.
     sys.path[0] = str(Path(__file__).parents[1])
 
 from tests.browser.conftest import ARGUMENTS, CHROMIUM, NO_WEBGL
@@ -36,7 +36,7 @@ SPEED_PX_S = 600
 SETTLED_MS = 3000
 OPENED_MS = 120_000
 
-# Times between frames [ms]; scrolled down and up again, as far a second on each machine.
+# Times between frames [ms]; the page scrolls down and up at the same speed on every machine.
 FRAMES = """
 ([seconds, speed]) => new Promise((done) => {
   const times = [], began = performance.now();
@@ -81,7 +81,7 @@ def main() -> None:
 
 
 def measure(robots: int, rounds: int, seconds: float) -> dict[str, Any]:
-    """Every width with and without pictures, in turn, so many rounds."""
+    """Measure every width with and without pictures, in turn, for that number of rounds."""
     router, console = free_port(), free_port()
     endpoint, address = f"tcp/127.0.0.1:{router}", f"127.0.0.1:{console}"
     kinds = [(size, drawn) for size, drawn in product(SIZES, (True, False))]
@@ -117,7 +117,7 @@ def measure(robots: int, rounds: int, seconds: float) -> dict[str, Any]:
 def one(
     browser: Browser, address: str, size: tuple[int, int], drawn: bool, robots: int, seconds: float
 ) -> dict[str, list[float]]:
-    """Times between frames [ms] of a page that was just opened."""
+    """Open the page and return the times between its frames [ms]."""
     page = browser.new_page(viewport={"width": size[0], "height": size[1]}, color_scheme="dark")
     if not drawn:
         page.add_init_script(NO_WEBGL)
@@ -138,7 +138,7 @@ def one(
 
 
 def _spread(rounds: list[list[float]]) -> dict[str, dict[str, float]]:
-    """Median, least and most of the rounds' own p50 and p99 [ms]."""
+    """Return the median, least and most of the rounds' p50 and p99 [ms]."""
     result = {}
     for name, share in (("p50_ms", 0.5), ("p99_ms", 0.99)):
         values = [sorted(times)[min(int(len(times) * share), len(times) - 1)] for times in rounds]

@@ -1,13 +1,13 @@
-"""The gateway under load: units parsed a second, robots that one process carries, clients that do not read.
+"""The gateway under load: units parsed a second, robots in one process, clients that do not read.
 
     ./dev run python benchmarks/gateway.py [--parse] [--robots 1,10,100] [--legacy] [--seconds 10] [--json]
 
-All three sections unless some are named. Processes are real ones (router, gateway, controllers, monitor),
-all on this machine: latencies are taken on its monotonic clock, from just before a unit is written to its
+Without an option, all three sections run. Router, gateway, controllers and monitor are separate processes
+on this machine. Latencies use its monotonic clock, from just before a unit is written to its
 controller's socket until a monitor's subscriber has the message. CPU is user and system time of all the
-gateway's threads. The peer is a bare Zenoh put of as many bytes, as often, right after.
+gateway's threads. The peer is a bare Zenoh put with the same size and rate, measured right after.
 
-Reach: 150,000 five-joint units a second on one core; 100 robots x 100 Hz, nothing lost, p99 under 20 ms,
+Target: 150,000 five-joint units a second on one core; 100 robots x 100 Hz, nothing lost, p99 under 20 ms,
 at most 60 us of CPU a unit; one of 64 clients that never reads costs the others at most 20 % of p99.
 """
 
@@ -93,7 +93,7 @@ def show(result: dict[str, Any]) -> None:
 
 
 def parse() -> dict[str, dict[str, float]]:
-    """Bytes in, events out, on one core; the best of five runs over 20,000 units."""
+    """Parse bytes to events on one core; return the best of five runs over 20,000 units."""
     chance = random.Random(1)
 
     def values(separator: str = ";") -> str:
@@ -138,7 +138,7 @@ def parsed_s(pieces: list[bytes], codes: dict[int, str], units: int) -> float:
 
 
 def carry(robots: int, seconds: float) -> dict[str, Any]:
-    """So many robots in one gateway, and as many bare publishers after them."""
+    """Measure a number of robots in one gateway, then the same number of bare publishers."""
     units = int(seconds * RATE_HZ)
     sent = robots * units
     written, put = multiprocessing.RawArray("q", sent), multiprocessing.RawArray("q", sent)
@@ -185,14 +185,14 @@ def carry(robots: int, seconds: float) -> dict[str, Any]:
 
 
 def decoded(key: str, payload: bytes, at: int) -> tuple[int, int, int] | None:
-    """Which robot's which unit it was, and when it came; None: one from before the measurement."""
+    """Return the robot, the unit's number and its arrival; None for a unit from before the measurement."""
     joints = JointStates.FromString(payload).joints
     k = round(joints[-1].position * DEGREES / STEP_DEG) + round(joints[0].position * DEGREES) * 10_000
     return (int(key.split("/")[2].removeprefix("arm-")), k, at) if k else None
 
 
 def lost_numbers(seen: list[Seen]) -> int:
-    """Gaps in the sequences of all publishers."""
+    """Count the gaps in the sequences of all publishers."""
     numbers: dict[str, list[int]] = {}
     for key, _, attachment, _ in seen:
         numbers.setdefault(key, []).append(unpack(attachment).sequence)
@@ -201,7 +201,7 @@ def lost_numbers(seen: list[Seen]) -> int:
 
 @contextlib.contextmanager
 def monitor(endpoint: str, key_expr: str) -> Iterator[list[Seen]]:
-    """All that comes on a key, with the time at which it was in hand; nothing is decoded meanwhile."""
+    """Receive every message on a key with its arrival time; decode none during the measurement."""
     seen: list[Seen] = []
     with zenoh.open(client_config((endpoint,))) as session:
         subscriber = session.declare_subscriber(key_expr, zenoh.handlers.RingChannel(100_000))
@@ -223,7 +223,7 @@ def monitor(endpoint: str, key_expr: str) -> Iterator[list[Seen]]:
 
 
 def bare_puts(endpoint: str, robots: int, put: Any, units: int, size: int, cpu: Any) -> None:
-    """What Zenoh itself takes: as many publishers and bytes, the same rate, priority and router."""
+    """Measure plain Zenoh: as many publishers and bytes, with the same rate, priority and router."""
     with zenoh.open(client_config((endpoint,))) as session:
         publishers = [
             session.declare_publisher(

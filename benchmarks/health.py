@@ -1,10 +1,10 @@
-"""What it costs a gateway of many robots to tell its health, and to be read by Prometheus.
+"""The CPU cost of a gateway's health reports and Prometheus scrapes, for many robots.
 
     ./dev run python benchmarks/health.py [--robots 100] [--json]
 
-CPU time of this process alone, over a real router: publishers and answerers as a gateway declares them.
-Health is told every 2 s, Prometheus asks every 5 s (docs/monitoring.md); a gateway of 100 robots at
-100 Hz uses 0.57 of a core (gateway.py). Reach: less than 2 % of that.
+CPU time of this process alone, over a real router: publishers and queryables as a gateway declares them.
+The gateway reports its health every 2 s, Prometheus scrapes every 5 s (docs/monitoring.md); a gateway of
+100 robots at 100 Hz uses 0.57 of a core (gateway.py). Target: less than 2 % of that.
 """
 
 import argparse
@@ -70,7 +70,7 @@ async def measure(robots: int) -> dict[str, float]:
 
 
 def declare(session: Session, names: list[str]) -> None:
-    """What a gateway declares for its robots."""
+    """Declare the publishers and queryables of a gateway for its robots."""
 
     async def answer(request: Request) -> LeaseAnswer:
         return LeaseAnswer()

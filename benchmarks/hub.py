@@ -1,13 +1,13 @@
-"""What a hub costs as the mesh grows: many sites' routers, each with many robots' keys, and one who joins.
+"""The cost of a hub as the mesh grows: many sites' routers with many robots' keys each, and a new client.
 
     ./dev run python benchmarks/hub.py [--sites 5,10,20] [--robots 50] [--json]
 
-Each site is a router with one client that declares what a robot's services declare: a publisher and a
+Each site is a router with one client that declares the keys of a robot's services: a publisher and a
 queryable for each topic of the table, a queryable for each request, four tokens of presence. The sites
-share a process, whose start costs more than they do; the hub has its own. No state is sent. Told: the hub's
-memory, the processor time of the hub and of all sites' routers and clients, what this machine's loopback
-carried until the hub knew everything, how long somebody who joins at the hub waits for everybody's presence
-and for every robot's answer to one get; and what one site more takes.
+share a process, because a process each would cost more than the sites do; the hub has a separate process.
+No state is sent. Results: the hub's memory; the processor time of the hub and of all sites' routers and
+clients; the bytes on this machine's loopback until the hub knew all keys; the time until a new client at the
+hub has all presence tokens, and every robot's answer to one get; and the cost of one more site.
 """
 
 import argparse
@@ -25,7 +25,7 @@ import psutil
 import zenoh
 
 if __name__ == "__main__":
-    # A program beside this one has a room's name: what is imported is looked for from the root.
+    # Import from the root: a program in this folder has the same name as a package.
     sys.path[0] = str(Path(__file__).parents[1])
 
 from robomesh.endpoints import client_config, router_config
@@ -48,7 +48,7 @@ def main() -> None:
 
 
 def measure(sites: int, robots: int) -> dict[str, Any]:
-    """So many sites on one hub."""
+    """Measure one hub with a number of sites."""
     context = multiprocessing.get_context("spawn")
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     hub = context.Process(target=route, args=(endpoint,), daemon=True)
@@ -66,7 +66,7 @@ def measure(sites: int, robots: int) -> dict[str, Any]:
             ours.send(sites)
             present.until(sites * robots * len(SERVICES))
             known_s = time.monotonic() - begun
-        time.sleep(2.0)  # what presence overtook
+        time.sleep(2.0)  # declarations that arrive after the presence tokens
         row = {
             "sites": sites,
             "robots": sites * robots,
@@ -99,7 +99,7 @@ def measure(sites: int, robots: int) -> dict[str, Any]:
 
 
 class Present:
-    """Whose tokens are known to a session."""
+    """The presence tokens that a session knows."""
 
     def __init__(self, session: zenoh.Session) -> None:
         self._keys: set[str] = set()
@@ -114,10 +114,10 @@ class Present:
         self._subscriber.undeclare()
 
     def until(self, count: int) -> None:
-        """Until so many are.
+        """Wait until that number of tokens is known.
 
         Raises:
-            SystemExit: If they are not within 2 minutes.
+            SystemExit: If they are not known within 2 minutes.
         """
         deadline = time.monotonic() + 120.0
         while len(self._keys) < count:
@@ -127,7 +127,7 @@ class Present:
 
 
 def topics() -> list[str]:
-    """Keys of a robot's topics; of views the four."""
+    """Return the keys of a robot's topics, with four views."""
     found = [name for name in TOPICS if not name.endswith("/*")]
     return found + [
         f"{kind}/{view}" for kind in ("video", "image") for view in ("front", "top", "left", "free")
@@ -144,7 +144,7 @@ def route(endpoint: str) -> None:
 
 
 def serve_plants(told: Connection, robots: int, hub: str) -> None:
-    """Starts as many sites more as it is told."""
+    """Start as many more sites as each request asks for."""
     with contextlib.ExitStack() as stack:
         kept: list[Any] = []
         number = 0
@@ -156,7 +156,7 @@ def serve_plants(told: Connection, robots: int, hub: str) -> None:
 
 
 def start(stack: contextlib.ExitStack, number: int, robots: int, hub: str) -> list[Any]:
-    """A site: its router, and a client in whose name all its robots' services speak."""
+    """Start a site: its router, and a client that declares the services of all its robots."""
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     stack.enter_context(zenoh.open(router_config((endpoint,), (hub,))))
     session = stack.enter_context(zenoh.open(client_config((endpoint,))))
@@ -190,7 +190,7 @@ def cpu_s(pid: int | None) -> float:
 
 
 def loopback() -> int:
-    """What the loopback interface has carried [bytes]."""
+    """Return how many bytes the loopback interface has carried."""
     return int(psutil.net_io_counters(pernic=True)["lo"].bytes_sent)
 
 

@@ -1,12 +1,12 @@
-"""Kinematics and checks: how many a second, how often solved, how long; beside peers in the same run.
+"""Kinematics and checks: calls a second, share solved and time taken, compared with peers in the same run.
 
     ./dev run python benchmarks/kinematics.py [--targets 1000] [--peers-python PYTHON] [--json]
 
-PYTHON has roboticstoolbox-python, mujoco and ikpy, in a venv of its own. UR5 and Panda are measured where
-`./dev example-robots` installed them. All are asked for the same targets, which random joint positions
+PYTHON is a separate environment with roboticstoolbox-python, mujoco and ikpy. UR5 and Panda are measured if
+`./dev example-robots` installed them. All solvers get the same targets, which random joint positions
 within limits reach; a solution counts within limits and 1e-4 m, 1e-3 rad (ours answers only within
-1e-5 m, 2e-4 rad). Pt500 and Pt600 are asked for position and tool axis; roboticstoolbox, which has no such
-task, for the whole pose, which there is reachable too. TRAC-IK's figures are its own, read, not measured.
+1e-5 m, 2e-4 rad). For Pt500 and Pt600 the task is position and tool axis. roboticstoolbox has no such
+task and solves for the whole pose, which is reachable too. TRAC-IK's figures are quoted, not measured.
 """
 
 import argparse
@@ -85,7 +85,7 @@ def measure(count: int, peers_python: str) -> dict[str, Any]:
 
 
 class Arm:
-    """An arm, and what all are asked of it: x (m,) are the positions of the joints that move its tool."""
+    """An arm and its test cases; x (m,) holds the positions of the joints that move its tool."""
 
     def __init__(self, name: str, count: int) -> None:
         description = load(name)
@@ -107,7 +107,7 @@ class Arm:
         return positions
 
     def forward(self) -> dict[str, Any]:
-        """Calls a second of forward kinematics and Jacobian together."""
+        """Count the calls a second of forward kinematics and Jacobian together."""
         model, everywhere = self.model, [self.whole(x) for x in self.positions]
         inner, data, frame = model._pinocchio, model._workspace, model._frame_ids[0]
 
@@ -132,7 +132,7 @@ class Arm:
         }
 
     def _from_product(self, positions: FloatArray) -> float:
-        """How far the tool is from where a plain product of matrices puts it."""
+        """Return the distance between the tool and its place by a plain product of matrices."""
         placement = np.eye(4)
         for fixed, angle in zip(self.fixed()[:-1], positions[self.chain.moving], strict=True):
             c, s = np.cos(angle), np.sin(angle)
@@ -141,7 +141,7 @@ class Arm:
         return float(np.abs(placement @ self.fixed()[-1] - tool_placement(self.model, positions)).max())
 
     def fixed(self) -> list[FloatArray]:
-        """(4, 4) from each joint to the one before it, z its axis, and from the tool to the last."""
+        """Return (4, 4) from each joint (axis z) to the previous one, and from the tool to the last."""
         if not hasattr(self, "_fixed"):
             frames = [np.eye(4)]
             for axis, origin in zip(self.chain.axes, self.chain.origins, strict=True):
@@ -165,9 +165,9 @@ class Arm:
         return self.judged(found, times)
 
     def judged(self, found: Sequence[Any], seconds: Sequence[float]) -> dict[str, Any]:
-        """Whether each solution is one, put back through the forward kinematics.
+        """Return which solutions are correct, by forward kinematics.
 
-        Coupled limits do not count: the peers know none.
+        Coupled limits do not count, because the peers do not know them.
         """
         solved, worst = 0, 0.0
         for x, target in zip(found, self.targets, strict=False):
@@ -221,7 +221,7 @@ def ask_peers(arms: dict[str, Arm], python: str) -> dict[str, Any]:
 
 
 def rate(call: Callable[[FloatArray], Any], positions: Sequence[FloatArray]) -> float:
-    """Calls a second: the best of five rounds over the positions."""
+    """Return the calls a second: the best of five rounds over the positions."""
     best = np.inf
     for _ in range(5):
         begin = time.perf_counter()
@@ -232,7 +232,7 @@ def rate(call: Callable[[FloatArray], Any], positions: Sequence[FloatArray]) -> 
 
 
 def around() -> tuple[Fixture, ...]:
-    """Three fixtures about an arm that stands on the floor."""
+    """Return three fixtures around an arm on the floor."""
     rows = [
         ("table", (600.0, 800.0, 100.0), (650.0, 0.0, 50.0)),
         ("fence", (20.0, 1500.0, 1000.0), (-800.0, 0.0, 500.0)),
@@ -248,7 +248,7 @@ def around() -> tuple[Fixture, ...]:
 
 
 def collisions(name: str) -> dict[str, Any]:
-    """Checks a second at random positions, of hulls."""
+    """Count the checks of hulls a second at random positions."""
     cell = build_cell(CellDescription((CellRobot("arm", name, np.eye(4)),), around()))
     joints = cell.arms["arm"].joints
     random = np.random.default_rng(2)
@@ -268,7 +268,7 @@ def collisions(name: str) -> dict[str, Any]:
 
 
 def program() -> dict[str, Any]:
-    """A minute of moves beside three fixtures, and how long its check takes, the best of three."""
+    """Return the check time of a minute of moves near three fixtures, the best of three."""
     cell = build_cell(CellDescription((CellRobot("arm", "pt600", np.eye(4)),), around()))
     joints = cell.arms["arm"].joints
     start = joints.home
@@ -277,7 +277,7 @@ def program() -> dict[str, Any]:
         for x in allowed_positions(joints, 500, seed=3)
         if not own_contacts(cell, "arm", x) and not outside_nearest(cell, "arm", x, {}, within_m=0.05)
     ]
-    # No motion comes twice: a check keeps what it has seen of one.
+    # Use each motion once: a check caches the motions that it has seen.
     lines = ["speed 60", *("move_joints " + " ".join(f"{x:.2f}" for x in np.degrees(x)) for x in clear)]
     count, found = 1, None
     while found is None or found.duration_s < 60:

@@ -1,9 +1,9 @@
-"""The same arms, targets and questions for the peers: run by `kinematics.py` with a Python that has them.
+"""Peers on the same arms, targets and tasks: `kinematics.py` runs this with a Python that has them.
 
     PEERS_PYTHON benchmarks/kinematics_peers.py ARMS.json
 
-It imports nothing of the project. Each arm is joints that turn about z: where each stands in the one
-before it, and where the tool stands in the last.
+It imports no module of the project. Each arm is a list of joints that turn about z: the placement of each in
+the previous one, and of the tool in the last.
 """
 
 import json
@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-# Of a squared error [m^2 + rad^2], halved: within 1e-4.
+# Half the squared error [m^2 + rad^2], for an error within 1e-4.
 TOLERANCE = 5e-9
-# For who takes a tenth of a second each.
+# For solvers that take a tenth of a second for each target.
 SLOW_TARGETS = 100
 
 
@@ -43,7 +43,7 @@ def toolbox(arm: dict[str, Any]) -> dict[str, Any]:
     found, times = [], []
     for target in arm["targets"]:
         begin = time.perf_counter()
-        # The damping that it does best with, of 1, 0.1 and 0.01.
+        # The best damping for it, of 1, 0.1 and 0.01.
         solution = ets.ik_LM(target, tol=TOLERANCE, method="chan", k=0.1)
         times.append(time.perf_counter() - begin)
         found.append(np.asarray(solution.q if hasattr(solution, "q") else solution[0]).tolist())
@@ -126,7 +126,7 @@ def ikpy_(arm: dict[str, Any]) -> dict[str, Any]:
 
 
 def rate(call: Any, positions: Any) -> float:
-    """Calls a second: the best of five rounds over the positions."""
+    """Return the calls a second: the best of five rounds over the positions."""
     best = np.inf
     for _ in range(5):
         begin = time.perf_counter()
@@ -137,7 +137,7 @@ def rate(call: Any, positions: Any) -> float:
 
 
 def pose(placement: Any) -> str:
-    """A placement as MJCF has it: Shepperd's quaternion."""
+    """Return a placement in MJCF's form, with Shepperd's quaternion."""
     r = placement[:3, :3]
     squares = [1 + np.trace(r), *(1 + 2 * r[i, i] - np.trace(r) for i in range(3))]
     k = int(np.argmax(squares))

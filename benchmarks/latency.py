@@ -1,12 +1,12 @@
 """Latency: a controller writes a unit -> a monitor has the decoded joints, and -> a video packet shows it.
 
-One robot at 100 Hz through the real gateway and router, each its own process, beside a bare Zenoh
-put -> subscriber through the same router in the same seconds. Every clock read is this machine's
-monotonic one, so all processes must run here.
+One robot at 100 Hz goes through the real gateway and router, each a separate process. In the same seconds a
+bare Zenoh put -> subscriber uses the same router. Every clock is this machine's monotonic one, so all
+processes must run here.
 
     ./dev run python benchmarks/latency.py [--seconds 60] [--video] [--json]
 
-The bare message has the size of a joints message. Reach: p50 at most 4 times the bare one, nothing lost.
+The bare message has the size of a joints message. Target: p50 at most 4 times the bare one, nothing lost.
 """
 
 import argparse
@@ -34,7 +34,7 @@ from robots.description import load
 from robots.joints import joints_of
 
 RATE_HZ = 100
-# The counter travels in the last joint, in steps that the protocol's text carries exactly.
+# The counter is in the last joint, in steps that the protocol's text carries exactly.
 STEP_DEG = 0.01
 
 
@@ -54,7 +54,7 @@ def main() -> None:
 
 
 def measure(seconds: float, *, video: bool) -> dict[str, Any]:
-    """Everything, in one run."""
+    """Measure all figures in one run."""
     units = int(seconds * RATE_HZ)
     written = multiprocessing.RawArray("q", units + 1)
     put = multiprocessing.RawArray("q", units + 1)
@@ -83,7 +83,7 @@ def measure(seconds: float, *, video: bool) -> dict[str, Any]:
 async def listen(
     endpoint: str, go: Any, written: Any, put: Any, units: int, *, video: bool
 ) -> dict[str, Any]:
-    """The monitor: joints, the bare messages, and video packets, each with the time it was in hand."""
+    """Receive joints, bare messages and video packets, each with its arrival time."""
     async with open_session(SessionSettings(connect=(endpoint,), wait_s=20.0)) as session:
         joints = session.subscribe("robomesh/bench/arm/joints", newest=10_000, history=False)
         bare: list[tuple[int, int]] = []
@@ -154,7 +154,7 @@ def take_bare(subscriber: Any, bare: list[tuple[int, int]], units: int) -> None:
 
 
 def controller_process(port: int, written: Any, units: int, go: Any) -> None:
-    """A controller of the paper's own kind: positions only, the counter in the joints."""
+    """Run a controller of the original kind: positions only, with the counter in the joints."""
     joints = joints_of(load("pt600"))
     with socket.create_server(("127.0.0.1", port)) as server:
         client, _ = server.accept()
@@ -174,7 +174,7 @@ def controller_process(port: int, written: Any, units: int, go: Any) -> None:
 
 
 def bare_process(endpoint: str, put: Any, units: int, go: Any) -> None:
-    """What Zenoh itself takes: the same size, rate, priority and router, half a period apart."""
+    """Measure plain Zenoh: the same size, rate, priority and router, offset by half a period."""
     with zenoh.open(client_config((endpoint,))) as session:
         publisher = session.declare_publisher(
             "bare", priority=zenoh.Priority.REAL_TIME, congestion_control=zenoh.CongestionControl.DROP
@@ -195,7 +195,7 @@ def wait(until: float) -> None:
 
 
 def summary(values: list[int]) -> dict[str, float]:
-    """Median, 99th percentile and spread [ms] of durations [ns]."""
+    """Return the median, 99th percentile and spread [ms] of durations [ns]."""
     if not values:
         return {"n": 0, "p50": float("nan"), "p99": float("nan"), "min": float("nan"), "max": float("nan")}
     ordered = sorted(value / 1e6 for value in values)
