@@ -61,20 +61,20 @@ def main() -> None:
     parser.add_argument("--monitors", default="1,4,16,64")
     parser.add_argument("--seconds", type=float, default=5.0)
     parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--minutes", type=float, default=10.0, help="after which nothing more is begun")
+    parser.add_argument("--minutes", type=float, default=10.0, help="start no measurement after this time")
     parser.add_argument("--arms", default=",".join(ARMS))
-    parser.add_argument("--stopped", action="store_true", help="beside each, with a stopped monitor too")
+    parser.add_argument("--stopped", action="store_true", help="also measure with a stopped monitor")
     parser.add_argument("--peers-python", metavar="PYTHON")
     parser.add_argument("--nats-server", default="nats-server", metavar="FILE")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     arms = [each for each in arguments.arms.split(",") if each]
     if unknown := set(arms) - {f"{arm}{plain}" for arm in ARMS[:6] for plain in ("", "-plain")}:
-        parser.error(f"no such arm: {', '.join(sorted(unknown))}; there are {', '.join(ARMS)}")
+        parser.error(f"unknown arm: {', '.join(sorted(unknown))}; choose from {', '.join(ARMS)}")
     for arm in tuple(arms):
         if missing := missing_peer(arm.removesuffix("-plain"), arguments):
             arms.remove(arm)
-            print(f"{arm} is left out: {missing}", file=sys.stderr, flush=True)
+            print(f"{arm} skipped: {missing}", file=sys.stderr, flush=True)
     rows, left_out = [], 0
     last_s = time.monotonic() + 60 * arguments.minutes
     with tempfile.TemporaryDirectory() as name:
@@ -94,7 +94,7 @@ def main() -> None:
                         except NotMeasured as error:
                             print(f"{count:3} {arm}: not measured: {error}", file=sys.stderr, flush=True)
     if left_out:
-        print(f"{left_out} not begun within {arguments.minutes:g} minutes", file=sys.stderr)
+        print(f"{left_out} not started within {arguments.minutes:g} minutes", file=sys.stderr)
     result = {"cores": os.cpu_count(), "seconds": arguments.seconds, "rows": summed(rows)}
     print(json.dumps(result) if arguments.json else "\n".join(words(row) for row in result["rows"]))
 
@@ -104,12 +104,12 @@ def missing_peer(kind: str, arguments: Any) -> str:
     if kind not in PEERS:
         return ""
     if arguments.peers_python is None:
-        return "--peers-python names no Python"
+        return "--peers-python is missing"
     imported = [arguments.peers_python, "-c", f"import {PEERS[kind]}"]
     if not shutil.which(arguments.peers_python) or subprocess.run(imported, capture_output=True).returncode:
         return f"{arguments.peers_python} has no {PEERS[kind]}"
     if kind == "nats" and not shutil.which(arguments.nats_server):
-        return f"there is no {arguments.nats_server}"
+        return f"{arguments.nats_server} not found"
     return ""
 
 
@@ -289,7 +289,7 @@ def until_connectable(address: str) -> None:
         with contextlib.suppress(OSError), socket.create_connection((host, int(port))):
             return
         time.sleep(0.05)
-    raise NotMeasured(f"nothing listens on {address} (FANOUT_DEBUG=1 shows why)")
+    raise NotMeasured(f"no server listens on {address} (FANOUT_DEBUG=1 shows why)")
 
 
 def cpu_s(processes: list[Any]) -> float:
@@ -303,7 +303,7 @@ def cpu_s(processes: list[Any]) -> float:
         try:
             fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
         except OSError:
-            raise NotMeasured(f"did not come up within {MOST_S:g} s") from None
+            raise NotMeasured(f"did not start within {MOST_S:g} s") from None
         ticks += int(fields[11]) + int(fields[12])
     return ticks / os.sysconf("SC_CLK_TCK")
 

@@ -135,7 +135,7 @@ class WebSocketReader(asyncio.Protocol):
             if not found:
                 return
             if b" 101 " not in head.split(b"\r\n")[0]:
-                raise SystemExit(f"no WebSocket there: {head[:200]!r}")
+                raise SystemExit(f"the server refused the WebSocket: {head[:200]!r}")
             self._buffer, self._in_head = bytearray(rest), False
             self.open.set_result(None)
         buffer, at, end = self._buffer, 0, len(self._buffer)

@@ -104,7 +104,7 @@ def main() -> None:
         )
         print(f"{row['fault']:<8} {row['state']:<22} {row['event']:<22} {times}")
     print(f"most stale: {result['most_stale_s']:.3f} s")
-    print(f"joints dated newer than they came: {result['newer_s']:.3f} s")
+    print(f"joints with a time stamp after their arrival: {result['newer_s']:.3f} s")
 
 
 def measure(names: list[str], rounds: int) -> dict[str, Any]:

@@ -60,7 +60,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--robots", type=int, default=200)
     parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--seconds", type=float, default=5.0, help="at rest, and of scrolling, each time")
+    parser.add_argument("--seconds", type=float, default=5.0, help="at rest, and then while scrolling")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     build_page.build()

@@ -81,8 +81,8 @@ def show(result: dict[str, Any]) -> None:
     if row := result.get("legacy"):
         reading, ratio = row["p99_ms"], row["ratio_p99"]
         print(
-            f"{row['readers']} old programs beside one that reads: p99 {reading['all read']:.2f} ms; "
-            f"beside one that never reads: {reading['one does not']:.2f} ms, ratio {ratio:.2f} "
+            f"{row['readers']} legacy clients and one that reads: p99 {reading['all read']:.2f} ms; "
+            f"and one that never reads: {reading['one does not']:.2f} ms, ratio {ratio:.2f} "
             f"(of each pair of runs: {', '.join(f'{each:.2f}' for each in row['ratios'])}); "
             f"it missed {row['states_skipped']} states; "
             f"the others lost {row['lost']} of {row['sent']:,}"

@@ -300,8 +300,8 @@ def program() -> dict[str, Any]:
 
 def tell(result: dict[str, Any]) -> None:
     if not result["peers"]:
-        print("without peers: 'pip install roboticstoolbox-python mujoco ikpy' in a venv of its own,")
-        print("and --peers-python its python, puts them beside")
+        print("no peers: run 'pip install roboticstoolbox-python mujoco ikpy' in a separate environment")
+        print("and name its Python with --peers-python")
     print("peers:", ", ".join(f"{name} {version}" for name, version in result["peers"].items()) or "none")
     print(
         "\nFK + Jacobian, calls/s      ours  Pinocchio alone  roboticstoolbox    mujoco   "
@@ -320,12 +320,12 @@ def tell(result: dict[str, Any]) -> None:
             f"{row['mean_ms']:8.4f} {row['p99_ms']:7.3f}   {row['worst_m']:.1e}"
             + (f"   ({row['targets']} targets)" if row["targets"] != result["targets"] else "")
         )
-    print("  TRAC-IK's own table, read: " + "; ".join(f"{n} {s} %, {t} ms" for n, (s, t) in TRAC_IK.items()))
+    print("  TRAC-IK's table, quoted: " + "; ".join(f"{n} {s} %, {t} ms" for n, (s, t) in TRAC_IK.items()))
     found = result["collision"]
     print(f"\n{found['arm']} with hulls, {found['pairs']} pairs of its own links, calls/s:")
-    print(f"  touches itself or not, at random positions where it does not: {found['own_contacts']:,.0f}")
+    print(f"  self-contact check, at random positions without contact: {found['own_contacts']:,.0f}")
     print(
-        f"  and what touches where, at all random positions ({100 * found['touching']:.0f} % touch): "
+        f"  contacts and their points, at all random positions ({100 * found['touching']:.0f} % touch): "
         f"{found['own_contacts_with_points']:,.0f}"
     )
     print(
@@ -334,7 +334,7 @@ def tell(result: dict[str, Any]) -> None:
     )
     found = result["program"]
     print(
-        f"a program of {found['duration_s']:.1f} s beside three fixtures: checked in "
+        f"a program of {found['duration_s']:.1f} s near three fixtures: checked in "
         f"{found['check_s']:.2f} s, {found['samples']} samples; "
         + ("nothing found" if found["ok"] else "; ".join(found["violations"]))
     )

@@ -41,7 +41,7 @@ STEP_DEG = 0.01
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--seconds", type=float, default=60.0)
-    parser.add_argument("--video", action="store_true", help="measure to the H.264 packet too")
+    parser.add_argument("--video", action="store_true", help="also measure to the H.264 packet")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     result = measure(arguments.seconds, video=arguments.video)

@@ -1,4 +1,4 @@
-"""Old client programs at one robot of the gateway: what one that never reads costs the others."""
+"""Legacy clients at one robot of the gateway: the cost of one client that never reads to the others."""
 
 import contextlib
 import multiprocessing
@@ -18,14 +18,14 @@ from robomesh.schemas.robomesh_pb2 import ControllerState
 
 READERS = 63
 PAIRS = 10
-# Two socket buffers fill up, and it is behind; 5 s later the gateway would close it.
+# The client falls behind once two socket buffers are full; 5 s later the gateway would close it.
 FILLING_S, MEASURED_S = 1.5, 3.0
-# Long ones, so that they fill up soon.
+# Long units, so that the buffers fill up soon.
 UNIT_BYTES = 300
 
 
 def serve_old_programs() -> dict[str, Any]:
-    """The readers' delays at one gateway, in turns beside one that reads and one that never does."""
+    """Measure the readers' delays, in turn with one more reader and with a client that never reads."""
     seconds = 1.5 * PAIRS * 2 * (FILLING_S + MEASURED_S)
     units = int(seconds * RATE_HZ)
     written = multiprocessing.RawArray("q", units)
@@ -43,7 +43,7 @@ def serve_old_programs() -> dict[str, Any]:
             until(attached.is_set)
             go.set()
             for turn in range(2 * PAIRS):
-                # The order changes from pair to pair, so that what drifts counts for both.
+                # The order alternates from pair to pair, so that drift affects both equally.
                 silent = turn % 4 in (1, 2)
                 with beside(port, silent=silent):
                     time.sleep(FILLING_S)
@@ -77,7 +77,7 @@ def serve_old_programs() -> dict[str, Any]:
 
 @contextlib.contextmanager
 def beside(port: int, *, silent: bool) -> Iterator[None]:
-    """A client more: one that reads, or one that never does."""
+    """Connect one more client, which reads or never does."""
     with process(attend, (port, silent)):
         yield
 
@@ -91,7 +91,7 @@ def attend(port: int, silent: bool) -> None:
 
 
 def read_all(port: int, received: Any, units: int, attached: Any) -> None:
-    """One lean process that is all readers: when each unit was in hand."""
+    """Run all readers in one small process and record when each unit arrived."""
     with selectors.DefaultSelector() as selector:
         rests = [b""] * READERS
         for reader in range(READERS):
@@ -111,8 +111,8 @@ def read_all(port: int, received: Any, units: int, attached: Any) -> None:
 
 
 def last_counts(endpoint: str) -> Any:
-    """What the gateway counted of its old client programs."""
+    """Return what the gateway last counted of its legacy clients."""
     with zenoh.open(client_config((endpoint,))) as session:
         for reply in session.get("robomesh/bench/arm-0/controller"):
             return ControllerState.FromString(reply.ok.payload.to_bytes()).legacy_clients
-    raise AssertionError("the gateway tells no state")
+    raise AssertionError("the gateway publishes no state")

@@ -1,14 +1,14 @@
-"""Live kinematics: how late, and at what cost, one process tells where ten arms are and how near to things.
+"""Live kinematics: delay and cost of the poses and clearances that one process publishes for ten arms.
 
     ./dev run python benchmarks/live_kinematics.py [--robots 10] [--seconds 20] [--checks] [--json]
 
-Two arms a cell, with a table, a post and a fence of which one is within the warning distance, so that all of
-it is measured. Router, gateway, kinematics and controllers are real processes; joints come at 100 Hz and
-differ each time. A latency is from when the gateway had the unit (which `kinematics` carries as its source
-time) until a monitor's subscriber has the message; CPU is user and system time of all the service's threads.
-With --checks somebody asks for one program's check after another meanwhile, of worker processes.
+Each cell has two arms, a table, a post and a fence. One of them is within the warning distance, so that all
+parts are measured. Router, gateway, kinematics and controllers are separate processes; joints arrive at
+100 Hz and differ each time. A latency is from when the gateway had the unit (`kinematics` carries this as its
+source time) until a monitor's subscriber has the message; CPU is user and system time of all the service's
+threads. With --checks a client also asks for one program check after another, which worker processes do.
 
-Reach, for 10 robots: p99 under 20 ms, at most half a core.
+Target, for 10 robots: p99 under 20 ms, at most half a core.
 """
 
 import argparse
@@ -38,7 +38,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--robots", type=int, default=10)
     parser.add_argument("--seconds", type=float, default=20.0)
-    parser.add_argument("--checks", action="store_true", help="programs are checked meanwhile")
+    parser.add_argument("--checks", action="store_true", help="check programs during the measurement")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     result = measure(arguments.robots, arguments.seconds, checks=arguments.checks)
@@ -57,7 +57,7 @@ def main() -> None:
 
 
 def measure(robots: int, seconds: float, *, checks: bool) -> dict[str, Any]:
-    """One run."""
+    """Measure one run."""
     units = int((seconds + WARM_UP_S + 2.0) * RATE_HZ)
     written, go = multiprocessing.RawArray("q", robots * units), multiprocessing.Event()
     endpoint = f"tcp/127.0.0.1:{free_port()}"
@@ -74,7 +74,7 @@ def measure(robots: int, seconds: float, *, checks: bool) -> dict[str, Any]:
 
 
 def site_text(endpoint: str, folder: Path, ports: list[int]) -> str:
-    """A cell for each two robots, a few metres apart."""
+    """Return a site file with a cell for each two robots, a few metres apart."""
     text = f'site = "bench"\n[router]\nlisten = ["{endpoint}"]\n[audit]\nfolder = "{folder}/audit"\n'
     for number, port in enumerate(ports):
         cell, y = number // 2, 0.45 if number % 2 else -0.45
@@ -98,7 +98,7 @@ def site_text(endpoint: str, folder: Path, ports: list[int]) -> str:
 async def listen(
     endpoint: str, go: Any, process: int, robots: int, seconds: float, *, checks: bool
 ) -> dict[str, Any]:
-    """The monitor: each robot's kinematics, with the time that it came."""
+    """Receive each robot's kinematics with the arrival time."""
     came: list[tuple[Sample, int]] = []
     checked: list[float] = []
     async with open_session(SessionSettings(connect=(endpoint,), wait_s=20.0)) as session:

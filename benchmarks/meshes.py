@@ -1,10 +1,10 @@
-"""How long mesh files take to read, and how much memory; beside VTK's importers in the same run.
+"""Time and memory for reading mesh files, compared with VTK's importers in the same run.
 
     ./dev run python benchmarks/meshes.py [--runs 5] [--vtk-python PYTHON] [--large] [--json]
 
-The files are made here: a wavy plate of 50,000 triangles in each format (3DS holds it in five objects),
-and with --large one of 1,000,000 as VRML, with its progress. Each reading is a process of its own, in
-turns; importing the libraries is not counted, for either.
+The program makes the files: a wavy plate of 50,000 triangles in each format (3DS holds it in five objects),
+and with --large one of 1,000,000 as VRML, with its progress. Each reading is a separate process, and both
+readers take turns. The time to import the libraries does not count for either.
 """
 
 import argparse
@@ -42,7 +42,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--vtk-python", default=sys.executable, help="a Python that has vtk")
-    parser.add_argument("--large", action="store_true", help="1,000,000 triangles of VRML, too")
+    parser.add_argument("--large", action="store_true", help="also read 1,000,000 triangles of VRML")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--child", nargs=2, metavar=("WHO", "FILE"), help=argparse.SUPPRESS)
     arguments = parser.parse_args()
@@ -55,8 +55,8 @@ def main() -> None:
         print(json.dumps(result))
         return
     if result["vtk"] is None:
-        print(f"without VTK: {arguments.vtk_python} has none; 'pip install vtk' in a venv of its own,")
-        print("and --vtk-python its python, puts it beside")
+        print(f"no VTK in {arguments.vtk_python}: run 'pip install vtk' in a separate environment")
+        print("and name its Python with --vtk-python")
     print(
         "file         triangles     MB   ours: s (least .. most)  memory/file  VTK: s (least .. most)   ratio"
     )
@@ -74,7 +74,7 @@ def _times(found: dict[str, float]) -> str:
 
 
 def measure(folder: Path, runs: int, vtk_python: str, *, large: bool) -> dict[str, Any]:
-    """Medians and spreads [s] of each format, and the memory that reading took over the file's size."""
+    """Return medians and spreads [s] of each format, and the memory for reading over the file's size."""
     version = _vtk_version(vtk_python)
     sizes = [(ending, 50_000) for ending in WRITERS] + ([(".wrl", 1_000_000)] if large else [])
     rows = []
@@ -128,7 +128,7 @@ def _reading(_who: str, file: str) -> dict[str, Any]:
     if path.suffix in (".stl", ".obj", ".ply", ".glb"):
         import trimesh  # noqa: F401
     calls: list[float] = []
-    # Resident now, not at most so far: what the imports took and gave back is no gift to the reading.
+    # Current, not peak, memory: memory that the imports used and freed must not hide the reader's use.
     before = int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
     start = time.perf_counter()
     mesh = read_mesh(path, calls.append)
@@ -157,7 +157,7 @@ print(json.dumps({"seconds": time.perf_counter() - start}))
 
 
 def plate(count: int) -> Mesh:
-    """A wavy plate of about so many triangles."""
+    """Return a wavy plate of about that number of triangles."""
     side = round((count / 2) ** 0.5)
     x, y = np.meshgrid(np.arange(side + 1.0), np.arange(side + 1.0))
     vertices = np.column_stack([x.ravel(), y.ravel(), 5 * np.sin(x / 7).ravel() * np.cos(y / 9).ravel()])
@@ -183,7 +183,7 @@ def _in_pieces(mesh: Mesh, pieces: int) -> Mesh:
 
 
 def _vrml(mesh: Mesh) -> bytes:
-    """As CAD programs write it: points and faces, and the normals left to the reader."""
+    """Return VRML as CAD programs write it: points and faces, without normals."""
     (part,) = mesh.parts
     points = ",\n".join(f"{x:.6f} {y:.6f} {z:.6f}" for x, y, z in part.vertices.tolist())
     faces = ",\n".join(f"{a}, {b}, {c}, -1" for a, b, c in part.triangles.tolist())

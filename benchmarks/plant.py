@@ -1,4 +1,4 @@
-"""What the gateway's benchmarks run against: a site of real processes, and controllers that note the time."""
+"""The test bed of the gateway's benchmarks: a site of real processes, and controllers that record times."""
 
 import contextlib
 import multiprocessing
@@ -14,7 +14,7 @@ from typing import Any
 from latency import STEP_DEG, free_port, process, service, until_connectable, wait
 
 RATE_HZ = 100
-# The units of a period go out in this many groups, a millisecond apart: a sleep costs as much as a unit.
+# The units of a period leave in this many groups, a millisecond apart: a sleep costs as much as a unit.
 GROUPS = 10
 START_S = 60.0
 
@@ -23,7 +23,7 @@ START_S = 60.0
 def running_site(
     controllers: Sequence[int], *, more: str = ""
 ) -> Iterator[tuple[str, "subprocess.Popen[bytes]"]]:
-    """A router, and a gateway with a robot for each controller's port.
+    """Run a router, and a gateway with a robot for each controller's port.
 
     Args:
         more: Lines of the site file's last robot.
@@ -48,10 +48,10 @@ def running_site(
 def running_controllers(
     robots: int, written: Any, units: int, go: Any, *, unit_bytes: int = 0
 ) -> Iterator[list[int]]:
-    """The ports of so many controllers, which wait there for the gateway, and then for `go`.
+    """Yield the ports of controllers that wait there for the gateway, and then for `go`.
 
     Args:
-        unit_bytes: Units are filled up with blanks to this length.
+        unit_bytes: Units are padded with blanks to this length.
     """
     ports = multiprocessing.RawArray("i", robots)
     with process(controllers, (ports, written, units, go, unit_bytes)):
@@ -60,19 +60,19 @@ def running_controllers(
 
 
 def unit_of(k: int) -> bytes:
-    """A unit of five joints that carries a number: positions only, as the paper's own controllers send."""
+    """Return a unit of five joints that carries a number: positions only, as the original controllers do."""
     turns, steps = divmod(k, 10_000)
     return f"1#ABSOLUTE.DEG*{turns}.00;0.00;0.00;0.00;{steps * STEP_DEG:.2f}@".encode()
 
 
 def number_of(unit: bytes) -> int:
-    """The number that it carries; with or without its "@"."""
+    """Return the number that a unit carries, with or without its "@"."""
     values = unit.partition(b"*")[2].rstrip(b"@").split(b";")
     return round(float(values[0])) * 10_000 + round(float(values[-1]) / STEP_DEG)
 
 
 def controllers(ports: Any, written: Any, units: int, go: Any, unit_bytes: int) -> None:
-    """One lean process that is the controllers of all robots; before `go` the number is 0."""
+    """Run the controllers of all robots in one small process; before `go` the number is 0."""
     texts = [unit_of(k).rjust(unit_bytes) for k in range(units + 1)]
     servers = [socket.create_server(("127.0.0.1", 0)) for _ in ports]
     ports[:] = [server.getsockname()[1] for server in servers]
@@ -83,7 +83,7 @@ def controllers(ports: Any, written: Any, units: int, go: Any, unit_bytes: int) 
         for client in clients:
             client.sendall(texts[0])
         time.sleep(1 / RATE_HZ)
-    with contextlib.suppress(ConnectionError):  # the gateway was ended first
+    with contextlib.suppress(ConnectionError):  # the gateway has ended
         for k, robot in paced(len(clients), units):
             written[robot * units + k - 1] = time.monotonic_ns()
             clients[robot].sendall(texts[k])
@@ -91,7 +91,7 @@ def controllers(ports: Any, written: Any, units: int, go: Any, unit_bytes: int) 
 
 
 def paced(robots: int, units: int) -> Iterator[tuple[int, int]]:
-    """(k, robot), when it is time for that robot's unit k: spread over the period, and from unit to unit."""
+    """Yield (k, robot) when that robot's unit k is due, spread over the period and from unit to unit."""
     begun = time.monotonic() + 0.1
     for k in range(1, units + 1):
         for group in range(GROUPS):
@@ -107,7 +107,7 @@ def until(condition: Callable[[], bool]) -> None:
 
 
 def cpu_s(process_id: int) -> float:
-    """User and system time of a process, all its threads."""
+    """Return the user and system time of a process, all its threads."""
     fields = Path(f"/proc/{process_id}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 

@@ -1,20 +1,20 @@
-"""The recorder: messages a second from the mesh into files, nothing lost, and how soon any second is read.
+"""The recorder: messages a second from the mesh into files without loss, and the time to read any second.
 
     ./dev run python benchmarks/recorder.py [--seconds 10] [--peers-python PYTHON] [--json]
 
-A router, a recorder and publishers, all real processes on this machine. Each row says how many messages
-were published, how many the finished and indexed files hold, how many the files say are lost, and the CPU
-time of the recorder. Rows:
+A router, a recorder and publishers, all separate processes on this machine. Each row gives the number of
+messages that were published, that the finished and indexed files hold, and that the files report as lost,
+and the CPU time of the recorder. Rows:
 
-    one robot's joints, as fast as named    10,000 to 100,000 a second in one file
+    one robot's joints, at the named rate   10,000 to 100,000 a second in one file
     all topics of 100 robots at 100 Hz      joints 100, frames 60, kinematics 20, controller, lease, program
-                                            1 Hz each; a hundred files at once
+                                            1 Hz each; a hundred files at the same time
 
-Beside them the bare writers, which take what a loop in their own process gives them: ours (to the system,
-each 4 ms; not indexed yet), mcap's, foxglove-sdk's. Then a file of 1 GB: the time to the first message of
-each topic at random seconds of it.
+For comparison, the bare writers run in a loop in one process: ours (to the system, each 4 ms; without an
+index), mcap's, foxglove-sdk's. Then a file of 1 GB: the time to the first message of each topic at random
+seconds of it.
 
-Reach: 50,000 messages/s and the hundred robots with nothing lost; any second within 50 ms.
+Target: 50,000 messages/s and the hundred robots with no loss; any second within 50 ms.
 """
 
 import argparse
@@ -84,7 +84,7 @@ def main() -> None:
 
 
 def payloads() -> dict[str, bytes]:
-    """A message of each topic, as large as a real arm's."""
+    """Return a message of each topic, as large as a real arm's."""
     joints = JointStates()
     for number in range(6):
         joints.joints.add(name=f"joint_{number}", position=0.1 * number, velocity=0.01)
@@ -100,7 +100,7 @@ def payloads() -> dict[str, bytes]:
 
 
 def record(robots: int, rates: dict[str, int], seconds: float) -> dict[str, Any]:
-    """So many robots' topics at those rates, into a file each."""
+    """Record the topics of a number of robots at those rates, into a file for each robot."""
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
         site = Path(folder) / "site.toml"
@@ -155,7 +155,7 @@ async def _record(
 
 
 def publish(endpoint: str, names: list[str], rates: dict[str, int], seconds: float) -> None:
-    """A process that publishes at those rates, evenly."""
+    """Publish at those rates, evenly, in this process."""
     messages = payloads()
     with zenoh.open(client_config((endpoint,), None)) as session:
         work = []
@@ -168,7 +168,7 @@ def publish(endpoint: str, names: list[str], rates: dict[str, int], seconds: flo
                     priority=getattr(zenoh.Priority, row.priority.value),
                 )
                 work.append([publisher, messages[topic], rate, 0])
-        time.sleep(2.0)  # until the router knows the way
+        time.sleep(2.0)  # until the router knows the subscribers
         begun = time.perf_counter()
         while (passed := time.perf_counter() - begun) < seconds + 0.5:
             for each in work:
@@ -182,7 +182,7 @@ def publish(endpoint: str, names: list[str], rates: dict[str, int], seconds: flo
 
 
 def writers(peers_python: str) -> dict[str, Any]:
-    """Messages a second that the writers take, without a mesh."""
+    """Return the messages a second that the writers take, without a mesh."""
     found: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as folder:
         row, data = topics.topic("joints"), (bytes(range(256)) * 2)[:SIZE]
@@ -208,7 +208,7 @@ def writers(peers_python: str) -> dict[str, Any]:
 
 
 def seek(megabytes: int) -> dict[str, Any]:
-    """A long recording with video: how soon the messages at any second of it are there."""
+    """Return how soon the messages at any second of a long recording with video are read."""
     chance = random.Random(1)
     messages, frame = payloads(), 20_000
     with tempfile.TemporaryDirectory() as folder:

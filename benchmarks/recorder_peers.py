@@ -1,8 +1,8 @@
-"""The same messages written by the peers: run by `recorder.py` with a Python that has them.
+"""Peers that write the same messages: `recorder.py` runs this with a Python that has them.
 
     PEERS_PYTHON benchmarks/recorder_peers.py MESSAGES BYTES FOLDER
 
-It imports nothing of the project. Nothing comes over a network here: the writers alone.
+It imports no module of the project and measures the writers alone, without a network.
 """
 
 import json

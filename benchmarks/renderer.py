@@ -1,12 +1,12 @@
-"""Pictures a second beside VTK, pyrender and mujoco: same meshes, cameras and sizes, software OpenGL.
+"""Pictures a second, compared with VTK, pyrender and mujoco: same meshes, cameras, sizes, software OpenGL.
 
     ./dev run python benchmarks/renderer.py [--peers-python PYTHON] [--rounds 3] [--turns 12] [--json]
 
-PYTHON has vtk, pyrender and mujoco, in a venv of its own. Each is a process of its own, which draws and
-reads back to NumPy; they take turns, row by row, so that all meet the same machine. Ours draws more than
-they are asked for: the floor and its grid, the arm's soft shadow, edges, dimmed hollows; its rows
-"full" with the lamp's shadow on the arm too. Medians of all turns; the spread is from p10 to p90. On a
-machine that does other things too, pictures for a second of one core's time say more than by the clock.
+PYTHON is a separate environment with vtk, pyrender and mujoco. Each program is a separate process, which
+draws and reads back to NumPy; they take turns, row by row, so that other load affects all of them. Ours draws
+more than the task for the peers: the floor and its grid, the arm's soft shadow, edges, dimmed hollows; its
+rows "full" add the lamp's shadow on the arm. Medians of all turns; the spread is from p10 to p90. On a
+machine with other load, pictures for a second of one core's time are a better measure than pictures a second.
 """
 
 import argparse
@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 if __name__ == "__main__":
-    # This program has a room's name: what it imports is looked for from the root.
+    # Import from the root: this program has the same name as a package.
     sys.path[0] = str(Path(__file__).parents[1])
 
 from benchmarks.renderer_peers import serve
@@ -60,7 +60,7 @@ def main() -> None:
 
 
 def rows() -> list[dict[str, Any]]:
-    """Every row: sizes, anti-aliasing and triangles, then views."""
+    """Return every row: sizes, anti-aliasing and triangles, then views."""
     some = [
         {"size": size, "samples": samples, "count": count, "views": 1}
         for count in ("20k", "100k")
@@ -72,7 +72,7 @@ def rows() -> list[dict[str, Any]]:
 
 
 def measure(peers_python: str, rounds: int, turns: int) -> dict[str, Any]:
-    """Milliseconds of each row and program."""
+    """Return the milliseconds of each row and program."""
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder) / "scene.npz"
         triangles = write_scene(scene)
@@ -110,7 +110,7 @@ def measure(peers_python: str, rounds: int, turns: int) -> dict[str, Any]:
 
 
 def summary(answers: list[dict[str, Any]], views: int) -> dict[str, float]:
-    """Of one row and program: pictures a second, also of processor time, ms of a turn, memory."""
+    """Return for one row and program: pictures a second, also of processor time, ms of a turn, memory."""
     ms = np.concatenate([answer["ms"] for answer in answers])
     low, middle, high = np.percentile(ms, [10, 50, 90]).tolist()
     cpu_ms = float(np.median(np.concatenate([answer["cpu_ms"] for answer in answers])))
@@ -127,7 +127,7 @@ def summary(answers: list[dict[str, Any]], views: int) -> dict[str, float]:
 
 
 def write_scene(path: Path) -> dict[str, int]:
-    """The arm's meshes with few and with many triangles, its motion, the cameras."""
+    """Write the arm's meshes with few and with many triangles, its motion, the cameras."""
     description = load(ROBOT)
     model = build_model(description)
     glbs = link_meshes(description)
@@ -170,7 +170,7 @@ def mesh_of(glb: bytes, count: str) -> Mesh:
 
 
 def subdivided(mesh: Mesh) -> Mesh:
-    """Each triangle made four."""
+    """Divide each triangle into four."""
     faces = mesh.triangles.astype(np.int64)
     sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     unique, numbers = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
@@ -216,7 +216,7 @@ def serve_ours(path: Path) -> None:
 
 
 class Server:
-    """A process that answers a line with a line."""
+    """A process that answers each line with a line."""
 
     def __init__(self, command: list[str]) -> None:
         environment = {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1"}

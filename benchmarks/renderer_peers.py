@@ -1,12 +1,11 @@
-"""The same meshes, cameras and sizes for the peers: run by `renderer.py` with a Python that has them.
+"""Peers on the same meshes, cameras and sizes: `renderer.py` runs this with a Python that has them.
 
     PEERS_PYTHON benchmarks/renderer_peers.py vtk|pyrender|mujoco SCENE.npz
 
-It imports nothing of the project. Each line of standard input asks for one row in JSON, and is answered
-by a line: milliseconds of each turn (every view drawn and read back to NumPy), by the clock and of
-processor, all threads; the share of the last
-picture that is not background, the process's memory. Smooth normals, one light from the camera, no
-shadows, no reflections: the least that each can do.
+It imports no module of the project. Each line of standard input asks for one row in JSON. The answer is a
+line with the milliseconds of each turn (every view drawn and read back to NumPy), by the clock and of
+processor time of all threads; the share of the last picture that is not background; and the process's memory.
+Smooth normals, one light from the camera, no shadows, no reflections: the least that each can do.
 """
 
 import json
@@ -71,7 +70,7 @@ def serve(make: Callable[[dict[str, Any]], tuple[Render, Callable[[], None]]], s
 
 
 def links(scene: dict[str, Any], count: str) -> list[dict[str, Any]]:
-    """Positions, normals, triangles and colour of each link."""
+    """Return the positions, normals, triangles and colour of each link."""
     names = ("positions", "normals", "triangles", "color")
     return [
         {name: scene[f"{count}/{number}/{name}"] for name in names} for number in range(int(scene["links"]))
@@ -212,7 +211,7 @@ def mujoco_(scene: dict[str, Any], row: dict[str, Any] | None) -> Any:
 
 
 def looking(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """(4, 4) camera to world; it looks along its -z."""
+    """Return (4, 4) camera to world; the camera looks along its -z."""
     backward = (eye - target) / np.linalg.norm(eye - target)
     right = np.cross([0.0, 0.0, 1.0], backward)
     right /= np.linalg.norm(right)

@@ -1,14 +1,15 @@
-"""A whole site for hours: what is lost, what grows, which stops nobody asked for.
+"""A whole site for hours: lost messages, growth of memory and files, and stops without a request.
 
     ./dev run python benchmarks/soak.py HOURS [--robots 8] [--kills SECONDS] [--json]
 
-`robomesh up` with simulated robots at 100 Hz and every service; here a monitor of all joints and a page's
-WebSocket; half of each minute one robot is recorded, and the recording deleted. With `--kills` a service
-(never the router: that is benchmarks/wan.py's) is killed about so often, and the supervisor starts it again.
-Each minute a line of JSON, at the end one more: share of joint states delivered, memory and open files of
-each process with their slopes (a line through the last four fifths), events by code, latched stops.
+`robomesh up` runs simulated robots at 100 Hz and every service. This program runs a monitor of all joints and
+a page's WebSocket; half of each minute it records one robot, and then deletes the recording. With `--kills`
+it kills a service about that often (never the router, which benchmarks/wan.py kills), and the supervisor
+restarts the service. Each minute prints a line of JSON, the end one more: share of joint states delivered,
+memory and open files of each process with their slopes (a line through the last four fifths), events by
+code, latched stops.
 
-Reach: 99.995 % delivered without kills, no slope, no stop.
+Target: 99.995 % delivered without kills, no slope, no stop.
 """
 
 import argparse
@@ -31,7 +32,7 @@ import numpy as np
 import psutil
 
 if __name__ == "__main__":
-    # A program beside this one has a room's name: what is imported is looked for from the root.
+    # Import from the root: a program in this folder has the same name as a package.
     sys.path[0] = str(Path(__file__).parents[1])
 
 from benchmarks.fanout_parts import HEADER, WebSocketReader, connected
@@ -45,7 +46,7 @@ LOOK_EACH_S = 60.0
 CAPTURE_S = 30.0
 ENDED_WITHIN_S = 20.0
 KILLED = ("gateway", "kinematics", "console", "recorder", "renderer", "player", "watch")
-# A page shows fewer states than there are when a machine stalls: it counts apart.
+# The page counts separately: when a machine stalls, a page shows fewer states than were published.
 WATCHED = f"robomesh/{SITE}/*/joints"
 
 
@@ -53,8 +54,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("hours", type=float)
     parser.add_argument("--robots", type=int, default=8)
-    parser.add_argument("--kills", type=float, metavar="SECONDS", help="kill a service about so often")
-    parser.add_argument("--json", action="store_true", help="the last line only")
+    parser.add_argument("--kills", type=float, metavar="SECONDS", help="kill a service about this often")
+    parser.add_argument("--json", action="store_true", help="print the last line only")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         ports = Ports(free_port(), free_port())
@@ -65,7 +66,7 @@ def main() -> None:
 
 
 class Ports:
-    """Where the site is."""
+    """The ports of the site's services."""
 
     def __init__(self, router: int, page: int) -> None:
         self.router, self.page = f"tcp/127.0.0.1:{router}", f"127.0.0.1:{page}"
@@ -91,7 +92,7 @@ def site_file(folder: Path, robots: int, ports: Ports) -> Path:
 
 @contextlib.contextmanager
 def up(file: Path) -> Iterator[subprocess.Popen[str]]:
-    """The site, once its arms are on the page."""
+    """Start the site and wait until its arms are on the page."""
     log = (file.parent / "log").open("w")
     process = subprocess.Popen(
         [*ROBOMESH, "up", str(file)],
@@ -113,7 +114,7 @@ def up(file: Path) -> Iterator[subprocess.Popen[str]]:
 
 
 class Seen:
-    """What came of a stream, by publisher: numbers without a gap are all."""
+    """The messages received of a stream, by publisher: numbers without a gap mean that none is missing."""
 
     def __init__(self) -> None:
         self._numbers: dict[tuple[str, int], list[int]] = {}
@@ -140,13 +141,13 @@ class Grown:
         self._rows: dict[str, list[tuple[float, float, float]]] = {}
 
     def look(self) -> dict[str, Any]:
-        """One look; resident MiB and open files now."""
+        """Take one sample and return the current resident MiB and open files."""
         now = {}
         for process in (self._site, *self._site.children(recursive=True)):
             with contextlib.suppress(psutil.Error, OSError):
                 name = self._name(process)
                 resident = process.memory_info().rss / 2**20
-                # A killed service's successor is another: its memory begins anew.
+                # The successor of a killed service is another process: its memory series restarts.
                 self._rows.setdefault(f"{name} {process.pid}", []).append(
                     (time.monotonic(), resident, process.num_fds())
                 )
@@ -154,7 +155,7 @@ class Grown:
         return now
 
     def slopes(self) -> dict[str, dict[str, float]]:
-        """MiB and open files an hour."""
+        """Return the slopes in MiB and open files an hour."""
         found = {}
         for name, rows in self._rows.items():
             late = np.array(rows[len(rows) // 5 :])
@@ -249,7 +250,7 @@ async def watch_events(session: Session, events: Counter[str]) -> None:
 
 
 async def watch_page(address: str, seen: Seen) -> None:
-    """A page's WebSocket; it ends when the console is killed, and is begun anew."""
+    """Watch through a page's WebSocket; reconnect when the console is killed."""
 
     def take(_: WebSocketReader, opcode: int, message: bytes) -> None:
         at = message.find(b"\x12\x18", 0, 120)
@@ -264,7 +265,7 @@ async def watch_page(address: str, seen: Seen) -> None:
 
 
 async def record(folder: Path, ports: Ports, robots: int, unended: list[str]) -> None:
-    """A capture of one robot after another, each deleted when it is whole: the disk stays as it is."""
+    """Record one robot after another, and delete each complete capture; the disk use stays constant."""
     number = 0
     while True:
         process = await asyncio.create_subprocess_exec(
@@ -279,7 +280,7 @@ async def record(folder: Path, ports: Ports, robots: int, unended: list[str]) ->
             process.send_signal(signal.SIGINT)
             await asyncio.wait_for(process.wait(), ENDED_WITHIN_S)
         except TimeoutError:
-            # One that is late says something of the machine, and an hour is not thrown away for it.
+            # A late capture is a sign of a slow machine; it is no reason to abort hours of measurement.
             unended.append(f"soak-{number}")
         finally:
             if process.returncode is None:

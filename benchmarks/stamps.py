@@ -2,15 +2,15 @@
 
     ./dev run python benchmarks/stamps.py MINUTES [--robots 4] [--burners 2] [--json]
 
-`robomesh up` with simulated robots at 100 Hz beside processes that use all the CPU they get. One robot is
-recorded all the time, and a monitor takes the joints and frames of all of them. At the end:
+`robomesh up` runs simulated robots at 100 Hz while other processes use all the CPU that they get. One robot
+is recorded all the time, and a monitor receives the joints and frames of all robots. At the end:
 
-- shared: joint states whose stamp is not after the one before, of one publisher identity (reach: 0)
-- unmatched: frames whose stamp no joint state has, of those that came while joints did (reach: 0)
-- inversions: recorded messages whose log time is before their publish time (reach: 0)
-- rows, states: of the recording's CSV, and of its joints channel; repeated: equal times in it (reach: 0)
+- shared: joint states whose stamp is not after the previous one of the same publisher identity (target: 0)
+- unmatched: frames without a joint state of the same stamp, while joint states arrived (target: 0)
+- inversions: recorded messages whose log time is before their publish time (target: 0)
+- rows, states: of the recording's CSV, and of its joints channel; repeated: equal times in it (target: 0)
 
-Two identities of one publisher are two clocks (ARCHITECTURE.md): how many there were is told.
+Two identities of one publisher are two clocks (ARCHITECTURE.md); the result has their number.
 """
 
 import argparse
@@ -33,7 +33,7 @@ from typing import Any
 from mcap.reader import make_reader
 
 if __name__ == "__main__":
-    # A program beside this one has a room's name: what is imported is looked for from the root.
+    # Import from the root: a program in this folder has the same name as a package.
     sys.path[0] = str(Path(__file__).parents[1])
 
 from benchmarks.soak import ROBOMESH, SITE, Ports, site_file, up
@@ -71,7 +71,7 @@ def main() -> None:
 
 @contextlib.contextmanager
 def burning(count: int) -> Iterator[None]:
-    """Processes that use all the CPU they get."""
+    """Run processes that use all the CPU that they get."""
     processes = [multiprocessing.Process(target=burn, daemon=True) for _ in range(count)]
     for process in processes:
         process.start()
@@ -89,7 +89,7 @@ def burn() -> None:
 
 
 class Seen:
-    """Stamps of joints and frames, by robot and publisher identity, in the order in which they came."""
+    """Stamps of joints and frames, by robot and publisher identity, in order of arrival."""
 
     def __init__(self) -> None:
         self.joints: dict[tuple[str, int], list[int]] = defaultdict(list)
@@ -117,7 +117,7 @@ class Seen:
 
 
 async def watch(ports: Ports, seconds: float) -> tuple[Seen, str]:
-    """Watch and record for so long; what was seen, and the recording's file."""
+    """Watch and record for that time; return the stamps and the recording's file."""
     seen = Seen()
     async with open_session(SessionSettings(connect=(ports.router,))) as session:
         asked = RecorderRequest(action=RecorderRequest.TRACE_ON, name="stamps")
@@ -155,7 +155,7 @@ def closed(path: Path) -> None:
 
 
 def recorded(path: Path) -> dict[str, Any]:
-    """Log times against publish times, by the MCAP project's own reader."""
+    """Compare log times with publish times through the MCAP project's own reader."""
     messages = states = inversions = 0
     least_ns = sys.maxsize
     with path.open("rb") as stream:
@@ -168,7 +168,7 @@ def recorded(path: Path) -> dict[str, Any]:
 
 
 def table(path: Path, out: Path) -> dict[str, Any]:
-    """The rows of the recording's CSV, and how many of its times repeat one."""
+    """Return the rows of the recording's CSV, and how many of its times repeat one."""
     subprocess.run([*ROBOMESH, "recordings", "export", str(path), str(out)], check=True, capture_output=True)
     with out.open(newline="") as stream:
         times = [row["time"] for row in csv.DictReader(stream)]

@@ -1,21 +1,21 @@
-"""Stops beside other load: alone, beside two processes that burn CPU, beside two that flood `command/*`.
+"""Stops during other load: without load, with two processes that burn CPU, with two that flood `command/*`.
 
-Part of `command.py`, or by itself:
+Part of `command.py`, or alone:
 
     ./dev run python benchmarks/stops_beside.py [--stops 120] [--keys] [--json]
 
-A real router and a gateway of two robots, each its own process; two controllers of this program's, in a
-process of their own. A plain Zenoh session, written from Zenoh's own documentation, sends stops to both
-robots in turn, and then our own client does, which asks over both links. The loads take turns, so that a
-neighbour on the machine disturbs all of them. Times run from the question to the stop unit in the
-controller's hands (`wire`) and to the answer in the asker's (`answer`), by this machine's monotonic clock.
+A real router and a gateway of two robots are separate processes; this program runs two controllers in one
+more process. Two clients send stops to both robots in turn: a plain Zenoh session, written from Zenoh's own
+documentation, and then our own client, which asks over both links. The loads take turns, so that other
+load on the machine affects all of them. Times run from the request to the stop unit at the controller
+(`wire`) and to the answer at the client (`answer`), by this machine's monotonic clock.
 
 The flood: each process asks `command/<name>` of the first robot with `{}` as fast as Zenoh takes it, without
 waiting for answers, over one plain Zenoh session; `names`: under a hundred names in turn, which only a mesh
-without keys lets it do. Beside each load another plain session asks for control a hundred times, as an honest
-operator would (`others`): how many are answered within 2 s, and when.
+without keys permits. During each load another plain session asks for control a hundred times, as an honest
+operator would (`others`): the number of answers within 2 s, and their delays.
 
-Reach: p95 beside a flood at most three times the p95 beside the burners.
+Target: p95 during a flood at most three times the p95 with the CPU burners.
 """
 
 import argparse
@@ -49,14 +49,14 @@ from tests.conftest import free_port
 
 ROBOTS = ("arm", "other")
 LOADS = ("idle", "burners", "flood", "names")
-STOP_AFTER_S = (0.06, 0.075)  # two robots: each has one every 0.12 to 0.15 s; those within 0.1 s share a unit
+STOP_AFTER_S = (0.06, 0.075)  # a robot gets one every 0.12 to 0.15 s; those within 0.1 s share a unit
 MOST_STOPS = 100_000
 OTHERS = 100
 
 
 @dataclass(frozen=True)
 class Site:
-    """Where a site is, and with what one attaches."""
+    """A site's address and the credentials that its clients use."""
 
     endpoint: str
     operator: str
@@ -87,16 +87,16 @@ def print_table(result: dict[str, Any]) -> None:
         print(f"{name:<22} n {row['n']:4d} missing {row['missing']:2d}  {cells}")
     for name, row in result["others_ms"].items():
         print(
-            f"others beside {name:<8} n {row['n']:4d} unanswered {row['missing']:3d}  "
+            f"others during {name:<8} n {row['n']:4d} unanswered {row['missing']:3d}  "
             f"p50 {row['wire']['p50']:.1f} p95 {row['wire']['p95']:.1f}"
         )
     for name, ratio in result["to_burners_p95"].items():
-        print(f"p95 to the p95 beside the burners, {name:<24}: {ratio:.2f}")
-    print(f"asked by the flooders: {result['asked_per_s']:.0f} a second")
+        print(f"p95 divided by the p95 with the burners, {name:<24}: {ratio:.2f}")
+    print(f"requests of the flood: {result['asked_per_s']:.0f} a second")
 
 
 def stops_beside(number: int, *, with_keys: bool, rounds: int = 4) -> dict[str, Any]:
-    """Send stops beside each load.
+    """Send stops during each load.
 
     Args:
         number: How many of each client, robot and load.
@@ -137,7 +137,7 @@ def stops_beside(number: int, *, with_keys: bool, rounds: int = 4) -> dict[str, 
 
 
 def summary(times: list[tuple[float, float]]) -> dict[str, Any]:
-    """Return the percentiles [ms] of (to the wire, to the answer) pairs [s]; nan: it did not come."""
+    """Return the percentiles [ms] of (to the wire, to the answer) pairs [s]; nan: no arrival."""
     row: dict[str, Any] = {"n": len(times), "missing": sum(any(t != t for t in pair) for pair in times)}
     for index, what in enumerate(("wire", "answer")):
         values = sorted(pair[index] * 1e3 for pair in times if pair[index] == pair[index])
@@ -154,7 +154,7 @@ def summary(times: list[tuple[float, float]]) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def site(*, with_keys: bool) -> Iterator[tuple[Site, Any]]:
-    """A router, a gateway of two robots, and their controllers, which note when each stop came [ns]."""
+    """Run a router, a gateway of two robots, and their controllers, which record each stop's arrival [ns]."""
     ports, router = [free_port(), free_port()], free_port()
     arrivals = multiprocessing.RawArray("q", 2 * MOST_STOPS + 2)
     endpoint = f"{'tls' if with_keys else 'tcp'}/127.0.0.1:{router}"
@@ -186,7 +186,7 @@ def site(*, with_keys: bool) -> Iterator[tuple[Site, Any]]:
 
 
 def controllers(ports: list[int], arrivals: Any) -> None:
-    """Two controllers that stand still, each in threads of its own."""
+    """Run two controllers at rest, each in separate threads."""
     servers = [socket.create_server(("127.0.0.1", port)) for port in ports]
     for index, server in enumerate(servers):
         threading.Thread(target=accept, args=(server, index, arrivals), daemon=True).start()
@@ -220,12 +220,12 @@ def hear(client: socket.socket, index: int, arrivals: Any) -> None:
                 arrivals[index] = count + 1
 
 
-# ------------------------------------------------------------------------- the askers
+# ----------------------------------------------------------------------- the clients
 
 
 @contextlib.contextmanager
 def askers(where: Site) -> Iterator[Callable[[str, int, Any], dict[str, list[tuple[float, float]]]]]:
-    """A process for each client, which sends stops when it is asked to."""
+    """Start a process for each client, which sends stops on request."""
     pipes = {}
     with contextlib.ExitStack() as stack:
         for name, target in (("plain", plain_client), ("ours", our_client)):
@@ -245,7 +245,7 @@ def askers(where: Site) -> Iterator[Callable[[str, int, Any], dict[str, list[tup
                 came = list(arrivals[start + first : start + last])
                 found[robot] = []
                 for at, answered in asked[robot]:
-                    # The first unit since it was asked, and before the next was.
+                    # The first unit after this request and before the next one.
                     wire = next((each for each in came if each >= at), None)
                     found[robot].append(
                         (
@@ -259,7 +259,7 @@ def askers(where: Site) -> Iterator[Callable[[str, int, Any], dict[str, list[tup
 
 
 def plain_config(where: Site) -> zenoh.Config:
-    """What Zenoh's own documentation says that a client needs."""
+    """Return the configuration that Zenoh's own documentation gives for a client."""
     config = zenoh.Config()
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", json.dumps([where.endpoint]))
@@ -333,7 +333,7 @@ def our_client(where: Site, pipe: Any) -> None:
 
 
 def honest(where: Site, number: int) -> list[tuple[float, float]]:
-    """Ask for control in another's name, and count the time to the refusal [s]; nan: none came within 2 s."""
+    """Ask for control in another's name; time [s] each refusal, nan after 2 s without one."""
     name = "li" if where.bundle is None else where.operator
     key = f"robomesh/bench/{ROBOTS[0]}/lease/request/{name}"
     found = []
@@ -341,7 +341,7 @@ def honest(where: Site, number: int) -> list[tuple[float, float]]:
         for _ in range(number):
             at, took = time.monotonic(), float("nan")
             for reply in session.get(key, payload=b'{"action": "RENEW", "lease": "x"}', timeout=2.0):
-                # Zenoh's own, that the time is over, has another encoding.
+                # Zenoh's own timeout error has another encoding.
                 if reply.err is None or str(reply.err.encoding).startswith("text/plain"):
                     took = time.monotonic() - at
             found.append((took, took))
@@ -354,7 +354,7 @@ def honest(where: Site, number: int) -> list[tuple[float, float]]:
 
 @contextlib.contextmanager
 def beside(load: str, where: Site, asked: Any) -> Iterator[None]:
-    """Two processes of a load while the block runs."""
+    """Run two processes of a load while the block runs."""
     with contextlib.ExitStack() as stack:
         before = asked[0]
         for index in range(0 if load == "idle" else 2):

@@ -1,9 +1,9 @@
-"""The renderer's streams: how soon the first picture comes, how many come, and what each watcher costs.
+"""The renderer's streams: the delay of the first picture, the picture rate, and the cost of each watcher.
 
     ./dev run python benchmarks/streams.py [--size 1280x720] [--seconds 8] [--json]
 
-A site of its own: router, a robot that moves at 100 Hz, kinematics, and the renderer in a process of
-its own, whose CPU is measured. It is watched from here.
+The program starts a site: router, a robot that moves at 100 Hz, kinematics, and the renderer in a separate
+process, whose CPU is measured. This process watches the streams.
 """
 
 import argparse
@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 if __name__ == "__main__":
-    # A program beside this one has a room's name: what is imported is looked for from the root.
+    # Import from the root: a program in this folder has the same name as a package.
     sys.path[0] = str(Path(__file__).parents[1])
 
 import zenoh
@@ -43,7 +43,7 @@ ARM = "robomesh/hall/arm"
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--size", default="1280x720")
-    parser.add_argument("--seconds", type=float, default=8.0, help="each step is watched")
+    parser.add_argument("--seconds", type=float, default=8.0, help="of each step")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     width, height = (int(part) for part in arguments.size.split("x"))
@@ -111,8 +111,8 @@ async def move(robot: Session) -> None:
 
 
 async def first_ms(monitor: Session, key: str) -> float:
-    """From subscribing to the first packet that comes live."""
-    await asyncio.sleep(0.3)  # the watcher before has gone
+    """Return the time from subscribing to the first live packet."""
+    await asyncio.sleep(0.3)  # until the previous watcher has left
     began = time.monotonic()
     video = monitor.subscribe(key, history=False)
     async with asyncio.timeout(10):
@@ -122,7 +122,7 @@ async def first_ms(monitor: Session, key: str) -> float:
 
 
 async def asked_ms(monitor: Session, number: int) -> float:
-    """From asking for a view of one's own, of a size that nobody has, to its first packet."""
+    """Return the time from a request for a private view, of an unused size, to its first packet."""
     began = time.monotonic()
     request = ViewRequest(of="free", width=480 + 16 * number, height=320)
     answer = await monitor.ask(f"{ARM}/views/{monitor.own_name}", request, timeout_s=5.0)
@@ -135,7 +135,7 @@ async def asked_ms(monitor: Session, number: int) -> float:
 
 
 async def rates(monitor: Session, renderer: int, views: int, watchers: int, seconds: float) -> dict[str, Any]:
-    """Pictures a second of each view, and the renderer's CPU, in shares of a core."""
+    """Return pictures a second of each view, and the renderer's CPU as a share of a core."""
     watched = [
         monitor.subscribe(f"{ARM}/video/{view}", newest=4, history=False)
         for view in VIEWS[:views]

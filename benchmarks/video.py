@@ -1,15 +1,15 @@
 """Video: unit on the controller's socket -> picture drawn in Chromium; the cost of a viewer; a slow link.
 
-A controller's unit carries a counter in its last joint while the arm swings. Each picture's header tells the
-unit that it shows (the gateway's date of it), in the browser too: the page's own decoding and drawing are
-noted, not replaced. All clocks are this machine's. Drawn is when the page hands the picture to its canvas;
-the display's own refresh comes after. Viewers are clients that speak the page's protocol; the slow one reads
-so many bits a second through a small receive buffer.
+A controller's unit carries a counter in its last joint while the arm swings. Each picture's header names the
+unit that it shows (by the gateway's time stamp), also in the browser: hooks in the page record its decoding
+and drawing, and do not replace them. All clocks are this machine's. A picture counts as drawn when the page
+hands it to its canvas; the display's own refresh comes after. Viewers are clients that speak the page's
+protocol; the slow one reads at a limited bit rate through a small receive buffer.
 
     ./dev run python benchmarks/video.py [--seconds 30] [--viewers 64] [--link 2e6] [--json]
 
-Reach: p50 60 ms at 30 pictures a second; at most 0.1 % of a core for each further viewer; the slow viewer's
-own age p99 under 0.5 s, and the others' as without it.
+Target: p50 60 ms at 30 pictures a second; at most 0.1 % of a core for each further viewer; the slow viewer's
+own age p99 under 0.5 s, and the others' the same as without it.
 """
 
 import argparse
@@ -38,14 +38,14 @@ from robots.joints import joints_of
 from web import build_page
 
 RATE_HZ = 100
-# The counter, in steps that the protocol's text carries exactly: 300 degrees of the last joint, then anew.
+# The counter, in steps that the protocol's text carries exactly: 300 degrees of the last joint, then wraps.
 STEP_DEG, STEPS = 0.01, 30_000
 KEY = "robomesh/bench/arm/video/free"
 WARM_S = 6.0
 OTHERS = 8
 CHROMIUM = "/usr/bin/chromium"
 
-# Notes the source time of the message that is being taken, and when its picture is drawn.
+# Records the source time of the current message, and when its picture is drawn.
 NOTING = """
 const Socket = WebSocket, decode = VideoDecoder.prototype.decode, sources = new Map();
 let source = 0n;
@@ -101,7 +101,7 @@ def _words(value: Any) -> str:
 
 
 def measure(seconds: float, viewers: int, bits_per_s: float) -> dict[str, Any]:
-    """Everything, in one run."""
+    """Measure all figures in one run."""
     units = int((4 * (seconds + WARM_S) + 60) * RATE_HZ)
     written = multiprocessing.RawArray("q", STEPS)
     router, controller, page = free_port(), free_port(), free_port()
@@ -136,7 +136,7 @@ async def _measure(
 
 
 async def drawn(endpoint: str, address: str, written: Any, seconds: float) -> dict[str, Any]:
-    """Unit on the socket -> picture drawn, in a Chromium that shows the Wall with this view alone."""
+    """Measure from the unit on the socket to the picture drawn, in a Chromium that shows only this view."""
     sources: dict[int, int] = {}
     async with open_session(SessionSettings(connect=(endpoint,), wait_s=20.0)) as session:
         joints = session.subscribe("robomesh/bench/arm/joints", newest=10_000, history=False)
@@ -172,7 +172,7 @@ async def drawn(endpoint: str, address: str, written: Any, seconds: float) -> di
 
 
 async def cost(address: str, console: int, seconds: float, viewers: int) -> dict[str, Any]:
-    """What the console's process needs for one viewer and for many of the same view [share of a core]."""
+    """Return the console's CPU use for one viewer and for many of the same view [share of a core]."""
     shares = []
     for count in (1, 1 + viewers):
         ages = multiprocessing.Queue()
@@ -192,7 +192,7 @@ async def cost(address: str, console: int, seconds: float, viewers: int) -> dict
 
 
 async def slow_link(address: str, seconds: float, bits_per_s: float) -> dict[str, Any]:
-    """Ages of the pictures that some viewers get, without and with one behind a slow link, and its own."""
+    """Return the ages of some viewers' pictures, without and with one on a slow link, and that one's ages."""
     result: dict[str, Any] = {"bits_per_s": bits_per_s}
     for name, slow in (("others_alone_ms", False), ("others_beside_it_ms", True)):
         ages = multiprocessing.Queue()
@@ -223,7 +223,7 @@ class Viewer:
 
 
 def watching(address: str, count: int, seconds: float, ages: Any) -> None:
-    """So many viewers in a process of their own, which decode nothing."""
+    """Run a number of viewers in a separate process; they decode no pictures."""
 
     async def view(until: float, seen: dict[str, Any]) -> None:
         async with Viewer(address) as socket_:
@@ -242,7 +242,7 @@ def watching(address: str, count: int, seconds: float, ages: Any) -> None:
 
 
 def take(message: bytes, warm: bool, seen: dict[str, Any]) -> int | None:
-    """Notes a picture's age; its step, where it is one."""
+    """Record a picture's age, and its step if it has one."""
     sample = ToPage.FromString(message).sample
     if sample.key != KEY:
         return None
@@ -254,7 +254,7 @@ def take(message: bytes, warm: bool, seen: dict[str, Any]) -> int | None:
 
 
 def read_slowly(address: str, seconds: float, bits_per_s: float) -> tuple[dict[str, Any], list[int]]:
-    """A page whose line takes so many bits a second, and its system holds little."""
+    """Watch as a page with a limited bit rate and small buffers."""
     host, port = address.split(":")
     seen: dict[str, Any] = {"ages_ns": [], "frames": 0, "bytes": 0}
     steps: list[int] = []
@@ -277,7 +277,7 @@ def read_slowly(address: str, seconds: float, bits_per_s: float) -> tuple[dict[s
                 continue
             piece = line.recv(min(allowed, 4096))
             read += len(piece)
-            # What the line could have taken and nobody sent is lost to it.
+            # Unused time on the line is lost: it does not add to the later rate.
             read = max(read, int(now * bits_per_s / 8) - 8192)
             buffer += piece
             if in_head and b"\r\n\r\n" in buffer:
@@ -292,7 +292,7 @@ def read_slowly(address: str, seconds: float, bits_per_s: float) -> tuple[dict[s
 
 
 def next_frame(buffer: bytes) -> tuple[bytes, bytes] | None:
-    """The first WebSocket frame's payload (empty: a ping) and what is behind it; None: it is not whole."""
+    """Return the first WebSocket frame's payload (empty: a ping) and the rest; None if it is incomplete."""
     if len(buffer) < 2:
         return None
     length, at = buffer[1] & 0x7F, 2
@@ -308,13 +308,13 @@ def next_frame(buffer: bytes) -> tuple[bytes, bytes] | None:
 
 
 def cpu_s(pid: int) -> float:
-    """Processor time that a process has used [s]."""
+    """Return the processor time that a process has used [s]."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def swinging(port: int, written: Any, units: int) -> None:
-    """A controller whose arm swings, with the counter in its last joint."""
+    """Run a controller whose arm swings, with the counter in its last joint."""
     names = joints_of(load("pt600"))
     with socket.create_server(("127.0.0.1", port)) as server:
         client, _ = server.accept()
@@ -327,7 +327,7 @@ def swinging(port: int, written: Any, units: int) -> None:
             step = k % STEPS
             values = ";".join(f"{value:.2f}" for value in (*others, step * STEP_DEG - 150.0))
             written[step] = time.monotonic_ns()
-            with contextlib.suppress(ConnectionError):  # the gateway has ended first
+            with contextlib.suppress(ConnectionError):  # the gateway has ended
                 client.sendall(f"1#ABSOLUTE.DEG*{values}@".encode())
 
 

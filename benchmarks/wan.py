@@ -1,28 +1,28 @@
 """Sites over a wide area: emulated links (`tests/wan/link.py`) between network namespaces, real services.
 
 A plant (controller, gateway, router), a hub (router), a control room (a monitor of the hub's router). The far
-link is the one between plant and hub. All clocks are this machine's. Needs root, or whatever may make
-network namespaces and TUN devices.
+link is the one between plant and hub. All clocks are this machine's. Needs root, or another user that may
+make network namespaces and TUN devices.
 
     ./dev run python benchmarks/wan.py [--only delay,narrow,cut,kills,failover,frozen,bytes,border] [--json]
 
-delay      80 ms there and back, with and without 1 % of the packets lost each way: how late the room has
-           the joints; how soon a stop is on the controller's socket after it was asked for over both
-           links, as stops are, and over one, as other requests are
-narrow     100, 20 and 2 Mbit/s, 40 ms each way, beside publications like 8 Mbit/s of video: how late the
-           joints are and how many come, and how much of the video comes; then 2 Mbit/s of which the plant's
-           router was told (`line_mbit`), and meshes of 3 MB fetched over it, with and without that video;
-           then a view of a moving arm, drawn by the plant's own renderer
-cut        the link cut for 5 and 60 s: how soon the room sees it, how soon all is live again, and whether
-           what was lost is what was counted
+delay      80 ms round trip, with and without 1 % of the packets lost each way: delay of the joints in the
+           room; delay from a request for a stop to the controller's socket, over both links (as for
+           stops), and over one (as for other requests)
+narrow     100, 20 and 2 Mbit/s, 40 ms each way, while publications like 8 Mbit/s of video use the link: delay
+           and share of the joints, and share of the video; then 2 Mbit/s with a router that knows the rate
+           (`line_mbit`), and meshes of 3 MB fetched over it, with and without that video; then a view of
+           a moving arm, drawn by the plant's own renderer
+cut        the link cut for 5 and 60 s: the delay until the room shows it, the delay until all is live again,
+           and whether the count of lost messages is correct
 kills      the plant's router killed with -9, 20 times: how soon the room has live joints and the last state
-failover   a monitor with two routers, of which the one it is at is killed: for how long nothing comes
-frozen     the plant's router frozen (SIGSTOP): how soon that is noticed, how soon all is live again
-bytes      what a robot costs on the link, a topic at a time, by TLS too, and what an idle mesh does
-border     all of a robot's topics and its far view watched from the hub, by TLS: what crosses the link, and
-           what a slow border leaves of it
+failover   a monitor with two routers, of which the connected one is killed: how long no message arrives
+frozen     the plant's router frozen (SIGSTOP): the delay until the room notices, and until all is live again
+bytes      bytes of a robot on the link, a topic at a time, also by TLS, and bytes of an idle mesh
+border     all of a robot's topics and its far view watched from the hub, by TLS: bytes that cross the link,
+           and the share that a slow border lets through
 
-On a machine that others use too, `chrt -r 5 python benchmarks/wan.py` shows the line and not the others.
+On a machine with other users, `chrt -r 5 python benchmarks/wan.py` measures the line without their load.
 """
 
 import argparse
@@ -53,7 +53,7 @@ CONTROLLER = f"{ROBOT}/controller"
 EVENTS = f"{ROBOT}/events"
 VIDEO = f"{ROBOT}/video/free"
 ONE_WAY_MS = 40.0
-# As much as a few views of 1280 x 720; and what a line's own router queues, 0.26 s at 2 Mbit/s.
+# About as much as a few views of 1280 x 720; and the queue of a line's own router, 0.26 s at 2 Mbit/s.
 VIDEO_MBIT = 8.0
 QUEUE_BYTES = 64_000
 NARROW_MBIT = 2
@@ -64,7 +64,7 @@ START_S = 120.0
 
 @dataclass
 class Stage:
-    """What stands there."""
+    """The running processes and links."""
 
     network: Network
     plant: Site
@@ -77,17 +77,17 @@ class Stage:
 
     @property
     def at_hub(self) -> str:
-        """The hub's router, from the room."""
+        """Return the hub's router as the room reaches it."""
         return f"tcp/{self.near.far}:{PORT}"
 
 
 @contextlib.contextmanager
 def stage(*, told_mbit: float | None = None, moving: bool = False, **link: Any) -> Iterator[Stage]:
-    """Everything up, and joints live in the room.
+    """Start all processes, and wait until joints are live in the room.
 
     Args:
-        moving: The arm swings by itself.
-        told_mbit: What the plant's router is told that its line carries [Mbit/s]; None: nothing.
+        moving: The arm swings without a command.
+        told_mbit: The rate of its line that the plant's router knows [Mbit/s]; None: no rate.
     """
     with tempfile.TemporaryDirectory() as folder, Network() as network:
         hosts = {name: network.host(name) for name in ("plant", "hub", "room")}
@@ -111,7 +111,7 @@ def stage(*, told_mbit: float | None = None, moving: bool = False, **link: Any) 
 
 
 def note_stops(made: Stage) -> None:
-    """When each stop was on the controller's socket."""
+    """Record when each stop was on the controller's socket."""
     output = made.plant.processes["controller"].stdout
     assert output is not None
     with contextlib.suppress(ValueError):  # closed
@@ -120,7 +120,7 @@ def note_stops(made: Stage) -> None:
 
 
 def quantiles(values: list[float]) -> dict[str, float]:
-    """Of durations [s], in ms."""
+    """Return quantiles of durations [s], in ms."""
     if not values:
         return {"n": 0}
     ordered = sorted(value * 1e3 for value in values)
@@ -133,7 +133,7 @@ def quantiles(values: list[float]) -> dict[str, float]:
 
 
 def joints_for(made: Stage, seconds: float, topic: str = JOINTS) -> list[tuple[float, float]]:
-    """(when it came, how long after its source's time) [s] of each sample that came."""
+    """Return (arrival, delay after its source's time) [s] of each sample received."""
     made.room.do("samples", topic)
     time.sleep(seconds)
     return [(at, lag) for at, lag, live, *_ in made.room.do("samples", topic) if live]
@@ -143,7 +143,7 @@ def joints_for(made: Stage, seconds: float, topic: str = JOINTS) -> list[tuple[f
 
 
 def delay(seconds: float, stops: int) -> dict[str, Any]:
-    """80 ms there and back, with and without losses."""
+    """Measure 80 ms of round trip, with and without losses."""
     rows: dict[str, Any] = {}
     for loss in (0.0, 0.01):
         with stage(delay_ms=ONE_WAY_MS, loss=loss) as made:
@@ -160,7 +160,7 @@ def delay(seconds: float, stops: int) -> dict[str, Any]:
 
 
 def stops_asked(made: Stage, number: int, order: tuple[Any, ...]) -> dict[str, Any]:
-    """From asking for a stop to its unit on the controller's socket."""
+    """Measure from the request for a stop to its unit on the controller's socket."""
     took = []
     for _ in range(number):
         before = len(made.stops)
@@ -170,7 +170,7 @@ def stops_asked(made: Stage, number: int, order: tuple[Any, ...]) -> dict[str, A
             time.sleep(0.002)
         if len(made.stops) > before:
             took.append(made.stops[before] - began)
-        time.sleep(0.15)  # those closer than 0.1 s share a unit
+        time.sleep(0.15)  # stops closer than 0.1 s share a unit
     return {"asked": number, **quantiles(took)}
 
 
@@ -178,7 +178,7 @@ def stops_asked(made: Stage, number: int, order: tuple[Any, ...]) -> dict[str, A
 
 
 def narrow(seconds: float, meshes: int) -> dict[str, Any]:
-    """Joints beside video on a narrow link, and meshes over it."""
+    """Measure joints while video uses a narrow link, and meshes over it."""
     rows: dict[str, Any] = {}
     with stage(delay_ms=ONE_WAY_MS) as made:
         pour_video(made)
@@ -199,7 +199,7 @@ def narrow(seconds: float, meshes: int) -> dict[str, Any]:
 
 
 def drawn_view(made: Stage) -> str:
-    """Have the plant's own renderer draw for the room; the view's key."""
+    """Let the plant's own renderer draw for the room; return the view's key."""
     for service in ("kinematics", "renderer"):
         made.plant.start(service)
     wanted, deadline = {"of": "free", "width": 1280, "height": 720}, time.monotonic() + START_S
@@ -214,13 +214,13 @@ def drawn_view(made: Stage) -> str:
 
 
 def pour_video(made: Stage) -> None:
-    """Publish what is like video at the plant, and watch it in the room."""
+    """Publish data like video at the plant, and watch it in the room."""
     made.beside.do("pour", "plant", "arm", "free", VIDEO_MBIT, 30.0)
     made.room.do("watch", VIDEO)
 
 
 def beside_video(made: Stage, mbit: float, seconds: float, video: str = VIDEO) -> dict[str, Any]:
-    """Joints and video over a line of that rate."""
+    """Measure joints and video over a line of that rate."""
     made.far.change(rate_bps=mbit * 1e6, queue_bytes=QUEUE_BYTES)
     time.sleep(5.0)
     made.room.do("samples", video)
@@ -239,7 +239,7 @@ def beside_video(made: Stage, mbit: float, seconds: float, video: str = VIDEO) -
 
 
 def fetch_meshes(made: Stage, times: int) -> dict[str, Any]:
-    """How many of them came whole, how long each took, and the joints meanwhile."""
+    """Return how many meshes arrived complete, the time for each, and the joints during the transfer."""
     sha256 = made.beside.do("hold_mesh", "plant", "arm", MESH_BYTES)
     made.room.do("samples", JOINTS)
     answers = [made.room.do("mesh", MESH, 10.0) for _ in range(times)]
@@ -255,7 +255,7 @@ def fetch_meshes(made: Stage, times: int) -> dict[str, Any]:
 
 
 def cut(lengths: tuple[float, ...]) -> dict[str, Any]:
-    """The link goes and comes back."""
+    """Cut the link and restore it."""
     rows: dict[str, Any] = {}
     with stage(delay_ms=ONE_WAY_MS) as made:
         for length in lengths:
@@ -289,7 +289,7 @@ def cut(lengths: tuple[float, ...]) -> dict[str, Any]:
 
 
 def kills(times: int) -> dict[str, Any]:
-    """The plant's router is killed and started again."""
+    """Kill the plant's router and restart it."""
     took, state = [], []
     with stage(delay_ms=ONE_WAY_MS) as made:
         for _ in range(times):
@@ -304,14 +304,14 @@ def kills(times: int) -> dict[str, Any]:
                 time.sleep(0.02)
             state.append(time.monotonic() - killed)
             came: list[float] = []
-            while not came:  # but for what was on its way
+            while not came:  # except messages in flight
                 came = [at for at, *_ in made.room.do("samples", JOINTS) if at > killed + 4e-3 * ONE_WAY_MS]
             took.append(came[0] - killed)
     return {"joints_again_ms": quantiles(took), "last_state_again_ms": quantiles(state)}
 
 
 def failover(times: int) -> dict[str, Any]:
-    """A monitor that knows two routers; the one that it is at dies."""
+    """Kill the router that a monitor is connected to; the monitor knows two."""
     gaps = []
     with stage(delay_ms=ONE_WAY_MS) as made:
         second = made.network.host("second")
@@ -339,7 +339,7 @@ def failover(times: int) -> dict[str, Any]:
 
 
 def frozen(times: int) -> dict[str, Any]:
-    """The plant's router stands still for 5 s."""
+    """Freeze the plant's router for 5 s."""
     noticed, well = [], []
     with stage(delay_ms=ONE_WAY_MS) as made:
         for _ in range(times):

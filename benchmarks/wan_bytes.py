@@ -1,4 +1,4 @@
-"""What crosses the line between a plant and a hub, for `wan.py`: a topic at a time, by TLS, past a border."""
+"""The bytes on the line between a plant and a hub, for `wan.py`: a topic at a time, by TLS, past a border."""
 
 import contextlib
 import subprocess
@@ -18,7 +18,7 @@ _ROBOMESH = (sys.executable, "-m", "services.command_line.main")
 
 
 def bytes_per_topic(seconds: float) -> dict[str, Any]:
-    """For each topic that one monitor takes; and two of them by TLS."""
+    """Measure each topic for one monitor, and two of the topics by TLS."""
     rows: dict[str, Any] = {}
     for topic in ("", "joints", "joints/slow", "controller", "frames", "kinematics"):
         with _stage((topic,) if topic else ()) as far:
@@ -30,7 +30,7 @@ def bytes_per_topic(seconds: float) -> dict[str, Any]:
 
 
 def over_border(seconds: float) -> dict[str, Any]:
-    """All that a monitor at the hub asks for of one robot, and its far view alone."""
+    """Measure all that a monitor at the hub requests of one robot, and its far view alone."""
     rows: dict[str, Any] = {}
     for name, watched, border in (
         ("all, border open", _WATCHED, "open"),
@@ -57,7 +57,7 @@ def _crossed(far: Link, seconds: float) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def _stage(topics: tuple[str, ...], *, border: str = "") -> Iterator[Link]:
-    """A plant with a moving arm, watched from the hub; by TLS if its border is told."""
+    """Start a plant with a moving arm, watched from the hub; by TLS if its border is given."""
     with tempfile.TemporaryDirectory() as folder, Network() as network:
         plant_host, hub_host = network.host("plant"), network.host("hub")
         far = network.link(plant_host, hub_host)
@@ -88,7 +88,7 @@ def _stage(topics: tuple[str, ...], *, border: str = "") -> Iterator[Link]:
 
 
 def _with_keys(plant: Site, hub: Site, at_hub: str, border: str) -> tuple[Path, Path]:
-    """Authorities, certificates and the link between both; a monitor's keys at each."""
+    """Make authorities, certificates and the link between both sites; return a monitor's keys at each."""
     plant.links = (f"hub={at_hub}",)
     plant.router = f'border = "{border}"'
     for site in (plant, hub):
@@ -103,6 +103,6 @@ def _with_keys(plant: Site, hub: Site, at_hub: str, border: str) -> tuple[Path, 
 
 
 def _keys(site: Site, *words: str) -> None:
-    """`robomesh keys` at a site."""
+    """Run `robomesh keys` at a site."""
     folder = () if words[0] == "init" else ("--folder", str(site.folder / "keys"))
     subprocess.run([*_ROBOMESH, "keys", *words, *folder], check=True, stdout=subprocess.DEVNULL)

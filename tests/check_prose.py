@@ -18,7 +18,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("robomesh", "robots", "protocol_gateway", "mcap_files", "renderer", "services", "web")
+PACKAGES = (
+    "robomesh",
+    "robots",
+    "protocol_gateway",
+    "mcap_files",
+    "renderer",
+    "services",
+    "web",
+    "benchmarks",
+)
 
 # A docstring begins with a verb in the imperative, or with a noun phrase.
 QUESTION_WORD = re.compile(
