@@ -122,7 +122,7 @@ def shared() -> Path:
 
 # ------------------------------------------------------------------------ --quick
 
-# What `--quick` leaves out, in words, by marker or fixture; the first that fits counts.
+# Tests that `--quick` omits, in words, by marker or fixture; the first match counts.
 LEFT_OUT = {
     "browser": "drive the page in a browser",
     "processes": "start a whole site of processes",

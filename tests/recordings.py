@@ -1,4 +1,4 @@
-"""Recordings for tests, written by the plain `mcap` writer: what is in them is known."""
+"""Recordings for tests, written by the plain `mcap` writer, with known content."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,7 +40,7 @@ class Written:
         self._stream.close()
 
     def put(self, topic: str, message: Message, at_s: float) -> None:
-        """A message of the robot, received so long after the start."""
+        """Put a message of the robot, received so long after the start."""
         key = f"robomesh/{self.site}/{self.robot}/{topic}"
         if key not in self._channels:
             number = register_schema(self._writer, type(message))
@@ -51,12 +51,12 @@ class Written:
         )
 
     def attach(self, name: str, data: bytes, media_type: str = "application/octet-stream") -> None:
-        """An attachment."""
+        """Add an attachment."""
         self._writer.add_attachment(0, 0, name, media_type, data)
 
 
 def joints(**positions: float) -> JointStates:
-    """Joint states."""
+    """Return joint states."""
     message = JointStates()
     for name, position in positions.items():
         message.joints.add(name=name, position=position)
@@ -66,7 +66,7 @@ def joints(**positions: float) -> JointStates:
 def write_recording(
     path: Path, *, seconds: float = 4.0, hz: float = 100.0, chunked: bool = True, video: bool = True
 ) -> Path:
-    """An arm whose waist turns by 1 rad a second, and what belongs to it."""
+    """Write an arm whose waist turns by 1 rad a second, and its other topics."""
     with Written(path, chunked=chunked) as file:
         file.put("description", schema.Description(name="pt600", title="Pt600", cell="a"), 0.0)
         file.attach("mesh/base", b"glTF of the base", "model/gltf-binary")

@@ -30,17 +30,17 @@ class RunningSite:
 
     @property
     def mesh(self) -> SessionSettings:
-        """Session settings towards its router."""
+        """Return session settings for its router."""
         return SessionSettings(connect=(self.router,), wait_s=20.0)
 
     def children(self) -> dict[str, int]:
-        """Process ids of its services, by name."""
+        """Return process ids of its services, by name."""
         return {words[0]: pid for pid, words in self.services()}
 
     def services(self) -> Iterator[tuple[int, list[str]]]:
-        """Each process that does something now, and its command's words.
+        """Return each working process and its command's words.
 
-        No spare, which waits at its standard input, a pipe; nor one that is just going, or not there yet.
+        Exclude a spare, which waits at its standard input, a pipe, and a process that starts or exits.
         """
         for line in _output("ps", "-ww", "-o", "pid=,args=", "--ppid", str(self.process.pid)).splitlines():
             pid, *words = line.split()
@@ -100,7 +100,7 @@ demo = true
 def running_site(
     folder: Path, *, name: str = "test", robots: str = ONE_ARM, more: str = ""
 ) -> Iterator[RunningSite]:
-    """A running site; ended, with all its processes, when the block ends."""
+    """Yield a running site; it ends, with all its processes, when the block ends."""
     router, console = f"tcp/127.0.0.1:{free_port()}", f"127.0.0.1:{free_port()}"
     path = site_file(folder, name=name, robots=robots, router=router, console=console, more=more)
     with running_file(path, router, console) as site:
@@ -157,7 +157,7 @@ def running_file(path: Path, router: str, console: str) -> Iterator[RunningSite]
 
 
 def alive(pid: int) -> bool:
-    """Whether a process runs (a zombie does not)."""
+    """Return whether a process runs (a zombie does not)."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
     except (FileNotFoundError, ProcessLookupError):

@@ -1,4 +1,4 @@
-"""What the files of compose and systemd name is there: commands, options, roles, site files."""
+"""Names in the files of compose and systemd: commands, options, roles and site files exist."""
 
 import re
 import shlex

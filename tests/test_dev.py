@@ -1,4 +1,4 @@
-"""How `./dev test` judges tests that pass only when run again: they are named, and too many fail the run."""
+"""Verdict of `./dev test` on tests that pass only when repeated: it names them, and too many fail the run."""
 
 import sys
 from importlib.machinery import SourceFileLoader
@@ -55,7 +55,7 @@ def dev():
 
 @pytest.fixture
 def judged(dev, tmp_path, capfd):
-    """What becomes of a folder of tests: why it failed, and which are named as unsteady."""
+    """Return why a folder of tests failed, and the tests that are named as unsteady."""
 
     def judge(text):
         (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = other\n")

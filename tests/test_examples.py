@@ -1,4 +1,4 @@
-"""Each example is a whole program, run as a user runs it."""
+"""Examples as whole programs, run as a user runs them."""
 
 import os
 import signal

@@ -31,8 +31,8 @@ from web import build_page
 CHROMIUM = Path("/usr/bin/chromium")
 PATIENCE_MS = 60_000
 LAUNCH_MS = 180_000  # a browser start next to four busy processes
-# What an address bar offers is drawn for each page by two processes more, and a third waits for the next one.
-# The last such list counts: the others are Playwright's that could matter here.
+# Address bar suggestions cost two more processes for each page, and a third waits for the next page.
+# Chromium uses the last list only, so this one repeats Playwright's features that could matter here.
 WITHOUT = (
     *("WebUIOmniboxPopup", "WebUIOmniboxAimPopup", "SpareRendererForSitePerProcess"),
     *("HttpsUpgrades", "PaintHolding", "OptimizationHints"),
@@ -322,7 +322,7 @@ def open_page(contexts, plant):
         return page
 
     yield open_one
-    found = [*wrong]  # what pages say of their end is none of it
+    found = [*wrong]  # messages about a page's end are no errors
     for context, kind in lent:
         contexts.give_back(context, kind, plant.address)
     assert found == []

@@ -47,7 +47,7 @@ def ready(page, name="li"):
     take(page, name)
     reset = page.get_by_role("button", name=re.compile("^Reset"))
     home, notice = button(page, "Home"), page.locator(".control .notice")
-    # What stands on the page is the newest that it has heard: a stop of just before may come yet.
+    # The page shows the newest state that it received: a stop sent just before may still arrive.
     for _ in range(100):
         if reset.count() and reset.first.is_enabled():
             reset.first.click()

@@ -62,7 +62,7 @@ def test_a_motion_that_another_goes_on_from_has_not_failed(open_page):
     button(page, "waist +5°").click()
     expect(page.locator('[data-joint="waist"]')).to_have_text("5.00°")
     expect(page.locator(".joints .notice")).to_contain_text("Done: waist")
-    # As soon as the target is reached, while the gateway still waits for the arm to settle.
+    # The target is reached, but the gateway still waits for the arm to settle.
     button(page, "Home").click()
     expect(page.locator('[data-joint="waist"]')).to_have_text("0.00°")
     button(page, "waist +5°").click()

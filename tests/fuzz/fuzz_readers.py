@@ -185,7 +185,7 @@ def _grown(data: bytearray, at: int, chance: random.Random) -> bytearray:
             for _ in range(chance.choice((1, 3, 6))):
                 if len(block) < LARGEST:
                     block = block + b" " + block
-        case 1:  # beside itself: what has it has it many times
+        case 1:  # after itself: its parent contains it many times
             block = (block + b" ") * min(chance.choice((2, 100, 2000)), 1 + LARGEST // len(block))
         case 2:  # PROTOs of PROTOs, each of which uses the one before some times
             times, levels = chance.choice((1, 2, 10, 100, 5000)), chance.choice((1, 2, 8, 30, 150))

@@ -33,7 +33,7 @@ from robots.description import load
 from robots.joints import joints_of
 
 JOINTS = joints_of(load("pt600"))
-# What is kept between inputs has a bound: numbers and words of a few units.
+# State between inputs is bounded: numbers and words of a few units.
 GROWTH_MIB = 24
 WARM_UP = 20_000
 LONGEST = 64 * 1024

@@ -105,7 +105,7 @@ class Side:
         self.cancelled: list[Any] = []
         self.secrets: dict[str, str] = {}
 
-    # What AuditTrail, LatchFile, Journal and Checks offer.
+    # Interface of AuditTrail, LatchFile, Journal and Checks.
 
     async def write_before(self, *entries: Any) -> None:
         self.effects.append(("append", *(replace(each, time_ns=0) for each in entries)))
@@ -154,7 +154,7 @@ class Side:
     def publish(self) -> None:
         self.effects.append(("publish", self.state()))
 
-    # What a sequence does, on either side.
+    # Steps of a sequence, on either side.
 
     def state(self) -> Any:
         program = self.program()
@@ -412,7 +412,7 @@ class New(Side):
 
 # ---------------------------------------------------------------- sequences
 
-# "holder" is whoever holds the lease at that time, so that most requests get far.
+# "holder" is the lease's holder at that time, so that most requests are not rejected early.
 names = st.sampled_from(["holder", "holder", "holder", *NAMES])
 moves = st.sampled_from([(C.MOVE_ABSOLUTE, THERE), (C.HOME, HOME), (C.MOVE_ABSOLUTE, HOME)])
 others = st.tuples(
@@ -420,7 +420,7 @@ others = st.tuples(
     st.sampled_from([THERE, HOME, BAD, (0.1,)]),
 )
 command = st.one_of(moves, others, others)
-# A request that is carried on has its check and its audit entry completed at once.
+# The check and the audit entry of a continued request complete immediately.
 carried = st.sampled_from([True, True, False])
 TTLS = [0.0, 0.5, 5.0]
 
@@ -516,7 +516,7 @@ MOVE, STOP = given_command(C.MOVE_ABSOLUTE), ("stop", "wang", "smoke")
 REST, MOVING = ("observe", False), ("observe", True)
 RUN, STEP = ("run_program", "holder", False, False, True), ("step", "holder", (C.MOVE_ABSOLUTE, THERE), True)
 LATER, SOON = ("pass", 2.1, False), ("pass", 0.2, False)
-# What generated events alone reach too rarely; a sequence leaves out some of each.
+# Sequences that random events reach too rarely; a sequence omits some events of each.
 EPISODES = [
     [
         REST,

@@ -48,7 +48,7 @@ class GatewaySite:
 
     @property
     def joints(self):
-        """The newest positions; empty: none received yet."""
+        """Return the newest positions; empty: none received yet."""
         states = self.seen.get("joints")
         return [joint.position for joint in states[-1].joints] if states else []
 

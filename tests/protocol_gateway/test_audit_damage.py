@@ -240,7 +240,7 @@ def test_any_line_is_an_entry_or_an_audit_error(tmp_path_factory, numbers, value
     write(live, entry())
     (line,) = lines(live)
     for name, number in numbers.items():
-        # As text, because Python parses 4300 digits at most.
+        # Text, because Python parses 4300 digits at most.
         digits = number if isinstance(number, str) else str(number % 10**4000)
         line = _with(line, name, digits.encode())
     line = line.replace(b'"HOME"', b'"%s"' % request_.encode(errors="backslashreplace"))

@@ -279,7 +279,7 @@ def test_a_line_without_end_does_not_fill_the_memory(tmp_path):
 
 @pytest.fixture(scope="module")
 def searched(tmp_path_factory):
-    """A log of several files that the tests do not change."""
+    """Return a log of several files that the tests do not change."""
     live = tmp_path_factory.mktemp("searched") / "arm.jsonl"
     write(
         live,

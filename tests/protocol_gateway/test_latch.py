@@ -67,7 +67,7 @@ def test_a_reset_stop_is_no_longer_latched(path):
 
 def test_a_stop_number_is_never_given_out_twice(path):
     killed(path, (stop(1), 1))
-    given = RESERVED + 1  # what a killed gateway may have given out, and not written
+    given = RESERVED + 1  # numbers that a killed gateway may have issued and not written
     latch = LatchFile(path)
     latch.begin(latch.found.stop, latch.found.last_stop_id, given_out=latch.found.reserved)
     assert latch.next_number(given, NOW_NS) == given + 1

@@ -1,4 +1,4 @@
-"""Order of the effects of a robot's authority, without sockets or disk; and its equality with the old one."""
+"""Order of the effects of a robot's authority, without sockets or disk; and its equality with the old implementation."""
 
 import asyncio
 from dataclasses import replace
@@ -38,7 +38,7 @@ STOP = events.StopRequested(by="li", reason="smoke", source="test")
 
 
 class Bench:
-    """A robot's authority whose effects are only written down.
+    """A robot's authority whose effects are recorded and not performed.
 
     Attributes:
         performed: Names of the effects since the last `clear`.
@@ -175,7 +175,7 @@ def test_nothing_is_sent_if_something_comes_between(fault, order, code):
 
 
 def test_a_stop_never_waits():
-    """A stop at any point of a command yields no effect that must be awaited."""
+    """Check that a stop at any point of a command yields no effect that must be awaited."""
     for name in ("EnterCell", "CheckMotion", "Append", "Recheck", "Send"):
         bench = Bench().in_control()
         bench.during = {name: STOP}

@@ -108,7 +108,7 @@ def test_a_urdf_that_is_not_a_chain_is_rejected(urdf, says):
 
 
 def test_a_robot_with_rows_of_zeros_is_visible_in_every_view(tmp_path):
-    """A new robot in Define has rows of zeros; it once crashed the renderer."""
+    """Check a new robot in Define, which has rows of zeros: it crashed the renderer."""
     (tmp_path / "robot.toml").write_text(
         'name = "new"\n[[joint]]\nname = "j"\na = 0.0\nalpha = 0.0\nd = 0.0\nlimits = [-180.0, 180.0]\n'
         "max_speed = 90.0\nmax_acceleration = 360.0\nmax_jerk = 3600.0\n"

@@ -9,7 +9,7 @@ from renderer.frame_scheduler import FrameScheduler, next_due, next_view
 
 @dataclass
 class View:
-    """A view that changes all the time."""
+    """A view that changes constantly."""
 
     fps: float
     due_at: float = 0.0

@@ -99,7 +99,7 @@ def test_key_frames_are_forced_at_most_once_a_second(mesh, tmp_path):
 
 
 def test_a_stream_recovers_from_a_failed_encoder(mesh, tmp_path, monkeypatch):
-    """The encoder fails during the stream, as after the loss of a GPU."""
+    """Let the encoder fail during the stream, as after the loss of a GPU."""
 
     class Failing(H264Encoder):
         def encode(self, picture, *, key_frame):
@@ -272,7 +272,7 @@ def test_invalid_settings_are_rejected(mesh, tmp_path, settings, says):
 
 
 def test_a_slow_machine_draws_without_anti_aliasing_and_reports_it_once(mesh, tmp_path, monkeypatch):
-    """Drawing is slowed down, as on a busy machine."""
+    """Slow down drawing, as on a busy machine."""
     sizes = []
 
     class Slow(service.Studio):
@@ -334,7 +334,7 @@ def test_no_old_picture_is_sent_after_drawing_has_failed(mesh, tmp_path, monkeyp
 
 
 def test_a_robot_that_returns_after_a_long_time_is_drawn_again(mesh, tmp_path, monkeypatch):
-    """After an outage of the router, a kinematics service that kept running has no new description."""
+    """Let a kinematics service return without a new description, as after an outage of the router."""
     monkeypatch.setattr(robots, "_FORGET_AFTER_S", 0.2)
 
     async def main():

@@ -1,4 +1,4 @@
-"""Closing subscriptions and processes while threads still read."""
+"""Ends of subscriptions and processes while threads still read."""
 
 import asyncio
 import subprocess

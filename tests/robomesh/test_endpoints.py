@@ -13,7 +13,7 @@ from tests.conftest import free_port, run
 
 
 async def no_answer(request):
-    """Answers no request."""
+    """Answer no request."""
 
 
 @pytest.mark.parametrize(
@@ -52,7 +52,7 @@ def buffer_sizes():
 
 
 def test_connection_for_commands_has_small_buffers(router):
-    """A slow service then slows down a flooding sender and not the requests of other callers."""
+    """Check that a slow service slows down a flooding sender, and not the requests of other callers."""
     port = int(router.rpartition(":")[2])
 
     async def main():

@@ -19,7 +19,7 @@ STOP = "robomesh/site/{}/stop"
 
 @pytest.fixture
 def plain(mesh):
-    """A plain Zenoh session, without the library's checks."""
+    """Yield a plain Zenoh session, without the library's checks."""
     with zenoh.open(client_config(mesh.connect)) as session:
         yield session
 

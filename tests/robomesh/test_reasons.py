@@ -118,7 +118,7 @@ def test_refusal_keeps_its_code_over_a_router(mesh):
 
 
 def test_older_client_gets_the_encodings_that_it_knows(mesh):
-    """It does not request codes, and compares the whole encoding."""
+    """Check a client that does not request codes and compares the whole encoding."""
     errors = iter(
         [BusyError(codes.BUSY()), QuotaError(codes.BUSY(), again_s=0.25), RefusedError(codes.BUSY())]
     )

@@ -57,7 +57,7 @@ def test_value_published_during_its_query_is_live(mesh):
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
             publisher = gateway.declare_publisher("site", "arm", "joints")
             publisher.put(joints(1.0))
-            # As in the middle of `put`: the reply has the value before its publication.
+            # Simulates the middle of `put`: the reply has the value before its publication.
             put_unheard(publisher, joints(2.0))
             subscription = monitor.subscribe("robomesh/site/arm/joints", newest=10)
             answer = await anext(subscription)
@@ -245,7 +245,7 @@ def test_publisher_restarted_during_an_outage_is_queried_again(mesh):
                 publisher.put(schema.Description(name="first"))
                 assert (await anext(subscription)).message().name == "first"
             async with open_session(mesh) as second:
-                # As after an outage: its put was lost, only its presence arrives.
+                # Simulates an outage: its put was lost, only its presence arrives.
                 publisher = second.declare_publisher("site", "arm", "description")
                 publisher.remember(schema.Description(name="second"), source_time_ns=1)
                 second.declare_presence("site", "arm", "kinematics")

@@ -11,7 +11,7 @@ from robots.meshes.vrml.read import read_vrml
 
 @pytest.fixture
 def draw(tmp_path: Path) -> Callable[[str], Mesh]:
-    """What a VRML text, with the header before it, draws from a file `a.wrl`."""
+    """Return the drawing of a VRML text, with the header before it, from a file `a.wrl`."""
 
     def drawn(text: str) -> Mesh:
         path = tmp_path / "a.wrl"

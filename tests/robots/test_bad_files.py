@@ -1,4 +1,4 @@
-"""Files that cost more than they hold, or that other readers stumble over, one by one."""
+"""Files that need more memory than their size suggests, or that break other readers."""
 
 import json
 import struct
@@ -161,7 +161,7 @@ def test_step_that_needs_too_much_memory_is_rejected_with_that_reason(
 
 
 def test_obj_texture_and_normal_indices_may_be_negative(tmp_path: Path) -> None:
-    # As trimesh's models/negative_indices.obj, with a second object.
+    # Like trimesh's models/negative_indices.obj, with a second object.
     points = "".join(f"v {x} {y} {z}\n" for x in (1, -1) for y in (1, -1) for z in (-1, 1))
     rest = "vt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\n"
     faces = ["f -4/-3/-1 -2/-2/-1 -1/-1/-1 -3/-1/-1\n", "f -8/-3/-1 -7/-2/-1 -5/-1/-1\n"]

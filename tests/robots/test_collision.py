@@ -68,7 +68,7 @@ def test_pairs_beyond_the_requested_distance_are_left_out(tmp_path: Path) -> Non
 
 def test_folded_arm_touches_its_post_from_the_geometric_angle_on(tmp_path: Path) -> None:
     cell = build_cell(arm_cell(tmp_path))
-    # The post's corner at (0.1, 0.1) meets the bar's flank, 0.02 m beside its middle; elbow at (0.4, 0).
+    # The post's corner at (0.1, 0.1) meets the bar's flank, 0.02 m from its middle; elbow at (0.4, 0).
     reach = np.hypot(0.3, 0.1)
     touch = pi - np.arctan2(0.1, 0.3) - np.arcsin(0.02 / reach)
     assert own_contacts(cell, "arm", np.array([0.0, touch - radians(0.05)])) == ()

@@ -106,7 +106,7 @@ def test_tool_and_shapes_keep_their_places_at_all_positions(name: str, tmp_path:
             )
 
 
-# As in KUKA arms: the first axis points down, so positive rotations are clockwise from above.
+# Like KUKA arms: the first axis points down, so positive rotations are clockwise from above.
 KUKA_LIKE = urdf(
     ("revolute", "0 0 0.4", "0 0 0", "0 0 -1"), ("revolute", "0.025 0 0", "0 0 0", "0 1 0"),
     ("revolute", "0.56 0 0", "0 0 0", "0 1 0"), ("revolute", "0 0 0.035", "0 0 0", "-1 0 0"),

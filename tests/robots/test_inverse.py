@@ -136,7 +136,7 @@ def test_singular_positions_are_solved(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["puma560", "pt500"])
 def test_pose_with_two_decimals_is_reached_within_its_rounding(name: str) -> None:
-    """Values that users type or controllers report are rounded."""
+    """Use poses that users type or controllers report, with rounded values."""
     _, model, solver = arm(name)
     for positions in allowed_positions(model, 20):
         target = tool_placement(model, positions)

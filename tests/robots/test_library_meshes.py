@@ -71,7 +71,7 @@ def test_arm_stands_on_the_floor_and_ends_at_its_tool(robot: str) -> None:
     assert np.concatenate(list(corners.values()))[:, 2].min() == pytest.approx(0.0, abs=1e-6)
     tool = tool_placement(model, model.joints.home)
     along = (corners["flange"] - tool[:3, 3]) @ tool[:3, 2]
-    assert along.max() == pytest.approx(0.0, abs=0.005)  # the dowel stands out by 3 mm
+    assert along.max() == pytest.approx(0.0, abs=0.005)  # the dowel projects by 3 mm
     # Each link touches the next: no gap that one could see through.
     names = list(corners)
     for one, other in pairwise(names):

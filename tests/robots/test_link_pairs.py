@@ -107,7 +107,7 @@ def test_samples_fill_a_constraint_of_any_thickness(tmp_path: Path) -> None:
 
 
 def test_samples_spread_from_a_home_in_a_corner_of_the_limits(tmp_path: Path) -> None:
-    # Home is the right angle of a triangle whose other corners are (60, 0) and (0, 60) degrees.
+    # Home is the right angle of a triangle with the other corners (60, 0) and (0, 60) degrees.
     triangle = "[[constraint]]\njoints = { shoulder = 1.0, elbow = 1.0 }\nlimits = [-60.0, 60.0]\n"
     description = an_arm(tmp_path, "[0.0, 90.0]", shoulder="[0.0, 90.0]", more=triangle)
     positions = np.degrees(allowed_positions(joints_of(description), 2000))

@@ -15,7 +15,7 @@ from robots.urdf.files import files_of
 from robots.urdf.read import UrdfRobot, read_urdf
 
 LIMIT = '<limit lower="-1" upper="2" velocity="3" effort="1"/>'
-# A branching arm: skew axes, a slide, a gripper whose second finger follows, a joint that never ends.
+# A branching arm: skew axes, a slide, a gripper with a second finger that follows, a continuous joint.
 ARM = f"""<?xml version="1.0"?>
 <robot name="skew">
   <material name="blue"><color rgba="0 0 1 0.5"/></material>
@@ -73,7 +73,7 @@ def arm_file(folder: Path, text: str = ARM) -> Path:
 
 
 def pinocchios_placements(text: str, names: tuple[str, ...], by_joint: dict[str, float]) -> np.ndarray:
-    """Every link's placement as Pinocchio's own reader has it."""
+    """Return every link's placement as Pinocchio's reader computes it."""
     model = pinocchio.buildModelFromXML(text)
     data = model.createData()
     positions = pinocchio.neutral(model)

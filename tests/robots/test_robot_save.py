@@ -347,7 +347,7 @@ def test_vrml_robot_reads_no_file_outside_its_folder(tmp_path, confined):
 
 
 def test_confined_robot_reads_no_file_of_another_folder(tmp_path):
-    (tmp_path / "package.xml").touch()  # what is in the robot's package may be read, if it is not confined
+    (tmp_path / "package.xml").touch()  # files of the robot's package may be read, unless reading is confined
     (tmp_path / "outside.wrl").write_text(BOX)
     robot = tmp_path / "arm"
     write_inlining_robot(robot, f"{tmp_path}/outside.wrl")

@@ -1,4 +1,4 @@
-"""STEP files, of a box written out here, by Open CASCADE in a process of its own."""
+"""STEP files of a box, read by Open CASCADE in a separate process."""
 
 from itertools import count
 from pathlib import Path
@@ -21,7 +21,7 @@ def step_box(
     unit: str = MILLIMETRE,
     color: tuple[float, float, float] | None = None,
 ) -> str:
-    """The text of a STEP file of a box from the origin to `size`."""
+    """Return the text of a STEP file of a box from the origin to `size`."""
     lines: list[str] = []
     numbers = count(1)
 
@@ -31,7 +31,7 @@ def step_box(
         return f"#{number}"
 
     def chain(*texts: str) -> str:
-        """Each names the one before it."""
+        """Return the last of nodes that each name the one before."""
         made = ""
         for text in texts:
             made = add(text.format(made))
@@ -169,7 +169,7 @@ def test_reading_is_stopped_at_the_time_limit(tmp_path: Path) -> None:
 def test_lack_of_memory_is_reported_instead_of_a_missing_model(tmp_path: Path, megabytes: int) -> None:
     path = tmp_path / "box.step"
     path.write_text(step_box((1, 2, 3)))
-    # With so little it fails as it is loaded, or later and without a word.
+    # With so little memory it fails while it is loaded, or later without a message.
     with pytest.raises(MeshError, match=r"GB of memory|more than 20 s"):
         read_step(path, time_limit_s=20.0, memory_limit=megabytes << 20)
 

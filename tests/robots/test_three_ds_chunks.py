@@ -80,7 +80,7 @@ def test_faces_of_several_materials_become_parts_and_the_rest_is_grey(tmp_path: 
         (chunk(0x0011, bytes([51, 102, 255])), (0.2, 0.4, 1.0)),
         (chunk(0x0012, bytes([51, 102, 255])), (0.2, 0.4, 1.0)),
         (chunk(0x0013, struct.pack("<3f", 0.25, 0.5, 1.0)), (0.25, 0.5, 1.0)),
-        # Both: the one as seen, wherever it stands.
+        # Both: the visible one, at any position.
         (chunk(0x0012, bytes([9, 9, 9])) + chunk(0x0011, bytes([51, 102, 255])), (0.2, 0.4, 1.0)),
     ],
 )

@@ -18,7 +18,7 @@ TESTDATA = Path(__file__).resolve().parents[2].parent / "shared" / "testdata"
 
 Draw = Callable[[str], Mesh]
 
-# As printed: a blank in the header, a name that begins with a digit, a sign apart from its digits.
+# Printed with errors: a blank in the header, a name that begins with a digit, a sign apart from its digits.
 PAPER_SAMPLE = """# VRML V2.0 utf8
 Shape {
   appearance Appearance { material Material { diffuseColor 0.7 0.7 0.7  transparency 0 } }
@@ -67,7 +67,7 @@ def test_real_file_has_the_triangles_and_bounds_that_other_readers_agree_on(
     assert mesh.triangle_count == expected["triangles"]
     np.testing.assert_allclose(low, expected["min"], atol=1e-5)
     np.testing.assert_allclose(high, expected["max"], atol=1e-5)
-    # Some of the 3DS files have textures, which are told.
+    # Some of the 3DS files have textures, which cause warnings.
     assert mesh.warnings == () or str(expected["file"]).startswith("3ds/")
 
 
@@ -80,7 +80,7 @@ def test_truncated_file_is_an_error_or_a_smaller_mesh(tmp_path: Path) -> None:
 
 
 def grid(count: int) -> str:
-    """A surface of 2 (count - 1)^2 triangles."""
+    """Return a surface of 2 (count - 1)^2 triangles."""
     lines, columns = np.mgrid[:count, :count]
     points = np.column_stack([columns.ravel(), lines.ravel(), np.sin(columns.ravel())])
     first = (np.arange(count - 1)[:, None] * count + np.arange(count - 1)).ravel()

@@ -28,13 +28,13 @@ def face_set(draw: Draw, fields: str) -> Part:
 
 
 def corners(part: Part) -> list[list[list[float]]]:
-    """Of each triangle its three points, rounded."""
+    """Return the three points of each triangle, rounded."""
     rounded: list[list[list[float]]] = (np.round(part.vertices[part.triangles], 9) + 0.0).tolist()
     return rounded
 
 
 def colors_at(part: Part) -> dict[tuple[float, ...], set[tuple[float, ...]]]:
-    """The colours of the vertices at each point."""
+    """Return the colours of the vertices at each point."""
     assert part.colors is not None
     found: dict[tuple[float, ...], set[tuple[float, ...]]] = {}
     for number in np.unique(part.triangles).tolist():
@@ -203,7 +203,7 @@ def test_too_short_color_index_is_ignored_with_a_warning(draw: Draw) -> None:
     assert "colorIndex is shorter than coordIndex" in mesh.warnings[0]
 
 
-# What is not there
+# Elements that are missing
 
 
 def test_faces_of_missing_points_are_omitted_with_a_warning(draw: Draw) -> None:
@@ -278,7 +278,7 @@ def zigzag(angles: np.ndarray, radius: np.ndarray) -> np.ndarray:
 
 
 def spiral(count: int, turns: int) -> np.ndarray:
-    """An arm that winds outwards on one side and back on the other."""
+    """Return an arm that winds outwards on one side and back on the other."""
     out = np.linspace(0.05, 1.0, count // 2)
     both = np.concatenate([out, out[::-1]])
     width = np.where(np.arange(count) < count // 2, 0.0, 0.4 / turns)
@@ -286,7 +286,7 @@ def spiral(count: int, turns: int) -> np.ndarray:
 
 
 def comb(teeth: int) -> np.ndarray:
-    """A bar of height 1 with teeth on it that are half as wide as the way from one to the next."""
+    """Return a bar of height 1 with teeth that are half as wide as their spacing."""
     at = np.repeat(np.arange(teeth)[::-1], 4) + np.tile([0.5, 0.5, 0.0, 0.0], teeth)
     high = np.tile([1.0, 100.0, 100.0, 1.0], teeth)
     top = np.column_stack([at, high])
@@ -335,7 +335,7 @@ def test_slow_faces_of_one_file_share_one_effort_limit(draw: Draw, monkeypatch: 
     outline = comb(500)
     shape = face_set_text(outline)
     monkeypatch.setattr(polygons, "_A_CORNER", 0)
-    # As much as one of them needs.
+    # The amount that one of them needs.
     effort = Effort()
     ears(outline, effort)
     monkeypatch.setattr(polygons, "_BEYOND", int(1.5 * (polygons._BEYOND - effort.left)))

@@ -1,4 +1,4 @@
-"""Files that break the rules: read with a warning where they can be, refused in one line where not."""
+"""Files that break the rules: read with a warning if possible, otherwise refused in one line."""
 
 import gzip
 from collections.abc import Callable

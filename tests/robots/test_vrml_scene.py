@@ -1,4 +1,4 @@
-"""What holds shapes: grouping nodes, DEF and USE, PROTO and EXTERNPROTO (4.8), Inline (6.25)."""
+"""Nodes that hold shapes: grouping nodes, DEF and USE, PROTO and EXTERNPROTO (4.8), Inline (6.25)."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,7 +22,7 @@ BOX = "Shape { geometry Box { size 2 2 2 } }"
 
 
 def corners(mesh: Mesh) -> list[list[list[float]]]:
-    """The three corners of each triangle, rounded."""
+    """Return the three corners of each triangle, rounded."""
     return [
         triangle
         for part in mesh.parts
@@ -265,9 +265,9 @@ def test_proto_without_a_field_of_its_own_has_the_nodes(draw: Draw) -> None:
 @pytest.mark.parametrize(
     "proto",
     [
-        # Wide: nothing of the 2,000 is drawn, and each use makes them anew.
+        # Wide: none of the 2,000 is drawn, and each use creates them again.
         f"PROTO P [ field MFNode c [ ] ] {{ Switch {{ choice [ {'Group { } ' * 2000} ] children IS c }} }}",
-        # A node that is written once and stands there 2,000 times.
+        # A node that is written one time and used 2,000 times.
         f"PROTO P [ field MFNode c [ ] ] {{ Switch {{ level [ DEF G Group {{}} {'USE G ' * 2000}] c IS c}}}}",
         f"PROTO P [ {' '.join(f'field SFFloat f{i} 1' for i in range(3000))} ] {{ Group {{ }} }}",
     ],
@@ -477,7 +477,7 @@ def test_unknown_nodes_are_named_once_each(draw: Draw) -> None:
 
 
 def test_list_of_nodes_is_not_copied_at_each_use(tmp_path: Path) -> None:
-    """Thousands of uses of a list of thousands, of which each draws one, took minutes."""
+    """Use a list of thousands thousands of times, of which each draws one; this took minutes."""
     path = write(tmp_path, "a.wrl", f"LOD {{ level [ {SHAPE} Group {{ }} ] }}")
     (node,) = parse_vrml(load(path)).nodes
     assert nodes_of(node, "level") is node.fields["level"]

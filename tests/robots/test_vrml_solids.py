@@ -23,7 +23,7 @@ def volume(part: Part) -> float:
 
 
 def outwards(part: Part) -> bool:
-    """Whether each vertex's normal and each triangle it is of face the same side."""
+    """Return whether each vertex's normal and its triangles face the same side."""
     a, b, c = (part.vertices[part.triangles[:, corner]] for corner in range(3))
     facing = np.cross(b - a, c - a)
     return bool((np.einsum("ij,ikj->ik", facing, part.normals[part.triangles]) > 0).all())

@@ -1,4 +1,4 @@
-"""GLB as it is written: read back by our reader, and by the renderer's."""
+"""Written GLB: read back by our reader, and by the renderer's."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -103,7 +103,7 @@ def test_large_mesh_is_simplified_and_keeps_its_shape() -> None:
     heavy = Mesh((a_ball(128), a_box()))
     light = lightened(heavy, 2000)
     assert light.triangle_count == pytest.approx(2000, rel=0.1)
-    assert len(light.parts[1].triangles) == 12  # what is small stays whole
+    assert len(light.parts[1].triangles) == 12  # small meshes are not reduced
     np.testing.assert_allclose(bounds(light), bounds(heavy), atol=0.02)
     radii = np.linalg.norm(light.parts[0].vertices, axis=1)
     assert radii.min() > 0.98

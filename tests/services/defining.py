@@ -29,17 +29,17 @@ class Answer:
 
     @property
     def json(self) -> Any:
-        """The response's JSON."""
+        """Return the response's JSON."""
         return json.loads(self.body)
 
     @property
     def code(self) -> str:
-        """The code of a refusal."""
+        """Return the code of a refusal."""
         return read_refusal({"content-type": self.headers["Content-Type"]}, self.body).code
 
     @property
     def text(self) -> str:
-        """The response's text."""
+        """Return the response's text."""
         return self.body.decode()
 
 
@@ -90,7 +90,7 @@ class Page:
 
 @contextmanager
 def defining(mesh: SessionSettings, folder: Path, **settings: Any) -> Iterator[Page]:
-    """A running console with Define, in its own thread."""
+    """Yield a running console with Define, in its own thread."""
     page = folder / "page"
     page.mkdir()
     (page / "index.html").write_text("<!doctype html>")

@@ -20,7 +20,7 @@ ROLES = {"li": AccountRole.OPERATOR, "zhao": AccountRole.MONITOR, "chen": Accoun
 
 @cache
 def cheap_hasher():
-    """A cheap hasher for tests, which sign in a hundred times."""
+    """Return a cheap hasher for tests, which sign in a hundred times."""
     return PasswordHasher(time_cost=1, memory_cost=64, parallelism=1)
 
 
@@ -84,7 +84,7 @@ class Client:
 
 @asynccontextmanager
 async def guarded(mesh, page, folder, **settings):
-    """A running console with accounts; yields a client that is not signed in, a session, and the file."""
+    """Yield a running console with accounts: a client that is not signed in, a session, and the file."""
     path = accounts_file(folder)
     with patch.object(passwords, "_hasher", cheap_hasher):
         async with console(mesh, page, accounts=path, **settings) as (address, other):

@@ -176,7 +176,7 @@ class Page:
 
 
 def watched(signed_in, *, in_control=False):
-    """An open page of a session."""
+    """Open a page of a session."""
     page = Page()
     page.in_control = in_control
     signed_in.pages.add(page)

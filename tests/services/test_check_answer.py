@@ -27,7 +27,7 @@ def test_a_path_is_told_on_request_a_column_a_value() -> None:
     assert len(path.lines) == count
     assert set(path.lines) == {1, 2}
     assert list(path.joint_positions[:5]) == HOME.tolist()
-    # Nothing stands around: there is no clearance to tell.
+    # There are no obstacles, so no clearance is reported.
     assert len(path.clearances) == 0
     assert not asked("home\n").HasField("path")
     around = asked("home\n", path=True, cell=BY_A_POST).path

@@ -37,7 +37,7 @@ def page(tmp_path):
 
 @asynccontextmanager
 async def console(mesh, page, **settings):
-    """A running console's HOST:PORT, and a second session on the same mesh."""
+    """Yield a running console's HOST:PORT, and a second session on the same mesh."""
     async with open_session(mesh) as own, open_session(mesh) as other:
         address = asyncio.get_running_loop().create_future()
         settings = {"site": "s", "listen": "127.0.0.1:0", "page": page, **settings}

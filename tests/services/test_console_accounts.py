@@ -22,7 +22,7 @@ LEASE = "robomesh/s/r/lease/request"
 
 
 def owner(other):
-    """A gateway's answers, and the requests that it got."""
+    """Return a gateway's answers, and the requests that it got."""
     asked = []
 
     async def lease(request):

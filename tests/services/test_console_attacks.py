@@ -347,7 +347,7 @@ def test_a_connection_in_its_handshake_counts_against_the_limit(monkeypatch):
 
 @asynccontextmanager
 async def page_of_bytes(address):
-    """A page's WebSocket as raw bytes that are hardly read."""
+    """Yield a page's WebSocket as raw bytes that are hardly read."""
     host, port = address.split(":")
     connection = socket.socket()
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)

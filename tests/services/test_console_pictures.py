@@ -37,7 +37,7 @@ def jpeg(shade):
 
 
 class Video:
-    """Return shades as H.264, one packet per picture."""
+    """Encoder of shades as H.264, one packet per picture."""
 
     def __init__(self):
         self._codec = av.CodecContext.create("libx264", "w")
@@ -52,7 +52,7 @@ class Video:
 
 @asynccontextmanager
 async def rendered(mesh, page):  # noqa: F811
-    """A console and a simulated renderer: its views, and 20 pictures a second while watched."""
+    """Yield a console and a simulated renderer: its views, and 20 pictures a second while watched."""
     async with console(mesh, page) as (address, other):
 
         async def views(request):

@@ -75,7 +75,7 @@ def test_a_forged_address_does_not_evade_the_limit(mesh, page, tmp_path):
 
 
 def test_a_flood_from_one_address_does_not_block_another(mesh, page, tmp_path):
-    """Each attempt takes a real argon2 hash; 127.0.0.2 is another address of the same machine."""
+    """Use a real argon2 hash in each attempt; 127.0.0.2 is another address of the same machine."""
 
     async def main():
         async with guarded(mesh, page, tmp_path, listen="0.0.0.0:0", insecure=True) as (client, _, _):

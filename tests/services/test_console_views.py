@@ -44,7 +44,7 @@ def test_a_small_view_is_never_reduced_to_a_size_that_no_picture_has():
 
 
 class SharedSubscriptions:
-    """Records subscriptions."""
+    """Recorder of subscriptions."""
 
     def __init__(self):
         self.joined = {}
@@ -69,7 +69,7 @@ class SharedSubscriptions:
 
 
 class Steps:
-    """A renderer's reduced views; `refused`: there are none."""
+    """Reduced views of a renderer; `refused`: there are none."""
 
     def __init__(self, refused=False):
         self.refused, self.asked = refused, 0

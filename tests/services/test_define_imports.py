@@ -139,7 +139,7 @@ def test_pairs_that_the_draft_ignores_are_judged_too(page):
 @pytest.mark.slow
 @pytest.mark.skipif(not REAL.is_dir(), reason="no ../shared/testdata/urdf: no real robots")
 def test_an_imported_robot_is_checked_against_itself_like_its_urdf(page):
-    """The ABB IRB 2400 with its SRDF and collision meshes, as `robomesh robot check` judges it."""
+    """Check the ABB IRB 2400 with its SRDF and collision meshes against `robomesh robot check`."""
     model = REAL / "urdf" / "irb2400_12_155.urdf"
     files = {
         str(path.relative_to(REAL.parent)): page.upload(path.read_bytes(), path.name)

@@ -71,7 +71,7 @@ def page(site):
 
 @pytest.fixture(scope="module")
 def mine(site, page):
-    """A started robot named mine."""
+    """Return a started robot named mine."""
     before = processes(site)
     draft = page.draft(name="mine")
     assert page.post("/save", draft).status == 200

@@ -152,7 +152,7 @@ BOX = b"#VRML V2.0 utf8\nShape { geometry Box { } }\n"
 
 
 def comb(teeth):
-    """A face with many corners, slow to triangulate."""
+    """Return a face with many corners, slow to triangulate."""
     corners = [(0, 0)]
     for y in range(0, 4 * teeth, 4):
         corners += [(1, y), (100, y + 0.5), (100, y + 1.5), (1, y + 2)]

@@ -130,7 +130,7 @@ def segment_in(folder, number, *, end):
 def test_segments_of_a_killed_flight_recorder_are_saved_at_the_next_start(mesh, tmp_path):
     segment = segment_in(tmp_path, 1, end=False)
     unreadable = segment.with_name("2026-01-01T00-00-00.000000Z.mcap")
-    unreadable.write_bytes(bytes(4096))  # as after a power loss
+    unreadable.write_bytes(bytes(4096))  # like a power loss
 
     async def main():
         async with recording_site(mesh, tmp_path, flight=Flight()):

@@ -1,4 +1,4 @@
-"""What every process tells of itself, and what Prometheus reads of it."""
+"""Health and metrics that every process publishes, and the metrics that Prometheus reads."""
 
 import asyncio
 import json
@@ -28,7 +28,7 @@ GATEWAY = Served(service="gateway", present_for=(("s", "arm"), ("s", "other")))
 
 
 async def scraped(url: str) -> dict[str, dict[tuple[tuple[str, str], ...], float]]:
-    """By sample's name and labels, as Prometheus's own parser reads them."""
+    """Return samples by name and labels, as Prometheus's parser reads them."""
 
     def get() -> str:
         with urllib.request.urlopen(url, timeout=10.0) as answer:
@@ -63,7 +63,7 @@ def test_a_process_tells_who_it_is_and_what_it_has_done(mesh):
             assert health.version == own_version()
             assert health.memory_bytes > 1e6
             assert health.open_files > 3
-            # What is a number for each robot is in its topics and its metrics.
+            # Numbers of each robot are in its topics and its metrics.
             assert dict(health.values) == {"captures": 7.0}
 
     run(main())
@@ -87,7 +87,7 @@ def test_prometheus_reads_counts_ages_latencies_and_the_services_own(mesh):
                     await anext(subscription)
                 await read_clock(monitor, "s", gateway.identity)
                 joints.close()
-                # What is closed stays counted, also when something else is declared.
+                # A closed publisher remains in the counters, also after another declaration.
                 gateway.declare_publisher("s", "arm", "lease")
                 found, there = await scraped(url), await scraped(monitored)
             topic = (("topic", "joints"),)
@@ -172,9 +172,9 @@ def test_only_the_process_that_is_asked_answers_for_its_clock(mesh):
         ((0, 10, 10, 20), 0.0, 20.0),
         ((0, 110, 110, 20), 100.0, 20.0),
         ((0, -90, -90, 20), -100.0, 20.0),
-        ((0, 110, 150, 60), 100.0, 20.0),  # what its owner took is no part of the way
+        ((0, 110, 150, 60), 100.0, 20.0),  # the owner's processing time is not part of the delay
         ((0, 15, 15, 20), 5.0, 20.0),  # an uneven way: off by less than half the round trip
-        ((0, 10, 40, 20), 15.0, 0.0),  # a clock that was set meanwhile
+        ((0, 10, 40, 20), 15.0, 0.0),  # a clock that was set during the request
     ],
 )
 def test_offset_and_round_trip_come_from_four_times(times, offset_s, round_trip_s):
@@ -196,7 +196,7 @@ def test_hops_are_measured_across_clocks_that_differ():
     there = [("a", 0.0), ("a", 0.5), ("r", 101.5), ("r", 101.75), ("b", 3.75)]
     back = [("b", 4.0), ("r", 106.0), ("r", 106.5), ("a", 7.5)]
     assert hops_of([*there, *back]) == (("a", "r", 1.0), ("r", "b", 2.0))
-    # A way back by another router tells nothing of each hop.
+    # A return path through another router gives no delay of a hop.
     assert hops_of([*there, ("b", 4.0), ("q", 5.0), ("a", 7.0)]) == ()
     assert hops_of([]) == ()
 
@@ -210,7 +210,7 @@ def test_latencies_are_counted_in_steps():
 
 
 def test_the_dashboard_asks_for_metrics_that_there_are():
-    """Every name in the dashboard's queries is told somewhere, and its file is what Grafana takes."""
+    """Check that every metric in the dashboard's queries is published, and that Grafana accepts its file."""
     dashboard = json.loads((ROOT / "deploy" / "grafana" / "robomesh.json").read_text(encoding="utf-8"))
     assert dashboard["title"]
     assert len({panel["id"] for panel in dashboard["panels"]}) == len(dashboard["panels"])

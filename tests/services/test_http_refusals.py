@@ -1,4 +1,4 @@
-"""The one form of the console's refusals over HTTP."""
+"""The common form of the console's refusals over HTTP."""
 
 import json
 

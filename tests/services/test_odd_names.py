@@ -1,4 +1,4 @@
-"""Names that fit no key of the contract, from a plain client: every service ignores them, and goes on."""
+"""Invalid names from a plain client: every service ignores them, and continues."""
 
 import asyncio
 import contextlib
@@ -45,7 +45,7 @@ WITHIN_S = 60.0
     repr=False
 )  # a session's settings fill pages, and Hypothesis warns of that in place of its finding
 class Site:
-    """Every service of a site in one event loop, in a thread, and a plain client that keeps to nothing."""
+    """All services of a site in one event loop, in a thread, and a plain client without checks."""
 
     loop: asyncio.AbstractEventLoop
     services: dict
@@ -58,7 +58,7 @@ class Site:
         return asyncio.run_coroutine_threadsafe(coroutine, self.loop).result(WITHIN_S)
 
     async def everything_goes_on(self):
-        """Every service answers, and whoever comes now finds the site as it was."""
+        """Check that every service answers, and that a new client sees the site unchanged."""
         assert not self.foxglove.done(), self.foxglove
         for name, (task, session) in self.services.items():
             assert not task.done(), (name, task)
@@ -67,7 +67,7 @@ class Site:
             assert isinstance(answer, schema.ClockAnswer), name
 
     async def greeting(self):
-        """What a page that is loaded now is told: the presence of which services."""
+        """Return the services whose presence a newly loaded page receives."""
         present = set()
         async with (
             asyncio.timeout(WITHIN_S),
@@ -84,7 +84,7 @@ class Site:
 
 
 def site_settings(folder: Path) -> dict:
-    """Each service's coroutine and settings."""
+    """Return each service's coroutine and settings."""
     robot = gateway.RobotSettings(name="arm", description="pt600", host="127.0.0.1", port=free_port())
     return {
         "gateway": (
@@ -108,7 +108,7 @@ def site_settings(folder: Path) -> dict:
 
 @contextlib.asynccontextmanager
 async def services_of(folder: Path, mesh_of, site: Site):
-    """All services, present on the mesh."""
+    """Yield all services, present on the mesh."""
     wanted = site_settings(folder)
     try:
         context_or_skip().release()
@@ -193,7 +193,7 @@ def site(request, tmp_path_factory):
 
 # ------------------------------------------------------------------------ keys
 
-# What Zenoh takes as a chunk: anything without these; hostile ones more often than Hypothesis finds them.
+# Zenoh's chunks exclude these characters; hostile chunks occur more often than Hypothesis finds them.
 _ODD = [
     "EV IL",
     "\u202egnp.mra",
@@ -219,7 +219,7 @@ NAMES = sorted({*TOPICS, *REQUESTS, "alive/gateway/*", "alive/operator/*", "aliv
 
 @st.composite
 def odd_keys(draw):
-    """A key of the mesh's form, of which at least one chunk fits nothing; else anything at all."""
+    """Return a key of the mesh's form with an invalid chunk, or any other key."""
     name = "/".join(draw(CHUNK) if each == "*" else each for each in draw(st.sampled_from(NAMES)).split("/"))
     key = f"robomesh/{draw(CHUNK)}/{draw(CHUNK)}/{name}"
     try:
@@ -233,7 +233,7 @@ def odd_keys(draw):
 
 
 def say(plain, key, payload):
-    """Everything that a plain client can do with a key; what takes part stays a moment."""
+    """Use a key in every way that a plain client can; declarations last for a moment."""
     header = pack(Header(7, 1, time.time_ns()))
     with contextlib.ExitStack() as held:
 
@@ -283,7 +283,7 @@ def test_an_odd_token_is_ignored_counted_and_made_one_event(site):
 
 
 async def events_of_the_watch(site, do, key):
-    """What the watch says of a key, until it has looked at every process's health again."""
+    """Return the watch's events for a key, until it has checked every process's health again."""
     events, looks = [], 0
     said = site.observer.subscribe(f"robomesh/{SITE}/-/events/watch", newest=1000, history=False)
     beat = f"robomesh/{SITE}/-/health/watch.{site.services['watch'][1].identity}"

@@ -32,7 +32,7 @@ def selectors(sheet: Path) -> Iterator[str]:
 
 
 def test_sheets_that_are_loaded_on_demand_style_only_their_own_page():
-    """A sheet stays loaded when the operator goes to another page."""
+    """Check pages after navigation: a sheet stays loaded when the operator opens another page."""
     pages: dict[str, set[str]] = {}
     shared: set[str] = set()
     for path, names in classes_of_page().items():

@@ -1,4 +1,4 @@
-"""Commands that read strangers' files end with one line at their limits of memory and time."""
+"""Limits of commands that read untrusted files: at a limit of memory or time they end with one line."""
 
 import subprocess
 import sys

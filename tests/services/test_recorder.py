@@ -123,7 +123,7 @@ def test_lost_publications_are_counted_in_the_file(mesh, tmp_path):
             await trace_on(session)
             await until_watched(publisher)
             await put_states(publisher, range(3))
-            publisher._sequence += 7  # as if a congested link had dropped seven
+            publisher._sequence += 7  # simulates a congested link that dropped seven
             await put_states(publisher, range(3))
             done = await trace_off(session)
             return tmp_path / "arm" / done.file

@@ -45,7 +45,7 @@ def test_the_recording_topic_counts_recorded_and_lost_messages_live(mesh, tmp_pa
             await trace_on(session, name="seen", views=["-"])
             await until(lambda: joints.watched)
             await put_states(joints, range(3))
-            joints._sequence += 4  # as if a congested link had dropped four
+            joints._sequence += 4  # simulates a congested link that dropped four
             await put_states(joints, range(3))
             seen = await next_state(session, lambda now: now.open and any(row.lost for row in now.topics))
             (row,) = [row for row in seen.topics if row.topic == JOINTS]

@@ -172,7 +172,7 @@ def test_check_prints_the_path_of_an_invalid_value(
         "path": ["joint", 0, "limits"],
         "text": "joint 'waist' limits = [150, -150]: the lower must be below the upper",
     }
-    # The meshes are beside another file.
+    # The meshes are next to another file.
     assert ["base", "mesh"] in [problem["path"] for problem in problems]
 
 

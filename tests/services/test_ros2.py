@@ -250,7 +250,7 @@ def test_rmw_zenohs_subscription_gets_the_description_early_and_late(mesh, tmp_p
     ids=lambda each: each.name if isinstance(each, Topic) else "",
 )
 def test_types_have_the_hashes_that_ros_2_prints(topic, hashed):
-    """Source of the hashes: `ros2 topic info --verbose`, Jazzy."""
+    """Compare type hashes with those of `ros2 topic info --verbose`, Jazzy."""
     assert topic.type_hash == f"RIHS01_{hashed}"
 
 

@@ -24,7 +24,7 @@ def one_link(endpoint, file):
 
 
 async def linked_sites(tmp_path, border="open", sites=()):
-    """Folders and endpoints of two sites; the second links to the first as its guest."""
+    """Yield folders and endpoints of two sites; the second links to the first as its guest."""
     here, at_here = prepared(tmp_path, "here", border)
     there, at_there = prepared(tmp_path, "there")
     authority.issue_guest(here, "there")

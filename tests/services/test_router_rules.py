@@ -1,4 +1,4 @@
-"""A router follows its rules and keys while it runs; a client without a rule is rejected, with an event."""
+"""Rules and keys of a running router; a client without a rule is rejected, with an event."""
 
 import asyncio
 import json
@@ -43,7 +43,7 @@ def settings_of(folder, endpoint, *links):
 
 @asynccontextmanager
 async def routing(*every):
-    """Routers that run like the service."""
+    """Yield routers that run like the service."""
     ready = [asyncio.Event() for _ in every]
     tasks = [
         asyncio.create_task(service.serve(settings, ready=lambda text, there=there: there.set()))

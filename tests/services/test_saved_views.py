@@ -1,4 +1,4 @@
-"""`robomesh video` and `robomesh snapshot` against a real renderer, as somebody at a terminal uses them."""
+"""Output of `robomesh video` and `robomesh snapshot` with a real renderer, as on a terminal."""
 
 import asyncio
 import json

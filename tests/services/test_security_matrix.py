@@ -43,7 +43,7 @@ REQUESTS_OF_ONE_WORD = ("stop",)
 
 @dataclass
 class Somebody:
-    """A plain Zenoh client with a certificate, without the checks of this library."""
+    """Plain Zenoh client with a certificate, without the checks of this library."""
 
     name: str
     role: Role
@@ -69,7 +69,7 @@ def one_link(endpoint: str, tls: Tls) -> zenoh.Config:
 
 @pytest.fixture(scope="module")
 def mesh(tmp_path_factory):
-    """A router, a client for each principal, and the witness, which answers every request of the table."""
+    """Yield a router, a client for each principal, and the witness, which answers every request of the table."""
     folder = Folder(tmp_path_factory.mktemp("site") / "keys")
     authority.prepare(folder, SITE, robots=[OWN_ROBOT], border="open", routers=[], started=[STARTED_ROBOT])
     for name, role in people().items():
@@ -158,7 +158,7 @@ def key(robot: str, topic: str, site: str = SITE) -> str:
 
 
 class Arrived:
-    """Wait until the expected set has arrived."""
+    """Condition that the expected set has arrived."""
 
     def __init__(self) -> None:
         self._seen: set[tuple[str, str]] = set()

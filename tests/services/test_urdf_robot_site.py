@@ -66,7 +66,7 @@ def test_a_urdf_with_a_gripper_is_homed_moved_and_drawn(tmp_path: Path) -> None:
     before, after = red_pixels(tmp_path / "home.png"), red_pixels(tmp_path / "move.png")
     assert before.sum() > 300
     assert after.sum() > 300
-    # Upright at home, it lies over afterwards.
+    # Upright at home, it is horizontal afterwards.
     assert np.argmax(before.any(axis=1)) < np.argmax(after.any(axis=1)) - 10
 
 

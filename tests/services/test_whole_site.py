@@ -29,7 +29,7 @@ def site(tmp_path_factory):
 
 
 async def last_positions(session) -> list[float]:
-    """Joint positions in degrees, the next live ones."""
+    """Return joint positions in degrees, the next live ones."""
     async for sample in session.subscribe("robomesh/test/arm/joints", history=False):
         return [degrees(joint.position) for joint in sample.message().joints]
     raise AssertionError
@@ -69,7 +69,7 @@ def test_joints_arrive_where_they_were_sent_and_the_recording_holds_all_that_a_m
     target = [12.0, 34.5, -20.0, 15.0, -40.0]
 
     async def watch():
-        """Everything on `joints` between trace on and trace off."""
+        """Return all messages on `joints` between trace on and trace off."""
         async with open_session(site.mesh) as session:
             seen = []
 
@@ -132,7 +132,7 @@ def test_home_brings_the_joints_home(site):
 
 @pytest.fixture
 def slow(site):
-    """An arm that has far to go for longer than a busy machine needs for a command."""
+    """Slow down the arm, so that a motion takes longer than a busy machine needs for a command."""
     assert site.command("send", "arm", "speed", "10").returncode == 0
     yield
     assert site.command("send", "arm", "speed", "100").returncode == 0
@@ -285,7 +285,7 @@ def test_a_killed_service_comes_back_and_the_others_did_not_notice(site, victim)
 
 @pytest.fixture
 def controller():
-    """The address of a simulated controller that outlives the site, as a real one does."""
+    """Yield the address of a simulated controller that outlives the site, as a real one does."""
     process = subprocess.Popen(
         [sys.executable, "-m", "services.command_line.main", "simulate", "--listen", "127.0.0.1:0", "--demo"],
         stdout=subprocess.PIPE,
@@ -299,7 +299,7 @@ def controller():
 
 
 def unit_of(controller: str) -> str:
-    """What a controller tells now."""
+    """Return the unit that a controller sends now."""
     host, port = controller.split(":")
     told = b""
     with socket.create_connection((host, int(port)), timeout=20.0) as connection:

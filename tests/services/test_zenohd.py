@@ -1,4 +1,4 @@
-"""zenohd in our router's place, started as `robomesh router --config-out` says, on a machine that has it."""
+"""zenohd in place of our router, started as `robomesh router --config-out` says, if it is installed."""
 
 import asyncio
 import re
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(
 
 @contextmanager
 def zenohd(settings, folder):
-    """zenohd, by the very words in which its start is told."""
+    """Run zenohd with the command line of the printed instructions."""
     said = service.write_config(settings, folder / "zenohd.json5")
     command = re.search(r"ZENOH_RUNTIME=.* zenohd --config \S+", said)[0]
     process = subprocess.Popen(

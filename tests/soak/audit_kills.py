@@ -1,12 +1,11 @@
-"""Kill -9 a commanding gateway at random, again and again, and compare its audit log with its controller.
+"""Kill -9 a commanding gateway repeatedly at random, and compare its audit log with its controller.
 
     .venv/bin/python -m tests.soak.audit_kills --times 50
 
-A real router, a real gateway process, a controller that keeps every unit it receives, an operator who
-commands as fast as he is answered, and somebody who stops the robot now and then. The log is rotated
+A real router, a real gateway process, a controller that keeps every unit it receives, an operator that\nsends each command after the previous answer, and a client that stops the robot at intervals. The log is rotated
 every 10 KiB, so that kills meet rotations too. After each kill:
 
-    every command that reached the controller stands in the log as accepted, once
+    every command that reached the controller is in the log as accepted, exactly one time
     the chain holds, and the newest head that was seen on the mesh is in it
     the stop that the log leaves latched is latched after the restart
     a stop whose entry was lost shows as the controller's own: stopped, and motion is refused
@@ -58,7 +57,7 @@ stop_proven = true
 
 @dataclass
 class Report:
-    """What was found; `problems`: in words, none when all is well."""
+    """Results; `problems`: sentences, empty: none."""
 
     kills: int = 0
     commands: int = 0
@@ -72,7 +71,7 @@ class Report:
 
 
 class Controller:
-    """A controller that is at once where it is sent, and keeps what it was sent."""
+    """Controller that reaches each target immediately, and records the units that it receives."""
 
     def __init__(self) -> None:
         self.targets: list[tuple[int, int]] = []
@@ -81,7 +80,7 @@ class Controller:
         self._where = "0;0;0;0;0"
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Tell the state again and again, and take units until the gateway is gone."""
+        """Send the state periodically, and read units until the gateway is gone."""
         telling = asyncio.create_task(self._tell(writer))
         try:
             with contextlib.suppress(OSError, asyncio.IncompleteReadError):
@@ -112,7 +111,7 @@ class Controller:
 
 @dataclass
 class Trial:
-    """A router, a controller and the folder of a site, over which one gateway after the other dies."""
+    """A router, a controller and the folder of a site, used by one gateway after another."""
 
     folder: Path
     session: Session
@@ -138,7 +137,7 @@ class Trial:
         await self.session.ask(self.key("command/li"), request)
 
     async def begin(self) -> None:
-        """Control of a gateway that has just begun."""
+        """Acquire control of a gateway that has just started."""
         async with asyncio.timeout(READY_S):
             while True:
                 with contextlib.suppress(NoAnswerError, RefusedError):
@@ -159,7 +158,7 @@ class Trial:
         await self.command(C.RESET, stop_id=state.stop.id)
 
     async def check_stop(self, state: STATE) -> None:
-        """After a restart, what the log says is latched is; else the controller shows its own stop."""
+        """Check after a restart that the logged latch is latched; otherwise the controller reports its stop."""
         shown = state.stop.id if state.HasField("stop") else 0
         begun_s = time.monotonic()
         while True:
@@ -183,7 +182,7 @@ class Trial:
         await self.command(C.MOVE_ABSOLUTE, joint_positions=target)
 
     async def work(self) -> None:
-        """Command until the gateway is gone; a stop and its reset now and then; a renewal meanwhile."""
+        """Command until the gateway is gone; stop, reset and renew at intervals."""
         renewed_s = time.monotonic()
         while True:
             try:
@@ -199,7 +198,7 @@ class Trial:
                 pass  # the last stop of this gateway's; it stays latched
 
     async def watch(self) -> None:
-        """The newest head that anybody outside the gateway knows."""
+        """Record the newest head that is known outside the gateway."""
         async for sample in self.session.subscribe(self.key("audit"), history=False):
             message = sample.message()
             if isinstance(message, schema.AuditEntry):
@@ -222,7 +221,7 @@ def _target(values: dict[str, str]) -> tuple[int, int]:
 
 
 async def kills(times: int, folder: Path, *, seed: int = 1) -> Report:
-    """Kill a gateway so many times; what was found."""
+    """Kill a gateway so many times; return the results."""
     report, controller = Report(), Controller()
     server = await asyncio.start_server(controller.serve, "127.0.0.1", 0)
     router = f"tcp/127.0.0.1:{free_port()}"
@@ -277,17 +276,17 @@ async def _one_life(trial: Trial, *, die: bool = True) -> None:
         process.kill()
         await process.wait()
         log.close()
-        # What nobody answered would be asked of the next gateway.
+        # The next gateway would receive an unanswered request.
         for task in asked:
             task.cancel()
         await asyncio.gather(*asked, return_exceptions=True)
-    # What the socket still holds is read, too.
+    # Read the bytes that the socket still holds, too.
     await asyncio.sleep(0.1)
     trial.check(f"after kill {trial.report.kills}")
 
 
 def main() -> None:
-    """The program."""
+    """Run the program."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--times", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)

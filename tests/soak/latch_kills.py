@@ -1,4 +1,4 @@
-"""Kill -9 a gateway 50 ms after it answered a stop, on a disk that is full, again and again.
+"""Kill -9 a gateway repeatedly 50 ms after it answered a stop, on a disk that is full.
 
     .venv/bin/python -m tests.soak.latch_kills --times 20
 
@@ -56,7 +56,7 @@ KEY = "robomesh/full/arm/"
 
 @dataclass
 class Report:
-    """What was found; `problems`: in words, none when all is well."""
+    """Results; `problems`: sentences, empty: none."""
 
     kills: int = 0
     latched: int = 0
@@ -68,7 +68,7 @@ class Report:
 
 @dataclass
 class Trial:
-    """A router, a controller and a disk, over which one gateway after the other dies."""
+    """A router, a controller and a disk, used by one gateway after another."""
 
     folder: Path
     session: Session
@@ -89,7 +89,7 @@ class Trial:
         return self.folder / "audit" / "filler"
 
     async def ask(self, request: str, **fields: object) -> dict[str, object]:
-        """What a client without any code of robomesh's gets; {"refused": words} where it is refused."""
+        """Return the reply to a client without robomesh's code; {"refused": words} if it is refused."""
 
         def get() -> dict[str, object]:
             for reply in self.client.get(KEY + request, payload=json.dumps(fields), timeout=5.0):
@@ -102,7 +102,7 @@ class Trial:
         return await asyncio.to_thread(get)
 
     async def command(self, command: str, **fields: object) -> str:
-        """Why a command was refused; empty: it was not."""
+        """Return the reason why a command was refused; empty: it was not."""
         await self.ask("lease/request/li", action="RENEW", lease=self.secret, ttl_s=5)
         self.id += 1
         answer = await self.ask("command/li", lease=self.secret, id=self.id, command=command, **fields)
@@ -112,7 +112,7 @@ class Trial:
         return await self.command("MOVE_ABSOLUTE", joint_positions=[radians(self.id % 40), 0, 0, 0, 0])
 
     async def state(self) -> STATE:
-        """The gateway's state, as soon as its link is up."""
+        """Return the gateway's state, as soon as its link is up."""
         async with asyncio.timeout(READY_S):
             while True:
                 state = await self.session.last(KEY + "controller", timeout_s=0.5)
@@ -131,7 +131,7 @@ class Trial:
 
 
 async def _one_life(trial: Trial, number: int, *, die: bool = True) -> None:
-    """Start a gateway, look at what it remembers, stop the robot on a full disk, kill it."""
+    """Start a gateway, check its restored state, stop the robot on a full disk, kill it."""
     report = trial.report
     if number % 2:
         trial.make_room()
@@ -188,7 +188,7 @@ async def _after_restart(trial: Trial, state: STATE) -> None:
 
 async def _stop_on_a_full_disk(trial: Trial) -> None:
     trial.fill()
-    for _ in range(100):  # what is left of the log's last page is taken, now by this much, now by that
+    for _ in range(100):  # fill the rest of the log's last page, by different amounts
         if refused := await trial.command("TRACE_ON", program_name="x" * trial.chance.randrange(200)):
             break
     else:
@@ -233,7 +233,7 @@ async def kills(times: int, folder: Path) -> Report:
 
 
 def in_own_namespace(*arguments: str) -> list[str]:
-    """This program's command line, where it may mount a disk of its own."""
+    """Return this program's command line in a namespace where it may mount a disk."""
     private = ["unshare", "-m"] if os.geteuid() == 0 else ["unshare", "-rm"]
     return [*private, sys.executable, "-m", "tests.soak.latch_kills", "--mount", *arguments]
 
@@ -248,7 +248,7 @@ def may_mount() -> bool:
 
 
 def main() -> None:
-    """The program."""
+    """Run the program."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--times", type=int, default=20)
     parser.add_argument("--json", action="store_true")

@@ -1,4 +1,4 @@
-"""Fill a recorder's disk to the last byte, and give it room again.
+"""Fill a recorder's disk to the last byte, and free space again.
 
     .venv/bin/python -m tests.soak.recorder_disk
 
@@ -56,7 +56,7 @@ _Request = schema.RecorderRequest
 
 @dataclass
 class Report:
-    """What was found; `problems`: in words, none when all is well."""
+    """Results; `problems`: sentences, empty: none."""
 
     events: list[str] = field(default_factory=list)
     told_after_s: float = -1.0
@@ -68,17 +68,17 @@ class Report:
 
 
 class Events:
-    """What the recorder says."""
+    """Events of the recorder."""
 
     def __init__(self) -> None:
         self.said: list[tuple[float, schema.Event]] = []
 
     def take(self, sample: zenoh.Sample) -> None:
-        """On Zenoh's thread."""
+        """Store an event, on Zenoh's thread."""
         self.said.append((time.monotonic(), schema.Event.FromString(sample.payload.to_bytes())))
 
     async def wait_for(self, code: str, *, since: float = 0.0) -> float:
-        """When it was said."""
+        """Return the time at which an event arrived."""
         async with asyncio.timeout(WITHIN_S):
             while True:
                 for at, event in self.said:
@@ -88,7 +88,7 @@ class Events:
 
 
 async def publish(session: Session) -> None:
-    """Joints, frames and video until cancelled."""
+    """Publish joints, frames and video until cancelled."""
     names = ("joints", "frames", "video/front")
     joints, frames, video = (session.declare_publisher("full", "arm", name) for name in names)
     number = 0
@@ -105,19 +105,19 @@ async def publish(session: Session) -> None:
 
 
 def count(path: Path, topic: str) -> int:
-    """Messages in a file, by the library's own reader."""
+    """Return the number of messages in a file, counted by the library's reader."""
     with path.open("rb") as stream:
         return sum(1 for _ in make_reader(stream).iter_messages(topics=[topic]))
 
 
 def free(folder: Path) -> int:
-    """Bytes that are free."""
+    """Return the number of free bytes."""
     found = os.statvfs(folder)
     return found.f_bavail * found.f_frsize
 
 
 async def begin(session: Session, name: str) -> schema.Recording:
-    """A capture, as soon as there is a recorder."""
+    """Start a capture, as soon as there is a recorder."""
     asked = _Request(action=_Request.TRACE_ON, name=name, views=["front"])
     answer = await session.ask(KEY, asked, timeout_s=WITHIN_S)
     assert isinstance(answer, schema.Recording)
@@ -125,7 +125,7 @@ async def begin(session: Session, name: str) -> schema.Recording:
 
 
 async def fill(session: Session, events: Events, disk: Path, report: Report) -> None:
-    """The story."""
+    """Fill the disk, free it again, and check the recorder after each step."""
     first = await begin(session, "first")
     path = disk / "recordings" / "arm" / first.file
     await events.wait_for("recorder.gives_up")
@@ -169,7 +169,7 @@ async def fill(session: Session, events: Events, disk: Path, report: Report) -> 
 
 
 async def run(folder: Path) -> Report:
-    """Everything, in a folder."""
+    """Run all steps in a folder."""
     report, events = Report(), Events()
     site, mount = folder / "site.toml", folder / "disk"
     site.write_text(SITE)
@@ -201,7 +201,7 @@ async def run(folder: Path) -> Report:
 
 
 def main() -> None:
-    """The program."""
+    """Run the program."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--json", action="store_true")
     given = parser.parse_args()

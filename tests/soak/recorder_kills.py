@@ -1,4 +1,4 @@
-"""Kill -9 a recorder at random, again and again, and compare its files with what a second subscriber saw.
+"""Kill -9 a recorder repeatedly at random, and compare its files with a second subscriber's messages.
 
     .venv/bin/python -m tests.soak.recorder_kills --times 50
 
@@ -54,7 +54,7 @@ _Request = schema.RecorderRequest
 
 @dataclass
 class Report:
-    """What was found; `problems`: in words, none when all is well."""
+    """Results; `problems`: sentences, empty: none."""
 
     kills: int = 0
     messages: int = 0
@@ -67,20 +67,20 @@ class Report:
 
 
 class Witness:
-    """What a subscriber beside the recorder receives: the last number, and when."""
+    """Second subscriber next to the recorder: the last number received, and its time."""
 
     def __init__(self) -> None:
         self.received: list[tuple[float, int]] = []
 
     def take(self, sample: zenoh.Sample) -> None:
-        """On Zenoh's thread."""
+        """Store a sample, on Zenoh's thread."""
         message = JointStates.FromString(sample.payload.to_bytes())
         self.received.append((time.monotonic(), int(message.joints[0].position)))
 
 
 @contextlib.asynccontextmanager
 async def running_recorder(site: Path, endpoint: str) -> AsyncIterator[asyncio.subprocess.Process]:
-    """A recorder process; ended when the block is left."""
+    """Yield a recorder process; it ends when the block is left."""
     command = [sys.executable, "-m", "services.command_line.main", "recorder"]
     with (site.parent / "recorder.log").open("ab") as log:
         process = await asyncio.create_subprocess_exec(
@@ -109,7 +109,7 @@ async def publish(session: Session, numbers: list[int]) -> None:
 
 
 def numbers_as_left(path: Path) -> tuple[list[int], bool]:
-    """The numbers in a file without an end, and whether its last record is torn."""
+    """Return the numbers in a file without an end, and whether its last record is torn."""
     found, channels, size = [], set(), 0
     with path.open("rb") as stream:
         for opcode, body, end in records.walk(stream):
@@ -122,7 +122,7 @@ def numbers_as_left(path: Path) -> tuple[list[int], bool]:
 
 
 def numbers_indexed(path: Path) -> list[int]:
-    """The numbers in a file, by the library's own indexed reader."""
+    """Return the numbers in a file, read by the library's indexed reader."""
     with path.open("rb") as stream:
         return [_number(m.data) for _, _, m in make_reader(stream).iter_messages(topics=[JOINTS])]
 
@@ -132,7 +132,7 @@ def _number(data: bytes) -> int:
 
 
 async def kill_once(session: Session, site: Path, endpoint: str, report: Report, *, after_s: float) -> None:
-    """One recorder's life and death, and what it left."""
+    """Start and kill one recorder, and check its file."""
     folder, witness = site.parent / "recordings" / "arm", Witness()
     before = set(folder.glob("*.mcap"))
     async with running_recorder(site, endpoint) as process:
@@ -170,7 +170,7 @@ async def kill_once(session: Session, site: Path, endpoint: str, report: Report,
 def judge(
     report: Report, path: Path, numbers: list[int], received: list[tuple[float, int]], killed: float
 ) -> None:
-    """Compare a file as it was left with what was received beside it."""
+    """Compare an unfinished file with the messages of the second subscriber."""
     if not numbers:
         report.problems.append(f"{path.name}: holds nothing")
         return
@@ -202,7 +202,7 @@ async def kills(
 
 
 def main() -> None:
-    """The program."""
+    """Run the program."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--times", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)

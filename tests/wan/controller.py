@@ -1,6 +1,6 @@
-"""A controller of the old protocol: 100 units a second; prints when each stop came [monotonic s].
+"""A controller of the old protocol: 100 units a second; prints when each stop arrived [monotonic s].
 
-`moving`: the arm swings by itself."""
+`moving`: the arm swings without a command."""
 
 import contextlib
 import math
@@ -13,7 +13,7 @@ _PERIOD_S = 0.01
 
 
 def tell(client: socket.socket, moving: bool) -> None:
-    """Where the arm is, for as long as somebody listens."""
+    """Send the arm's position while a client is connected."""
     next_s, count = time.monotonic(), 0
     with contextlib.suppress(OSError):
         while True:
@@ -27,7 +27,7 @@ def tell(client: socket.socket, moving: bool) -> None:
 
 
 def hear(client: socket.socket) -> None:
-    """What is asked of the arm: it does nothing, and notes stops."""
+    """Read commands without executing them, and record stops."""
     rest = b""
     with contextlib.suppress(OSError):
         while data := client.recv(65536):

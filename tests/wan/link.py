@@ -1,9 +1,8 @@
-"""A wide-area link in user space: packets between two TUN devices, late, lost, throttled or cut.
+"""A wide-area link in user space: packets between two TUN devices, delayed, lost, throttled or cut.
 
-A program of its own for each link. Its first argument is JSON: two ends, each a namespace (a file descriptor
+Each link is a separate process. Its first argument is JSON: two ends, each a namespace (a file descriptor
 that it inherits), a device's name and an address. Each line on its standard input changes what the link does
-and is answered with what it did so far; the end of the input is its own end, so it never outlives who
-started it.
+and is answered with what it did so far; the end of the input is its own end, so it never outlives\nthe process that started it.
 
 Each direction by itself: `delay_ms`; `jitter_ms` (up to so much more, in order); `loss` (a share of 1);
 `rate_bps` (0: no limit) behind a queue of `queue_bytes`, and what finds that full is lost, as in a router;
@@ -37,7 +36,7 @@ _C = ctypes.CDLL(None, use_errno=True)
 
 @dataclass
 class Way:
-    """One direction: what it does, and what it did."""
+    """One direction: settings and counters."""
 
     delay_ms: float = 0.0
     jitter_ms: float = 0.0
@@ -53,7 +52,7 @@ class Way:
 
 @dataclass
 class Direction:
-    """Packets on their way from one device to another, in order."""
+    """Queue of packets from one device to another, in order."""
 
     source: int
     sink: int
@@ -65,7 +64,7 @@ class Direction:
     last_due: float = 0.0
 
     def take(self) -> None:
-        """Read what came, and date it."""
+        """Read packets, and timestamp them."""
         way = self.way
         for _ in range(_AT_ONCE):
             try:
@@ -94,7 +93,7 @@ class Direction:
             self.waiting_bytes += size
 
     def give(self) -> None:
-        """Hand over what is due."""
+        """Send the packets that are due."""
         while self.waiting and self.waiting[0][0] <= time.monotonic():
             _, packet = self.waiting.popleft()
             self.waiting_bytes -= len(packet)
@@ -104,7 +103,7 @@ class Direction:
                 self.way.bytes += len(packet)
 
     def change(self, values: dict[str, Any]) -> None:
-        """Behave otherwise from now on."""
+        """Change the settings from now on."""
         for name, value in values.items():
             setattr(self.way, name, value)
         if self.way.cut:
@@ -115,7 +114,7 @@ class Direction:
 
 
 def device(netns: int, name: str, address: str) -> int:
-    """A TUN device in a namespace, up and with an address."""
+    """Return a TUN device in a namespace, up and with an address."""
     if _C.setns(netns, 0):
         raise OSError(ctypes.get_errno(), "cannot enter the namespace")
     tun = os.open("/dev/net/tun", os.O_RDWR | os.O_NONBLOCK)

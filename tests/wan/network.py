@@ -24,7 +24,7 @@ _C = ctypes.CDLL(None, use_errno=True)
 
 
 def missing() -> str | None:
-    """What this kernel or container does not allow, in words; None: all is there."""
+    """Return what this kernel or container does not allow, in words; None: all is available."""
     if not Path("/dev/net/tun").exists():
         return "no /dev/net/tun here"
     try:
@@ -37,7 +37,7 @@ def missing() -> str | None:
 
 @dataclass(frozen=True)
 class Host:
-    """A machine with a network of its own."""
+    """A machine with its own network."""
 
     name: str
     namespace: int
@@ -51,7 +51,7 @@ class Host:
         return process
 
     def run(self, command: Sequence[str], timeout_s: float = 60.0) -> str:
-        """What a process there prints, after its end."""
+        """Return the output of a process there, after its end."""
         process = self.start(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         text, _ = process.communicate(timeout=timeout_s)
         return text
@@ -66,7 +66,7 @@ class Link:
     far: str
 
     def change(self, *, direction: str = "both", **values: Any) -> dict[str, dict[str, Any]]:
-        """Behave otherwise from now on (`link.py` says how); the counters so far."""
+        """Change the link's settings (see `link.py`); return the counters so far."""
         assert not set(values) - SETTINGS, values
         names = ("forth", "back") if direction == "both" else (direction,)
         assert self.process.stdin is not None
@@ -77,12 +77,12 @@ class Link:
         return answer
 
     def counters(self) -> dict[str, dict[str, Any]]:
-        """What each direction did so far."""
+        """Return each direction's counters."""
         return self.change()
 
 
 class Network:
-    """Hosts and links, gone with the block."""
+    """Hosts and links; the end of the block removes them."""
 
     def __init__(self) -> None:
         self._stack = ExitStack()
@@ -95,14 +95,14 @@ class Network:
         self._stack.close()
 
     def host(self, name: str) -> Host:
-        """A new machine, with nothing but its own loopback."""
+        """Return a new machine, with only its loopback device."""
 
         def make() -> int:
             if _C.unshare(_CLONE_NEWNET):
                 raise OSError(ctypes.get_errno(), "cannot make a network namespace (CAP_SYS_ADMIN)")
             subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
             with suppress(OSError):
-                # What any namespace may have; the machine's own may be one that heeds no loss.
+                # Available in any namespace; the machine's default may be one that ignores loss.
                 Path("/proc/sys/net/ipv4/tcp_congestion_control").write_text("reno")
             return os.open("/proc/thread-self/ns/net", os.O_RDONLY)
 
@@ -139,7 +139,7 @@ class Network:
 
 
 def _in_a_thread(make: Callable[[], T]) -> T:
-    """Done by a thread of its own, which alone changes its namespace."""
+    """Run a function in a new thread, so that no other thread changes its namespace."""
     done: list[T] = []
     failed: list[BaseException] = []
 

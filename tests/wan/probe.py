@@ -1,4 +1,4 @@
-"""A monitor and operator on a host of the tests' network: told on standard input, answers there.
+"""A monitor and operator on a host of the tests' network, controlled over standard input and output.
 
 Arguments: routers, comma between, and the file with its keys where they take TLS. A line is a JSON list, a
 function below and its arguments; each is answered with one line of JSON.
@@ -29,7 +29,7 @@ from robomesh.topics import request
 
 
 class Probe:
-    """What it watches, and how late each sample was."""
+    """Watched keys, and the delay of each sample."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -39,7 +39,7 @@ class Probe:
         self._seen: dict[str, list[tuple[float, float, bool, int, float | None]]] = {}
 
     async def watch(self, expression: str) -> bool:
-        """Listen from now on."""
+        """Subscribe from now on."""
         self._subscriptions[expression] = subscription = self._session.subscribe(expression, newest=2000)
         self._seen[expression] = []
         self._readers.append(asyncio.create_task(self._read(expression, subscription)))
@@ -53,23 +53,27 @@ class Probe:
             self._seen[expression].append((time.monotonic(), lag_s, sample.live, len(sample.payload), age_s))
 
     async def samples(self, expression: str) -> list[tuple[float, float, bool, int, float | None]]:
-        """Since the last question: (monotonic time, lag behind its source's time, live, bytes, age then)."""
+        """Return samples since the last call: (monotonic time, lag behind its source's time, live, bytes, age
+        then).
+        """
         seen, self._seen[expression] = self._seen[expression], []
         return seen
 
     async def state(self, expression: str, key: str) -> dict[str, Any]:
-        """Age and losses now."""
+        """Return the current age and losses."""
         subscription = self._subscriptions[expression]
         return {"age_s": subscription.age_s(key), "lost": subscription.lost(key), "at": time.monotonic()}
 
     async def sequence(self, expression: str, key: str) -> dict[str, int]:
-        """The newest number of a key whose publisher stays the same, and what came and did not until then."""
+        """Return the newest number of a key with an unchanged publisher, and the received and missing ones
+        until then.
+        """
         subscription = self._subscriptions[expression]
         lost, received = subscription.lost(key), subscription.received
         return {"number": self._newest[key], "lost": lost, "received": received}
 
     async def until(self, expression: str, key: str, stale_s: float, stale: bool, timeout_s: float) -> Any:
-        """When a key went stale, or live again [monotonic s]; None: not in time."""
+        """Return when a key became stale, or live again [monotonic s]; None: not in time."""
         deadline = time.monotonic() + timeout_s
         while time.monotonic() < deadline:
             age_s = self._subscriptions[expression].age_s(key)
@@ -79,7 +83,7 @@ class Probe:
         return None
 
     async def ask(self, key: str, values: dict[str, Any], timeout_s: float) -> Any:
-        """A request's answer, or why there is none; and how long it took."""
+        """Return a request's answer or error, and its duration."""
         schema = request(key.split("/", 3)[3]).request
         assert schema is not None
         began = time.monotonic()
@@ -91,7 +95,7 @@ class Probe:
         return {"answer": as_json(answer), "began": began, "took_s": time.monotonic() - began}
 
     async def pour(self, site: str, robot: str, view: str, mbit_per_s: float, pictures_per_s: float) -> bool:
-        """Publish what a view of that rate is to the network, from now on."""
+        """Publish, from now on, messages as large and as frequent as those of a view of that rate."""
         publisher = self._session.declare_publisher(site, robot, f"video/{view}")
         size = round(mbit_per_s * 1e6 / 8 / pictures_per_s)
 
@@ -109,7 +113,7 @@ class Probe:
         return True
 
     async def hold_mesh(self, site: str, robot: str, size: int) -> str:
-        """Answer for meshes, all the same and of that many bytes; its SHA-256."""
+        """Answer for meshes of that many equal bytes; return their SHA-256."""
         mesh = random.randbytes(size)
 
         async def answer(_: Request) -> bytes:
@@ -119,7 +123,7 @@ class Probe:
         return hashlib.sha256(mesh).hexdigest()
 
     async def mesh(self, key: str, timeout_s: float) -> dict[str, Any]:
-        """A mesh's SHA-256, or why there is none; and how long it took."""
+        """Return a mesh's SHA-256 or the error, and the duration."""
         began = time.monotonic()
         try:
             sha256 = hashlib.sha256(await self._session.ask_bytes(key, timeout_s=timeout_s)).hexdigest()
@@ -128,7 +132,7 @@ class Probe:
         return {"sha256": sha256, "took_s": time.monotonic() - began}
 
     async def stop_over_one_link(self, key: str) -> dict[str, float]:
-        """A stop asked as any other request is, to compare."""
+        """Request a stop like any other request, for comparison."""
         began = time.monotonic()
         get = self._session.zenoh_session.get
         await asyncio.to_thread(
@@ -139,24 +143,24 @@ class Probe:
         return {"began": began, "took_s": time.monotonic() - began}
 
     async def last(self, key: str, timeout_s: float) -> Any:
-        """The last value of a topic."""
+        """Return the last value of a topic."""
         message = await self._session.last(key, timeout_s=timeout_s)
         return None if message is None else as_json(message)
 
     async def present(self) -> list[str]:
-        """Who is alive."""
+        """Return the participants that are alive."""
         while True:
             with suppress(NoAnswerError):
                 return ["/".join(map(str, each)) for each in await self._session.present()]
 
 
 def as_json(message: Any) -> Any:
-    """A message as others see it."""
+    """Return a message as JSON values."""
     return json.loads(messages.encode(message, as_json=True))
 
 
 async def main() -> None:
-    """Do what standard input says, one at a time, until it ends."""
+    """Execute the requests of standard input, one after the other, until it ends."""
     loop = asyncio.get_running_loop()
     lines: asyncio.Queue[str] = asyncio.Queue()
 

@@ -1,4 +1,4 @@
-"""Sites on hosts of the tests' network: real services, and probes beside them."""
+"""Sites on hosts of the tests' network: real services, and probes next to them."""
 
 import json
 import subprocess
@@ -19,7 +19,7 @@ READY_S = 60.0
 
 @dataclass
 class Site:
-    """A site's services, each a process on its host."""
+    """Services of a site, each a process on its host."""
 
     host: Host
     name: str
@@ -31,7 +31,7 @@ class Site:
 
     @property
     def file(self) -> Path:
-        """The site file, written anew."""
+        """Return the site file, written again."""
         self.folder.mkdir(parents=True, exist_ok=True)
         path = self.folder / f"{self.name}.toml"
         path.write_text(
@@ -51,7 +51,7 @@ class Site:
         return process
 
     def with_arm(self, *, moving: bool = False, connect: str = ROUTER, keys: Path | None = None) -> "Probe":
-        """Router, controller and gateway of one arm, and a probe beside them."""
+        """Start router, controller and gateway of one arm, and a probe next to them."""
         self.start("router")
         self.processes["controller"] = self.host.start(
             [sys.executable, "-m", "tests.wan.controller", "127.0.0.1", "5400", *["moving"] * moving],
@@ -62,7 +62,7 @@ class Site:
         return Probe(self.host, connect, keys)
 
     def log(self, service: str) -> str:
-        """What a service wrote."""
+        """Return a service's log."""
         return (self.folder / f"{self.name}-{service}.log").read_text()
 
 
@@ -88,18 +88,18 @@ class Probe:
         self._ready = False
 
     def do(self, name: str, *arguments: Any) -> Any:
-        """Have it done, and wait for the answer."""
+        """Send a request to the probe, and wait for the answer."""
         self.begin(name, *arguments)
         return self.end()
 
     def begin(self, name: str, *arguments: Any) -> None:
-        """Have it begun; `end` waits."""
+        """Send a request to the probe; `end` waits for the answer."""
         assert self.process.stdin is not None
         self.process.stdin.write(json.dumps([name, *arguments]) + "\n")
         self.process.stdin.flush()
 
     def end(self) -> Any:
-        """The answer to what was begun."""
+        """Return the answer to the request of `begin`."""
         assert self.process.stdout is not None
         if not self._ready:
             assert self.process.stdout.readline() == "ready\n"
@@ -117,7 +117,7 @@ class Probe:
         return answer
 
     def until(self, key: str, *, stale: bool, within_s: float, stale_s: float = 1.0) -> float:
-        """When a watched key went stale, or live again [monotonic s]."""
+        """Return when a watched key became stale, or live again [monotonic s]."""
         at = self.do("until", key, key, stale_s, stale, within_s)
         assert at is not None, f"{key} is not {'stale' if stale else 'live'} after {within_s:g} s"
         assert isinstance(at, float)

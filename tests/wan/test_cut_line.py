@@ -1,4 +1,4 @@
-"""A plant and a hub over a far line that loses, stops and comes back: what the others see."""
+"""A plant and a hub over a slow line that loses packets, breaks and recovers: the view of other sites."""
 
 import threading
 import time
@@ -28,7 +28,7 @@ def network():
 
 
 class Plant:
-    """A plant linked to a hub, a probe beside each router, and the stops that reached the controller."""
+    """Plant linked to a hub, a probe next to each router, and the stops that reached the controller."""
 
     def __init__(self, network: Network, folder: Path) -> None:
         self.site = Site(network.host("plant"), "plant", folder, more=ARM)
@@ -46,20 +46,20 @@ class Plant:
         self.line.change(delay_ms=1e3 * DELAY_S)
 
     def cut(self) -> None:
-        """Until both routers have given the line up: nothing is kept back any more."""
+        """Cut the line until both routers have closed the link: no buffered message is left."""
         until(lambda: self._seen() == {GATEWAY, HUB})
         self.line.change(cut=True)
         self.far.until(JOINTS, stale=True, within_s=60.0)
         until(lambda: not self._seen())
 
     def mend(self) -> None:
-        """Until live joints come again, and each router knows who is at the other, which takes longer."""
+        """Restore the line until live joints arrive and, later, each router knows the other side."""
         self.line.change(cut=False)
         self.far.until(JOINTS, stale=False, within_s=60.0)
         until(lambda: self._seen() == {GATEWAY, HUB})
 
     def _seen(self) -> set[str]:
-        """Whom of the other side each sees."""
+        """Return the participants of the other side that each side sees."""
         sides = ((self.far, GATEWAY), (self.near, HUB))
         return {token for probe, token in sides if any(who.startswith(token) for who in probe.do("present"))}
 
@@ -129,7 +129,7 @@ def test_a_stop_over_a_line_that_loses_is_done_once(plant):
         numbers.append(int(answer["answer"]["stop_id"]))
         time.sleep(0.12)  # those closer than 0.1 s share a unit
     assert numbers == list(range(numbers[0], numbers[0] + 8))
-    # One more from beside the arm, which comes behind them all.
+    # One more from the arm's side, which arrives after all others.
     last = int(plant.near.do("ask", STOP, {"by": "li"}, 20.0)["answer"]["stop_id"])
     until(lambda: plant.stops >= last)
     assert plant.stops == last == numbers[-1] + 1
@@ -156,7 +156,7 @@ def test_what_was_kept_back_comes_late_and_never_looks_live(plant):
 
 def test_losses_are_counted_over_a_cut(plant):
     def counted():
-        """While nothing comes, so that all that has come is counted."""
+        """Return the counts after all traffic has arrived."""
         found = [plant.far.do("sequence", JOINTS, JOINTS)]
 
         def quiet():

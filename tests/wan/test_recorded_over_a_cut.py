@@ -1,4 +1,4 @@
-"""A line that was cut for seconds: what recorders at its ends hold and miss, and what is complete again."""
+"""A line that was cut for seconds: data that recorders at its ends hold and miss, and data that is complete."""
 
 import time
 from pathlib import Path
@@ -23,7 +23,7 @@ CUT_S = 5.0
 
 
 def recorded(site: Site) -> Path | None:
-    """The file of a site's capture, where there is one."""
+    """Return the file of a site's capture, if there is one."""
     for path in (site.folder / "recordings").rglob("*.mcap"):
         try:
             if describe_file(path).name == "cut":
@@ -34,7 +34,7 @@ def recorded(site: Site) -> Path | None:
 
 
 def joints_of(path: Path) -> tuple[Recording.TopicCount, list[int]]:
-    """What a recording tells of its joints, and the numbers of those that it holds."""
+    """Return a recording's summary of its joints, and the sequence numbers that it holds."""
     told = next(each for each in describe_file(path).topics if each.topic == JOINTS)
     with RecordingFile(path) as file:
         return told, [each.sequence for each in file.messages([JOINTS])]

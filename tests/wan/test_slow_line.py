@@ -1,4 +1,4 @@
-"""A far line of 2 Mbit/s with more video than it carries: what is asked for over it arrives whole."""
+"""A slow line of 2 Mbit/s with more video than it carries: requested data arrives completely."""
 
 import pytest
 
