@@ -27,6 +27,8 @@ PACKAGES = (
     "services",
     "web",
     "benchmarks",
+    "tests",
+    "examples",
 )
 
 # A docstring begins with a verb in the imperative, or with a noun phrase.
