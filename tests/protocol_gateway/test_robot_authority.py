@@ -1,4 +1,4 @@
-"""Order of the effects of a robot's authority, without sockets or disk; and its equality with the old implementation."""
+"""Order of the effects of a robot's authority, without sockets or disk; and comparison with the old one."""
 
 import asyncio
 from dataclasses import replace

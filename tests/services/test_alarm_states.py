@@ -202,7 +202,7 @@ STEPS = st.lists(
 @settings(max_examples=200)
 @given(STEPS)
 def test_whatever_happens_nothing_unseen_is_forgotten(steps):
-    """Compare with a naive reference: an alarm that was activated since its last acknowledgement is listed."""
+    """Compare with a naive reference: an alarm activated since its last acknowledgement is listed."""
     alarms, now = Alarms(), 0.0
     unseen, counts = set(), {"a": 0, "b": 0}
     for what, name, passes in steps:

@@ -69,7 +69,7 @@ def one_link(endpoint: str, tls: Tls) -> zenoh.Config:
 
 @pytest.fixture(scope="module")
 def mesh(tmp_path_factory):
-    """Yield a router, a client for each principal, and the witness, which answers every request of the table."""
+    """Yield a router, a client for each principal, and the witness, which answers every request."""
     folder = Folder(tmp_path_factory.mktemp("site") / "keys")
     authority.prepare(folder, SITE, robots=[OWN_ROBOT], border="open", routers=[], started=[STARTED_ROBOT])
     for name, role in people().items():

@@ -2,8 +2,9 @@
 
     .venv/bin/python -m tests.soak.audit_kills --times 50
 
-A real router, a real gateway process, a controller that keeps every unit it receives, an operator that\nsends each command after the previous answer, and a client that stops the robot at intervals. The log is rotated
-every 10 KiB, so that kills meet rotations too. After each kill:
+A real router, a real gateway process, a controller that keeps every unit it receives, an operator that
+sends each command after the previous answer, and a client that stops the robot at intervals. The log is
+rotated every 10 KiB, so that kills meet rotations too. After each kill:
 
     every command that reached the controller is in the log as accepted, exactly one time
     the chain holds, and the newest head that was seen on the mesh is in it
@@ -158,7 +159,7 @@ class Trial:
         await self.command(C.RESET, stop_id=state.stop.id)
 
     async def check_stop(self, state: STATE) -> None:
-        """Check after a restart that the logged latch is latched; otherwise the controller reports its stop."""
+        """Check after a restart that the logged stop is latched, or else that the controller reports it."""
         shown = state.stop.id if state.HasField("stop") else 0
         begun_s = time.monotonic()
         while True:

@@ -2,7 +2,8 @@
 
 Each link is a separate process. Its first argument is JSON: two ends, each a namespace (a file descriptor
 that it inherits), a device's name and an address. Each line on its standard input changes what the link does
-and is answered with what it did so far; the end of the input is its own end, so it never outlives\nthe process that started it.
+and is answered with what it did so far; the link ends with its input, so it never outlives the process that
+started it.
 
 Each direction by itself: `delay_ms`; `jitter_ms` (up to so much more, in order); `loss` (a share of 1);
 `rate_bps` (0: no limit) behind a queue of `queue_bytes`, and what finds that full is lost, as in a router;

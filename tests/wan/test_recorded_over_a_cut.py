@@ -1,4 +1,4 @@
-"""A line that was cut for seconds: data that recorders at its ends hold and miss, and data that is complete."""
+"""A line cut for seconds: data that recorders at its ends hold and miss, and data that is complete."""
 
 import time
 from pathlib import Path
