@@ -18,7 +18,6 @@ COPY pyproject.toml requirements.lock README.md LICENSE ./
 COPY robomesh robomesh
 COPY robots robots
 COPY protocol_gateway protocol_gateway
-COPY mcap_files mcap_files
 COPY renderer renderer
 COPY services services
 COPY web web

@@ -12,7 +12,7 @@ from functools import partial
 import zenoh
 from google.protobuf.message import Message
 
-from robomesh import access, client, connect_errors, keys, presence, server, topics
+from robomesh import access, connect_errors, keys, presence, requests, server, topics
 from robomesh import reason_codes as codes
 from robomesh.counters import Counters, Measure
 from robomesh.endpoints import DEFAULT_ROUTER, Tls, client_config, first_line
@@ -123,13 +123,13 @@ class Session:
         """
         key = keys.parse_expression(key)
         payload = b"" if request is None else request.SerializeToString()
-        return client.decode_answer(key, await self.ask_bytes(key, payload, timeout_s=timeout_s))
+        return requests.decode_answer(key, await self.ask_bytes(key, payload, timeout_s=timeout_s))
 
     async def ask_bytes(self, key: keys.Key | str, payload: bytes = b"", *, timeout_s: float = 2.0) -> bytes:
         """Send a request as bytes and return the answer's bytes; see `ask`."""
         self._check("query", str(key))
         try:
-            return await client.ask_bytes(self.zenoh_session, key, payload, timeout_s=timeout_s)
+            return await requests.ask_bytes(self.zenoh_session, key, payload, timeout_s=timeout_s)
         except NoAnswerError as error:
             if self.principal is None or isinstance(error, BrokenAnswerError):
                 raise
@@ -138,14 +138,14 @@ class Session:
 
     async def ask_all(
         self, key: str, request: Message | None = None, *, timeout_s: float = 2.0
-    ) -> list[client.Answer]:
+    ) -> list[requests.Answer]:
         """Send a request on a key with a wildcard and return every owner's answer."""
         self._check("query", key)
         payload = b"" if request is None else request.SerializeToString()
-        answers = await client.ask_all(self.zenoh_session, key, payload, timeout_s=timeout_s)
+        answers = await requests.ask_all(self.zenoh_session, key, payload, timeout_s=timeout_s)
         # A refusal has the request's key instead of its owner's.
         fits = (each for each in answers if each[0] == key or self.ignored.key(REPLY, each[0]) is not None)
-        return [client.answer_of(*each) for each in fits]
+        return [requests.answer_of(*each) for each in fits]
 
     async def last(self, key: str, *, timeout_s: float = 2.0) -> Message | None:
         """Return the last value of a topic, or its history message; None: no publisher has one."""

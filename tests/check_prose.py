@@ -22,7 +22,6 @@ PACKAGES = (
     "robomesh",
     "robots",
     "protocol_gateway",
-    "mcap_files",
     "renderer",
     "services",
     "web",

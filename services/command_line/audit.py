@@ -96,7 +96,7 @@ def verify(
 
 
 def _recorded_head(recording: Path) -> str:
-    from mcap_files.files import describe_file
+    from robomesh.recordings.files import describe_file
 
     described = describe_file(recording)
     if not described.HasField("audit_head"):

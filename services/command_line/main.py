@@ -71,10 +71,10 @@ def _failed(text: str) -> int:
 
 
 def _known_errors() -> tuple[type[Exception], ...]:
-    from mcap_files.errors import RecordingsError
     from protocol_gateway.errors import ProtocolGatewayError
     from renderer.errors import RendererError
     from robomesh.errors import BusError
+    from robomesh.recordings.errors import RecordingsError
     from robots.errors import RobotError
     from services.errors import ServiceError
 

@@ -9,12 +9,12 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from mcap_files.errors import RecordingError
-from mcap_files.folder import find_file
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.keys import WHOLE_SITE
 from robomesh.presence import OPERATOR
+from robomesh.recordings.errors import RecordingError
+from robomesh.recordings.folder import find_file
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
 from robomesh.session import Session

@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 from google.protobuf.message import DecodeError
 
-from mcap_files.publisher_time import PublisherTimes
-from mcap_files.reading import RecordedMessage, RecordingFile
-from mcap_files.video import holds_key_frame
 from robomesh import reason_codes as codes
 from robomesh import topics
 from robomesh.errors import BusError
 from robomesh.keys import Key, parse_key
 from robomesh.publisher import LIST_LENGTH
+from robomesh.recordings.publisher_time import PublisherTimes
+from robomesh.recordings.reading import RecordedMessage, RecordingFile
+from robomesh.recordings.video import holds_key_frame
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.topics import History
 from services.player.errors import ReplayError

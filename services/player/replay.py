@@ -7,13 +7,13 @@ import time
 from collections import deque
 from dataclasses import dataclass
 
-from mcap_files.errors import RecordingError
 from robomesh import reason_codes as codes
 from robomesh import topics
 from robomesh.errors import BusError, RefusedError
 from robomesh.keys import replay_name, robot_key
 from robomesh.publisher import Publisher
 from robomesh.reasons import Reason
+from robomesh.recordings.errors import RecordingError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Answerer, Handler, Request
 from robomesh.session import Session

@@ -10,14 +10,14 @@ from typing import Any
 from google.protobuf.message import Message
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from mcap_files.channel_names import SUFFIX
-from mcap_files.errors import RecordingError
-from mcap_files.files import describe_file, describe_unreadable
-from mcap_files.folder import find_file
-from mcap_files.reading import RecordingFile
-from mcap_files.series import MOST_POINTS, POINTS, SeriesReader, known_values
-from mcap_files.video import holds_key_frame
 from robomesh import reason_codes as codes
+from robomesh.recordings.channel_names import SUFFIX
+from robomesh.recordings.errors import RecordingError
+from robomesh.recordings.files import describe_file, describe_unreadable
+from robomesh.recordings.folder import find_file
+from robomesh.recordings.reading import RecordingFile
+from robomesh.recordings.series import MOST_POINTS, POINTS, SeriesReader, known_values
+from robomesh.recordings.video import holds_key_frame
 from robomesh.schemas import robomesh_pb2 as schema
 
 _MESSAGES, _MOST_MESSAGES, _MOST_BYTES = 1000, 10_000, 4 << 20

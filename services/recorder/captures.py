@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
-from mcap_files.capture import Capture
-from mcap_files.channel_names import SUFFIX
-from mcap_files.errors import CaptureError
 from robomesh import reason_codes as codes
 from robomesh.errors import KeyNameError, RefusedError
 from robomesh.keys import check_chunk
+from robomesh.recordings.capture import Capture
+from robomesh.recordings.channel_names import SUFFIX
+from robomesh.recordings.errors import CaptureError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wall_clock import WallClock
 from services.recorder.disk import Disk, error_text

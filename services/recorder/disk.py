@@ -13,9 +13,9 @@ from collections.abc import Callable, Mapping
 from enum import IntEnum
 from pathlib import Path
 
-from mcap_files import records
-from mcap_files.capture import Capture
-from mcap_files.recover import close_in_place
+from robomesh.recordings import records
+from robomesh.recordings.capture import Capture
+from robomesh.recordings.recover import close_in_place
 from robomesh.topics import History, Topic
 from services.recorder.settings import MIB, Marks
 

@@ -4,8 +4,8 @@ import time
 from collections import Counter
 from collections.abc import Callable
 
-from mcap_files.capture import Capture
 from robomesh.header import Header
+from robomesh.recordings.capture import Capture
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.topics import TOPICS, Topic
 from robomesh.wall_clock import WallClock

@@ -12,13 +12,13 @@ from functools import partial
 from math import inf
 from pathlib import Path
 
-from mcap_files.capture import Capture, is_being_written
-from mcap_files.channel_names import SUFFIX
-from mcap_files.errors import CaptureError
-from mcap_files.recover import State, state_of
 from robomesh import reason_codes as codes
 from robomesh.errors import MessageError, RefusedError
 from robomesh.messages import decode
+from robomesh.recordings.capture import Capture, is_being_written
+from robomesh.recordings.channel_names import SUFFIX
+from robomesh.recordings.errors import CaptureError
+from robomesh.recordings.recover import State, state_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.topics import Topic
 from services.recorder.captures import Files, check_name

@@ -9,13 +9,13 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
-from mcap_files.capture import Capture
-from mcap_files.channel_names import INDEXING, SUFFIX
-from mcap_files.errors import RecordingsError
-from mcap_files.recover import State
 from robomesh import reason_codes as codes
 from robomesh.errors import MessageError, RefusedError
 from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.recordings.capture import Capture
+from robomesh.recordings.channel_names import INDEXING, SUFFIX
+from robomesh.recordings.errors import RecordingsError
+from robomesh.recordings.recover import State
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
 from robomesh.session import Session

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from google.protobuf.message import Message
 
-from mcap_files.errors import RecordingError
 from robomesh import reason_codes as codes
 from robomesh.errors import BusyError, RefusedError
 from robomesh.keys import WHOLE_SITE
 from robomesh.quotas import DEFAULT_QUOTAS, Quota, Quotas
+from robomesh.recordings.errors import RecordingError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
 from robomesh.session import Session

@@ -14,13 +14,13 @@ from typing import Any, Protocol
 import zenoh
 import zenoh.ext
 
-from mcap_files.video import holds_key_frame
 from robomesh.endpoints import settle
 from robomesh.errors import MessageError
 from robomesh.header import Header, unpack
 from robomesh.ignored import PUBLICATION, REPLY, Ignored
 from robomesh.keys import robot_key
 from robomesh.messages import decode
+from robomesh.recordings.video import holds_key_frame
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.topics import History, Topic, topic
 

@@ -3,7 +3,7 @@
 import asyncio
 
 from protocol_gateway.audit.log import read_entries
-from robomesh.client import ask_all
+from robomesh.requests import ask_all
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
 from tests.conftest import run

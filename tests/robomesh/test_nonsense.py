@@ -6,10 +6,10 @@ import time
 import pytest
 import zenoh
 
-from robomesh.client import ask_all
 from robomesh.endpoints import client_config
 from robomesh.errors import RefusedError
 from robomesh.messages import TEXT
+from robomesh.requests import ask_all
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
 from tests.conftest import run

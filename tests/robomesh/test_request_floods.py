@@ -6,10 +6,10 @@ import time
 
 import pytest
 
-from robomesh.client import ask_all
 from robomesh.errors import BusyError
 from robomesh.messages import PROTOBUF
 from robomesh.request_queue import RateLimit, begin_now
+from robomesh.requests import ask_all
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
 from robomesh.session import open_session

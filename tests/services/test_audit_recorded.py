@@ -4,8 +4,8 @@ import asyncio
 import contextlib
 import json
 
-from mcap_files.files import describe_file
 from protocol_gateway.audit.log import read_entries
+from robomesh.recordings.files import describe_file
 from robomesh.session import open_session
 from services.recorder.recorder import Settings, serve
 from tests.conftest import run

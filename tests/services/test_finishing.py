@@ -8,11 +8,11 @@ import signal
 import psutil
 import pytest
 
-from mcap_files.recover import State, state_of
+from robomesh.recordings.recover import State, state_of
 from services.recorder import finishing
 from services.recorder.finishing import Finisher, Job
 from tests.conftest import run
-from tests.mcap_files.test_capture import write
+from tests.robomesh.recordings.test_capture import write
 
 pytestmark = pytest.mark.slow
 
@@ -38,7 +38,7 @@ def submit(finisher, path):
 def worker_process():
     """Return the worker process of this process, or None."""
     children = psutil.Process().children()
-    return next((each for each in children if "mcap_files.reindex" in each.cmdline()), None)
+    return next((each for each in children if "robomesh.recordings.reindex" in each.cmdline()), None)
 
 
 def test_job_of_a_killed_worker_fails_and_the_next_job_is_done(tmp_path):

@@ -9,11 +9,11 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from mcap_files.capture import Capture
-from mcap_files.files import describe_file
-from mcap_files.reindex import rewrite
 from robomesh import reason_codes as codes
 from robomesh.header import Header
+from robomesh.recordings.capture import Capture
+from robomesh.recordings.files import describe_file
+from robomesh.recordings.reindex import rewrite
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.topics import topic
 from services.recorder import flight

@@ -5,8 +5,8 @@ import time
 
 from mcap.reader import make_reader
 
-from mcap_files.capture import Capture
 from robomesh.header import Header, pack
+from robomesh.recordings.capture import Capture
 from robomesh.session import open_session
 from robomesh.wall_clock import WallClock
 from services.recorder import captures, subscriptions

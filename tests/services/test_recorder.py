@@ -10,11 +10,11 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from mcap_files import records
-from mcap_files.capture import Capture
-from mcap_files.files import RecordingError, describe_file
-from mcap_files.recover import State, state_of
 from robomesh import reason_codes as codes
+from robomesh.recordings import records
+from robomesh.recordings.capture import Capture
+from robomesh.recordings.files import RecordingError, describe_file
+from robomesh.recordings.recover import State, state_of
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
 from tests.refusals import refused

@@ -5,9 +5,9 @@ import threading
 
 import pytest
 
-from mcap_files.capture import Capture
-from mcap_files.recover import State, state_of
 from robomesh.header import Header
+from robomesh.recordings.capture import Capture
+from robomesh.recordings.recover import State, state_of
 from robomesh.topics import topic
 from services.recorder.disk import Disk
 from services.recorder.settings import Marks

@@ -7,10 +7,10 @@ import zenoh
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from mcap.reader import make_reader
 
-from mcap_files.files import describe_file
 from robomesh import reason_codes as codes
 from robomesh.endpoints import router_config
 from robomesh.errors import RefusedError
+from robomesh.recordings.files import describe_file
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import SessionSettings
 from services.recorder.settings import Marks, Split

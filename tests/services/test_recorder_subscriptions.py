@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from mcap_files.capture import Capture
-from mcap_files.reading import RecordingFile
 from robomesh.header import Header, pack
+from robomesh.recordings.capture import Capture
+from robomesh.recordings.reading import RecordingFile
 from robomesh.schemas.robomesh_pb2 import Event, EventList, RecordingQuery
 from robomesh.session import open_session
 from robomesh.topics import TOPICS, topic

@@ -11,8 +11,8 @@ import av
 import numpy as np
 import pytest
 
-from mcap_files.capture import Capture
 from robomesh.errors import QuotaError
+from robomesh.recordings.capture import Capture
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
 from robots.description import load

@@ -14,10 +14,10 @@ import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from starlette.applications import Starlette
 
-from mcap_files.errors import RecordingError
 from robomesh import reason_codes as codes
 from robomesh.errors import BrokenAnswerError, BusyError, QuotaError, RefusedError
 from robomesh.quotas import DEFAULT_QUOTAS, Quotas
+from robomesh.recordings.errors import RecordingError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
 from services.console.http.recordings import Recordings
@@ -149,7 +149,7 @@ class _Direct:
         self._answers = Answers(folder)
 
     async def ask(self, key, request, *, timeout_s):
-        from mcap_files.errors import RecordingError
+        from robomesh.recordings.errors import RecordingError
 
         try:
             name = key.split("/recordings/")[1].removesuffix("/li")

@@ -6,9 +6,9 @@ import signal
 import sys
 
 from robomesh import reason_codes as codes
-from robomesh.client import ask_all
 from robomesh.errors import RefusedError
 from robomesh.lease import control
+from robomesh.requests import ask_all
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
 from services.command_line import discovery

@@ -27,10 +27,10 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 
-from mcap_files import records
-from mcap_files.recover import State, state_of
 from robomesh.endpoints import router_config
 from robomesh.errors import NoAnswerError, RefusedError
+from robomesh.recordings import records
+from robomesh.recordings.recover import State, state_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session, SessionSettings, open_session
 from tests.conftest import free_port

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from mcap_files.errors import RecordingError
-from mcap_files.files import describe_file
-from mcap_files.reading import RecordingFile
+from robomesh.recordings.errors import RecordingError
+from robomesh.recordings.files import describe_file
+from robomesh.recordings.reading import RecordingFile
 from robomesh.schemas.robomesh_pb2 import Recording
 from tests.wan.network import Network, missing
 from tests.wan.sites import ARM, PORT, Probe, Site, stop

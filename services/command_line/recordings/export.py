@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from mcap_files.reading import RecordingFile
+from robomesh.recordings.reading import RecordingFile
 from services.command_line import discovery
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.fetch import local_file

@@ -147,8 +147,8 @@ def info(what: str, router: str, as_json: bool) -> None:
 
 
 def _described(file: Path) -> schema.Recording:
-    from mcap_files.capture import is_being_written
-    from mcap_files.files import describe_file
+    from robomesh.recordings.capture import is_being_written
+    from robomesh.recordings.files import describe_file
 
     recording = describe_file(file)
     if recording.problem and is_being_written(file):

@@ -61,7 +61,7 @@ async def _of_file(
 
 async def _site_for(session: Session, path: Path) -> str:
     """Return the recording's own site if present; else a present site, where the replay is visible."""
-    from mcap_files.files import describe_file
+    from robomesh.recordings.files import describe_file
 
     own = (await asyncio.to_thread(describe_file, path)).site
     sites = {who.site for who in await session.present()}

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mcap_files.channel_names import ABOUT
-from mcap_files.publisher_time import PublisherTimes
-from mcap_files.reading import RecordingFile
-from mcap_files.series import MOST_VALUES, Series, SeriesReader, known_values
+from robomesh.recordings.channel_names import ABOUT
+from robomesh.recordings.publisher_time import PublisherTimes
+from robomesh.recordings.reading import RecordingFile
+from robomesh.recordings.series import MOST_VALUES, Series, SeriesReader, known_values
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.output import progress

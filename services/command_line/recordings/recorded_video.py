@@ -4,10 +4,10 @@ from pathlib import Path
 
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from mcap_files.publisher_time import PublisherTimes
-from mcap_files.reading import RecordingFile
-from mcap_files.video import holds_key_frame
 from renderer.mp4 import FragmentedMp4
+from robomesh.recordings.publisher_time import PublisherTimes
+from robomesh.recordings.reading import RecordingFile
+from robomesh.recordings.video import holds_key_frame
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.output import progress
 from services.command_line.recordings.span import Span, decoded, needed

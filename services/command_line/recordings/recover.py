@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from mcap_files import recover as files
-from mcap_files.capture import is_being_written
-from mcap_files.files import describe_file
+from robomesh.recordings import recover as files
+from robomesh.recordings.capture import is_being_written
+from robomesh.recordings.files import describe_file
 from services.command_line import discovery
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.output import progress

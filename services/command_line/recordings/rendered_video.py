@@ -7,9 +7,6 @@ from pathlib import Path
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from mcap_files.errors import RecordingError
-from mcap_files.publisher_time import PublisherTimes
-from mcap_files.reading import RecordedMessage, RecordingFile
 from renderer.appearance import appearance_of, mesh_name, placements_at
 from renderer.cache import cache_folder, stored_glb
 from renderer.clearance_line import draw_clearance_line
@@ -20,6 +17,9 @@ from renderer.overlay import write_over
 from renderer.requested_views import ViewSpec
 from renderer.robot_state import Ages, RobotState
 from renderer.studio import Studio
+from robomesh.recordings.errors import RecordingError
+from robomesh.recordings.publisher_time import PublisherTimes
+from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.output import progress

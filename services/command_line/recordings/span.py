@@ -4,9 +4,9 @@ from typing import NamedTuple, TypeVar
 
 from google.protobuf.message import DecodeError, Message
 
-from mcap_files.reading import RecordingFile
 from robomesh.errors import KeyNameError
 from robomesh.keys import parse_key
+from robomesh.recordings.reading import RecordingFile
 from services.command_line.recordings.errors import ExportError
 
 M = TypeVar("M", bound=Message)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from mcap_files.reading import RecordedMessage, RecordingFile
-from mcap_files.table import Table, is_due, table_of
+from robomesh.recordings.reading import RecordedMessage, RecordingFile
+from robomesh.recordings.table import Table, is_due, table_of
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.output import progress

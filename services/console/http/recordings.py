@@ -23,10 +23,10 @@ from starlette.responses import Response
 from starlette.routing import Route
 from starlette.types import Scope
 
-from mcap_files.table import Table, is_due, table_of
 from robomesh import reason_codes as codes
 from robomesh.errors import BusError, NoAnswerError, QuotaError
 from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.recordings.table import Table, is_due, table_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 from services.console.errors import RecordingChangedError, RefusedRequest
@@ -58,7 +58,7 @@ class _Where(NamedTuple):
 
 
 class _Recorded(NamedTuple):
-    """The fields of a message that `mcap_files.publisher_time` needs."""
+    """The fields of a message that `robomesh.recordings.publisher_time` needs."""
 
     topic: str
     received_ns: int

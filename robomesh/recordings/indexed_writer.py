@@ -10,8 +10,8 @@ import zstandard
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, ChunkIndex, MessageIndex, Metadata, Schema
 
-from mcap_files import records
-from mcap_files.channel_names import ABOUT, LOST
+from robomesh.recordings import records
+from robomesh.recordings.channel_names import ABOUT, LOST
 
 _CHUNK_BYTES = 1 << 20
 

@@ -3,9 +3,9 @@
 import re
 from pathlib import Path
 
-from mcap_files.channel_names import SUFFIX
-from mcap_files.errors import RecordingError
 from robomesh import reason_codes as codes
+from robomesh.recordings.channel_names import SUFFIX
+from robomesh.recordings.errors import RecordingError
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.:+-]*")
 

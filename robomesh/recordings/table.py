@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from mcap_files.publisher_time import PublisherTimes, Recorded
+from robomesh.recordings.publisher_time import PublisherTimes, Recorded
 from robomesh.schemas import robomesh_pb2 as schema
 
 # The tool's position is recorded less often than the joints; an older one is omitted.

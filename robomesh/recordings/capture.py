@@ -19,11 +19,11 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata, Schema
 from mcap_protobuf.schema import build_file_descriptor_set
 
-from mcap_files import records
-from mcap_files.channel_names import ABOUT, INDEXING, LOST
-from mcap_files.errors import CaptureError
 from robomesh import reason_codes as codes
 from robomesh.header import Header
+from robomesh.recordings import records
+from robomesh.recordings.channel_names import ABOUT, INDEXING, LOST
+from robomesh.recordings.errors import CaptureError
 from robomesh.topics import Topic
 
 __all__ = ["ABOUT", "INDEXING", "LOST", "Capture", "is_being_written"]

@@ -18,8 +18,9 @@ from mcap.reader import make_reader
 from mcap.records import Channel, ChunkIndex, Metadata, Schema
 from mcap.summary import Summary
 
-from mcap_files.errors import RecordingError
-from mcap_files.records import (
+from robomesh import reason_codes as codes
+from robomesh.recordings.errors import RecordingError
+from robomesh.recordings.records import (
     DAMAGE,
     MAGIC,
     MESSAGE,
@@ -29,7 +30,6 @@ from mcap_files.records import (
     unpack_chunk,
     walk_chunk,
 )
-from robomesh import reason_codes as codes
 
 _BLOCK_BYTES = 1 << 20
 _ATTACHMENT = struct.Struct("<QQ")

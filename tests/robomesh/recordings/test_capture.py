@@ -7,14 +7,14 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
-from mcap_files import indexed_writer
-from mcap_files.capture import Capture
-from mcap_files.errors import CaptureError
-from mcap_files.files import describe_file
-from mcap_files.layout import layout_of
-from mcap_files.recover import State, close_in_place, is_ours, recover, state_of
-from mcap_files.reindex import index, rewrite
 from robomesh.header import Header
+from robomesh.recordings import indexed_writer
+from robomesh.recordings.capture import Capture
+from robomesh.recordings.errors import CaptureError
+from robomesh.recordings.files import describe_file
+from robomesh.recordings.layout import layout_of
+from robomesh.recordings.recover import State, close_in_place, is_ours, recover, state_of
+from robomesh.recordings.reindex import index, rewrite
 from robomesh.topics import topic
 from tests.recordings import write_recording
 

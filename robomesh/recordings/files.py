@@ -9,12 +9,12 @@ from google.protobuf.duration_pb2 import Duration
 from google.protobuf.message import DecodeError
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from mcap_files.channel_names import ABOUT, LOST
-from mcap_files.errors import RecordingError
-from mcap_files.layout import Layout, layout_of
-from mcap_files.reading import RecordingFile
-from mcap_files.records import number_in
 from robomesh import reason_codes as codes
+from robomesh.recordings.channel_names import ABOUT, LOST
+from robomesh.recordings.errors import RecordingError
+from robomesh.recordings.layout import Layout, layout_of
+from robomesh.recordings.reading import RecordingFile
+from robomesh.recordings.records import number_in
 from robomesh.schemas import robomesh_pb2 as schema
 
 _CONTROLLER = "/controller"

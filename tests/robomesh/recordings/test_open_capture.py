@@ -4,8 +4,8 @@ import errno
 
 import pytest
 
-from mcap_files.capture import Capture, is_being_written
 from robomesh.header import Header
+from robomesh.recordings.capture import Capture, is_being_written
 from robomesh.topics import topic
 
 KEY = "robomesh/site/arm/joints"

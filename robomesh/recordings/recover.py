@@ -13,11 +13,11 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.records import Metadata
 
-from mcap_files import records
-from mcap_files.capture import is_being_written
-from mcap_files.channel_names import ABOUT, LOST
-from mcap_files.errors import CaptureError
-from mcap_files.reindex import rewrite
+from robomesh.recordings import records
+from robomesh.recordings.capture import is_being_written
+from robomesh.recordings.channel_names import ABOUT, LOST
+from robomesh.recordings.errors import CaptureError
+from robomesh.recordings.reindex import rewrite
 
 
 class State(Enum):

@@ -1,7 +1,7 @@
 """Rewriting of one or several consecutive closed recordings: 1 MiB zstd chunks, an index, verified, renamed.
 
-`python -m mcap_files.reindex` is a worker process, so that the recorder never waits for it. It reports its
-progress, a number from 0 to 1.
+`python -m robomesh.recordings.reindex` is a worker process, so that the recorder never waits for it. It
+reports its progress, a number from 0 to 1.
 """
 
 import contextlib
@@ -16,11 +16,11 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.records import Attachment, Channel, Metadata, Schema, Statistics
 
-from mcap_files import records
-from mcap_files.capture import is_being_written
-from mcap_files.channel_names import INDEXING, LOST
-from mcap_files.errors import CaptureError
-from mcap_files.indexed_writer import Copied, IndexedWriter
+from robomesh.recordings import records
+from robomesh.recordings.capture import is_being_written
+from robomesh.recordings.channel_names import INDEXING, LOST
+from robomesh.recordings.errors import CaptureError
+from robomesh.recordings.indexed_writer import Copied, IndexedWriter
 from robomesh.worker import answer_all, report
 
 _STEP_BYTES = 8 << 20

@@ -11,10 +11,10 @@ from typing import IO, Any, NamedTuple, Self
 from mcap.opcode import Opcode
 from mcap_protobuf.decoder import DecoderFactory
 
-from mcap_files.errors import RecordingError
-from mcap_files.layout import Attached, Block, layout_of
-from mcap_files.records import DAMAGE, MESSAGE, RECORD, unpack_chunk
 from robomesh import reason_codes as codes
+from robomesh.recordings.errors import RecordingError
+from robomesh.recordings.layout import Attached, Block, layout_of
+from robomesh.recordings.records import DAMAGE, MESSAGE, RECORD, unpack_chunk
 
 FOREVER_NS = (1 << 64) - 1
 # Messages that wait for sorting because their chunk overlaps the next one; above this limit the file's order

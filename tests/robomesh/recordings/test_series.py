@@ -5,10 +5,10 @@ import math
 import pytest
 from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorProto
 
-from mcap_files.errors import RecordingError
-from mcap_files.reading import RecordingFile
-from mcap_files.series import SeriesReader, known_values
-from mcap_files.values import unit_of, values_of
+from robomesh.recordings.errors import RecordingError
+from robomesh.recordings.reading import RecordingFile
+from robomesh.recordings.series import SeriesReader, known_values
+from robomesh.recordings.values import unit_of, values_of
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.recordings import START_NS, Written, joints, write_recording
 

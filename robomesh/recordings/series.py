@@ -11,13 +11,13 @@ import numpy as np
 from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 
-from mcap_files.errors import RecordingError
-from mcap_files.publisher_time import PublisherTimes
-from mcap_files.reading import RecordingFile
-from mcap_files.values import has_values, unit_of, values_of
 from robomesh import keys
 from robomesh import reason_codes as codes
 from robomesh.errors import KeyNameError
+from robomesh.recordings.errors import RecordingError
+from robomesh.recordings.publisher_time import PublisherTimes
+from robomesh.recordings.reading import RecordingFile
+from robomesh.recordings.values import has_values, unit_of, values_of
 from robomesh.schemas.robomesh_pb2 import Description
 
 POINTS, MOST_POINTS = 1000, 10_000
