@@ -1,0 +1,1 @@
+"""Clients of the mesh for Python programs: `import robomesh` exports what is public here."""

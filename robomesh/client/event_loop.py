@@ -1,0 +1,113 @@
+"""An event loop in its own thread, for callers that block."""
+
+import asyncio
+import contextlib
+import threading
+from collections.abc import Callable, Coroutine
+from concurrent.futures import Future
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+# How often a waiting caller shows that it is alive, and the loop looks for the end of the main thread.
+_POLL_S = 0.2
+# How long an interrupted caller waits until its coroutine has cleaned up, for example sent a stop.
+_CLEANUP_S = 5.0
+
+
+class EventLoopThread:
+    """An event loop that runs in its own thread until `close`, or until the main thread ends.
+
+    The thread is not a daemon: Python would end a daemon thread inside Zenoh's code, which aborts the process.
+    """
+
+    def __init__(self) -> None:
+        self._loop = asyncio.new_event_loop()
+        self._closing: Callable[[], Coroutine[Any, Any, None]] | None = None
+        self._thread = threading.Thread(target=self._run, name="robomesh")
+        self._thread.start()
+
+    def at_end(self, close: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Set what runs before the loop ends."""
+        self._closing = close
+
+    def run(self, coroutine: Coroutine[Any, Any, T], *, waiting: Callable[[], None] = lambda: None) -> T:
+        """Run a coroutine to its end and return its result; for any thread but the loop's own.
+
+        If the caller is interrupted, the coroutine is cancelled, and the interruption is raised when it has
+        ended.
+
+        Args:
+            waiting: Called several times a second by the waiting thread.
+
+        Raises:
+            RuntimeError: If the loop has been closed.
+        """
+        if self._loop.is_closed() or not self._thread.is_alive():
+            coroutine.close()
+            raise RuntimeError("the connection is closed: call robomesh.connect() again")
+        result: Future[T] = Future()
+        tasks: list[asyncio.Task[T]] = []
+
+        def start() -> None:
+            tasks.append(self._loop.create_task(coroutine))
+            tasks[0].add_done_callback(lambda task: _transfer(task, result))
+
+        def cancel() -> None:
+            for task in tasks:
+                task.cancel()
+
+        self._loop.call_soon_threadsafe(start)
+        try:
+            while True:
+                waiting()
+                with contextlib.suppress(TimeoutError):
+                    return result.result(timeout=_POLL_S)
+                if result.done():  # the coroutine itself timed out
+                    return result.result()
+        except BaseException:
+            if not result.done():
+                self._loop.call_soon_threadsafe(cancel)
+                with contextlib.suppress(Exception):
+                    result.exception(timeout=_CLEANUP_S)
+            raise
+
+    def close(self) -> None:
+        """Run what was set by `at_end`, and end the thread."""
+        if self._thread.is_alive():
+            with contextlib.suppress(RuntimeError):  # the loop has just ended
+                self._loop.call_soon_threadsafe(self._loop.stop)
+            self._thread.join()
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        end_with_main = self._loop.create_task(self._end_with_main_thread())
+        try:
+            self._loop.run_forever()
+        finally:
+            end_with_main.cancel()
+            self._loop.run_until_complete(self._end())
+            self._loop.close()
+
+    async def _end(self) -> None:
+        others = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in others:
+            task.cancel()
+        await asyncio.gather(*others, return_exceptions=True)
+        if self._closing is not None:
+            await self._closing()
+
+    async def _end_with_main_thread(self) -> None:
+        while threading.main_thread().is_alive():
+            await asyncio.sleep(_POLL_S)
+        self._loop.stop()
+
+
+def _transfer(task: asyncio.Task[T], result: "Future[T]") -> None:
+    if task.cancelled():
+        result.cancel()
+        result.set_running_or_notify_cancel()
+    elif (error := task.exception()) is not None:
+        result.set_exception(error)
+    else:
+        result.set_result(task.result())
