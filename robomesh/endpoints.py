@@ -115,7 +115,7 @@ def router_config(
     """Return the configuration of a router that listens and links to other sites' routers.
 
     Args:
-        access: Sections of Zenoh's configuration with the access rules (`robomesh/access.py`).
+        access: Sections of Zenoh's configuration with the access rules (`robomesh/access_rights.py`).
         line_bps: Rate of the lines to other sites [bit/s]; None: unknown.
 
     Raises:

@@ -9,7 +9,7 @@ event of each example.
 import threading
 
 from robomesh import keys
-from robomesh.access import PROBE_ROBOT
+from robomesh.access_rights import PROBE_ROBOT
 from robomesh.errors import KeyNameError
 from robomesh.texts import one_line
 

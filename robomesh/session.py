@@ -12,7 +12,7 @@ from functools import partial
 import zenoh
 from google.protobuf.message import Message
 
-from robomesh import access, connect_errors, keys, presence, requests, server, topics
+from robomesh import access_rights, connect_errors, keys, presence, requests, server, topics
 from robomesh import reason_codes as codes
 from robomesh.counters import Counters, Measure
 from robomesh.endpoints import DEFAULT_ROUTER, Tls, client_config, first_line
@@ -52,7 +52,7 @@ class Session:
     # Of the additional connections.
     extra_config: zenoh.Config
     # From the certificate; None: no certificate, or one without identity lines.
-    principal: access.Principal | None = None
+    principal: access_rights.Principal | None = None
     # Id of this process in presence keys.
     identity: str = field(default_factory=lambda: secrets.token_hex(4))
     # Metrics that the service defines.
@@ -229,11 +229,11 @@ class Session:
             raise NoAnswerError(str(error)) from None
         return await presence.present(client, ignored=self.ignored)
 
-    def _check(self, act: access.Act, key: str) -> None:
+    def _check(self, act: access_rights.Act, key: str) -> None:
         """Raise an error with the reason if the router would silently reject the act."""
         who = self.principal
-        if who is not None and not access.may(who, who.site, act, key):
-            raise NoRightError(codes.NO_RIGHT(access.refusal(who, act, key)))
+        if who is not None and not access_rights.may(who, who.site, act, key):
+            raise NoRightError(codes.NO_RIGHT(access_rights.refusal(who, act, key)))
 
     def measure(self, name: str, text: str, read: Callable[[], float | Mapping[str, float]]) -> None:
         """Add a number to the health and the metrics of this process; see `Measure`."""
@@ -307,7 +307,7 @@ async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
     identity, warning = connect_errors.own_certificate(settings.tls)
     if warning:
         log.warning("%s", warning)
-    principal = None if identity is None else access.principal_of(identity)
+    principal = None if identity is None else access_rights.principal_of(identity)
     config = client_config(settings.connect, settings.tls)
     extra_config = client_config(settings.connect, settings.tls, small_buffers=True)
     loop = asyncio.get_running_loop()

@@ -25,7 +25,6 @@ from pathlib import Path
 
 from protocol_gateway.audit.entry import Entry, Outcome, chain_entry
 from protocol_gateway.audit.files import Verification, older_parts, part_name, read_entries, verify
-from protocol_gateway.audit.latch import LatchFile, disk_problem
 from protocol_gateway.audit.persisted_state import (
     LATCH_UNKNOWN,
     ROTATE,
@@ -38,6 +37,7 @@ from protocol_gateway.audit.persisted_state import (
 )
 from protocol_gateway.audit.recovery import Recovery, find_end
 from protocol_gateway.errors import AuditError
+from protocol_gateway.latch_file import LatchFile, disk_problem
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 

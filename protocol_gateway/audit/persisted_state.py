@@ -11,8 +11,8 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
 from protocol_gateway.audit.entry import Entry, Outcome
-from protocol_gateway.audit.latch import LatchState
 from protocol_gateway.authority.lease_rules import Authority, Stop
+from protocol_gateway.latch_file import LatchState
 
 ROTATE = "ROTATE"
 UNKNOWN = "audit log damaged: whether a stop was latched is not known"

@@ -14,7 +14,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from protocol_gateway.audit.latch import LatchFile
 from protocol_gateway.authority.admission import Verdict
 from protocol_gateway.authority.lease_rules import Answer, Authority, Now
 from protocol_gateway.authority.preconditions import Controller
@@ -54,6 +53,7 @@ from protocol_gateway.control.events import (
 from protocol_gateway.control.robot_authority import RobotAuthority
 from protocol_gateway.errors import AuditError, LinkError
 from protocol_gateway.journal import Journal
+from protocol_gateway.latch_file import LatchFile
 from protocol_gateway.state_messages import lease_answer
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError

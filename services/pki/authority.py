@@ -12,7 +12,7 @@ from functools import wraps
 from itertools import count
 from typing import Concatenate, ParamSpec, TypeVar
 
-from robomesh.access import Border, access_sections
+from robomesh.access_rights import Border, access_sections
 from robomesh.certificate_identity import Identity, header
 from robomesh.errors import KeyNameError
 from robomesh.keys import check_name

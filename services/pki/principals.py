@@ -9,7 +9,7 @@ from typing import Annotated
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError
 
-from robomesh.access import Border, Principal
+from robomesh.access_rights import Border, Principal
 from robomesh.topics import Role
 from robots.bounded_toml import parse_toml
 from services.pki.errors import KeysError

@@ -8,7 +8,7 @@ from protocol_gateway.core.codes import code_table
 from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.errors import CodeTableError
 from robomesh import keys
-from robomesh.access import PROBE_ROBOT
+from robomesh.access_rights import PROBE_ROBOT
 from robomesh.errors import KeyNameError
 from robots.description import Pose
 from services.errors import ListenError

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, Field, StrictBool, ValidationError, field_validator
 
-from robomesh.access import Border
+from robomesh.access_rights import Border
 from robomesh.certificate_identity import read_identity
 from robomesh.endpoints import Link, Tls
 from robomesh.errors import KeyNameError

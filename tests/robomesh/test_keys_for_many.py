@@ -4,7 +4,7 @@ import asyncio
 
 import zenoh
 
-from robomesh.access import PROBE_ROBOT
+from robomesh.access_rights import PROBE_ROBOT
 from robomesh.endpoints import client_config
 from robomesh.header import Header, pack
 from robomesh.ignored import PUBLICATION, Ignored

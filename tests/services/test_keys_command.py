@@ -11,7 +11,7 @@ from itertools import chain
 import pytest
 import zenoh
 
-from robomesh.access import PROBE_ROBOT
+from robomesh.access_rights import PROBE_ROBOT
 from robomesh.certificate_identity import read_identity
 from robomesh.endpoints import router_config
 from robomesh.topics import Role

@@ -17,7 +17,7 @@ from itertools import chain, product
 
 import zenoh
 
-from robomesh.access import PROBE_ROBOT, Act, Principal
+from robomesh.access_rights import PROBE_ROBOT, Act, Principal
 from robomesh.keys import has_wildcard
 from robomesh.topics import Role, Topic
 from services.command_line.doctor.security_probes import probe

@@ -9,7 +9,7 @@ from threading import Condition
 
 import zenoh
 
-from robomesh.access import PROBE_ROBOT, Act, Principal
+from robomesh.access_rights import PROBE_ROBOT, Act, Principal
 from robomesh.endpoints import bundle, client_config, first_line
 from robomesh.messages import PROTOBUF
 from services.pki import Folder, authority

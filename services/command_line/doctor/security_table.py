@@ -1,12 +1,12 @@
 """The rights of each certificate by the topic table, as `doctor --security` expects them.
 
-Written independently of the generator of the rules (`robomesh/access.py`), which it verifies.
+Written independently of the generator of the rules (`robomesh/access_rights.py`), which it verifies.
 """
 
 from collections.abc import Iterable
 
 from robomesh import topics
-from robomesh.access import PROBE_ROBOT, Act, Principal
+from robomesh.access_rights import PROBE_ROBOT, Act, Principal
 from robomesh.errors import UnknownTopicError
 from robomesh.keys import has_wildcard, is_replay, parse_expression, replay_name
 from robomesh.topics import REQUESTS, TOPICS, Request, Role, Topic

@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from protocol_gateway.audit.latch import LatchFile
 from protocol_gateway.audit.log import GATEWAY, Outcome
 from protocol_gateway.authority import lease_rules
 from protocol_gateway.authority.lease_rules import Authority, Now
@@ -23,6 +22,7 @@ from protocol_gateway.control.audit_trail import AuditTrail
 from protocol_gateway.drivers.driver import Driver, Stop
 from protocol_gateway.errors import CommandError, LinkError
 from protocol_gateway.journal import Journal
+from protocol_gateway.latch_file import LatchFile
 from protocol_gateway.link.link import LinkState
 from robomesh import reason_codes as codes
 from robomesh.messages import reason_message
