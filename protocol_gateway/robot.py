@@ -157,10 +157,24 @@ class Robot:
             controller=self._controller,
         )
         self._control = Control(self._robot_authority, ports, self._checks)
-        self._programs = Programs(self._control, self._robot_authority, ports, self._checks)
+        self._programs = Programs(
+            self._control,
+            self._checks,
+            journal=self._journal,
+            controller=self._controller,
+            publish=self._publish_state,
+        )
         if settings.legacy_clients is not None:
             table = code_table(settings.codes)
-            self._legacy = LegacyClients(settings.legacy_clients, table, joints, self._control, ports)
+            self._legacy = LegacyClients(
+                settings.legacy_clients,
+                table,
+                joints,
+                self._control,
+                journal=self._journal,
+                audit=self._audit_trail.write_later,
+                publish=self._publish_state,
+            )
         self._operators = session.watch_presence(presence_key(site, settings.name, Role.OPERATOR.value, "*"))
         self._stops = session.answer(site, settings.name, "stop", self._answer_stop)
 

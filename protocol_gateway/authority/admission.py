@@ -12,6 +12,7 @@
 """
 
 import hmac
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -57,6 +58,18 @@ def admit(authority: Authority, request: CommandRequest, *, operator: str, now: 
         return Verdict(not_sent(codes.COMMAND_ID_OLD(id=request.id, last=lease.last_id)))
     refusal = deadline_refusal(request, now) or stop_refusal(authority, request)
     return Verdict(refusal or Answer(True, ""), id_used=True)
+
+
+def admit_all(
+    authority: Authority, requests: Sequence[CommandRequest], *, operator: str, now: Now
+) -> Verdict:
+    """Evaluate commands of one unit, each after the previous ones; return the first refusal or repeat."""
+    for request in requests:
+        verdict = admit(authority, request, operator=operator, now=now)
+        if verdict.repeat or not verdict.answer.accepted:
+            break
+        authority = after_command(authority, request)
+    return verdict
 
 
 def content_of(request: CommandRequest) -> Content:

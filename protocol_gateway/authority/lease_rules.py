@@ -230,6 +230,11 @@ class Authority:
     # Time at which motion without a command was last observed (monotonic).
     uncommanded_s: float | None = None
 
+    @property
+    def motion(self) -> Motion | None:
+        """The holder's motion; None: it has none, or there is no holder."""
+        return None if self.lease is None else self.lease.motion
+
 
 class LeaseOutcome(NamedTuple):
     """Outcome of a lease request; `granted`: the lease for the sender, with its secret."""

@@ -75,7 +75,7 @@ def _is_conclusive(
     authority: Authority, request: CommandRequest, waypoints: tuple[tuple[float, ...], ...]
 ) -> bool:
     """Return whether rest at the new motion's target proves that the motion has ended."""
-    motion = None if authority.lease is None else authority.lease.motion
+    motion = authority.motion
     if motion is None:
         return authority.moving is False
     if request.command == _C.RESUME:

@@ -120,7 +120,7 @@ class Checks:
         controller, authority = self._controller(), self._robot_authority.authority
         if controller.positions is None:
             return Occupancy(unknown=codes.OTHER_NO_POSITION())
-        motion = None if authority.lease is None else authority.lease.motion
+        motion = authority.motion
         program = self._robot_authority.program
         ahead = () if program is None else program.ahead
         if motion is not None and motion.waypoints:
@@ -166,8 +166,7 @@ class Checks:
         if controller.positions is None:
             raise CheckError(codes.CHECK_NO_POSITION())
         if must_rest:
-            lease = authority.lease
-            motion = None if lease is None else lease.motion
+            motion = authority.motion
             arrived = motion is not None and has_arrived(
                 motion.target, controller.positions, self._joints.types
             )
@@ -187,8 +186,8 @@ class Checks:
         controller = self._controller()
         for request in requests:
             if request.command == _C.RESUME:
-                lease = self._robot_authority.authority.lease
-                waypoints = () if lease is None or lease.motion is None else lease.motion.waypoints
+                motion = self._robot_authority.authority.motion
+                waypoints = () if motion is None else motion.waypoints
                 if not waypoints:
                     raise CheckError(codes.CHECK_HELD_WAY_UNKNOWN())
                 targets += waypoints

@@ -10,11 +10,11 @@ import contextlib
 import logging
 import secrets
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from protocol_gateway.authority.admission import Verdict
+from protocol_gateway.authority.admission import Verdict, admit_all
 from protocol_gateway.authority.lease_rules import Answer, Authority, Now
 from protocol_gateway.authority.preconditions import Controller
 from protocol_gateway.control.audit_trail import AuditTrail
@@ -35,19 +35,18 @@ from protocol_gateway.control.effects import (
     Report,
     Seen,
     Send,
-    SendStop,
     SetTimer,
-    StartProgram,
 )
+from protocol_gateway.control.entries import PROGRAM
+from protocol_gateway.control.evaluation import RunningProgram
 from protocol_gateway.control.events import (
-    AdmissionRequested,
     CommandsRequested,
     Event,
     LeaseEnded,
     LeaseRequested,
     LeaseResult,
-    StepRequested,
     StopRequested,
+    StopResult,
     TimePassed,
 )
 from protocol_gateway.control.robot_authority import RobotAuthority
@@ -78,8 +77,6 @@ class Ports:
         send: Writes a unit to the controller's socket immediately, or raises LinkError.
         controller: Returns the current state of the controller.
         publish: Publishes the state of lease, stop and program.
-        cancel_programs: Cancels programs that have not started; returns whether there were any.
-        start_program: Starts the steps of a program.
     """
 
     audit_trail: AuditTrail
@@ -88,8 +85,6 @@ class Ports:
     send: Callable[[bytes], None]
     controller: Callable[[], Controller]
     publish: Callable[[], None]
-    cancel_programs: Callable[[Reason], bool] = lambda why: False
-    start_program: Callable[[Program], None] = lambda program: None
 
 
 class Control:
@@ -104,6 +99,7 @@ class Control:
         self._ports = ports
         self._checks = checks
         self._command_lock = asyncio.Lock()
+        self._preparing: set[asyncio.Future[Reason]] = set()
         self._timer: asyncio.TimerHandle | None = None
 
     @property
@@ -111,12 +107,17 @@ class Control:
         """State of lease and stop."""
         return self._robot_authority.authority
 
+    @property
+    def program(self) -> RunningProgram | None:
+        """Program that runs; None: none runs."""
+        return self._robot_authority.program
+
     # --------------------------------------------------------------- requests
 
     def stop(self, *, by: str, reason: str, source: str) -> schema.StopAnswer:
         """Stop the robot; allowed for every sender at any time."""
-        answer: schema.StopAnswer = self.handle(StopRequested(by=by, reason=reason, source=source))
-        return answer
+        result: StopResult = self.handle(StopRequested(by=by, reason=reason, source=source))
+        return stop_answer(result)
 
     async def lease(self, request: schema.LeaseRequest, *, operator: str, source: str) -> schema.LeaseAnswer:
         """Answer a lease request.
@@ -174,14 +175,26 @@ class Control:
 
     async def step(self, request: schema.CommandRequest, *, operator: str) -> Answer:
         """Execute a step of the holder's program."""
-        event = StepRequested(request=request, operator=operator, arrived=read_clocks())
+        event = CommandsRequested(
+            requests=(request,), operator=operator, source=PROGRAM, arrived=read_clocks(), step=True
+        )
         answer: Answer = await self._handle_in_turn(event)
         return answer
 
-    def admit(self, requests: Sequence[schema.CommandRequest], operator: str) -> Verdict:
-        """Evaluate whether commands are the holder's, in time and new, and no stop forbids them."""
-        verdict: Verdict = self.handle(AdmissionRequested(tuple(requests), operator))
-        return verdict
+    def admit(self, request: schema.CommandRequest, operator: str) -> Verdict:
+        """Evaluate whether a command is the holder's, in time and new, and no stop forbids it."""
+        self.handle(TimePassed())
+        return admit_all(self.authority, (request,), operator=operator, now=read_clocks())
+
+    @contextlib.contextmanager
+    def preparing_program(self) -> Iterator[asyncio.Future[Reason]]:
+        """Prepare a program; the future's result is the reason why it must not start."""
+        cancelled: asyncio.Future[Reason] = asyncio.get_running_loop().create_future()
+        self._preparing.add(cancelled)
+        try:
+            yield cancelled
+        finally:
+            self._preparing.discard(cancelled)
 
     def obstacle(self, request: schema.CommandRequest) -> Answer | None:
         """Return the refusal of a command by the controller's present state; None: allowed."""
@@ -205,7 +218,7 @@ class Control:
                 return done.value
             result = self._perform(effect)
 
-    async def _handle_in_turn(self, event: LeaseRequested | CommandsRequested | StepRequested) -> Any:
+    async def _handle_in_turn(self, event: LeaseRequested | CommandsRequested) -> Any:
         """Hand over a request after the earlier ones, unless it is immediate; return its result."""
         async with (
             contextlib.nullcontext() if event.is_immediate else self._command_lock,
@@ -236,32 +249,29 @@ class Control:
         Raises:
             TypeError: If the effect must be awaited.
         """
-        ports = self._ports
         match effect:
-            case SendStop():
-                return self._send(effect.unit)
             case Send():
-                return self._send(effect.unit), self._seen()
-            case NumberStop():
-                return ports.latch.next_number(effect.last, read_clocks().wall_ns)
+                return self._send(effect)
             case Recheck():
                 return None if self._checks is None else self._checks.changed(effect.finding)
-            case CancelPrograms():
-                return ports.cancel_programs(effect.why)
-            case StartProgram():
-                return ports.start_program(effect.program)
             case EnterCell() | CheckMotion() | Append():
                 raise TypeError(f"{type(effect).__name__} cannot be performed without waiting")
         try:
-            self._perform_rest(effect)
+            return self._perform_rest(effect)
         except Exception:
             # A stop must be latched and audited, and a motion booked, whatever fails beside it.
             log.exception("%s failed", type(effect).__name__)
-        return None
+            return None
 
-    def _perform_rest(self, effect: AppendLater | KeepLatch | Publish | Report | SetTimer) -> None:
+    def _perform_rest(
+        self, effect: NumberStop | CancelPrograms | AppendLater | KeepLatch | Publish | Report | SetTimer
+    ) -> Any:
         ports = self._ports
         match effect:
+            case NumberStop():
+                return ports.latch.next_number(effect.last, read_clocks().wall_ns)
+            case CancelPrograms():
+                return self._cancel_programs(effect.why)
             case AppendLater():
                 ports.audit_trail.write_later(effect.entry)
             case KeepLatch():
@@ -274,6 +284,7 @@ class Control:
                 )
             case SetTimer():
                 self._set_timer(effect.at_s)
+        return None
 
     def _seen(self) -> Seen:
         return Seen(
@@ -282,12 +293,23 @@ class Control:
             latch_problem=self._ports.latch.problem,
         )
 
-    def _send(self, unit: bytes) -> Reason | None:
+    def _send(self, effect: Send) -> Reason | None:
         try:
-            self._ports.send(unit)
+            self._ports.send(effect.unit)
         except LinkError as error:
             return error.reason
+        except Exception as error:
+            if not effect.urgent:
+                raise
+            log.exception("the stop unit was not sent")
+            return codes.OTHER(detail=f"{type(error).__name__}: see the gateway's log")
         return None
+
+    def _cancel_programs(self, why: Reason) -> bool:
+        for each in self._preparing:
+            if not each.done():
+                each.set_result(why)
+        return bool(self._preparing)
 
     async def _append(self, effect: Append) -> Reason | None:
         try:
@@ -312,6 +334,12 @@ class Control:
 def refusal(answer: Answer) -> RefusedError:
     """Return the error that refuses a request with an answer."""
     return RefusedError(answer.reason or answer.text, text=answer.text)
+
+
+def stop_answer(result: StopResult) -> schema.StopAnswer:
+    """Return the answer to a stop."""
+    reason = reason_message(result.reason)
+    return schema.StopAnswer(stop_id=result.id, sent=result.sent, text=result.reason.text, reason=reason)
 
 
 def command_answer(answer: Answer) -> schema.CommandAnswer:

@@ -2,16 +2,15 @@
 
     effect                                result
     ------------------------------------  ---------------------------------------------------
-    SendStop                              reason of a failure, or None
-    Send                                  (reason of a failure or None, Seen)
-    NumberStop                            number of the stop
-    CancelPrograms                        whether a program was cancelled
+    Send                                  reason of a failure, or None
     Recheck                               reason for a change, or None
     EnterCell, CheckMotion, Append        awaited: Seen; Finding; (reason or None, Seen)
-    StartProgram                          none
-    AppendLater, KeepLatch, Publish,      none; a failure is logged, and the next effect is performed
+    NumberStop                            number of the stop; None: the next one
+    CancelPrograms                        whether a program was cancelled
+    AppendLater, KeepLatch, Publish,      none
       Report, SetTimer
 
+If an effect of the last three rows fails, that is logged, and the next effect is performed.
 Only commands and lease requests may yield an awaited effect. A stop yields none.
 """
 
@@ -72,27 +71,23 @@ class Program:
     Attributes:
         targets: Its targets in order [rad] or [m].
         start: Positions at which the robot must rest when it starts; None: anywhere.
-        run: What its runner needs; not read by the authority.
     """
 
     name: str
     targets: tuple[Positions, ...]
     start: Positions | None = None
-    run: Any = field(default=None, repr=False)
 
 
 @dataclass(frozen=True)
 class Send:
-    """Write a unit to the controller's socket now."""
+    """Write a unit to the controller's socket now.
+
+    Attributes:
+        urgent: It is a stop, which must be latched and audited whatever happens to its unit.
+    """
 
     unit: bytes
-
-
-@dataclass(frozen=True)
-class SendStop:
-    """Write the stop unit to the controller's socket, before anything else."""
-
-    unit: bytes
+    urgent: bool = False
 
 
 @dataclass(frozen=True)
@@ -175,16 +170,8 @@ class CancelPrograms:
     why: Reason
 
 
-@dataclass(frozen=True)
-class StartProgram:
-    """Run a program's steps."""
-
-    program: Program
-
-
 Effect: TypeAlias = (
     Send
-    | SendStop
     | Append
     | AppendLater
     | NumberStop
@@ -196,7 +183,6 @@ Effect: TypeAlias = (
     | CheckMotion
     | Recheck
     | CancelPrograms
-    | StartProgram
 )
 
 R = TypeVar("R")

@@ -4,10 +4,17 @@ from hashlib import sha256
 
 from protocol_gateway.audit.entry import Entry, Outcome
 from protocol_gateway.audit.log import GATEWAY
-from protocol_gateway.authority.lease_rules import Answer, LeaseEnd
+from protocol_gateway.authority.lease_rules import Answer, LeaseEnd, Now
+from protocol_gateway.control.events import (
+    CommandsRequested,
+    LeaseRequested,
+    ProgramEnded,
+    StopRequested,
+    StopResult,
+)
 from protocol_gateway.text_limits import LONGEST_SENTENCE
 from robomesh.reasons import Reason
-from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest, StopAnswer
+from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from robomesh.texts import one_line
 
 # Source of a program's steps.
@@ -42,15 +49,14 @@ def entry_of(
     )
 
 
-def lease_entry(
-    request: LeaseRequest, outcome: Outcome, answer: Answer, *, time_ns: int, operator: str, source: str
-) -> Entry:
+def lease_entry(event: LeaseRequested, outcome: Outcome, answer: Answer, now: Now) -> Entry:
     """Create the entry of a lease request."""
+    request = event.request
     return entry_of(
         LeaseRequest.Action.Name(request.action),
-        time_ns=time_ns,
-        operator=operator,
-        source=source,
+        time_ns=now.wall_ns,
+        operator=event.operator,
+        source=event.source,
         outcome=outcome,
         text=answer.text,
         why=answer.reason,
@@ -60,81 +66,80 @@ def lease_entry(
     )
 
 
-def command_entry(request: CommandRequest, *, time_ns: int, operator: str, source: str) -> Entry:
-    """Create the entry of an accepted command."""
-    return entry_of(
-        CommandRequest.Command.Name(request.command),
-        time_ns=time_ns,
-        operator=operator,
-        source=source,
-        outcome=Outcome.ACCEPTED,
-        text="",
-        id=str(request.id),
-        joint_positions=" ".join(f"{value:.6g}" for value in request.joint_positions),
-        speed_percent=f"{request.speed_percent:g}" if request.HasField("speed_percent") else "",
-        stop_id=request.stop_id,
-        program_name=request.program_name,
-        program_sha256=sha256(request.program.encode()).hexdigest() if request.program else "",
+def command_entries(event: CommandsRequested, outcome: Outcome, answer: Answer) -> tuple[Entry, ...]:
+    """Create the entries of commands, one each."""
+    return tuple(
+        entry_of(
+            CommandRequest.Command.Name(request.command),
+            time_ns=event.arrived.wall_ns,
+            operator=event.operator,
+            source=event.source,
+            outcome=outcome,
+            text=answer.text,
+            why=answer.reason,
+            id=str(request.id),
+            joint_positions=" ".join(f"{value:.6g}" for value in request.joint_positions),
+            speed_percent=f"{request.speed_percent:g}" if request.HasField("speed_percent") else "",
+            stop_id=request.stop_id,
+            program_name=request.program_name,
+            program_sha256=sha256(request.program.encode()).hexdigest() if request.program else "",
+        )
+        for request in event.requests
     )
 
 
-def stop_entry(
-    result: Reason, answer: StopAnswer, *, time_ns: int, by: str, source: str, reason: str
-) -> Entry:
+def stop_entry(event: StopRequested, result: StopResult, now: Now) -> Entry:
     """Create the entry of a stop request."""
     return entry_of(
         "STOP",
-        time_ns=time_ns,
-        operator=by,
-        source=source,
-        outcome=Outcome.ACCEPTED if answer.sent else Outcome.FAILED,
-        text=result.text,
-        why=result,
-        stop_id=answer.stop_id,
-        reason=reason,
+        time_ns=now.wall_ns,
+        operator=event.by,
+        source=event.source,
+        outcome=Outcome.ACCEPTED if result.sent else Outcome.FAILED,
+        text=result.reason.text,
+        why=result.reason,
+        stop_id=result.id,
+        reason=event.reason,
     )
 
 
-def repeated_stop_entry(result: Reason, stop_id: int, *, time_ns: int, sent: bool) -> Entry:
+def _gateway_entry(request: str, outcome: Outcome, why: Reason, now: Now, **values: object) -> Entry:
+    return entry_of(
+        request,
+        time_ns=now.wall_ns,
+        operator=GATEWAY,
+        source=GATEWAY,
+        outcome=outcome,
+        text=why.text,
+        why=why,
+        **values,
+    )
+
+
+def repeated_stop_entry(result: StopResult, now: Now) -> Entry:
     """Create the entry of a latched stop that the gateway sent again.
 
     Its request name differs, because a restart must not read it as a new stop.
     """
-    return entry_of(
-        "STOP_AGAIN",
-        time_ns=time_ns,
-        operator=GATEWAY,
-        source=GATEWAY,
-        outcome=Outcome.ACCEPTED if sent else Outcome.FAILED,
-        text=result.text,
-        why=result,
-        stop_id=stop_id,
-    )
+    outcome = Outcome.ACCEPTED if result.sent else Outcome.FAILED
+    return _gateway_entry("STOP_AGAIN", outcome, result.reason, now, stop_id=result.id)
 
 
-def lease_end_entry(request: str, ended: LeaseEnd, *, time_ns: int) -> Entry:
+def lease_end_entry(request: str, ended: LeaseEnd, now: Now) -> Entry:
     """Create the entry of a lease that the gateway ended."""
-    return entry_of(
-        request,
-        time_ns=time_ns,
-        operator=GATEWAY,
-        source=GATEWAY,
-        outcome=Outcome.ACCEPTED,
-        text=ended.why.text,
-        why=ended.why,
-        holder=ended.holder,
-        renewals=ended.renewals,
+    return _gateway_entry(
+        request, Outcome.ACCEPTED, ended.why, now, holder=ended.holder, renewals=ended.renewals
     )
 
 
-def program_end_entry(outcome: Reason, done: bool, *, time_ns: int, operator: str) -> Entry:
+def program_end_entry(event: ProgramEnded, now: Now) -> Entry:
     """Create the entry of a program's end."""
     return entry_of(
         "PROGRAM_END",
-        time_ns=time_ns,
-        operator=operator,
+        time_ns=now.wall_ns,
+        operator=event.operator,
         source=PROGRAM,
-        outcome=Outcome.ACCEPTED if done else Outcome.FAILED,
-        text=outcome.text,
-        why=outcome,
+        outcome=Outcome.ACCEPTED if event.problem is None else Outcome.FAILED,
+        text=event.outcome.text,
+        why=event.outcome,
     )

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 
-from protocol_gateway.audit.entry import Entry
 from protocol_gateway.authority.admission import (
     after_command,
     deadline_refusal,
@@ -12,6 +11,7 @@ from protocol_gateway.authority.admission import (
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, Authority, not_sent
 from protocol_gateway.authority.preconditions import Controller, obstacle, predicted
 from protocol_gateway.control.effects import Program, Seen
+from protocol_gateway.control.events import CommandsRequested
 from protocol_gateway.drivers.driver import Activity
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest
@@ -28,57 +28,34 @@ class RunningProgram:
     """Program that moves the robot.
 
     Attributes:
-        targets: Its targets in order [rad] or [m].
         done: Number of targets that were sent to the controller.
         held: HOLD was sent, and no RESUME since.
         given_up: RESET was sent while the program was held, so the rest of it must not run.
     """
 
-    name: str
-    targets: tuple[tuple[float, ...], ...] = ()
+    program: Program
     done: int = 0
     held: bool = False
     given_up: bool = False
 
     @property
     def ahead(self) -> tuple[tuple[float, ...], ...]:
-        """Targets after the current motion."""
-        return self.targets[self.done :]
+        """Targets after the current motion [rad] or [m]."""
+        return self.program.targets[self.done :]
 
-
-@dataclass(frozen=True, kw_only=True)
-class Attempt:
-    """Commands that go to the controller as one unit.
-
-    Attributes:
-        arrived_s: Time of arrival (monotonic).
-        id_used: Their ids are used by the holder, so the answer is kept for a repeat.
-        step: They are a step of the program that runs.
-        program: Program to start, instead of sending a unit.
-        nothing_to_hold: Nothing is sent, because nothing is to be held.
-    """
-
-    requests: tuple[CommandRequest, ...]
-    entries: tuple[Entry, ...]
-    arrived_s: float
-    id_used: bool = False
-    step: bool = False
-    program: Program | None = None
-    nothing_to_hold: bool = False
-
-    @property
-    def names(self) -> str:
-        """Names of the commands."""
-        return ", ".join(_C.Name(request.command) for request in self.requests)
-
-    @property
-    def moves(self) -> bool:
-        """True if a command moves the robot."""
-        return any(each.command in MOTION_COMMANDS for each in self.requests)
+    def after(self, request: CommandRequest, controller: Controller) -> "RunningProgram":
+        """Return the program after a command was sent, before which the controller was in a state."""
+        match request.command:
+            case _C.HOLD | _C.RESUME:
+                return replace(self, held=request.command == _C.HOLD)
+            case _C.RESET:
+                holding = controller.status.activity is Activity.HOLDING
+                return replace(self, given_up=self.held or holding)
+        return self
 
 
 def refusal_of(
-    attempt: Attempt,
+    command: CommandsRequested,
     authority: Authority,
     program: RunningProgram | None,
     seen: Seen,
@@ -92,18 +69,18 @@ def refusal_of(
         program: Program that runs.
         reset_s: Time of the last RESET that no status has followed (monotonic).
     """
-    controller, refusal = seen.controller, wait_refusal(attempt.arrived_s, seen.now)
-    motions = [each.command for each in attempt.requests if each.command in MOTION_COMMANDS]
+    controller, refusal = seen.controller, wait_refusal(command.arrived.monotonic_s, seen.now)
+    motions = [each.command for each in command.requests if each.command in MOTION_COMMANDS]
     if len(motions) > 1 and _C.RESUME in motions:
         # Some controllers resume the held motion first, others drop it, so the path would be unknown.
         return not_sent(codes.COMMAND_TWO_UNITS())
-    for request in attempt.requests:
+    for request in command.requests:
         refusal = (
             refusal
             or deadline_refusal(request, seen.now)
             or stop_refusal(authority, request)
             or _latch_refusal(request, seen)
-            or (None if attempt.step else _program_refusal(request, program))
+            or (None if command.step else _program_refusal(request, program))
             or controller_refusal(request, controller, seen, joints, reset_s=reset_s)
         )
         if refusal is not None:
@@ -126,15 +103,15 @@ def controller_refusal(
 
 
 def overtaken_by_hold(
-    attempt: Attempt, authority: Authority, program: RunningProgram | None
+    command: CommandsRequested, authority: Authority, program: RunningProgram | None
 ) -> Answer | None:
     """Return the refusal of a motion that a HOLD has overtaken; None: none has."""
-    if not attempt.moves:
+    if not command.moves:
         return None
-    if attempt.step:
+    if command.step:
         held = program is not None and (program.held or program.given_up)
     else:
-        held = authority.lease is not None and authority.lease.last_id > attempt.requests[-1].id
+        held = authority.lease is not None and authority.lease.last_id > command.requests[-1].id
     return not_sent(codes.COMMAND_HELD()) if held else None
 
 
@@ -148,4 +125,4 @@ def _program_refusal(request: CommandRequest, program: RunningProgram | None) ->
     # The check of a program holds only at its speed.
     if program is None or request.command not in (MOTION_COMMANDS | {_C.SPEED}) - {_C.RESUME}:
         return None
-    return not_sent(codes.COMMAND_PROGRAM_RUNS(name=program.name))
+    return not_sent(codes.COMMAND_PROGRAM_RUNS(name=program.program.name))

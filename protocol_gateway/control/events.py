@@ -1,20 +1,29 @@
 """Events of a robot's authority: requests, what the controller did, and the end of something.
 
-Requests have results: `StopRequested` a StopAnswer, `LeaseRequested` a LeaseResult, `CommandsRequested` and
-`StepRequested` an Answer, `AdmissionRequested` a Verdict.
+Requests have results: `StopRequested` a StopResult, `LeaseRequested` a LeaseResult, `CommandsRequested` an
+Answer.
 """
 
 from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
-from protocol_gateway.authority.lease_rules import Answer, Lease, Now
+from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, Lease, Now
 from protocol_gateway.control.effects import Program
 from protocol_gateway.drivers.driver import Activity
+from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 
 _A = LeaseRequest.Action
-_HOLD = CommandRequest.Command.HOLD
+_C = CommandRequest.Command
+
+
+class StopResult(NamedTuple):
+    """Result of a stop; `id`: its number, 0 if it is not latched; `sent`: its unit is on the wire."""
+
+    reason: Reason
+    id: int = 0
+    sent: bool = False
 
 
 class LeaseResult(NamedTuple):
@@ -54,11 +63,12 @@ class LeaseRequested:
 
 @dataclass(frozen=True, kw_only=True)
 class CommandsRequested:
-    """An operator commands the robot: all commands as one unit, or none.
+    """An operator, or the program that runs, commands the robot: all commands as one unit, or none.
 
     Attributes:
         program: Checked program to start, for RUN_PROGRAM.
         refused: A refusal that is already known, to be audited and returned.
+        step: The command is the next step of the program that runs, so it has no id.
     """
 
     requests: tuple[CommandRequest, ...]
@@ -67,33 +77,22 @@ class CommandsRequested:
     arrived: Now
     program: Program | None = None
     refused: Answer | None = None
+    step: bool = False
 
     @property
     def is_immediate(self) -> bool:
         """True if it does not wait for earlier commands: HOLD can only slow the robot down."""
-        return all(each.command == _HOLD for each in self.requests)
-
-
-@dataclass(frozen=True, kw_only=True)
-class StepRequested:
-    """The program that runs sends its next step."""
-
-    request: CommandRequest
-    operator: str
-    arrived: Now
+        return not self.step and all(each.command == _C.HOLD for each in self.requests)
 
     @property
-    def is_immediate(self) -> bool:
-        """False: a step waits for earlier commands."""
-        return False
+    def moves(self) -> bool:
+        """True if a command moves the robot."""
+        return any(each.command in MOTION_COMMANDS for each in self.requests)
 
-
-@dataclass(frozen=True)
-class AdmissionRequested:
-    """Evaluate whether commands are the holder's, in time and new, and no stop forbids them."""
-
-    requests: tuple[CommandRequest, ...]
-    operator: str
+    @property
+    def names(self) -> str:
+        """Names of the commands."""
+        return ", ".join(_C.Name(each.command) for each in self.requests)
 
 
 @dataclass(frozen=True)
@@ -104,6 +103,13 @@ class ProgramEnded:
     operator: str
     line: int
     problem: Reason | None
+
+    @property
+    def outcome(self) -> Reason:
+        """How it ended."""
+        if self.problem is None:
+            return codes.PROGRAM_DONE(program=self.name)
+        return codes.PROGRAM_ENDED(self.problem, program=self.name, line=self.line)
 
 
 @dataclass(frozen=True)
@@ -170,8 +176,6 @@ Event: TypeAlias = (
     StopRequested
     | LeaseRequested
     | CommandsRequested
-    | StepRequested
-    | AdmissionRequested
     | ProgramEnded
     | TimePassed
     | SessionEnded

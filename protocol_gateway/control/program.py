@@ -18,14 +18,15 @@ from dataclasses import dataclass
 
 from protocol_gateway.authority import lease_rules
 from protocol_gateway.authority.lease_rules import Answer, refused
+from protocol_gateway.authority.preconditions import Controller
 from protocol_gateway.checking.worker_messages import Checked
 from protocol_gateway.control.checks import Checks
-from protocol_gateway.control.control import Control, Ports, command_answer, refusal
+from protocol_gateway.control.control import Control, command_answer, refusal
 from protocol_gateway.control.effects import Program
 from protocol_gateway.control.events import ProgramEnded
-from protocol_gateway.control.robot_authority import RobotAuthority
 from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import CheckError
+from protocol_gateway.journal import Journal
 from protocol_gateway.state_messages import timestamp
 from protocol_gateway.text_limits import LONGEST_TEXT
 from robomesh import reason_codes as codes
@@ -57,14 +58,14 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class _Run:
-    """A program that runs.
+    """A program, ready to run.
 
     Attributes:
         secret: Secret of the lease under which it runs.
-        last_stop_id: Number of the newest stop at its start.
+        last_stop_id: Number of the newest stop at its check.
     """
 
-    name: str
+    program: Program
     operator: str
     secret: str
     last_stop_id: int
@@ -83,30 +84,33 @@ class _Prepared:
 
     refused: Answer | None = None
     warning: Reason | None = None
-    program: Program | None = None
+    run: _Run | None = None
 
 
 class Programs:
     """Runner of one robot's programs, one at a time.
+
+    Args:
+        controller: Returns the current state of the controller.
+        publish: Publishes the state of lease, stop and program.
 
     Attributes:
         state: State of the current or last program; its timestamp is set when it is published.
     """
 
     def __init__(
-        self, control: Control, robot_authority: RobotAuthority, ports: Ports, checks: Checks
+        self,
+        control: Control,
+        checks: Checks,
+        *,
+        journal: Journal,
+        controller: Callable[[], Controller],
+        publish: Callable[[], None],
     ) -> None:
-        self._control, self._robot_authority, self._ports, self._checks = (
-            control,
-            robot_authority,
-            ports,
-            checks,
-        )
-        ports.cancel_programs, ports.start_program = self._cancel_preparing, self._start
+        self._control, self._checks, self._journal = control, checks, journal
+        self._controller, self._publish = controller, publish
         self.state = _STATE()
         self._task: asyncio.Task[None] | None = None
-        # A future of each program that is being checked or audited; its result is the reason to cancel it.
-        self._preparing: set[asyncio.Future[Reason]] = set()
 
     async def run(
         self, request: schema.CommandRequest, *, operator: str, source: str
@@ -116,37 +120,39 @@ class Programs:
         Raises:
             RefusedError: If it is refused, with the reason; the robot has not moved.
         """
-        cancelled: asyncio.Future[Reason] = asyncio.get_running_loop().create_future()
-        try:
-            return await self._begin(request, cancelled, operator=operator, source=source)
-        finally:
-            self._preparing.discard(cancelled)
-
-    async def _begin(
-        self, request: schema.CommandRequest, cancelled: asyncio.Future[Reason], *, operator: str, source: str
-    ) -> schema.CommandAnswer:
-        verdict = self._control.admit([request], operator)
-        name = one_line(request.program_name, LONGEST_TEXT).strip() or "unnamed"
-        # A refusal here is final, even if its reason disappears, because the program was not planned.
-        prepared = _Prepared(None if verdict.answer.accepted else verdict.answer)
-        if verdict.answer.accepted and not verdict.repeat:
-            self._preparing.add(cancelled)
+        verdict = self._control.admit(request, operator)
+        if verdict.repeat or not verdict.answer.accepted:
+            # A refusal here is final, even if its reason disappears, because the program was not planned.
+            prepared = _Prepared(None if verdict.answer.accepted else verdict.answer)
+            return await self._begin(request, prepared, operator=operator, source=source)
+        with self._control.preparing_program() as cancelled:
             try:
-                prepared = await self._prepare_in_time(request, cancelled, name, operator)
+                prepared = await self._prepare_in_time(request, cancelled, operator)
             except CheckError as error:
                 prepared = _Prepared(refused(error.reason, what="Not run"))
+            return await self._begin(request, prepared, operator=operator, source=source)
+
+    async def _begin(
+        self, request: schema.CommandRequest, prepared: "_Prepared", *, operator: str, source: str
+    ) -> schema.CommandAnswer:
+        run = prepared.run
+        program = None if run is None else run.program
         answer = await self._control.attempt(
-            [request], operator=operator, source=source, program=prepared.program, refused=prepared.refused
+            [request], operator=operator, source=source, program=program, refused=prepared.refused
         )
         if not answer.accepted:
             raise refusal(answer)
+        # A repeat gets the first answer, and its own program is not started.
+        running = self._control.program
+        if run is not None and running is not None and running.program is run.program:
+            self._start(run)
         if prepared.warning is not None:
             text = f"{answer.text}; mind: {prepared.warning}"
             answer = answer._replace(text=text, reason=prepared.warning)
         return command_answer(answer)
 
     async def _prepare_in_time(
-        self, request: schema.CommandRequest, cancelled: asyncio.Future[Reason], name: str, operator: str
+        self, request: schema.CommandRequest, cancelled: asyncio.Future[Reason], operator: str
     ) -> "_Prepared":
         """Prepare a program, unless the sender's timeout, a HOLD or a stop comes first.
 
@@ -156,7 +162,7 @@ class Programs:
         waits_s = PREPARE_TIMEOUT_S
         if request.HasField("not_after"):
             waits_s = (request.not_after.ToNanoseconds() - time.time_ns()) * 1e-9 - _ANSWER_MARGIN_S
-        prepared = asyncio.ensure_future(self._prepare(request, name, operator))
+        prepared = asyncio.ensure_future(self._prepare(request, operator))
         try:
             within_s = max(0.0, min(waits_s, PREPARE_TIMEOUT_S))
             await asyncio.wait((prepared, cancelled), timeout=within_s, return_when=asyncio.FIRST_COMPLETED)
@@ -171,22 +177,21 @@ class Programs:
             raise CheckError(codes.PROGRAM_ASKER_GAVE_UP())
         raise CheckError(codes.PROGRAM_PLAN_TOO_SLOW(seconds=PREPARE_TIMEOUT_S))
 
-    async def _prepare(self, request: schema.CommandRequest, name: str, operator: str) -> "_Prepared":
+    async def _prepare(self, request: schema.CommandRequest, operator: str) -> "_Prepared":
         """Check a program."""
         if len(request.program.encode()) > MOST_BYTES:
             raise CheckError(codes.PROGRAM_TOO_LONG(kib=MOST_BYTES // 1024))
         checked, finding = await self._checks.program(request.program)
-        lines = tuple(request.program.split("\n"))
-        newest_stop = self._robot_authority.authority.last_stop_id
-        run = _Run(name, operator, request.lease, newest_stop, lines, checked)
+        newest_stop = self._control.authority.last_stop_id
         if finding.refusal is not None:
             return _Prepared(finding.refusal)
         first = next((step for step in checked.steps if step.target is not None), None)
         # Refuse now if the present state (not homed, on hold) would refuse the first step.
         if first is not None and (problem := self._control.obstacle(_request(first, ""))) is not None:
             return _Prepared(problem)
+        name = one_line(request.program_name, LONGEST_TEXT).strip() or "unnamed"
         if finding.warning is not None:
-            self._ports.journal.report(
+            self._journal.report(
                 _S.WARNING,
                 finding.code,
                 f"program {name}: {finding.warning}",
@@ -194,22 +199,15 @@ class Programs:
                 program=name,
             )
         targets = tuple(tuple(each.target.tolist()) for each in checked.steps if each.target is not None)
-        program = Program(name=name, targets=targets, start=finding.start, run=run)
-        return _Prepared(None, finding.warning, program)
+        program = Program(name=name, targets=targets, start=finding.start)
+        lines = tuple(request.program.split("\n"))
+        run = _Run(program, operator, request.lease, newest_stop, lines, checked)
+        return _Prepared(None, finding.warning, run)
 
-    def _cancel_preparing(self, why: Reason) -> bool:
-        """Cancel the programs that have not started; return whether there were any."""
-        for each in self._preparing:
-            if not each.done():
-                each.set_result(why)
-        return bool(self._preparing)
-
-    def _start(self, program: Program) -> None:
-        run = program.run
-        assert isinstance(run, _Run)
+    def _start(self, run: _Run) -> None:
         self.state = _STATE(
             outcome=_STATE.RUNNING,
-            name=run.name,
+            name=run.program.name,
             operator=run.operator,
             since=timestamp(time.time_ns()),
             steps=len(run.checked.steps),
@@ -224,8 +222,10 @@ class Programs:
             await asyncio.gather(self._task, return_exceptions=True)
 
     async def _run(self, run: _Run) -> None:
-        text = f"{run.operator} runs program {run.name}"
-        self._ports.journal.report(_S.INFO, "program.started", text, operator=run.operator, program=run.name)
+        text = f"{run.operator} runs program {run.program.name}"
+        self._journal.report(
+            _S.INFO, "program.started", text, operator=run.operator, program=run.program.name
+        )
         problem: Reason | None = codes.PROGRAM_FAILED()
         try:
             problem = await self._run_steps(run)
@@ -233,7 +233,7 @@ class Programs:
             problem = codes.ENDED_GATEWAY()
             raise
         except Exception:
-            log.exception("program %s failed", run.name)
+            log.exception("program %s failed", run.program.name)
         finally:
             self._end(run, problem)
 
@@ -242,7 +242,7 @@ class Programs:
         for number, step in enumerate(run.checked.steps):
             self.state.step, self.state.line = number + 1, step.line
             self.state.statement = one_line(run.lines[step.line - 1].partition("#")[0].strip(), LONGEST_TEXT)
-            self._ports.publish()
+            self._publish()
             problem = await self._step(run, step)
             if problem is not None:
                 return problem
@@ -285,27 +285,25 @@ class Programs:
                 return problem
             if done():
                 return None
-            lease = self._robot_authority.authority.lease
-            if moves and (lease is None or lease.motion is None):
+            if moves and self._motion_is_over():
                 return codes.PROGRAM_NOT_ARRIVED()
             await asyncio.sleep(_POLL_S)
 
     def _motion_is_over(self) -> bool:
-        lease = self._robot_authority.authority.lease
-        return lease is None or lease.motion is None
+        return self._control.authority.motion is None
 
     def _not_held(self) -> bool:
-        program = self._robot_authority.program
-        holding = self._ports.controller().status.activity is Activity.HOLDING
+        program = self._control.program
+        holding = self._controller().status.activity is Activity.HOLDING
         return not holding and (program is None or not program.held)
 
     def _abort_reason(self, run: _Run) -> Reason | None:
-        authority = self._robot_authority.authority
+        authority = self._control.authority
         if authority.stop is not None:
             return codes.PROGRAM_STOPPED(by=authority.stop.by, reason=authority.stop.reason)
         if authority.last_stop_id != run.last_stop_id:
             return codes.PROGRAM_STOPPED_BY_NUMBER(id=authority.last_stop_id)
-        program = self._robot_authority.program
+        program = self._control.program
         if program is not None and program.given_up:
             return codes.PROGRAM_GIVEN_UP()
         if not lease_rules.holds(authority, run.operator, run.secret):
@@ -320,7 +318,7 @@ class Programs:
                 self.state.reason.CopyFrom(reason_message(problem))
         finally:
             # While a program runs, other motion is refused.
-            self._control.handle(ProgramEnded(run.name, run.operator, self.state.line, problem))
+            self._control.handle(ProgramEnded(run.program.name, run.operator, self.state.line, problem))
 
 
 def _checked_too_slowly(answer: Answer) -> bool:

@@ -13,14 +13,16 @@ Source: Chen, Zhang, Xue 2001, section 5, figures 7 and 8.
 import asyncio
 import os
 import time
+from collections.abc import Callable
 
-from protocol_gateway.audit.log import Outcome
-from protocol_gateway.control.control import Control, Ports
+from protocol_gateway.audit.entry import Entry, Outcome
+from protocol_gateway.control.control import Control
 from protocol_gateway.control.entries import entry_of
 from protocol_gateway.core.codes import CodeTable
 from protocol_gateway.core.records import Error, write_unit
 from protocol_gateway.core.stream import Malformed, StreamEvent, Unit, printable
 from protocol_gateway.errors import GatewaySettingsError
+from protocol_gateway.journal import Journal
 from protocol_gateway.legacy.commander import Commander
 from protocol_gateway.legacy.requests import (
     FAULT,
@@ -42,7 +44,12 @@ _MOST_REJECTED = 32
 
 
 class LegacyClients:
-    """Server of one robot's old client programs."""
+    """Server of one robot's old client programs.
+
+    Args:
+        audit: Writes the entry of a refused unit, without waiting for the disk.
+        publish: Publishes the number of clients.
+    """
 
     def __init__(
         self,
@@ -50,14 +57,16 @@ class LegacyClients:
         table: CodeTable,
         joints: Joints,
         control: Control,
-        ports: Ports,
+        *,
+        journal: Journal,
+        audit: Callable[[Entry], None],
+        publish: Callable[[], None],
     ) -> None:
         self._settings = settings
         self._table = table
         self._joints = joints
         self._control = control
-        self._ports = ports
-        self._journal = ports.journal
+        self._journal, self._audit, self._publish = journal, audit, publish
         self._clients: dict[Client, Commander | None] = {}
         self._rejected: set[Client] = set()
         self._ending: set[asyncio.Task[None]] = set()
@@ -148,7 +157,7 @@ class LegacyClients:
         may = f"may command as {operator}" if operator else "reads"
         text = f"an old client program connected: {client.name} {may}, {len(self._clients)} in all"
         self._journal.report(_S.INFO, "legacy.attached", text, client=client.name)
-        self._ports.publish()
+        self._publish()
 
     def client_disconnected(self, client: Client) -> None:
         """Remove a client, and end its lease."""
@@ -163,7 +172,7 @@ class LegacyClients:
                 task.add_done_callback(self._ending.discard)
             text = f"an old client program disconnected: {client.name}, {len(self._clients)} are left"
             self._journal.report(_S.INFO, "legacy.gone", text, client=client.name)
-            self._ports.publish()
+            self._publish()
         self._empty.set()
 
     def units_received(self, client: Client, events: list[StreamEvent]) -> None:
@@ -270,7 +279,7 @@ class LegacyClients:
 
     def _write_down(self, client: Client, operator: str, unit: str, error: Error) -> None:
         host, _ = client.address
-        self._ports.audit_trail.write_later(
+        self._audit(
             entry_of(
                 "UNIT",
                 time_ns=time.time_ns(),

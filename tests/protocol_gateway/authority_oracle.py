@@ -331,16 +331,19 @@ class New(Side):
             send=self.send,
             controller=around.controller,
             publish=self.publish,
-            cancel_programs=self._cancel,
-            start_program=lambda program: self.effects.append(("start", program.name)),
         )
         self.control = _Control(self, ports)
+        self.entered = new_control.contextlib.ExitStack()
 
     def authority(self) -> Authority:
         return self.robot_authority.authority
 
     def program(self) -> Any:
-        return self.robot_authority.program
+        running = self.robot_authority.program
+        if running is None:
+            return None
+        name, targets = running.program.name, running.program.targets
+        return old_stops.RunningProgram(name, targets, running.done, running.held, running.given_up)
 
     def speed(self) -> float | None:
         return self.robot_authority.speed_percent
@@ -353,24 +356,28 @@ class New(Side):
 
     def run_program(self, name: str, request: CommandRequest, start: Any, refusal: Any) -> None:
         program = None if refusal else Program(name="p", targets=(THERE, HOME), start=start)
-        self.control.admit([request], name)
-        self.ask(
-            name,
-            self.control.attempt([request], operator=name, source="mesh", program=program, refused=refusal),
-        )
+        self.control.admit(request, name)
 
-    def _cancel(self, why: Any) -> bool:
-        self.cancelled = [each or why for each in self.cancelled]
-        return bool(self.cancelled)
+        async def run() -> Any:
+            answer = await self.control.attempt(
+                [request], operator=name, source="mesh", program=program, refused=refusal
+            )
+            running = self.robot_authority.program
+            if program is not None and running is not None and running.program is program:
+                self.effects.append(("start", "p"))
+            return answer
+
+        self.ask(name, run())
 
     def prepare(self) -> None:
-        self.cancelled.append(None)
+        self.cancelled.append(self.entered.enter_context(self.control.preparing_program()))
 
     def prepared(self) -> None:
+        self.entered.close()
         self.cancelled.clear()
 
     def cancelled_programs(self) -> list[str]:
-        return sorted(each.text for each in self.cancelled if each is not None)
+        return sorted(each.result().text for each in self.cancelled if each.done())
 
     def step(self, name: str, request: CommandRequest) -> None:
         self.ask(name, self.control.step(request, operator=name))

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from protocol_gateway.control import entries
+from tests.protocol_gateway.old_authority import frozen_entries as entries
 
 entry_of = partial(entries.entry_of, time_ns=0)
 lease_entry = partial(entries.lease_entry, time_ns=0)
