@@ -442,7 +442,7 @@ class Robot:
                 rate_hz=self._link.rate_hz,
                 controller_time_s=self._telemetry.controller_time_s,
                 audit_head=self._audit.head,
-                speed_percent=self._robot_authority.speed_percent,
+                speed_percent=authority.speed_percent,
                 legacy_clients=None if self._legacy is None else self._legacy.counts,
                 policy=self._checks.policy,
                 unchecked=self._checks.problem,

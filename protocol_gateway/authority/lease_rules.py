@@ -216,6 +216,8 @@ class Authority:
         moving: The robot moved at the last observation; None: not observed yet.
         ended: Reason for the end of the previous lease; None: there was none.
         asked_by: Operators who request control from the holder, oldest first.
+        speed_percent: Speed last set by the gateway since the link came up; None: unknown.
+        reset_s: Time of the last RESET that no status has followed (monotonic).
         stopping_s: Time at which the first stop since the last RESET was sent (monotonic). A repeated stop
             does not change it, because it must not hide that the robot ignores its stop.
     """
@@ -226,6 +228,8 @@ class Authority:
     stop: Stop | None = None
     last_stop_id: int = 0
     stopping_s: float | None = None
+    speed_percent: float | None = None
+    reset_s: float | None = None
     moving: bool | None = None
     # Time at which motion without a command was last observed (monotonic).
     uncommanded_s: float | None = None
@@ -413,37 +417,6 @@ def why_not_holder(authority: Authority, operator: str) -> Reason:
     if lease.holder != operator:
         return codes.LEASE_HELD(holder=lease.holder)
     return codes.LEASE_OTHER(name=operator)
-
-
-def stop(
-    authority: Authority, *, by: str, reason: str, now: Now, number: int | None = None
-) -> tuple[Authority, Stop]:
-    """Latch a stop under a new number, and drop the motion that it ends.
-
-    Args:
-        number: Number above all previous ones; None: the next one.
-    """
-    number = authority.last_stop_id + 1 if number is None else number
-    latched = Stop(id=number, by=by, reason=reason or "no reason given", since_ns=now.wall_ns)
-    lease = authority.lease
-    if lease is not None:
-        lease = replace(lease, motion=None)
-    return replace(authority, stop=latched, last_stop_id=number, lease=lease), latched
-
-
-def stop_sent(authority: Authority, stop_id: int, sent_s: float, *, first: bool = False) -> Authority:
-    """Record the monotonic time at which a stop's unit was put on the controller's socket.
-
-    Args:
-        first: First unit on a new connection: the controller may not have received earlier ones.
-    """
-    if authority.stop is None or authority.stop.id != stop_id:
-        return authority
-    return replace(
-        authority,
-        stop=replace(authority.stop, sent_s=sent_s),
-        stopping_s=sent_s if first or authority.stopping_s is None else authority.stopping_s,
-    )
 
 
 def moved_recently(authority: Authority, now: Now) -> bool:

@@ -52,6 +52,10 @@ def command_sent(
     lease = authority.lease
     if request.command == _C.RESET and authority.stop is not None and authority.stop.id == request.stop_id:
         authority = replace(authority, stop=None, stopping_s=None)
+    if request.command == _C.RESET:
+        authority = replace(authority, reset_s=now.monotonic_s)
+    if request.command == _C.SPEED:
+        authority = replace(authority, speed_percent=request.speed_percent)
     if lease is None:
         return authority
     motion = lease.motion

@@ -3,12 +3,14 @@
 from dataclasses import dataclass, replace
 
 from protocol_gateway.authority.admission import (
+    Verdict,
+    admit_all,
     after_command,
     deadline_refusal,
     stop_refusal,
     wait_refusal,
 )
-from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, Authority, not_sent
+from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, Authority, Now, holds, not_sent
 from protocol_gateway.authority.preconditions import Controller, obstacle, predicted
 from protocol_gateway.control.effects import Program, Seen
 from protocol_gateway.control.events import CommandsRequested
@@ -54,20 +56,25 @@ class RunningProgram:
         return self
 
 
+def admission(command: CommandsRequested, authority: Authority, now: Now) -> Verdict:
+    """Evaluate whether commands are the holder's, in time and new, and no stop forbids them."""
+    if not command.step:
+        return admit_all(authority, command.requests, operator=command.operator, now=now)
+    held = holds(authority, command.operator, command.requests[0].lease)
+    return Verdict(Answer(True, "") if held else not_sent(codes.COMMAND_CONTROL_ENDED()))
+
+
 def refusal_of(
     command: CommandsRequested,
     authority: Authority,
     program: RunningProgram | None,
     seen: Seen,
     joints: Joints,
-    *,
-    reset_s: float | None,
 ) -> Answer | None:
     """Return the refusal of commands, each evaluated after the previous ones; None: allowed.
 
     Args:
         program: Program that runs.
-        reset_s: Time of the last RESET that no status has followed (monotonic).
     """
     controller, refusal = seen.controller, wait_refusal(command.arrived.monotonic_s, seen.now)
     motions = [each.command for each in command.requests if each.command in MOTION_COMMANDS]
@@ -81,7 +88,7 @@ def refusal_of(
             or stop_refusal(authority, request)
             or _latch_refusal(request, seen)
             or (None if command.step else _program_refusal(request, program))
-            or controller_refusal(request, controller, seen, joints, reset_s=reset_s)
+            or controller_refusal(request, authority, controller, seen, joints)
         )
         if refusal is not None:
             return refusal
@@ -91,10 +98,10 @@ def refusal_of(
 
 
 def controller_refusal(
-    request: CommandRequest, controller: Controller, seen: Seen, joints: Joints, *, reset_s: float | None
+    request: CommandRequest, authority: Authority, controller: Controller, seen: Seen, joints: Joints
 ) -> Answer | None:
     """Return the refusal of a command by the controller's state; None: allowed."""
-    status = controller.status
+    status, reset_s = controller.status, authority.reset_s
     just_reset = reset_s is not None and seen.now.monotonic_s - reset_s < RESET_SHOWS_WITHIN_S
     if just_reset and status.activity in (Activity.STOPPED, Activity.FAULT):
         # The controller still reports the stop that was just reset. If it is stopped, it refuses itself.
@@ -102,10 +109,23 @@ def controller_refusal(
     return obstacle(request, controller, joints)
 
 
-def overtaken_by_hold(
+def refusal_meanwhile(
+    command: CommandsRequested,
+    authority: Authority,
+    program: RunningProgram | None,
+    seen: Seen,
+    joints: Joints,
+) -> Answer | None:
+    """Return the refusal of commands whose audit entry has just been written; None: send them."""
+    if not holds(authority, command.operator, command.requests[0].lease):
+        return not_sent(codes.COMMAND_CONTROL_ENDED_MEANWHILE())
+    overtaken = _overtaken_by_hold(command, authority, program)
+    return overtaken or refusal_of(command, authority, program, seen, joints)
+
+
+def _overtaken_by_hold(
     command: CommandsRequested, authority: Authority, program: RunningProgram | None
 ) -> Answer | None:
-    """Return the refusal of a motion that a HOLD has overtaken; None: none has."""
     if not command.moves:
         return None
     if command.step:

@@ -23,16 +23,9 @@ from typing import Any, assert_never
 
 from protocol_gateway.audit.entry import Outcome
 from protocol_gateway.audit.log import GATEWAY
-from protocol_gateway.authority import lease_rules, motion_owner
-from protocol_gateway.authority.admission import Verdict, admit_all, keep_answer
-from protocol_gateway.authority.lease_rules import (
-    Answer,
-    Authority,
-    LeaseEnd,
-    LeaseOutcome,
-    not_sent,
-    refused,
-)
+from protocol_gateway.authority import lease_rules, motion_owner, stop_rules
+from protocol_gateway.authority.admission import Verdict, keep_answer
+from protocol_gateway.authority.lease_rules import Answer, Authority, LeaseEnd, not_sent, refused
 from protocol_gateway.authority.preconditions import Controller, controller_command, predicted, target_of
 from protocol_gateway.control import effects, entries, evaluation, events, reports
 from protocol_gateway.control.effects import Effects, Finding, Seen
@@ -52,8 +45,6 @@ _C = CommandRequest.Command
 
 # Longer than any arm needs to come to rest: after this time, a moving arm has ignored its stop unit.
 HEED_TIMEOUT_S = 2.0
-# A burst of dozens of units would fill the send buffer, which closes the connection.
-IN_TRANSIT_S = 0.1
 
 
 class RobotAuthority:
@@ -70,11 +61,9 @@ class RobotAuthority:
     ) -> None:
         self._authority = authority
         self._program: RunningProgram | None = None
-        self._speed_percent: float | None = None
         self._joints = joints
         self._encode = encode
         self._orphan = orphan
-        self._reset_s: float | None = None  # time of the last RESET that no status has followed
         self._last_unit_s = float("-inf")  # when the newest unit of commands was sent
         self._disobeyed_reported_s = 0.0
         self._last_stop: tuple[str, str, StopResult] | None = None  # operator, source
@@ -88,11 +77,6 @@ class RobotAuthority:
     def program(self) -> RunningProgram | None:
         """Program that runs; None: none runs."""
         return self._program
-
-    @property
-    def speed_percent(self) -> float | None:
-        """Speed last set by the gateway since the link came up; None: unknown."""
-        return self._speed_percent
 
     def handle(self, event: events.Event, seen: Seen) -> Effects[Any]:
         """Return the effects of an event, to be performed one after the other, each with its result.
@@ -122,14 +106,18 @@ class RobotAuthority:
             case events.LinkRestored():
                 yield from self._send_latched_stop(seen)
             case events.StatusChanged():
-                self._reset_s = None
+                self._authority = replace(self._authority, reset_s=None)
             case events.StatusReported():
                 resting = event.activity is Activity.IDLE and self._has_arrived(seen.controller)
                 self._authority = motion_owner.reported(
                     self._authority, resting=resting, dated_s=event.dated_s
                 )
             case events.UnitRefused():
-                yield from self._unit_refused()
+                # The refused unit is unknown, and may have been the speed.
+                before = replace(self._authority, speed_percent=None)
+                self._authority = motion_owner.refused(before)
+                if before is not self._authority:
+                    yield effects.Publish()
             case events.MotionObserved():
                 yield from self._motion_observed(event.moving, seen)
             case _:
@@ -138,15 +126,14 @@ class RobotAuthority:
 
     def obstacle(self, request: CommandRequest, seen: Seen) -> Answer | None:
         """Return the refusal of a command by the controller's present state; None: allowed."""
-        return evaluation.controller_refusal(
-            request, seen.controller, seen, self._joints, reset_s=self._reset_s
-        )
+        return evaluation.controller_refusal(request, self._authority, seen.controller, seen, self._joints)
 
     # ------------------------------------------------------------------ stops
 
     def _stop(self, stop: events.StopRequested, seen: Seen) -> Effects[StopResult]:
         """Send the stop unit and latch the stop; a repeated request of its sender is the same stop."""
-        read_only, sent_s = seen.controller.read_only, self._in_transit_since(seen)
+        read_only, up = seen.controller.read_only, seen.controller.link.state is LinkState.UP
+        sent_s = stop_rules.in_transit_since(self._authority, seen.now) if up else None
         if read_only is not None:
             # No operator could reset the latch, and the gateway never sends motion to this robot.
             result = StopResult(codes.STOP_READ_ONLY(read_only))
@@ -156,12 +143,12 @@ class RobotAuthority:
         else:
             problem = (yield from self._send_stop_unit()) if sent_s is None else None
             number = yield effects.NumberStop(self._authority.last_stop_id)
-            self._authority, latched = lease_rules.stop(
+            self._authority, latched = stop_rules.stop(
                 self._authority, by=stop.by, reason=stop.reason, now=seen.now, number=number
             )
             if problem is None:
                 result = StopResult(codes.STOP_SENT(id=latched.id), latched.id, sent=True)
-                self._authority = lease_rules.stop_sent(
+                self._authority = stop_rules.stop_sent(
                     self._authority, latched.id, sent_s or seen.now.monotonic_s
                 )
             else:
@@ -183,7 +170,7 @@ class RobotAuthority:
         latched = self._authority.stop
         if latched is None or seen.controller.read_only or (yield from self._send_stop_unit()) is not None:
             return
-        self._authority = lease_rules.stop_sent(self._authority, latched.id, seen.now.monotonic_s, first=True)
+        self._authority = stop_rules.stop_sent(self._authority, latched.id, seen.now.monotonic_s, first=True)
         yield effects.Publish()
         result = StopResult(codes.STOP_SENT_AGAIN(id=latched.id), latched.id, sent=True)
         yield reports.stop_sent(result)
@@ -202,13 +189,6 @@ class RobotAuthority:
         result = StopResult(why, latched.id, sent=problem is None)
         yield reports.stop_disobeyed(result)
         yield effects.AppendLater(entries.repeated_stop_entry(result, seen.now))
-
-    def _in_transit_since(self, seen: Seen) -> float | None:
-        """Return the time at which the latched stop's unit was sent (monotonic), if just now."""
-        latched = self._authority.stop
-        if latched is None or latched.sent_s is None or seen.controller.link.state is not LinkState.UP:
-            return None
-        return latched.sent_s if seen.now.monotonic_s - latched.sent_s < IN_TRANSIT_S else None
 
     def _send_stop_unit(self) -> Effects[Reason | None]:
         """Send the stop unit; return the reason of a failure."""
@@ -240,11 +220,11 @@ class RobotAuthority:
         yield from self._set_authority(outcome.authority, outcome.ended, seen)
         return LeaseResult(outcome.answer, outcome.granted)
 
-    def _evaluate_lease(self, event: events.LeaseRequested, seen: Seen) -> Effects[LeaseOutcome]:
+    def _evaluate_lease(self, event: events.LeaseRequested, seen: Seen) -> Effects[lease_rules.LeaseOutcome]:
         yield from self._expire(seen)
         read_only = seen.controller.read_only
         if read_only is not None and event.request.action in (_A.ACQUIRE, _A.TAKE):
-            return LeaseOutcome(self._authority, refused(codes.ROBOT_READ_ONLY(read_only)))
+            return lease_rules.LeaseOutcome(self._authority, refused(codes.ROBOT_READ_ONLY(read_only)))
         return lease_rules.request_lease(
             self._authority, event.request, operator=event.operator, now=seen.now, secret=event.secret
         )
@@ -276,16 +256,20 @@ class RobotAuthority:
     # --------------------------------------------------------------- commands
 
     def _commands_requested(self, command: events.CommandsRequested, seen: Seen) -> Effects[Answer]:
-        verdict = yield from self._admit(command, seen)
+        yield from self._expire(seen)
+        verdict = evaluation.admission(command, self._authority, seen.now)
         if verdict.repeat:
             return verdict.answer
         problem = command.refused or (None if verdict.answer.accepted else verdict.answer)
         sends = command.program is None
         if problem is None and command.is_immediate:
-            sends = not (yield from self._cancel_programs())
+            cancelled = yield effects.CancelPrograms(codes.PROGRAM_HOLD())
+            rests = self._authority.moving is False and self._authority.motion is None
+            # A HOLD sent to an arm at rest would make the controller refuse every motion.
+            sends = not (cancelled and rests and self._program is None)
         if problem is None:
             seen = yield effects.EnterCell(command.requests)
-            problem = self._refusal_of(command, seen)
+            problem = evaluation.refusal_of(command, self._authority, self._program, seen, self._joints)
         unit, finding = None, Finding(start=None if command.program is None else command.program.start)
         if problem is None and sends:
             try:
@@ -305,26 +289,6 @@ class RobotAuthority:
         self._keep_answer(command, answer, verdict)
         return answer
 
-    def _admit(self, command: events.CommandsRequested, seen: Seen) -> Effects[Verdict]:
-        """Evaluate whether commands are the holder's, in time and new, and no stop forbids them."""
-        yield from self._expire(seen)
-        if command.step:
-            held = self._is_held_by(command)
-            return Verdict(Answer(True, "") if held else not_sent(codes.COMMAND_CONTROL_ENDED()))
-        return admit_all(self._authority, command.requests, operator=command.operator, now=seen.now)
-
-    def _is_held_by(self, command: events.CommandsRequested) -> bool:
-        return lease_rules.holds(self._authority, command.operator, command.requests[0].lease)
-
-    def _cancel_programs(self) -> Effects[bool]:
-        """Cancel the programs that are being checked; return whether nothing else is to be held.
-
-        A HOLD sent to an arm at rest would make the controller refuse every motion.
-        """
-        cancelled = yield effects.CancelPrograms(codes.PROGRAM_HOLD())
-        rests = self._authority.moving is False and self._authority.motion is None
-        return bool(cancelled) and rests and self._program is None
-
     def _write_and_send(
         self, command: events.CommandsRequested, unit: bytes | None, finding: Finding
     ) -> Effects[Answer]:
@@ -333,7 +297,11 @@ class RobotAuthority:
         unwritten, seen = yield effects.Append(entries.command_entries(command, Outcome.ACCEPTED, accepted))
         if unwritten is not None:
             return not_sent(codes.COMMAND_NOT_WRITTEN(unwritten))
-        problem = yield from self._evaluate_again(command, finding, seen)
+        yield from self._expire(seen)
+        problem = evaluation.refusal_meanwhile(command, self._authority, self._program, seen, self._joints)
+        if problem is None and (changed := (yield effects.Recheck(finding))) is not None:
+            runs = command.program is not None
+            problem = not_sent(codes.PROGRAM_MOVED() if runs else codes.COMMAND_CHANGED(changed))
         if problem is None and unit is not None:
             failure = yield effects.Send(unit)
             problem = None if failure is None else not_sent(failure)
@@ -346,21 +314,6 @@ class RobotAuthority:
         if finding.is_violation or not command.step:
             yield reports.check_warning(command.names, finding)
         return Answer(True, f"{text}; mind: {warning}", warning)
-
-    def _evaluate_again(
-        self, command: events.CommandsRequested, finding: Finding, seen: Seen
-    ) -> Effects[Answer | None]:
-        """Evaluate again after the audit entry was written; return the refusal, None: send it."""
-        yield from self._expire(seen)
-        if not self._is_held_by(command):
-            return not_sent(codes.COMMAND_CONTROL_ENDED_MEANWHILE())
-        overtaken = evaluation.overtaken_by_hold(command, self._authority, self._program)
-        if problem := overtaken or self._refusal_of(command, seen):
-            return problem
-        changed = yield effects.Recheck(finding)
-        if changed is None:
-            return None
-        return not_sent(codes.COMMAND_CHANGED(changed) if command.program is None else codes.PROGRAM_MOVED())
 
     def _book(self, command: events.CommandsRequested, unit: bytes | None, seen: Seen) -> Effects[str]:
         """Apply commands after their unit was sent; return the answer's text."""
@@ -383,13 +336,9 @@ class RobotAuthority:
                 isolated=isolated,
             )
             self._program = self._program and self._program.after(request, controller)
-            if request.command == _C.SPEED:
-                self._speed_percent = request.speed_percent
-            if request.command == _C.RESET:
-                self._reset_s = now_s
-                if latched is not None:
-                    yield effects.KeepLatch(self._authority.stop, self._authority.last_stop_id)
-                    yield reports.stop_reset(latched.id)
+            if request.command == _C.RESET and latched is not None:
+                yield effects.KeepLatch(self._authority.stop, self._authority.last_stop_id)
+                yield reports.stop_reset(latched.id)
             yield effects.Publish()
             # Each command starts from the state after the previous one.
             controller = predicted(request, controller, self._joints)
@@ -397,11 +346,6 @@ class RobotAuthority:
             # From now on the lease's motion holds this target.
             self._program = replace(self._program, done=self._program.done + 1)
         return f"{command.names} {'is' if len(command.requests) == 1 else 'are'} on the controller's socket"
-
-    def _refusal_of(self, command: events.CommandsRequested, seen: Seen) -> Answer | None:
-        return evaluation.refusal_of(
-            command, self._authority, self._program, seen, self._joints, reset_s=self._reset_s
-        )
 
     def _keep_answer(self, command: events.CommandsRequested, answer: Answer, verdict: Verdict) -> None:
         if verdict.id_used:
@@ -411,17 +355,11 @@ class RobotAuthority:
 
     def _link_lost(self, why: str, seen: Seen) -> Effects[None]:
         """Stop the robot if motion of the holder runs: its position is unknown now."""
-        self._speed_percent = None  # the next connection may reach another controller
+        # The next connection may reach another controller.
+        self._authority = replace(self._authority, speed_percent=None)
         lease = self._authority.lease
         if lease is not None and lease.motion is not None:
             yield from self._stop_by_gateway(f"{lease.holder}'s motion ran, and {why}", seen)
-
-    def _unit_refused(self) -> Effects[None]:
-        self._speed_percent = None  # the refused unit is unknown, and may have been the speed
-        before = self._authority
-        self._authority = motion_owner.refused(before)
-        if before is not self._authority:
-            yield effects.Publish()
 
     def _motion_observed(self, moving: bool, seen: Seen) -> Effects[None]:
         orphaned_by, self._orphan = self._orphan, ""

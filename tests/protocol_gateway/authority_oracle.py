@@ -205,7 +205,7 @@ class Old(Side):
         self.control = old_control.Control(JOINTS, self.context, self)
 
     def authority(self) -> Authority:
-        return self.context.authority
+        return replace(self.context.authority, speed_percent=None, reset_s=None)
 
     def program(self) -> Any:
         return self.context.program
@@ -336,7 +336,7 @@ class New(Side):
         self.entered = new_control.contextlib.ExitStack()
 
     def authority(self) -> Authority:
-        return self.robot_authority.authority
+        return replace(self.robot_authority.authority, speed_percent=None, reset_s=None)
 
     def program(self) -> Any:
         running = self.robot_authority.program
@@ -346,7 +346,7 @@ class New(Side):
         return old_stops.RunningProgram(name, targets, running.done, running.held, running.given_up)
 
     def speed(self) -> float | None:
-        return self.robot_authority.speed_percent
+        return self.robot_authority.authority.speed_percent
 
     def lease(self, name: str, request: LeaseRequest) -> None:
         self.ask(name, self.control.lease(request, operator=name, source="mesh"))

@@ -15,9 +15,9 @@ from protocol_gateway.authority.lease_rules import (
     expire,
     holds,
     request_lease,
-    stop,
 )
 from protocol_gateway.authority.motion_owner import command_sent, observe, refused, reported
+from protocol_gateway.authority.stop_rules import stop
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 

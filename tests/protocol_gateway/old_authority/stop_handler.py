@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from protocol_gateway.audit.log import GATEWAY, Outcome
-from protocol_gateway.authority import lease_rules
+from protocol_gateway.authority import stop_rules
 from protocol_gateway.authority.lease_rules import Authority, Now
 from protocol_gateway.authority.preconditions import Controller
 from protocol_gateway.control.audit_trail import AuditTrail
@@ -129,15 +129,13 @@ class StopHandler:
             return answer
         problem = self._send() if sent_s is None else None
         number = context.latch.next_number(context.authority.last_stop_id, now.wall_ns)
-        context.authority, latched = lease_rules.stop(
+        context.authority, latched = stop_rules.stop(
             context.authority, by=by, reason=reason, now=now, number=number
         )
         context.write_latch()
         context.cancel_preparing(codes.PROGRAM_STOPPED(by=by, reason=latched.reason))
         if problem is None:
-            context.authority = lease_rules.stop_sent(
-                context.authority, latched.id, sent_s or now.monotonic_s
-            )
+            context.authority = stop_rules.stop_sent(context.authority, latched.id, sent_s or now.monotonic_s)
             result = codes.STOP_SENT(id=latched.id)
         else:
             result = codes.STOP_NOT_SENT(problem, id=latched.id)
@@ -180,7 +178,7 @@ class StopHandler:
         if latched is None or context.controller().read_only:
             return
         if self._send() is None:
-            context.authority = lease_rules.stop_sent(
+            context.authority = stop_rules.stop_sent(
                 context.authority, latched.id, read_clocks().monotonic_s, first=True
             )
             context.on_change()
