@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from protocol_gateway.audit.entry import audit_entry
-from protocol_gateway.audit.log import AuditLog, Entry, Outcome
+from protocol_gateway.audit.log import AuditLog, Entry
 from protocol_gateway.audit.persisted_state import ROTATE
 from protocol_gateway.audit.search import Query, SearchServer, find
 from protocol_gateway.authority.lease_rules import Authority, Now
@@ -18,22 +18,10 @@ from protocol_gateway.authority.preconditions import Controller
 from protocol_gateway.checking.cell_occupancy import CellOccupancy
 from protocol_gateway.checking.checker import Checker
 from protocol_gateway.checking.policy import Policy
+from protocol_gateway.control import events
 from protocol_gateway.control.audit_trail import AuditTrail
 from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.control import Control, Ports
-from protocol_gateway.control.deadlines import set_deadline
-from protocol_gateway.control.entries import entry_of
-from protocol_gateway.control.events import (
-    LeaseEnded,
-    LinkLost,
-    LinkRestored,
-    MotionObserved,
-    SessionEnded,
-    StatusChanged,
-    StatusReported,
-    TimePassed,
-    UnitRefused,
-)
 from protocol_gateway.control.program import Programs
 from protocol_gateway.control.robot_authority import RobotAuthority
 from protocol_gateway.core.codes import code_table
@@ -44,20 +32,17 @@ from protocol_gateway.journal import Journal
 from protocol_gateway.legacy.clients import LegacyClients
 from protocol_gateway.link.link import JOINT_COUNT, ControllerLink, LinkSettings, LinkState, LinkStatus
 from protocol_gateway.link.status import transition_events
+from protocol_gateway.mesh_requests import MeshRequests
 from protocol_gateway.settings import RobotSettings
 from protocol_gateway.state_messages import controller_state, lease_state, timestamp
 from protocol_gateway.telemetry import Telemetry
-from protocol_gateway.text_limits import LONGEST_SENTENCE, LONGEST_TEXT
 from robomesh import reason_codes as codes
-from robomesh.errors import KeyNameError, RefusedError
 from robomesh.keys import presence_key
 from robomesh.publisher import LIST_LENGTH, Publisher
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Answerer, Handler, Request
 from robomesh.session import Session
-from robomesh.texts import one_line
-from robomesh.topics import Role, check_operator
+from robomesh.topics import Role
 from robots.description import load
 from robots.joints import joints_of
 
@@ -70,9 +55,6 @@ _POLL_S = 0.1
 _SHOWN_WITHIN = 0.95
 _HEARTBEAT_S = 1.0
 _RETRY_S = 1.0
-MESH = "mesh"
-# Request names in the audit log where the request itself could not be read.
-_LEASE, _COMMAND = "LEASE", "COMMAND"
 
 
 class Robot:
@@ -134,7 +116,7 @@ class Robot:
         self._link_status = self._link.status
         self._audit = AuditLog(audit_path, on_written=self._on_written, rotate_bytes=rotate_bytes)
         self._audit_trail = AuditTrail(self._audit, self._journal)
-        self._robot_authority = RobotAuthority(
+        robot_authority = RobotAuthority(
             self._persisted_authority(), joints, driver.encode, orphan=self._audit.state.mover
         )
         ports = Ports(
@@ -153,10 +135,10 @@ class Robot:
             planner=planner,
             cell_occupancy=cell_occupancy,
             joints=joints,
-            robot_authority=self._robot_authority,
+            robot_authority=robot_authority,
             controller=self._controller,
         )
-        self._control = Control(self._robot_authority, ports, self._checks)
+        self._control = Control(robot_authority, ports, self._checks)
         self._programs = Programs(
             self._control,
             self._checks,
@@ -175,19 +157,16 @@ class Robot:
                 audit=self._audit_trail.write_later,
                 publish=self._publish_state,
             )
-        self._operators = session.watch_presence(presence_key(site, settings.name, Role.OPERATOR.value, "*"))
-        self._stops = session.answer(site, settings.name, "stop", self._answer_stop)
-
-        def answer(name: str, handler: Handler, what: str) -> Answerer:
-            refused = partial(self._record_unreadable, what)
-            return session.answer(site, settings.name, name, handler, on_refused=refused)
-
-        self._answerers = (
-            answer("lease/request/*", self._answer_lease, _LEASE),
-            answer("command/*", self._answer_command, _COMMAND),
+        self._requests = MeshRequests(
+            session,
+            site,
+            settings.name,
+            control=self._control,
+            programs=self._programs,
+            audit=self._audit_trail.write_later,
         )
-        self._turned_away = 0
         session.answer(site, settings.name, "audit/find", SearchServer(audit_path).answer)
+        self._operators = session.watch_presence(presence_key(site, settings.name, Role.OPERATOR.value, "*"))
         self._report_startup()
 
     def _persisted_authority(self) -> Authority:
@@ -236,7 +215,7 @@ class Robot:
     async def run(self) -> None:
         """Keep the link and the heartbeats until cancelled; then stop motion under a lease."""
         self._control.handle(
-            LinkRestored()
+            events.LinkRestored()
         )  # no link yet, but the failed send makes it connect without pauses
         link = asyncio.create_task(self._keep_running(self._link.run))
         sessions = asyncio.create_task(self._keep_running(self._watch_sessions))
@@ -245,7 +224,7 @@ class Robot:
         finally:
             try:
                 # Before the link ends, because the stop is sent over it.
-                self._control.handle(LeaseEnded(codes.ENDED_GATEWAY()))
+                self._control.handle(events.LeaseEnded(codes.ENDED_GATEWAY()))
             finally:
                 link.cancel()
                 sessions.cancel()
@@ -258,8 +237,7 @@ class Robot:
         await self._programs.close()
         await self._control.close()
         # Stop answering before the audit log closes, so that every answer has an entry.
-        for each in (self._stops, *self._answerers):
-            each.close()
+        self._requests.close()
         await self._audit.close()
 
     async def _keep_running(self, work: Callable[[], Awaitable[None]]) -> None:
@@ -278,7 +256,7 @@ class Robot:
         next_s = 0.0
         while True:
             await asyncio.sleep(_POLL_S)
-            self._control.handle(TimePassed())
+            self._control.handle(events.TimePassed())
             now_s = time.monotonic()
             if self._link.status.state is LinkState.UP:
                 self._telemetry.check_timeouts(now_s)
@@ -286,85 +264,14 @@ class Robot:
             if now_s >= next_s:
                 next_s = now_s + _HEARTBEAT_S
                 self._publish_state()
-                self._note_turned_away()
+                self._requests.record_turned_away()
                 self._audit_trail.write_pending()
-
-    def _note_turned_away(self) -> None:
-        """Write the number of requests that were rejected because too many waited into the audit log."""
-        turned_away = sum(each.turned_away for each in self._answerers)
-        if more := turned_away - self._turned_away:
-            self._turned_away = turned_away
-            why = codes.TURNED_AWAY()
-            entry = entry_of(
-                "REQUESTS",
-                time_ns=time.time_ns(),
-                operator="",
-                source=MESH,
-                outcome=Outcome.REFUSED,
-                text=why.text,
-                why=why,
-            )
-            self._audit_trail.write_later(replace(entry, repeated=more - 1))
 
     async def _watch_sessions(self) -> None:
         """End the lease of an operator's program or page when its session ends."""
         async for who, alive in self._operators:
             if not alive:
-                self._control.handle(SessionEnded(who.id))
-
-    # --------------------------------------------------------------- requests
-
-    async def _answer_stop(self, request: Request) -> schema.StopAnswer:
-        message = request.message
-        assert isinstance(message, schema.StopRequest)
-        # A stop is never refused because of its texts.
-        by, reason = one_line(message.by).strip(), one_line(message.reason).strip()
-        return self._control.stop(by=by or "somebody", reason=reason, source=MESH)
-
-    async def _answer_lease(self, request: Request) -> schema.LeaseAnswer:
-        message = request.message
-        assert isinstance(message, schema.LeaseRequest)
-        message.reason, message.to = one_line(message.reason), one_line(message.to)
-        return await self._control.lease(message, operator=self._operator(_LEASE, request), source=MESH)
-
-    async def _answer_command(self, request: Request) -> schema.CommandAnswer:
-        message = request.message
-        assert isinstance(message, schema.CommandRequest)
-        operator = self._operator(_COMMAND, request)
-        set_deadline(message, request)
-        if message.command == schema.CommandRequest.RUN_PROGRAM:
-            return await self._programs.run(message, operator=operator, source=MESH)
-        return await self._control.commands([message], operator=operator, source=MESH)
-
-    def _operator(self, what: str, request: Request) -> str:
-        """Return the name of the operator who sends a request.
-
-        Raises:
-            RefusedError: If the name is invalid. Shortened or corrected, it could be another operator's.
-        """
-        name = request.chunk
-        try:
-            if len(name) > LONGEST_TEXT:
-                raise KeyNameError(codes.OPERATOR_TOO_LONG(name=one_line(name, 40), most=LONGEST_TEXT))
-            return check_operator(name)
-        except KeyNameError as error:
-            reason = codes.INVALID(error.reason)
-            self._record_unreadable(what, name, reason)
-            raise RefusedError(reason) from None
-
-    def _record_unreadable(self, what: str, name: str, why: Reason) -> None:
-        """Audit a request that was rejected before evaluation: unreadable, or with an invalid operator."""
-        who, text = one_line(name, 40), one_line(why.text, LONGEST_SENTENCE)
-        entry = entry_of(
-            what,
-            time_ns=time.time_ns(),
-            operator=who,
-            source=MESH,
-            outcome=Outcome.REFUSED,
-            text=text,
-            why=why,
-        )
-        self._audit_trail.write_later(entry)
+                self._control.handle(events.SessionEnded(who.id))
 
     # ------------------------------------------------------------------ state
 
@@ -385,23 +292,23 @@ class Robot:
             self._journal.report(event.severity, event.code, event.text, why=event.reason)
         if before.state is not status.state:
             if before.state is LinkState.UP:
-                self._control.handle(LinkLost(status.text))
+                self._control.handle(events.LinkLost(status.text))
             if status.state is LinkState.DOWN and self._legacy is not None:
                 self._legacy.link_is_down(status.text)
             if before.state is LinkState.DOWN:
-                self._control.handle(LinkRestored())
+                self._control.handle(events.LinkRestored())
         self._publish_state()
 
     def _on_controller_status(self) -> None:
-        self._control.handle(StatusChanged())
+        self._control.handle(events.StatusChanged())
         self._observe()
         self._publish_state()
 
     def _on_activity(self, activity: Activity | None, dated_s: float) -> None:
-        self._control.handle(StatusReported(activity, dated_s))
+        self._control.handle(events.StatusReported(activity, dated_s))
 
     def _on_refused(self) -> None:
-        self._control.handle(UnitRefused())
+        self._control.handle(events.UnitRefused())
 
     def _on_written(self, entry: Entry) -> None:
         self._audit_topic.put(audit_entry(entry), source_time_ns=entry.time_ns)
@@ -414,7 +321,7 @@ class Robot:
             return
         moving = self._telemetry.moving(time.monotonic())
         if moving is not None:
-            self._control.handle(MotionObserved(moving))
+            self._control.handle(events.MotionObserved(moving))
 
     def _controller(self) -> Controller:
         now_s = time.monotonic()

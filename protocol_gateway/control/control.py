@@ -17,38 +17,12 @@ from typing import Any
 from protocol_gateway.authority.admission import Verdict, admit_all
 from protocol_gateway.authority.lease_rules import Answer, Authority, Now
 from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.control import effects, events
 from protocol_gateway.control.audit_trail import AuditTrail
 from protocol_gateway.control.checks import Checks
-from protocol_gateway.control.effects import (
-    Append,
-    AppendLater,
-    CancelPrograms,
-    CheckMotion,
-    Effect,
-    EnterCell,
-    Finding,
-    KeepLatch,
-    NumberStop,
-    Program,
-    Publish,
-    Recheck,
-    Report,
-    Seen,
-    Send,
-    SetTimer,
-)
+from protocol_gateway.control.effects import Finding, Program, Seen
 from protocol_gateway.control.entries import PROGRAM
 from protocol_gateway.control.evaluation import RunningProgram
-from protocol_gateway.control.events import (
-    CommandsRequested,
-    Event,
-    LeaseEnded,
-    LeaseRequested,
-    LeaseResult,
-    StopRequested,
-    StopResult,
-    TimePassed,
-)
 from protocol_gateway.control.robot_authority import RobotAuthority
 from protocol_gateway.errors import AuditError, LinkError
 from protocol_gateway.journal import Journal
@@ -116,7 +90,7 @@ class Control:
 
     def stop(self, *, by: str, reason: str, source: str) -> schema.StopAnswer:
         """Stop the robot; allowed for every sender at any time."""
-        result: StopResult = self.handle(StopRequested(by=by, reason=reason, source=source))
+        result: events.StopResult = self.handle(events.StopRequested(by=by, reason=reason, source=source))
         return stop_answer(result)
 
     async def lease(self, request: schema.LeaseRequest, *, operator: str, source: str) -> schema.LeaseAnswer:
@@ -126,8 +100,8 @@ class Control:
             RefusedError: If it is refused; the text says why and what to do.
         """
         secret = secrets.token_urlsafe(24)
-        event = LeaseRequested(request=request, operator=operator, source=source, secret=secret)
-        result: LeaseResult = await self._handle_in_turn(event)
+        event = events.LeaseRequested(request=request, operator=operator, source=source, secret=secret)
+        result: events.LeaseResult = await self._handle_in_turn(event)
         if not result.answer.accepted:
             raise RefusedError(result.answer.reason or result.answer.text)
         return lease_answer(result.granted, read_clocks())
@@ -162,7 +136,7 @@ class Control:
             program: Program to start instead of sending a unit.
             refused: A refusal that is already known, to be audited and returned.
         """
-        event = CommandsRequested(
+        event = events.CommandsRequested(
             requests=tuple(requests),
             operator=operator,
             source=source,
@@ -175,7 +149,7 @@ class Control:
 
     async def step(self, request: schema.CommandRequest, *, operator: str) -> Answer:
         """Execute a step of the holder's program."""
-        event = CommandsRequested(
+        event = events.CommandsRequested(
             requests=(request,), operator=operator, source=PROGRAM, arrived=read_clocks(), step=True
         )
         answer: Answer = await self._handle_in_turn(event)
@@ -183,7 +157,7 @@ class Control:
 
     def admit(self, request: schema.CommandRequest, operator: str) -> Verdict:
         """Evaluate whether a command is the holder's, in time and new, and no stop forbids it."""
-        self.handle(TimePassed())
+        self.handle(events.TimePassed())
         return admit_all(self.authority, (request,), operator=operator, now=read_clocks())
 
     @contextlib.contextmanager
@@ -202,59 +176,62 @@ class Control:
 
     async def close(self) -> None:
         """End the lease, if there is one, and write pending audit entries."""
-        self.handle(LeaseEnded(codes.ENDED_GATEWAY()))
+        self.handle(events.LeaseEnded(codes.ENDED_GATEWAY()))
         self._set_timer(None)
         await self._ports.audit_trail.settle()
 
     # ---------------------------------------------------------------- effects
 
-    def handle(self, event: Event) -> Any:
+    def handle(self, event: events.Event) -> Any:
         """Hand over an event whose effects wait for nothing, and perform them; return its result."""
-        effects, result = self._robot_authority.handle(event, self._seen()), None
+        handled, result = self._robot_authority.handle(event, self._seen()), None
         while True:
             try:
-                effect = effects.send(result)
+                effect = handled.send(result)
             except StopIteration as done:
                 return done.value
             result = self._perform(effect)
 
-    async def _handle_in_turn(self, event: LeaseRequested | CommandsRequested) -> Any:
+    async def _handle_in_turn(self, event: events.LeaseRequested | events.CommandsRequested) -> Any:
         """Hand over a request after the earlier ones, unless it is immediate; return its result."""
         async with (
             contextlib.nullcontext() if event.is_immediate else self._command_lock,
             contextlib.AsyncExitStack() as cell,
         ):
-            effects = self._robot_authority.handle(event, self._seen())
+            handled = self._robot_authority.handle(event, self._seen())
             result: Any = None
             while True:
                 try:
-                    effect = effects.send(result)
+                    effect = handled.send(result)
                 except StopIteration as done:
                     return done.value
                 match effect:
-                    case EnterCell():
+                    case effects.EnterCell():
                         if self._checks is not None:
                             await cell.enter_async_context(self._checks.motion_lock(effect.requests))
                         result = self._seen()
-                    case CheckMotion():
-                        result = await self._check(effect)
-                    case Append():
+                    case effects.CheckMotion():
+                        if self._checks is None:
+                            result = Finding()
+                        else:
+                            result = await self._checks.check(effect.requests)
+                    case effects.Append():
                         result = await self._append(effect), self._seen()
                     case _:
                         result = self._perform(effect)
 
-    def _perform(self, effect: Effect) -> Any:
+    def _perform(self, effect: effects.Effect) -> Any:
         """Perform an effect that waits for nothing, and return its result.
 
         Raises:
             TypeError: If the effect must be awaited.
         """
         match effect:
-            case Send():
+            case effects.Send():
                 return self._send(effect)
-            case Recheck():
+            case effects.Recheck():
                 return None if self._checks is None else self._checks.changed(effect.finding)
-            case EnterCell() | CheckMotion() | Append():
+            case effects.EnterCell() | effects.CheckMotion() | effects.Append():
                 raise TypeError(f"{type(effect).__name__} cannot be performed without waiting")
         try:
             return self._perform_rest(effect)
@@ -263,26 +240,24 @@ class Control:
             log.exception("%s failed", type(effect).__name__)
             return None
 
-    def _perform_rest(
-        self, effect: NumberStop | CancelPrograms | AppendLater | KeepLatch | Publish | Report | SetTimer
-    ) -> Any:
+    def _perform_rest(self, effect: effects.Effect) -> Any:
         ports = self._ports
         match effect:
-            case NumberStop():
+            case effects.NumberStop():
                 return ports.latch.next_number(effect.last, read_clocks().wall_ns)
-            case CancelPrograms():
+            case effects.CancelPrograms():
                 return self._cancel_programs(effect.why)
-            case AppendLater():
+            case effects.AppendLater():
                 ports.audit_trail.write_later(effect.entry)
-            case KeepLatch():
+            case effects.KeepLatch():
                 ports.latch.keep(effect.stop, effect.last_stop_id)
-            case Publish():
+            case effects.Publish():
                 ports.publish()
-            case Report():
+            case effects.Report():
                 ports.journal.report(
                     effect.severity, effect.code, effect.text, why=effect.why, **effect.values
                 )
-            case SetTimer():
+            case effects.SetTimer():
                 self._set_timer(effect.at_s)
         return None
 
@@ -293,7 +268,7 @@ class Control:
             latch_problem=self._ports.latch.problem,
         )
 
-    def _send(self, effect: Send) -> Reason | None:
+    def _send(self, effect: effects.Send) -> Reason | None:
         try:
             self._ports.send(effect.unit)
         except LinkError as error:
@@ -311,15 +286,12 @@ class Control:
                 each.set_result(why)
         return bool(self._preparing)
 
-    async def _append(self, effect: Append) -> Reason | None:
+    async def _append(self, effect: effects.Append) -> Reason | None:
         try:
             await self._ports.audit_trail.write_before(*effect.entries)
         except AuditError as error:
             return error.reason
         return None
-
-    async def _check(self, effect: CheckMotion) -> Finding:
-        return Finding() if self._checks is None else await self._checks.check(effect.requests)
 
     def _set_timer(self, at_s: float | None) -> None:
         if self._timer is not None:
@@ -328,7 +300,7 @@ class Control:
         if at_s is not None:
             # A millisecond late: an early timer would find an unexpired lease.
             left_s = max(0.0, at_s - time.monotonic()) + 0.001
-            self._timer = asyncio.get_running_loop().call_later(left_s, self.handle, TimePassed())
+            self._timer = asyncio.get_running_loop().call_later(left_s, self.handle, events.TimePassed())
 
 
 def refusal(answer: Answer) -> RefusedError:
@@ -336,7 +308,7 @@ def refusal(answer: Answer) -> RefusedError:
     return RefusedError(answer.reason or answer.text, text=answer.text)
 
 
-def stop_answer(result: StopResult) -> schema.StopAnswer:
+def stop_answer(result: events.StopResult) -> schema.StopAnswer:
     """Return the answer to a stop."""
     reason = reason_message(result.reason)
     return schema.StopAnswer(stop_id=result.id, sent=result.sent, text=result.reason.text, reason=reason)

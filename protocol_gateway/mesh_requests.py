@@ -1,0 +1,119 @@
+"""Requests over the mesh to one robot: stops, leases, commands and programs."""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+from protocol_gateway.audit.entry import Entry, Outcome
+from protocol_gateway.control.control import Control
+from protocol_gateway.control.deadlines import set_deadline
+from protocol_gateway.control.entries import entry_of
+from protocol_gateway.control.program import Programs
+from protocol_gateway.text_limits import LONGEST_SENTENCE, LONGEST_TEXT
+from robomesh import reason_codes as codes
+from robomesh.errors import KeyNameError, RefusedError
+from robomesh.reasons import Reason
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.server import Answerer, Handler, Request
+from robomesh.session import Session
+from robomesh.texts import one_line
+from robomesh.topics import check_operator
+
+MESH = "mesh"
+# Request names in the audit log where the request itself could not be read.
+_LEASE, _COMMAND = "LEASE", "COMMAND"
+
+
+class MeshRequests:
+    """Server of one robot's requests over the mesh.
+
+    Args:
+        audit: Writes an entry without waiting for the disk.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        site: str,
+        robot: str,
+        *,
+        control: Control,
+        programs: Programs,
+        audit: Callable[[Entry], None],
+    ) -> None:
+        self._control, self._programs, self._audit = control, programs, audit
+        self._stops = session.answer(site, robot, "stop", self._answer_stop)
+
+        def answer(name: str, handler: Handler, what: str) -> Answerer:
+            refused = partial(self._record_refused, what)
+            return session.answer(site, robot, name, handler, on_refused=refused)
+
+        self._answerers = (
+            answer("lease/request/*", self._answer_lease, _LEASE),
+            answer("command/*", self._answer_command, _COMMAND),
+        )
+        self._turned_away = 0
+
+    def close(self) -> None:
+        """Stop answering."""
+        for each in (self._stops, *self._answerers):
+            each.close()
+
+    def record_turned_away(self) -> None:
+        """Write the number of requests that were rejected because too many waited into the audit log."""
+        turned_away = sum(each.turned_away for each in self._answerers)
+        if more := turned_away - self._turned_away:
+            self._turned_away = turned_away
+            self._record_refused("REQUESTS", "", codes.TURNED_AWAY(), repeated=more - 1)
+
+    async def _answer_stop(self, request: Request) -> schema.StopAnswer:
+        message = request.message
+        assert isinstance(message, schema.StopRequest)
+        # A stop is never refused because of its texts.
+        by, reason = one_line(message.by).strip(), one_line(message.reason).strip()
+        return self._control.stop(by=by or "somebody", reason=reason, source=MESH)
+
+    async def _answer_lease(self, request: Request) -> schema.LeaseAnswer:
+        message = request.message
+        assert isinstance(message, schema.LeaseRequest)
+        message.reason, message.to = one_line(message.reason), one_line(message.to)
+        return await self._control.lease(message, operator=self._operator(_LEASE, request), source=MESH)
+
+    async def _answer_command(self, request: Request) -> schema.CommandAnswer:
+        message = request.message
+        assert isinstance(message, schema.CommandRequest)
+        operator = self._operator(_COMMAND, request)
+        set_deadline(message, request)
+        if message.command == schema.CommandRequest.RUN_PROGRAM:
+            return await self._programs.run(message, operator=operator, source=MESH)
+        return await self._control.commands([message], operator=operator, source=MESH)
+
+    def _operator(self, what: str, request: Request) -> str:
+        """Return the name of the operator who sends a request.
+
+        Raises:
+            RefusedError: If the name is invalid. Shortened or corrected, it could be another operator's.
+        """
+        name = request.chunk
+        try:
+            if len(name) > LONGEST_TEXT:
+                raise KeyNameError(codes.OPERATOR_TOO_LONG(name=one_line(name, 40), most=LONGEST_TEXT))
+            return check_operator(name)
+        except KeyNameError as error:
+            reason = codes.INVALID(error.reason)
+            self._record_refused(what, name, reason)
+            raise RefusedError(reason) from None
+
+    def _record_refused(self, request: str, name: str, why: Reason, *, repeated: int = 0) -> None:
+        """Audit a request that was rejected before evaluation: unreadable, or with an invalid operator."""
+        entry = entry_of(
+            request,
+            time_ns=time.time_ns(),
+            operator=one_line(name, 40),
+            source=MESH,
+            outcome=Outcome.REFUSED,
+            text=one_line(why.text, LONGEST_SENTENCE),
+            why=why,
+        )
+        self._audit(replace(entry, repeated=repeated))
