@@ -29,6 +29,8 @@ from robots.meshes.polygons import Effort, ears
 
 MAX_ENTITIES = 1_000_000
 MAX_COPIES = 20_000  # of blocks: ezdxf takes about a millisecond for each
+# In copies of blocks: they can draw the points of a small file thousands of times, 10 us for each.
+MAX_COPIED_POINTS = 2_000_000
 MAX_DEPTH = 32
 _MOST_BROKEN = 20  # broken entities named in warnings
 _CREASE = np.radians(30)
@@ -64,6 +66,17 @@ class _Found:
     broken: dict[str, str] = field(default_factory=dict)
     entities: int = 0
     copies: int = 0
+    copied_points: int = 0
+
+    def copied(self, path: Path, points: int) -> None:
+        """Count points of a block's copy.
+
+        Raises:
+            MeshError: If there are too many.
+        """
+        self.copied_points += points
+        if self.copied_points > MAX_COPIED_POINTS:
+            raise MeshError(path, f"copies of blocks have more than {MAX_COPIED_POINTS} points")
 
 
 def read_dxf(path: Path) -> Mesh:
@@ -72,13 +85,14 @@ def read_dxf(path: Path) -> Mesh:
     Raises:
         MeshError: If it is not a DXF file, or is too damaged for ezdxf to recover.
     """
-    content(path)
+    size_bytes = len(content(path))
     try:
         drawing, warnings = open_drawing(path)
         found = _Found()
         for entity in drawing.modelspace():
             _walk(path, drawing, entity, _Appearance(), found, 0)
         effort = Effort()
+        effort.read(size_bytes)
         effort.grant(sum(len(polygon) for polygons in found.polygons.values() for polygon in polygons))
         parts = [_part(appearance, polygons, effort) for appearance, polygons in found.polygons.items()]
         wires = [_lines(appearance, runs) for appearance, runs in found.lines.items()]
@@ -181,6 +195,8 @@ def _draw(path: Path, drawing: Any, entity: Any, above: _Appearance, found: _Fou
         found.left_out[kind] += 1
         return
     appearance = _appearance(drawing, entity, above)
+    if depth > 0:
+        found.copied(path, _point_count(entity, kind))
     if kind == "INSERT":
         for one in _copies(path, entity, found):
             for child in one.virtual_entities(skipped_entity_callback=lambda e, _: _skip(e, found)):
@@ -258,6 +274,14 @@ def _indexed(index: int) -> Color:
 
 def _rgb(value: int) -> Color:
     return (value >> 16 & 255) / 255, (value >> 8 & 255) / 255, (value & 255) / 255
+
+
+def _point_count(entity: Any, kind: str) -> int:
+    if kind == "MESH":
+        return len(entity.vertices) + sum(map(len, entity.faces))
+    if kind in {"LWPOLYLINE", "POLYLINE"}:
+        return len(entity)
+    return len(entity.control_points) + len(entity.fit_points) if kind == "SPLINE" else 1
 
 
 def _array(points: Any) -> FloatArray:

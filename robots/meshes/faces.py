@@ -134,6 +134,8 @@ def _triangles(faces: Faces, effort: Effort) -> tuple[IndexArray, bool]:
     first = starts_of(faces.sizes - 2)
     effort.grant(int(faces.sizes[many].sum()))
     for face in many.tolist():
+        if effort.spent:
+            break  # The other faces remain fans.
         start, size = int(starts[face]), int(faces.sizes[face])
         cut = ears(faces.points[faces.corners[start : start + size]], effort)
         triangles[first[face] : first[face] + size - 2] = start + cut

@@ -17,6 +17,8 @@ _STEP = 10
 # A corner needs a try or two. The budget beyond that is a few seconds for a whole file.
 _A_CORNER = 3 * _TRY
 _BEYOND = 150_000_000
+# The shortest corner in a file: a digit and a separator.
+_CORNER_BYTES = 2
 
 
 class Effort:
@@ -24,10 +26,20 @@ class Effort:
 
     def __init__(self) -> None:
         self.left = _BEYOND
+        self._corners_in_file = 0
+
+    def read(self, size_bytes: int) -> None:
+        """Allow grants for the corners that a file of this size can contain, each once.
+
+        A few bytes can draw the same corners a million times (PROTO, USE, INSERT).
+        """
+        self._corners_in_file += size_bytes // _CORNER_BYTES
 
     def grant(self, corners: int) -> None:
         """Add the work that ordinary polygons with this many corners need."""
-        self.left += _A_CORNER * corners
+        granted = min(corners, self._corners_in_file)
+        self._corners_in_file -= granted
+        self.left += _A_CORNER * granted
 
     @property
     def spent(self) -> bool:

@@ -153,6 +153,25 @@ def test_huge_array_is_refused(tmp_path: Path, drawing: Any) -> None:
         read(tmp_path, drawing)
 
 
+@pytest.mark.parametrize("kind", ["mesh", "polyline"])
+def test_copies_of_a_large_entity_are_refused(
+    tmp_path: Path, drawing: Any, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    monkeypatch.setattr(dxf, "MAX_COPIED_POINTS", 900)
+    outline = [(x, x % 7, 0) for x in range(100)]
+    block = drawing.blocks.new("b")
+    if kind == "mesh":
+        with block.add_mesh().edit_data() as data:
+            data.vertices, data.faces = outline, [range(100)]
+    else:
+        block.add_lwpolyline(outline)
+    drawing.modelspace().add_blockref("b", (0, 0), dxfattribs={"column_count": 4, "column_spacing": 1})
+    assert not read(tmp_path, drawing).warnings
+    drawing.modelspace().add_blockref("b", (0, 0), dxfattribs={"column_count": 6, "column_spacing": 1})
+    with pytest.raises(MeshError, match="copies of blocks have more than 900 points"):
+        read(tmp_path, drawing)
+
+
 def test_truncated_file_is_repaired_or_rejected(tmp_path: Path, drawing: Any) -> None:
     for _ in range(5):
         drawing.modelspace().add_3dface(SQUARE)

@@ -307,6 +307,7 @@ def test_large_concave_face_is_triangulated_with_little_effort(outline: np.ndarr
     x, y = outline[:, 0], outline[:, 1]
     expected = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2
     effort = Effort()
+    effort.read(20 * len(outline))
     effort.grant(len(outline))
     given = effort.left
     triangles = ears(outline, effort)
@@ -342,6 +343,20 @@ def test_slow_faces_of_one_file_share_one_effort_limit(draw: Draw, monkeypatch: 
     mesh = draw(shape * 4)
     assert mesh.triangle_count == 4 * (len(outline) - 2)
     assert len([warning for warning in mesh.warnings if "too long to triangulate" in warning]) == 3
+
+
+def test_corners_of_a_file_are_granted_once_however_often_a_proto_draws_them(
+    draw: Draw, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The face of each instance is triangulated anew, because its `convex` could differ."""
+    outline = comb(500)
+    body = face_set_text(outline).replace("convex FALSE", "convex IS c")
+    monkeypatch.setattr(polygons, "_BEYOND", 0)
+    mesh = draw(f"PROTO P [ field SFBool c FALSE ] {{ {body} }} " + "P { } " * 100)
+    assert mesh.triangle_count == 100 * (len(outline) - 2)
+    rough = [warning for warning in mesh.warnings if "too long to triangulate" in warning]
+    # The text has a few characters a corner, so it pays for a few instances.
+    assert len(rough) > 50
 
 
 def test_exhausted_effort_ends_the_search_for_ears(monkeypatch: pytest.MonkeyPatch) -> None:

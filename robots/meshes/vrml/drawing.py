@@ -10,7 +10,6 @@ import numpy as np
 
 from robots.meshes.faces import Surface
 from robots.meshes.mesh import Color, FloatArray, Material, Part, Wire, placed, transformed
-from robots.meshes.polygons import Effort
 from robots.meshes.vrml.files import Files
 from robots.meshes.vrml.geometry import GEOMETRY
 from robots.meshes.vrml.lines import STROKES, Strokes
@@ -67,7 +66,6 @@ class Drawing:
     files: Files
     parts: list[Part] = field(default_factory=list)
     wires: list[Wire] = field(default_factory=list)
-    _effort: Effort = field(default_factory=Effort)
     _drawn: int = 0
     _triangles: int = 0
     _skipped: dict[str, Node] = field(default_factory=dict)
@@ -155,7 +153,7 @@ class Drawing:
     def _made(self, shape: Node) -> Surface | Strokes | None:
         drawn: Surface | Strokes
         if shape.type in GEOMETRY:
-            drawn = GEOMETRY[shape.type](shape, self._effort)
+            drawn = GEOMETRY[shape.type](shape, self.files.effort)
             if drawn.rough:
                 shape.warn("concave faces take too long to triangulate; some are drawn beyond their outline")
         elif shape.type in STROKES:

@@ -6,6 +6,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from robots.errors import MeshError
+from robots.meshes.polygons import Effort
 from robots.meshes.vrml.parser import Proto, Scene, parse_vrml
 from robots.meshes.vrml.source import Count, Source, load
 
@@ -22,6 +23,7 @@ class Files:
         missing: Names of files that were not found, each once.
         outside: Names, among those, of files that are not below `within`.
         looked_up: Paths at which files were looked for, each once.
+        effort: Work budget for the concave faces of all files.
     """
 
     within: Path | None = None
@@ -29,6 +31,7 @@ class Files:
     missing: dict[str, None] = field(default_factory=dict)
     outside: dict[str, None] = field(default_factory=dict)
     looked_up: dict[Path, None] = field(default_factory=dict)
+    effort: Effort = field(default_factory=Effort)
     _count: Count = field(default_factory=Count)
 
     def scene(self, path: Path, progress: Callable[[float], None] | None = None) -> Scene:
@@ -64,6 +67,7 @@ class Files:
             raise MeshError(path, f"is one file too many: a scene may use {_MOST_FILES}")
         source = load(path)
         source.count = self._count
+        self.effort.read(len(source.text))
         scene = self.scenes[path] = parse_vrml(source, progress)
         return list(scene.externals)
 
