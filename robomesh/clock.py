@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 
 import zenoh
 
+from robomesh import reason_codes as codes
 from robomesh.errors import MessageError, NoAnswerError
 from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.messages import PROTOBUF, decode
@@ -111,7 +112,7 @@ async def read_clock(
         received_ns, answered_ns = answer.received.ToNanoseconds(), answer.answered.ToNanoseconds()
         reading = reading_of(asked_ns, received_ns, answered_ns, arrived_ns)
         return Reading(reading.offset_s, reading.round_trip_s, hops_of(_stamps(sample)))
-    raise NoAnswerError(f"no answer to {key} within {timeout_s:g} s: is that process running?")
+    raise NoAnswerError(codes.NO_ANSWER(key=key, seconds=timeout_s))
 
 
 def reading_of(asked_ns: int, received_ns: int, answered_ns: int, arrived_ns: int) -> Reading:

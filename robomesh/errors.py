@@ -81,7 +81,7 @@ class NoRightError(RefusedError):
     """A request that our certificate does not allow; the text says which roles may send it."""
 
 
-class NoAnswerError(BusError):
+class NoAnswerError(CodedError):
     """A request without an answer in time: no owner, no route, or too slow."""
 
 

@@ -18,8 +18,10 @@ from threading import Lock
 
 import zenoh
 
+from robomesh import reason_codes as codes
 from robomesh.errors import BrokenAnswerError
 from robomesh.messages import TEXT
+from robomesh.reasons import Reason
 from robomesh.replies import query
 from robomesh.topics import Priority
 
@@ -198,7 +200,7 @@ async def whole(session: zenoh.Session, first: First, priority: Priority, *, tim
         began = time.monotonic()
         left_s = last_arrival + timeout_s - began
         if left_s <= 0:
-            raise _broken(first, taken, f"then none for {timeout_s:g} s")
+            raise _broken(first, taken, codes.NO_FURTHER_PIECE(seconds=timeout_s))
         now, later = missing[:at_once], missing[at_once:]
         selectors = [f"{first.key}?{_PIECE}={first.token}:{offset}" for offset in now]
         asked = [_ask(session, each, priority, min(patience_s, left_s)) for each in selectors]
@@ -208,7 +210,7 @@ async def whole(session: zenoh.Session, first: First, priority: Priority, *, tim
                 lost.append(offset)
             elif len(piece) != min(PIECE_BYTES, first.length - offset):
                 # Refused, or an invalid answer of another program.
-                raise _broken(first, taken, "then its owner no longer kept it: repeat the request")
+                raise _broken(first, taken, codes.PIECE_DROPPED())
             else:
                 taken[offset], last_arrival = piece, time.monotonic()
         missing = lost + later
@@ -222,9 +224,10 @@ async def whole(session: zenoh.Session, first: First, priority: Priority, *, tim
     return b"".join(taken[offset] for offset in sorted(taken))
 
 
-def _broken(first: First, taken: dict[int, bytes], why: str) -> BrokenAnswerError:
+def _broken(first: First, taken: dict[int, bytes], why: Reason) -> BrokenAnswerError:
     length = sum(map(len, taken.values()))
-    return BrokenAnswerError(f"{first.key}: {length} of {first.length} bytes arrived, {why}")
+    reason = codes.BROKEN_ANSWER(why, key=first.key, bytes=length, total=first.length)
+    return BrokenAnswerError(reason)
 
 
 async def _ask(session: zenoh.Session, selector: str, priority: Priority, timeout_s: float) -> bytes | None:

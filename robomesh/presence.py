@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator
 import zenoh
 
 from robomesh import keys
+from robomesh import reason_codes as codes
 from robomesh.errors import NoAnswerError
 from robomesh.ignored import Ignored
 from robomesh.replies import Handler, collect
@@ -56,7 +57,7 @@ async def present(
         if found is not None and was_empty and session.info.routers_zid():
             return []
         was_empty = found is not None
-    raise NoAnswerError(f"the router did not list the live services within {_TIMEOUT_S:g} s: try again")
+    raise NoAnswerError(codes.PRESENCE_UNKNOWN(seconds=_TIMEOUT_S))
 
 
 async def _tokens(

@@ -60,7 +60,22 @@ NEEDS_TEXT = Code("request.needs_text", "the field '{field}' is missing or is no
 NEEDS_OBJECT = Code("request.needs_object", "the field '{field}' is missing or is not an object")
 TOO_LARGE = Code("request.too_large", "the request is larger than {bytes} bytes")
 HALF_CHARACTER = Code("request.half_character", "the request contains an unpaired surrogate")
-NO_ANSWER = Code("request.no_answer", "{detail}")
+NO_ANSWER = Code("request.no_answer", "no answer to {key} within {seconds:g} s", "is its service running?")
+NO_ANSWER_OR_REVOKED = Code(
+    "request.no_answer_or_revoked", "{cause} Or was the certificate of {name} revoked?"
+)
+BROKEN_ANSWER = Code("request.broken_answer", "{key}: {bytes} of {total} bytes arrived, then {cause}")
+NO_FURTHER_PIECE = Code("piece.none", "no further piece within {seconds:g} s")
+PIECE_DROPPED = Code("piece.dropped", "its owner no longer kept it: repeat the request")
+NOT_ASKED = Code("request.not_asked", "{key} could not be asked: {detail}")
+NO_SERVICE = Code(
+    "request.no_service",
+    "no {services} runs for {place}",
+    "check the name, and that the service is running",
+)
+PRESENCE_UNKNOWN = Code(
+    "presence.unknown", "the router did not list the live services within {seconds:g} s", "try again"
+)
 ABANDONED = Code("request.abandoned", "the client has disconnected")
 UNKNOWN_FIELD = Code("request.unknown_field", "{request} has no field '{field}'; it takes {fields}")
 NOT_FINITE = Code("request.not_finite", "{value} is not finite")

@@ -6,6 +6,7 @@ from typing import Any, TypeAlias, TypeVar
 
 import zenoh
 
+from robomesh import reason_codes as codes
 from robomesh.endpoints import first_line
 from robomesh.errors import NoAnswerError
 from robomesh.topics import Priority
@@ -78,4 +79,5 @@ def query(
     try:
         return collect(send, read)
     except zenoh.ZError as error:
-        raise NoAnswerError(f"{selector.partition('?')[0]} could not be asked: {first_line(error)}") from None
+        key = selector.partition("?")[0]
+        raise NoAnswerError(codes.NOT_ASKED(key=key, detail=first_line(error))) from None

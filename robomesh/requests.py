@@ -10,6 +10,7 @@ import zenoh
 from google.protobuf.message import Message
 
 from robomesh import keys, pieces, topics
+from robomesh import reason_codes as codes
 from robomesh.endpoints import ON_THE_SECOND_LINK, settle
 from robomesh.errors import (
     BrokenAnswerError,
@@ -163,7 +164,7 @@ async def ask_bytes(
         await asyncio.sleep(min(again_s, left_s))
     if again is not None:
         raise again
-    raise NoAnswerError(f"no answer to {key} within {timeout_s:g} s: is its service running?")
+    raise NoAnswerError(codes.NO_ANSWER(key=key, seconds=timeout_s))
 
 
 def answer_of(owner: str, answer: bytes | None, refused: BusError | None) -> Answer:

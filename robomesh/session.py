@@ -134,7 +134,8 @@ class Session:
             if self.principal is None or isinstance(error, BrokenAnswerError):
                 raise
             # A router rejects silently.
-            raise NoAnswerError(f"{error} Or was the certificate of {self.principal.name} revoked?") from None
+            reason = codes.NO_ANSWER_OR_REVOKED(error.reason, name=self.principal.name)
+            raise NoAnswerError(reason) from None
 
     async def ask_all(
         self, key: str, request: Message | None = None, *, timeout_s: float = 2.0

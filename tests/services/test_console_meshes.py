@@ -3,7 +3,9 @@
 import pytest
 from starlette.requests import Request
 
+from robomesh import reason_codes as codes
 from robomesh.errors import BusyError, NoAnswerError, QuotaError, RefusedError
+from robomesh.keys import PresenceKey
 from services.console.http import meshes
 from services.console.http.meshes import MeshCache, mesh_response
 from tests.conftest import run
@@ -19,13 +21,16 @@ class Owner:
     async def ask_bytes(self, key, *, timeout_s):
         raise self._error
 
+    async def present(self):
+        return [PresenceKey("s", "r", "kinematics", "0")]
+
 
 @pytest.mark.parametrize(
     ("error", "status", "again"),
     [
         (BusyError("too many requests wait"), 503, "1"),
         (QuotaError("too many meshes a minute", again_s=2.5), 503, "3"),
-        (NoAnswerError("nobody answered"), 504, None),
+        (NoAnswerError(codes.NO_ANSWER(key="k", seconds=1)), 504, None),
         (RefusedError("no mesh 'base' here"), 404, None),
     ],
 )

@@ -55,7 +55,7 @@ def test_text_refusal_keeps_its_cause():
         (QuotaError(codes.BUSY(), again_s=2.5), 429, 2.5, "request.busy"),
         (BusyError(codes.BUSY()), 503, 1.0, "request.busy"),
         (RefusedError(codes.LEASE_NONE()), 404, None, "lease.none"),
-        (NoAnswerError("no answer"), 504, None, "request.no_answer"),
+        (NoAnswerError(codes.NO_ANSWER(key="k", seconds=1)), 504, None, "request.no_answer"),
         (KeyNameError("site 'S!' cannot be used"), 400, None, "request.invalid"),
     ],
 )

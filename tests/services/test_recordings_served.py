@@ -5,6 +5,7 @@ import csv
 import io
 import os
 import signal
+import time
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -30,6 +31,7 @@ from tests.services.http_refusals import read_refusal
 
 BASE = "robomesh/site/-/recordings"
 JOINTS = "robomesh/site/arm/joints"
+_BROKEN = codes.BROKEN_ANSWER(codes.PIECE_DROPPED(), key="k", bytes=30_000, total=90_000)
 
 
 @pytest.fixture
@@ -178,32 +180,32 @@ class _Http:
         self._app = app
 
     def get(self, path, headers=None, method="GET"):
-        async def main():
-            raw, _, query = path.partition("?")
-            scope = {
-                "type": "http",
-                "method": method,
-                "path": unquote(raw),
-                "raw_path": raw.encode(),
-                "query_string": query.encode(),
-                "headers": [(key.lower().encode(), value.encode()) for key, value in (headers or {}).items()],
-            }
-            start, body = {}, bytearray()
+        return run(self.request(path, headers, method))
 
-            async def receive():
-                await asyncio.get_running_loop().create_future()  # the client never disconnects
+    async def request(self, path, headers=None, method="GET"):
+        raw, _, query = path.partition("?")
+        scope = {
+            "type": "http",
+            "method": method,
+            "path": unquote(raw),
+            "raw_path": raw.encode(),
+            "query_string": query.encode(),
+            "headers": [(key.lower().encode(), value.encode()) for key, value in (headers or {}).items()],
+        }
+        start, body = {}, bytearray()
 
-            async def send(message):
-                if message["type"] == "http.response.start":
-                    start.update(message)
-                else:
-                    body.extend(message.get("body", b""))
+        async def receive():
+            await asyncio.get_running_loop().create_future()  # the client never disconnects
 
-            await self._app(scope, receive, send)
-            named = {key.decode(): value.decode() for key, value in start["headers"]}
-            return _Answer(start["status"], named, bytes(body))
+        async def send(message):
+            if message["type"] == "http.response.start":
+                start.update(message)
+            else:
+                body.extend(message.get("body", b""))
 
-        return run(main())
+        await self._app(scope, receive, send)
+        named = {key.decode(): value.decode() for key, value in start["headers"]}
+        return _Answer(start["status"], named, bytes(body))
 
     def head(self, path):
         return self.get(path, method="HEAD")
@@ -260,7 +262,7 @@ def test_a_missing_file_or_attachment_is_404_with_a_sentence(http):
     [
         (QuotaError("li has had its minute's worth", again_s=30.2), 429, "31"),
         (BusyError("too many requests wait"), 503, "1"),
-        (BrokenAnswerError("30000 of 90000 bytes came"), 504, None),
+        (BrokenAnswerError(_BROKEN), 504, None),
     ],
 )
 def test_http_errors_have_a_status_and_a_retry_after(folder, error, status, again):
@@ -270,8 +272,24 @@ def test_http_errors_have_a_status_and_a_retry_after(folder, error, status, agai
     app = Starlette(routes=Recordings(SimpleNamespace(ask=refuse), lambda _: "li").routes())
     answer = _Http(app).get("/recordings/site/trial.mcap")
     assert (answer.status_code, answer.headers.get("retry-after"), answer.text) == (status, again, str(error))
-    code = "request.no_answer" if status == 504 else "other"
+    code = "request.broken_answer" if status == 504 else "other"
     assert read_refusal(answer.headers, answer.content).code == code
+
+
+def test_a_site_without_a_recorder_is_refused_after_one_attempt(mesh):
+    async def main():
+        async with open_session(mesh) as session:
+            recordings = Recordings(session, lambda _: "li")
+            get = _Http(Starlette(routes=recordings.routes())).request
+            return await get("/recordings/unknown-site/trial.mcap")
+
+    began = time.monotonic()
+    answer = run(main())
+    # The attempts for a site with a slow line take 37 s in all.
+    assert time.monotonic() - began < 20.0
+    reason = read_refusal(answer.headers, answer.content)
+    assert (answer.status_code, reason.code) == (404, "request.no_service")
+    assert reason.values == {"services": "recorder", "place": "unknown-site"}
 
 
 def test_values_as_csv_equal_the_files_numbers(http, folder, monkeypatch):

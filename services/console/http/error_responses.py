@@ -58,7 +58,7 @@ def refused_on_the_mesh(error: BusError) -> RefusedRequest:
         case RefusedError():
             return RefusedRequest(404, error.reason)
         case NoAnswerError():
-            return RefusedRequest(504, codes.NO_ANSWER(detail=error))
+            return RefusedRequest(504, error.reason)
         case CodedError():
             return RefusedRequest(400, codes.INVALID(error.reason))
         case _:

@@ -1,6 +1,5 @@
 """Link meshes for the page: requested from their gateways, cached by their hash."""
 
-import contextlib
 import hashlib
 from collections import OrderedDict
 
@@ -9,14 +8,15 @@ from starlette.responses import Response
 
 from robomesh import keys
 from robomesh import reason_codes as codes
-from robomesh.errors import BusError, NoAnswerError, QuotaError
+from robomesh.errors import BusError, QuotaError
 from robomesh.session import Session
 from services.console.errors import RefusedRequest
 from services.console.http.error_responses import as_text, refused_on_the_mesh
+from services.console.http.repeated_requests import ask_repeatedly
 
 _MOST_BYTES = 256 * 1024 * 1024
 # A busy machine may lose a reply; a retry is better than an arm without a link.
-_TIMEOUTS_S = (3.0, 5.0, 10.0)
+_TIMEOUTS_S = (2.0, 5.0, 10.0)
 
 
 class MeshCache:
@@ -41,13 +41,6 @@ class MeshCache:
             self._bytes -= len(self._meshes.popitem(last=False)[1])
 
 
-async def _ask(session: Session, key: str) -> bytes:
-    for timeout_s in _TIMEOUTS_S[:-1]:
-        with contextlib.suppress(NoAnswerError):
-            return await session.ask_bytes(key, timeout_s=timeout_s)
-    return await session.ask_bytes(key, timeout_s=_TIMEOUTS_S[-1])
-
-
 async def mesh_response(request: Request, session: Session, cache: MeshCache) -> Response:
     """Handle `GET /mesh/<site>/<robot>/<name>?sha=<SHA-256>`.
 
@@ -60,7 +53,9 @@ async def mesh_response(request: Request, session: Session, cache: MeshCache) ->
             path = request.path_params
             name = keys.check_chunk(path["name"], "mesh")
             key = keys.robot_key(path["site"], path["robot"], f"mesh/{name}")
-            data = await _ask(session, key)
+            data = await ask_repeatedly(
+                session, key, lambda timeout_s: session.ask_bytes(key, timeout_s=timeout_s), _TIMEOUTS_S
+            )
         except BusError as error:
             refused = refused_on_the_mesh(error)
             if isinstance(error, QuotaError):

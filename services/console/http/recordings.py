@@ -7,7 +7,6 @@
 Only one piece is in memory at a time, however large the file.
 """
 
-import contextlib
 import csv
 import io
 import logging
@@ -36,6 +35,7 @@ from services.console.http.error_responses import (
     refused_on_the_mesh,
     with_error_responses,
 )
+from services.console.http.repeated_requests import ask_repeatedly
 from services.console.http.streaming import Streamed
 
 log = logging.getLogger(__name__)
@@ -43,7 +43,8 @@ log = logging.getLogger(__name__)
 AnyMessage = TypeVar("AnyMessage", bound=Message)
 
 _PIECE = 1 << 20
-_TIMEOUTS_S = (5.0, 10.0, 20.0)
+# The first one is short, because a request to a site without a recorder ends after it.
+_TIMEOUTS_S = (2.0, 5.0, 10.0, 20.0)
 _MOST_DOWNLOADS = 8
 _READS_WITHIN_S = 60.0
 _ROWS = 2000
@@ -224,10 +225,13 @@ class Recordings:
 
     async def _ask(self, where: _Where, what: str, asked: Message) -> Message:
         key = robot_key(where.site, WHOLE_SITE, f"recordings/{what}")
-        for timeout_s in _TIMEOUTS_S[:-1]:
-            with contextlib.suppress(NoAnswerError, QuotaError):
-                return await self._session.ask(key, asked, timeout_s=timeout_s)
-        return await self._session.ask(key, asked, timeout_s=_TIMEOUTS_S[-1])
+        return await ask_repeatedly(
+            self._session,
+            key,
+            lambda timeout_s: self._session.ask(key, asked, timeout_s=timeout_s),
+            _TIMEOUTS_S,
+            repeat_after=(NoAnswerError, QuotaError),
+        )
 
 
 def _within(first: str, last: str, total: int) -> tuple[int, int]:

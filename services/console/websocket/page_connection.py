@@ -258,8 +258,7 @@ class Browser:
         except (RefusedError, NoAnswerError) as error:
             # The page treats a busy service like a timeout: it retries while its lease lasts.
             no_answer = isinstance(error, NoAnswerError | BusyError)
-            reason = error.reason if isinstance(error, RefusedError) else None
-            self.send_message(refusal(ask.id, str(error), reason, no_answer=no_answer))
+            self.send_message(refusal(ask.id, str(error), error.reason, no_answer=no_answer))
         else:
             if row.request is ViewRequest:
                 self._learn_view(ask, key, payload)

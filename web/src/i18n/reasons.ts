@@ -84,7 +84,35 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ["request.needs_object", ["the field '{field}' is missing or is not an object", "字段“{field}”缺失或不是对象"]],
   ["request.too_large", ["the request is larger than {bytes} bytes", "请求超过 {bytes} 字节"]],
   ["request.half_character", ["the request contains an unpaired surrogate", "请求中含有不成对的代理字符"]],
-  ["request.no_answer", ["{detail}", "{detail}"]],
+  [
+    "request.no_answer",
+    ["no answer to {key} within {seconds} s: is its service running?", "{seconds} 秒内 {key} 无应答：其服务是否在运行？"],
+  ],
+  [
+    "request.no_answer_or_revoked",
+    ["{cause} Or was the certificate of {name} revoked?", "{cause}或者 {name} 的证书已被吊销？"],
+  ],
+  [
+    "request.broken_answer",
+    ["{key}: {bytes} of {total} bytes arrived, then {cause}", "{key}：收到 {total} 字节中的 {bytes} 字节，随后{cause}"],
+  ],
+  ["piece.none", ["no further piece within {seconds} s", "{seconds} 秒内没有后续数据"]],
+  ["piece.dropped", ["its owner no longer kept it: repeat the request", "对方已不再保留：请重新请求"]],
+  ["request.not_asked", ["{key} could not be asked: {detail}", "无法请求 {key}：{detail}"]],
+  [
+    "request.no_service",
+    [
+      "no {services} runs for {place}: check the name, and that the service is running",
+      "{place} 没有正在运行的 {services}：请检查名称以及该服务是否在运行",
+    ],
+  ],
+  [
+    "presence.unknown",
+    [
+      "the router did not list the live services within {seconds} s: try again",
+      "路由器在 {seconds} 秒内未列出在线服务：请再试一次",
+    ],
+  ],
   ["request.abandoned", ["the client has disconnected", "客户端已断开"]],
   [
     "request.unknown_field",
