@@ -53,6 +53,7 @@ class Bench:
         self.during = {}
         self.finding = Finding()
         self.link = self.disk = self.changed = None
+        self.cancelled = False
 
     def give(self, event):
         """Hand over an event and perform its effects; return its result."""
@@ -74,7 +75,7 @@ class Bench:
                 "Recheck": self.changed,
                 "EnterCell": self.seen,
                 "NumberStop": self.robot_authority.authority.last_stop_id + 1,
-                "CancelPrograms": False,
+                "CancelPrograms": self.cancelled,
             }.get(name)
 
     def lease(self, action, operator="li", secret="secret"):
@@ -252,6 +253,29 @@ def test_expired_control_ends_before_a_command_is_evaluated():
     bench.seen = replace(SEEN, now=Now(NOW.monotonic_s + 6.0, NOW.wall_ns + 6_000_000_000))
     assert bench.command(C.HOME, 2).reason.code == "lease.none"
     assert bench.performed[: len(STOPPED) + 2] == [*STOPPED, *APPLIED]
+
+
+def test_a_request_for_control_expires_after_the_lease():
+    bench = Bench().in_control()
+    bench.lease(A.ASK, "wang")
+    bench.lease(A.RELEASE)
+    bench.performed.clear()
+    bench.seen = replace(SEEN, now=Now(NOW.monotonic_s + 31.0, NOW.wall_ns + 31_000_000_000))
+    bench.give(events.TimePassed())
+    assert bench.performed == APPLIED
+    assert bench.robot_authority.authority.asked_by == ()
+
+
+@pytest.mark.parametrize("runs", [False, True])
+def test_hold_at_rest_is_sent_only_if_a_program_runs(runs):
+    bench = Bench().in_control()
+    bench.give(events.MotionObserved(False))
+    if runs:
+        bench.command(C.RUN_PROGRAM, program="home", checked=Program(name="p", targets=(THERE,)))
+    bench.cancelled = True
+    bench.performed.clear()
+    assert bench.command(C.HOLD, 2).accepted
+    assert ("Send" in bench.performed) == runs
 
 
 def test_generated_sequences_give_equal_states_and_effects():
