@@ -1,4 +1,4 @@
-"""Order of the effects of a robot's authority, without sockets or disk; and comparison with the old one."""
+"""Order of the effects of a robot's authority, without sockets or disk."""
 
 import asyncio
 from dataclasses import replace
@@ -18,7 +18,6 @@ from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from robots.description import load
 from robots.joints import joints_of
-from tests.protocol_gateway.authority_oracle import compare
 from tests.protocol_gateway.control_bench import control_bench
 
 A, C = LeaseRequest.Action, CommandRequest.Command
@@ -276,7 +275,3 @@ def test_hold_at_rest_is_sent_only_if_a_program_runs(runs):
     bench.performed.clear()
     assert bench.command(C.HOLD, 2).accepted
     assert ("Send" in bench.performed) == runs
-
-
-def test_generated_sequences_give_equal_states_and_effects():
-    compare(200)

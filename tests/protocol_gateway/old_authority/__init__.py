@@ -1,1 +1,0 @@
-"""The control of one robot as it was before `RobotAuthority`: the oracle of `test_authority_oracle`."""
