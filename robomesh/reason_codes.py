@@ -584,6 +584,39 @@ ALARM_NOT_SHELVED = Code("alarm.not_shelved", "alarm '{id}' is not shelved")
 ALARM_NONE_NAMED = Code("alarm.none_named", "the list of alarms is empty", "name at least one alarm in `ids`")
 ALARM_UNKNOWN = Code("alarm.unknown", "no alarm '{id}'", "it may have ended and been acknowledged")
 
+ALARM_FORGOTTEN = Code(
+    "alarm.forgotten", "the saved alarms cannot be read, so acknowledgements are lost: {detail}"
+)
+ALARM_NOT_SAVED = Code("alarm.not_saved", "alarms cannot be saved; a restart would lose them: {detail}")
+
+# Causes of alarms; the alarm has the advice.
+GATEWAY_SILENT = Code(
+    "gateway.silent", "the gateway of {robot} has reported nothing for more than {seconds:g} s"
+)
+FAULT_REPORTED = Code("controller.fault_reported", "the controller has a fault: {fault}")
+STOP_LATCHED_BY = Code("stop.latched_by", "stop {id} is latched by {by}: no reason given")
+STOP_LATCHED_WHY = Code("stop.latched_why", 'stop {id} is latched by {by}: reason "{reason}"')
+SITE_TWICE = Code("mesh.site_twice", "the name of site {site} is used twice: {names}")
+SERVICE_TWICE = Code("mesh.service_twice", "robot {robot} has {count} {service} services: {names}")
+SERVICE_GONE = Code("service.gone", "{name} is gone")
+SERVICE_SILENT = Code(
+    "service.silent", "{name} is present but has reported nothing for more than {seconds:g} s"
+)
+SITE_GONE = Code("site.gone", "site {other} is gone: {site} does not see any of its services")
+CLOCK_AHEAD = Code(
+    "clock.ahead", "the clock of {host} is {seconds:.1f} s ahead of that of {watch} (the watch's)"
+)
+CLOCK_BEHIND = Code(
+    "clock.behind", "the clock of {host} is {seconds:.1f} s behind that of {watch} (the watch's)"
+)
+VERSIONS_DIFFER = Code("mesh.versions", "versions differ: {versions}")
+MESSAGES_LOST = Code("mesh.loss", "{name} lost {percent:.1f} % of the messages for it within a minute")
+ROUTER_UNLINKED = Code(
+    "router.unlinked", "{name} reaches {count:.0f} of the {wanted:.0f} routers that it should link to"
+)
+CERTIFICATE_EXPIRES = Code("certificate.expires", "the certificate of {name} expires on {date} UTC")
+CERTIFICATE_EXPIRED = Code("certificate.expired", "the certificate of {name} expired on {date} UTC")
+
 # ------------------------------------------------------------------- kinematics
 
 INVERSE_TASK = Code("inverse.task", "task {task} is unknown", "use POSE_6D or POSITION_AND_AXIS_5D")

@@ -6,10 +6,12 @@ import logging
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from robomesh import reason_codes as codes
+from robomesh.messages import reason_message
 from robomesh.schemas import robomesh_pb2 as schema
 from services.watch import alarm_store
 from services.watch.alarms import Alarm, Alarms
-from services.watch.conditions import Condition
+from services.watch.conditions import Condition, condition_of
 from services.watch.subscriptions import EventHandler, alarm_of
 
 log = logging.getLogger(__name__)
@@ -19,8 +21,8 @@ _Request = schema.AlarmRequest
 _P = schema.Alarm.Priority
 _SEVERITY = {_P.LOW: _S.WARNING, _P.MEDIUM: _S.WARNING, _P.HIGH: _S.ERROR, _P.CRITICAL: _S.CRITICAL}
 
-# Severity, code, text and values of an event.
-PublishEvent = Callable[[schema.Event.Severity, str, str, dict[str, str]], None]
+# Severity, code, text and values of an event, and the reason in its text.
+PublishEvent = Callable[[schema.Event.Severity, str, str, dict[str, str], schema.Reason | None], None]
 
 
 class AlarmRegistry:
@@ -48,9 +50,9 @@ class AlarmRegistry:
             )
         except (ValueError, OSError) as error:
             aside = self._path.with_suffix(".damaged")
-            text = f"saved alarms cannot be read, so acknowledgements are lost: {error}"
-            log.error("%s", text)
-            self._publish_event(_S.ERROR, "alarm.forgotten", text, {})
+            reason = codes.ALARM_FORGOTTEN(detail=error)
+            log.error("%s", reason)
+            self._publish_event(_S.ERROR, reason.code, reason.text, {}, reason_message(reason))
             if isinstance(error, ValueError):
                 with contextlib.suppress(OSError):  # the next save reports a disk that refuses
                     await asyncio.to_thread(self._path.replace, aside)
@@ -88,7 +90,11 @@ class AlarmRegistry:
         self.alarms.activate(alarm, now)
         if not condition.reported:
             self._publish_event(
-                _SEVERITY[alarm.priority], condition.code, condition.text, dict(condition.values)
+                _SEVERITY[alarm.priority],
+                condition.code,
+                condition.text,
+                dict(condition.values),
+                condition.cause,
             )
 
     def change(self, condition: Condition) -> None:
@@ -99,7 +105,8 @@ class AlarmRegistry:
         """Clear a condition's alarm."""
         self.alarms.clear(condition.id, now)
         if not condition.reported:
-            self._publish_event(_S.INFO, f"{condition.code}.over", condition.over, dict(condition.values))
+            code, values = f"{condition.code}.over", dict(condition.values)
+            self._publish_event(_S.INFO, code, condition.over, values, None)
 
     def own_conditions(self) -> Iterator[Condition]:
         """Yield the faults of alarm handling itself."""
@@ -110,9 +117,9 @@ class AlarmRegistry:
                 over="the rate of alarms is normal again",
             )
         if self._problem:
-            yield Condition(
+            yield condition_of(
+                codes.ALARM_NOT_SAVED(detail=self._problem),
                 code="alarm.not_saved",
-                text=f"alarms cannot be saved; a restart would lose them: {self._problem}",
                 over="alarms are saved again",
             )
 
@@ -140,7 +147,7 @@ class AlarmRegistry:
                 alarms.unshelve(asked.ids, by, now)
                 code, did = "alarm.unshelved", "put back"
         for identity, text in texts.items():
-            self._publish_event(_S.INFO, code, f"{by} {did}: {text}", values | {"id": identity})
+            self._publish_event(_S.INFO, code, f"{by} {did}: {text}", values | {"id": identity}, None)
         await self._save()
 
     # ------------------------------------------------------------ outputs

@@ -9,6 +9,8 @@ from typing import Any
 
 from robomesh import reason_codes as codes
 from robomesh.keys import WHOLE_SITE
+from robomesh.messages import reason_message
+from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import ControllerState
 from robomesh.schemas.robomesh_pb2 import Reason as ReasonMessage
 
@@ -65,6 +67,11 @@ class Condition:
 def alarm_id(robot: str, what: str, each: str = "") -> str:
     """Return a stable alarm id: "pt600-1:link", "-:clock.off:host-b"."""
     return ":".join(filter(None, (robot, what, each)))
+
+
+def condition_of(reason: Reason, **more: Any) -> Condition:
+    """Return a condition whose text is a reason's sentence."""
+    return Condition(text=reason.text, cause=reason_message(reason), **more)
 
 
 @dataclass
@@ -126,13 +133,19 @@ def robot_conditions(robot: str, state: ControllerState, age_s: float) -> Iterat
     def condition(code: str, text: str, **more: Any) -> Condition:
         return Condition(robot=robot, source="gateway", code=code, text=text, reported=True, **more)
 
+    def stated(code: str, reason: Reason) -> Condition:
+        return condition_of(reason, robot=robot, source="gateway", code=code, reported=True)
+
     if age_s > _SILENT_AFTER_S:
-        text = f"the gateway of {robot} has said nothing for more than {_SILENT_AFTER_S:g} s"
-        over = f"the gateway of {robot} says something again, or is known to be gone"
-        yield Condition(robot=robot, code="gateway.silent", text=text, over=over)
+        yield condition_of(
+            codes.GATEWAY_SILENT(robot=robot, seconds=_SILENT_AFTER_S),
+            robot=robot,
+            code="gateway.silent",
+            over=f"the gateway of {robot} reports again, or is known to be gone",
+        )
     if state.link in _LINK:
         text = f"link to the controller: {state.link_text or 'not up'}"
-        # One that is frozen is silent, given up and connected to, again and again: that is one alarm.
+        # The gateway drops a frozen controller and reconnects, again and again: that is one alarm.
         yield condition(
             _LINK[state.link],
             text,
@@ -142,17 +155,16 @@ def robot_conditions(robot: str, state: ControllerState, age_s: float) -> Iterat
             words_after_s=_WORDS_AFTER_S,
         )
     if state.fault or state.activity == ControllerState.FAULT:
-        yield condition(
-            "controller.fault", f"the controller has a fault: {state.fault or 'it does not say which'}"
-        )
+        if state.fault:
+            yield stated("controller.fault", codes.FAULT_REPORTED(fault=state.fault))
+        else:
+            yield condition("controller.fault", "the controller has a fault and does not report which")
     if state.mode == ControllerState.LOCAL:
-        yield condition(
-            "controller.local", "the controller is in local mode: nobody moves the robot from here"
-        )
+        yield condition("controller.local", "the controller is in local mode: the mesh cannot move the robot")
     if state.HasField("stop"):
         stop = state.stop
-        reason = f'reason "{stop.reason}"' if stop.reason else "no reason given"
-        yield condition("stop.latched", f"stop {stop.id} is latched by {stop.by}: {reason}")
+        code = codes.STOP_LATCHED_WHY if stop.reason else codes.STOP_LATCHED_BY
+        yield stated("stop.latched", code(id=stop.id, by=stop.by, reason=stop.reason))
     if state.health.flooding:
         yield condition("link.flooding", "the controller sends far too much: only the newest is published")
     if state.check_text and not state.check_starting:

@@ -8,9 +8,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 
+from robomesh import reason_codes as codes
 from robomesh.keys import WHOLE_SITE, PresenceKey, is_replay
 from robomesh.session import CERTIFICATE
-from services.watch.conditions import Condition
+from services.watch.conditions import Condition, condition_of
 from services.watch.mesh import Mesh, Process
 
 # One per robot or per site.
@@ -101,15 +102,15 @@ def _duplicates(mesh: Mesh, tokens: list[PresenceKey]) -> Iterator[Condition]:
     for (service, robot), twins in owners.items():
         if len(twins) < 2:
             continue
-        names = " and ".join(_label(mesh, each) for each in twins)
+        names = "; ".join(_label(mesh, each) for each in twins)
         if robot == WHOLE_SITE:
-            text = f"the name of site {twins[0].site} is used twice: {names}"
+            reason = codes.SITE_TWICE(site=twins[0].site, names=names)
         else:
-            text = f"robot {robot} has {len(twins)} {service} services: {names}"
-        yield Condition(
+            reason = codes.SERVICE_TWICE(robot=robot, count=len(twins), service=service, names=names)
+        yield condition_of(
+            reason,
             robot=robot,
             code="mesh.twice",
-            text=text,
             over=f"only one {service} answers to {twins[0].site}/{robot} again",
             each=service,
             values=tuple((f"id_{number}", each.id) for number, each in enumerate(twins, 1)),
@@ -131,9 +132,9 @@ def _missing(mesh: Mesh, tokens: list[PresenceKey], site: str, expected: Expecte
     expected.without_gateway.clear()
     for (service, name), robots in gone.items():
         first = sorted(robots)[0]
-        condition = Condition(
+        condition = condition_of(
+            codes.SERVICE_GONE(name=name),
             code="service.gone",
-            text=f"{name} is gone",
             over=f"{service} is there again",
             each=service if first == WHOLE_SITE else f"{service}.{first}",
             values=(("service", service), ("name", name), ("robots", " ".join(sorted(robots)[:20]))),
@@ -143,9 +144,9 @@ def _missing(mesh: Mesh, tokens: list[PresenceKey], site: str, expected: Expecte
             expected.without_gateway[condition.id] = tuple(robots)
         yield condition
     for other in sorted(expected.sites - {who.site for who in tokens}):
-        yield Condition(
+        yield condition_of(
+            codes.SITE_GONE(other=other, site=site),
             code="site.gone",
-            text=f"site {other} is gone: {site} sees none of its services any more",
             over=f"site {other} is there again",
             each=other,
             values=(("site", other),),
@@ -166,15 +167,15 @@ def _clocks(mesh: Mesh, here: str, begun: frozenset[str]) -> Iterator[Condition]
         round_trip_s, offset_s = min(readings)
         limit = _CLOCK_OVER_S if f"{WHOLE_SITE}:clock.off:{host}" in begun else _CLOCK_S
         if abs(offset_s) - round_trip_s / 2 > limit:
-            way = "ahead of" if offset_s > 0 else "behind"
+            code = codes.CLOCK_AHEAD if offset_s > 0 else codes.CLOCK_BEHIND
             mine = own.health.host
-            yield Condition(
+            yield condition_of(
+                code(host=host, seconds=abs(offset_s), watch=mine),
                 code="clock.off",
-                text=f"the clock of {host} is {abs(offset_s):.1f} s {way} that of {mine} (the watch's)",
                 over=f"the clocks of {host} and {mine} agree again",
                 each=host,
                 values=(("offset_s", f"{offset_s:.3f}"), ("uncertainty_s", f"{round_trip_s / 2:.3f}")),
-                gist=way,
+                gist=code.name,
             )
 
 
@@ -184,12 +185,12 @@ def _versions(mesh: Mesh) -> Iterator[Condition]:
         versions[process.health.version].append(process.name)
     if len(versions) > 1:
         sides = "; ".join(
-            f"{version}: {', '.join(sorted(names)[:3])}{' and more' if len(names) > 3 else ''}"
+            f"{version}: {', '.join(sorted(names)[:3])}{', ...' if len(names) > 3 else ''}"
             for version, names in sorted(versions.items())
         )
-        yield Condition(
+        yield condition_of(
+            codes.VERSIONS_DIFFER(versions=sides),
             code="mesh.versions",
-            text=f"versions differ: {sides}",
             over="all have one version again",
         )
 
@@ -197,9 +198,9 @@ def _versions(mesh: Mesh) -> Iterator[Condition]:
 def _of_process(process: Process, begun: frozenset[str], now: float, now_s: float) -> Iterator[Condition]:
     health = process.health
     if now_s - process.at_s > _SILENT_S:
-        yield Condition(
+        yield condition_of(
+            codes.SERVICE_SILENT(name=process.name, seconds=_SILENT_S),
             code="service.silent",
-            text=f"{process.name} is present but has reported nothing for more than {_SILENT_S:g} s",
             over=f"{process.name} reports again",
             each=f"{health.service}.{health.id}",
         )
@@ -208,9 +209,9 @@ def _of_process(process: Process, begun: frozenset[str], now: float, now_s: floa
     share = lost / max(received + lost, 1)
     standing = f"{WHOLE_SITE}:mesh.loss:{each}" in begun
     if (lost >= _LOSS_LEAST and share > _LOSS) or (standing and share > _LOSS_OVER):
-        yield Condition(
+        yield condition_of(
+            codes.MESSAGES_LOST(name=process.name, percent=100 * share),
             code="mesh.loss",
-            text=f"{process.name} lost {100 * share:.1f} % of what was sent to it within a minute",
             over=f"{process.name} no longer loses messages at a notable rate",
             each=each,
             values=(("lost", str(lost)), ("received", str(received))),
@@ -218,9 +219,9 @@ def _of_process(process: Process, begun: frozenset[str], now: float, now_s: floa
         )
     links, wanted = (health.values.get(name, 0.0) for name in ("links", "links_wanted"))
     if links < wanted:
-        yield Condition(
+        yield condition_of(
+            codes.ROUTER_UNLINKED(name=process.name, count=links, wanted=wanted),
             code="router.unlinked",
-            text=f"{process.name} reaches {links:.0f} of the {wanted:.0f} routers that it should link to",
             over=f"{process.name} reaches every router that it should link to",
             each=health.id,
             after_s=_UNLINKED_AFTER_S,
@@ -228,16 +229,16 @@ def _of_process(process: Process, begun: frozenset[str], now: float, now_s: floa
     if CERTIFICATE in health.values and health.values[CERTIFICATE] < _EXPIRES_S:
         left_s = health.values[CERTIFICATE] - (now_s - process.at_s)
         ends = datetime.fromtimestamp(max(now + left_s, 0.0), UTC)
-        expires = "expires" if left_s > 0 else "expired"
-        yield Condition(
+        code = codes.CERTIFICATE_EXPIRES if left_s > 0 else codes.CERTIFICATE_EXPIRED
+        yield condition_of(
+            code(name=process.name, date=f"{ends:%Y-%m-%d %H:%M}"),
             code="certificate.expires",
-            text=f"the certificate of {process.name} {expires} on {ends:%Y-%m-%d at %H:%M} UTC",
             over=f"the certificate of {process.name} is renewed",
             each=each,
-            gist=expires,
+            gist=code.name,
         )
 
 
 def _label(mesh: Mesh, who: PresenceKey) -> str:
     process = mesh.processes.get(who.id)
-    return process.name if process is not None else f"{who.service} of {who.site} ({who.id})"
+    return process.name if process is not None else f"{who.service} ({who.site}, {who.id})"

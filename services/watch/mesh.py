@@ -37,7 +37,7 @@ class Process:
         """Return a label for people: service, site, robots and host."""
         robots = ", ".join(self.health.robots[:3]) + (", ..." if len(self.health.robots) > 3 else "")
         whose = f"{self.site}/{robots}" if robots else self.site
-        return f"{self.health.service} of {whose} at {self.health.host} ({self.health.id})"
+        return f"{self.health.service} ({whose}, {self.health.host}, {self.health.id})"
 
     @property
     def lost_lately(self) -> tuple[int, int]:

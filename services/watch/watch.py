@@ -285,12 +285,19 @@ class _Watch:
             if shown not in self._ignored and len(self._ignored) < _MOST_IGNORED:
                 self._ignored.add(shown)
                 text = f"ignored: {shown}: not a key of the mesh; a program uses a wrong name"
-                self._publish_event(schema.Event.WARNING, "mesh.key_ignored", text, {"key": shown})
+                self._publish_event(schema.Event.WARNING, "mesh.key_ignored", text, {"key": shown}, None)
 
     def _publish_event(
-        self, severity: schema.Event.Severity, code: str, text: str, values: dict[str, str]
+        self,
+        severity: schema.Event.Severity,
+        code: str,
+        text: str,
+        values: dict[str, str],
+        reason: schema.Reason | None,
     ) -> None:
-        event = schema.Event(severity=severity, code=code, text=text, source="watch", values=values)
+        event = schema.Event(
+            severity=severity, code=code, text=text, source="watch", values=values, reason=reason
+        )
         event.timestamp.GetCurrentTime()
         self._events.put(event)
         log.log(logging.INFO if severity == schema.Event.INFO else logging.WARNING, "%s", text)

@@ -24,7 +24,7 @@ def alarm(name="arm:link", code="link.down", *, robot="arm", state=Alarm.UNACKNO
 
 
 def gone(site="beijing", **values):
-    text = f"site {site} is gone: shanghai sees none of its services any more"
+    text = f"site {site} is gone: shanghai does not see any of its services"
     values = {"source": "watch", "text": text, "values": {"site": site}} | values
     return alarm(f"-:site.gone:{site}", "site.gone", robot="-", **values)
 

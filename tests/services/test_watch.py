@@ -10,13 +10,13 @@ import zenoh
 from robomesh import reason_codes as codes
 from robomesh.clock import answer_clock
 from robomesh.endpoints import router_config
-from robomesh.errors import RefusedError
 from robomesh.health import Served, present
 from robomesh.messages import reason_message
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import SessionSettings, open_session
 from services.watch import Settings, serve
 from tests.conftest import free_port, run
+from tests.refusals import refused
 
 State = schema.ControllerState
 Alarm, Request = schema.Alarm, schema.AlarmRequest
@@ -217,19 +217,19 @@ def test_events_are_alarms_by_the_table_and_end_as_it_says(mesh, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("request_", "said"),
+    ("request_", "code"),
     [
-        ({"action": Request.ACKNOWLEDGE, "ids": ["arm:none"]}, "no alarm 'arm:none'"),
-        ({"action": Request.ACKNOWLEDGE}, "name at least one alarm"),
-        ({"action": Request.SHELVE, "ids": ["arm:link"], "shelve_s": 60.0}, "reason"),
-        ({"ids": ["arm:link"]}, "ACKNOWLEDGE, SHELVE, UNSHELVE"),
+        ({"action": Request.ACKNOWLEDGE, "ids": ["arm:none"]}, codes.ALARM_UNKNOWN),
+        ({"action": Request.ACKNOWLEDGE}, codes.ALARM_NONE_NAMED),
+        ({"action": Request.SHELVE, "ids": ["arm:link"], "shelve_s": 60.0}, codes.ALARM_NO_REASON),
+        ({"ids": ["arm:link"]}, codes.INVALID),
     ],
     ids=["unknown", "none", "no reason", "no action"],
 )
-def test_an_impossible_alarm_request_is_refused_with_a_sentence(mesh, tmp_path, request_, said):
+def test_an_impossible_alarm_request_is_refused_with_its_code(mesh, tmp_path, request_, code):
     async def main():
         async with watched(mesh, tmp_path) as desk:
-            with pytest.raises(RefusedError, match=said):
+            with refused(code):
                 await desk.ask(**request_)
 
     run(main(), timeout_s=60.0)
@@ -276,9 +276,15 @@ def test_a_clock_that_is_off_is_measured_and_both_machines_are_named(mesh, tmp_p
                     offset = {other.identity: 3.0, near.identity: -0.2}[each.id]
                     assert abs(each.clock_offset_s - offset) <= each.round_trip_s / 2 + 1e-3
             await desk.until(lambda: "-:clock.off:host-b" in desk.alarms)
-            text = desk.alarms["-:clock.off:host-b"].text
-            assert "host-b is 3.0 s ahead" in text
-            assert any(each.host in text for each in desk.mesh.services if each.service == "watch")
+            cause = desk.alarms["-:clock.off:host-b"].cause
+            assert (cause.code, cause.values["host"], cause.values["seconds"]) == (
+                "clock.ahead",
+                "host-b",
+                "3.0",
+            )
+            assert cause.values["watch"] in {
+                each.host for each in desk.mesh.services if each.service == "watch"
+            }
             assert "-:clock.off:host-c" not in desk.alarms
             assert desk.codes().count("clock.off") == 1
 
@@ -290,11 +296,11 @@ def test_duplicate_names_and_differing_versions_are_reported_once_with_both_side
         async with watched(mesh, tmp_path) as desk, seeming(mesh, "gateway", robot="arm", host="host-a"):
             async with seeming(mesh, "gateway", robot="arm", host="host-b", version="9.9"):
                 await desk.until(lambda: "arm:mesh.twice:gateway" in desk.alarms)
-                text = desk.alarms["arm:mesh.twice:gateway"].text
-                assert "host-a" in text
-                assert "host-b" in text
+                names = desk.alarms["arm:mesh.twice:gateway"].cause.values["names"]
+                assert "host-a" in names
+                assert "host-b" in names
                 await desk.until(lambda: "-:mesh.versions" in desk.alarms)
-                assert "9.9: gateway of s at host-b" in desk.alarms["-:mesh.versions"].text
+                assert "9.9: gateway (s, host-b, " in desk.alarms["-:mesh.versions"].text
                 assert "0.1.0: " in desk.alarms["-:mesh.versions"].text
             await desk.until(lambda: {"mesh.twice.over", "mesh.versions.over"} <= set(desk.codes()))
             assert desk.codes().count("mesh.twice") == 1
@@ -307,7 +313,7 @@ def test_duplicate_names_and_differing_versions_are_reported_once_with_both_side
 def test_both_watches_report_a_duplicate_site_name(mesh, tmp_path):
     async def main():
         async with watched(mesh, tmp_path / "a") as desk, watched(mesh, tmp_path / "b"):
-            await desk.until(lambda: any("site s is used twice" in each.text for each in desk.events))
+            await desk.until(lambda: any(each.reason.code == "mesh.site_twice" for each in desk.events))
 
     run(main(), timeout_s=60.0)
 
@@ -318,7 +324,7 @@ def test_a_service_that_is_gone_is_an_alarm_until_it_is_back_or_known(mesh, tmp_
             async with seeming(mesh, "recorder"):
                 await desk.sees("recorder")
             await desk.until(lambda: "-:service.gone:recorder" in desk.alarms)
-            assert "recorder of s at host-b" in desk.alarms["-:service.gone:recorder"].text
+            assert "recorder (s, host-b, " in desk.alarms["-:service.gone:recorder"].text
             async with seeming(mesh, "recorder"):
                 await desk.until(lambda: desk.alarms["-:service.gone:recorder"].state == Alarm.RETURNED)
             await desk.until(lambda: desk.alarms["-:service.gone:recorder"].state == Alarm.UNACKNOWLEDGED)

@@ -86,7 +86,10 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ["request.half_character", ["the request contains an unpaired surrogate", "请求中含有不成对的代理字符"]],
   [
     "request.no_answer",
-    ["no answer to {key} within {seconds} s: is its service running?", "{seconds} 秒内 {key} 无应答：其服务是否在运行？"],
+    [
+      "no answer to {key} within {seconds} s: is its service running?",
+      "{seconds} 秒内 {key} 无应答：其服务是否在运行？",
+    ],
   ],
   [
     "request.no_answer_or_revoked",
@@ -879,6 +882,75 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     "alarm.unknown",
     ["no alarm '{id}': it may have ended and been acknowledged", "没有报警“{id}”：它可能已结束并被查看"],
   ],
+  [
+    "alarm.forgotten",
+    [
+      "the saved alarms cannot be read, so acknowledgements are lost: {detail}",
+      "已保存的报警无法读取，确认记录已丢失：{detail}",
+    ],
+  ],
+  [
+    "alarm.not_saved",
+    ["alarms cannot be saved; a restart would lose them: {detail}", "报警无法保存，重启后将丢失：{detail}"],
+  ],
+  [
+    "gateway.silent",
+    [
+      "the gateway of {robot} has reported nothing for more than {seconds} s",
+      "{robot} 的网关已超过 {seconds} 秒没有数据",
+    ],
+  ],
+  ["controller.fault_reported", ["the controller has a fault: {fault}", "控制器报告故障：{fault}"]],
+  ["stop.latched_by", ["stop {id} is latched by {by}: no reason given", "停止 {id} 由 {by} 锁定，未说明原因"]],
+  ["stop.latched_why", ['stop {id} is latched by {by}: reason "{reason}"', "停止 {id} 由 {by} 锁定，原因：{reason}"]],
+  ["mesh.site_twice", ["the name of site {site} is used twice: {names}", "站点名称 {site} 被使用了两次：{names}"]],
+  [
+    "mesh.service_twice",
+    ["robot {robot} has {count} {service} services: {names}", "机器人 {robot} 有 {count} 个 {service} 服务：{names}"],
+  ],
+  ["service.gone", ["{name} is gone", "{name} 已离线"]],
+  [
+    "service.silent",
+    [
+      "{name} is present but has reported nothing for more than {seconds} s",
+      "{name} 在线，但已超过 {seconds} 秒没有报告",
+    ],
+  ],
+  [
+    "site.gone",
+    ["site {other} is gone: {site} does not see any of its services", "站点 {other} 失联：{site} 看不到其任何服务"],
+  ],
+  [
+    "clock.ahead",
+    [
+      "the clock of {host} is {seconds} s ahead of that of {watch} (the watch's)",
+      "{host} 的时钟比 {watch}（监视服务所在）快 {seconds} 秒",
+    ],
+  ],
+  [
+    "clock.behind",
+    [
+      "the clock of {host} is {seconds} s behind that of {watch} (the watch's)",
+      "{host} 的时钟比 {watch}（监视服务所在）慢 {seconds} 秒",
+    ],
+  ],
+  ["mesh.versions", ["versions differ: {versions}", "版本不一致：{versions}"]],
+  [
+    "mesh.loss",
+    [
+      "{name} lost {percent} % of the messages for it within a minute",
+      "{name} 在一分钟内丢失了发给它的 {percent} % 的消息",
+    ],
+  ],
+  [
+    "router.unlinked",
+    [
+      "{name} reaches {count} of the {wanted} routers that it should link to",
+      "{name} 应连接 {wanted} 个路由器，目前只连接 {count} 个",
+    ],
+  ],
+  ["certificate.expires", ["the certificate of {name} expires on {date} UTC", "{name} 的证书将于 {date}（UTC）到期"]],
+  ["certificate.expired", ["the certificate of {name} expired on {date} UTC", "{name} 的证书已于 {date}（UTC）到期"]],
   [
     "inverse.task",
     [
