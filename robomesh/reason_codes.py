@@ -539,6 +539,40 @@ CHECK_HELD_WAY_UNKNOWN = Code(
 CHECK_OTHERS_UNKNOWN = Code("check.others_unknown", "unknown: {cause}")
 CHECK_OTHER_UNKNOWN = Code("check.other_unknown", "the position or the target of {name} ({cause})")
 CHECK_OTHERS_LEFT_OUT = Code("check.others_left_out", "unknown, so not included: {cause}")
+CHECK_INTERPOLATION = Code(
+    "check.interpolation",
+    "joint moves: straight between the joint positions, all joints in phase, jerk-limited, from rest "
+    "to rest; lines: joint moves that keep the tool within {line_mm:g} mm and {line_deg:g}° of the "
+    "line, each from rest to rest; home: a joint move at half of the greatest speeds",
+)
+CHECK_NOTE_NO_SHAPE = Code(
+    "check.note.no_shape", "not checked for collisions, because they have no shape: {links}"
+)
+CHECK_NOTE_PENDING = Code(
+    "check.note.pending", "links whose hulls touch are not studied yet; until then they are checked as hulls"
+)
+CHECK_NOTE_LEFT_OUT = Code("check.note.left_out", "{name} is left out: its position is unknown")
+CHECK_NOTE_ONLY_FLOOR = Code(
+    "check.note.only_floor", "only the floor around the arm: its cell has no fixture and no other robot"
+)
+CHECK_NOTE_ALONE = Code(
+    "check.note.alone", "no obstacle around the arm: its cell has no fixture, no floor and no other robot"
+)
+CHECK_NOTE_MORE_VIOLATIONS = Code("check.note.more_violations", "{count} more violations are not listed")
+CHECK_NOTE_MORE_PROBLEMS = Code("check.note.more_problems", "{count} more problems are not listed")
+CHECK_NOTE_ENDS = Code(
+    "check.note.ends", "nothing after line {line} is checked: the program cannot get there"
+)
+CHECK_NOTE_BENT = Code(
+    "check.note.bent",
+    "the tool's axis is up to {angle_deg:.1f}° from a uniform rotation between the ends of lines "
+    "{lines}: this arm cannot follow it",
+)
+FLOOR_ADVICE = Code(
+    "check.floor_advice",
+    "if the floor is lower than {height_mm:g} mm, write floor = {below_mm}.0 for the robot in the "
+    "site file; if there is none, floor = false",
+)
 OTHER_NO_POSITION = Code("other.no_position", "its controller does not report its position")
 OTHER_MOVES = Code("other.moves", "it is moving to an unknown target")
 OTHER_NOT_SERVED = Code("other.not_served", "this gateway does not serve it")
@@ -685,6 +719,9 @@ RECORDING_FILE = Code("recording.file", "{file}: cannot be read: {detail}")
 RECORDING_NOT_WRITABLE = Code("recording.not_writable", "{file}: cannot be written: {detail}")
 RECORDING_EMPTY = Code("recording.empty", "{file} is empty: the disk was full, or the recorder was killed")
 RECORDING_CUT = Code("recording.cut", "{file}: not a readable recording: it ends before its first message")
+RECORDING_KILLED = Code("recording.killed", "its recorder was killed: readable up to that point")
+RECORDING_DISK_FULL = Code("recording.disk_full", "ended: no space left on the disk")
+RECORDING_DISK_FAILED = Code("recording.disk_failed", "ended: {detail}")
 RECORDING_NOT_MCAP = Code("recording.not_mcap", "{file}: not an MCAP file: its first bytes are wrong")
 RECORDING_DAMAGED = Code("recording.damaged", "{file}: damaged near byte {byte}")
 RECORDING_CHUNK = Code("recording.chunk", "a chunk has {mib} MiB: the limit is {most} MiB")

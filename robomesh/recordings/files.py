@@ -10,6 +10,8 @@ from google.protobuf.message import DecodeError
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from robomesh import reason_codes as codes
+from robomesh.messages import reason_message
+from robomesh.reasons import Reason
 from robomesh.recordings.channel_names import ABOUT, LOST
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.layout import Layout, layout_of
@@ -35,12 +37,18 @@ def describe_file(path: Path) -> schema.Recording:
     return recording
 
 
-def describe_unreadable(path: Path, *, robot: str, problem: str) -> schema.Recording:
+def describe_unreadable(path: Path, *, robot: str, problem: Reason) -> schema.Recording:
     """Describe a file that cannot be read, by its name."""
     name = path.stem.partition("Z_")[2] or path.stem
-    return schema.Recording(
-        robot=robot, name=name, file=path.name, start=_timestamp(_begun_ns(path)), problem=problem
-    )
+    recording = schema.Recording(robot=robot, name=name, file=path.name, start=_timestamp(_begun_ns(path)))
+    set_problem(recording, problem)
+    return recording
+
+
+def set_problem(recording: schema.Recording, problem: Reason) -> None:
+    """Set a recording's problem, as text and as reason."""
+    recording.problem = problem.text
+    recording.problem_reason.CopyFrom(reason_message(problem))
 
 
 # Listing many described recordings costs only a `stat` each.
@@ -64,9 +72,10 @@ def _described(path: Path, inode: int, size: int, mtime_ns: int) -> schema.Recor
         start=_timestamp(layout.start_ns or _begun_ns(path)),
         duration=_duration(layout.end_ns - layout.start_ns),
         bytes=size,
-        problem="" if layout.whole else "its recorder was killed: readable up to that point",
         attachments=sorted(layout.attachments),
     )
+    if not layout.whole:
+        set_problem(recording, codes.RECORDING_KILLED())
     state = _newest_state(path)
     if state.HasField("audit_head"):
         recording.audit_head.CopyFrom(state.audit_head)

@@ -842,7 +842,7 @@ class CheckRequest(_message.Message):
     def __init__(self, program: _Optional[str] = ..., start: _Optional[_Iterable[float]] = ..., exact: _Optional[bool] = ..., path: _Optional[bool] = ...) -> None: ...
 
 class CheckAnswer(_message.Message):
-    __slots__ = ("ok", "duration_s", "violations", "interpolation", "notes", "path", "alone")
+    __slots__ = ("ok", "duration_s", "violations", "interpolation", "notes", "path", "note_reasons", "interpolation_reason", "alone")
     class Violation(_message.Message):
         __slots__ = ("line", "time_s", "kind", "pair", "points", "text", "until_s", "distance", "refuses", "reason")
         LINE_FIELD_NUMBER: _ClassVar[int]
@@ -885,6 +885,8 @@ class CheckAnswer(_message.Message):
     INTERPOLATION_FIELD_NUMBER: _ClassVar[int]
     NOTES_FIELD_NUMBER: _ClassVar[int]
     PATH_FIELD_NUMBER: _ClassVar[int]
+    NOTE_REASONS_FIELD_NUMBER: _ClassVar[int]
+    INTERPOLATION_REASON_FIELD_NUMBER: _ClassVar[int]
     ALONE_FIELD_NUMBER: _ClassVar[int]
     ok: bool
     duration_s: float
@@ -892,8 +894,10 @@ class CheckAnswer(_message.Message):
     interpolation: str
     notes: _containers.RepeatedScalarFieldContainer[str]
     path: CheckAnswer.Path
+    note_reasons: _containers.RepeatedCompositeFieldContainer[Reason]
+    interpolation_reason: Reason
     alone: bool
-    def __init__(self, ok: _Optional[bool] = ..., duration_s: _Optional[float] = ..., violations: _Optional[_Iterable[_Union[CheckAnswer.Violation, _Mapping]]] = ..., interpolation: _Optional[str] = ..., notes: _Optional[_Iterable[str]] = ..., path: _Optional[_Union[CheckAnswer.Path, _Mapping]] = ..., alone: _Optional[bool] = ...) -> None: ...
+    def __init__(self, ok: _Optional[bool] = ..., duration_s: _Optional[float] = ..., violations: _Optional[_Iterable[_Union[CheckAnswer.Violation, _Mapping]]] = ..., interpolation: _Optional[str] = ..., notes: _Optional[_Iterable[str]] = ..., path: _Optional[_Union[CheckAnswer.Path, _Mapping]] = ..., note_reasons: _Optional[_Iterable[_Union[Reason, _Mapping]]] = ..., interpolation_reason: _Optional[_Union[Reason, _Mapping]] = ..., alone: _Optional[bool] = ...) -> None: ...
 
 class VideoFrames(_message.Message):
     __slots__ = ("publisher", "frames")
@@ -988,7 +992,7 @@ class RecorderRequest(_message.Message):
     def __init__(self, action: _Optional[_Union[RecorderRequest.Action, str]] = ..., name: _Optional[str] = ..., views: _Optional[_Iterable[str]] = ...) -> None: ...
 
 class Recording(_message.Message):
-    __slots__ = ("site", "robot", "name", "file", "start", "duration", "bytes", "open", "topics", "started_by", "problem", "audit_head", "cause", "part", "attachments", "recovered", "indexing")
+    __slots__ = ("site", "robot", "name", "file", "start", "duration", "bytes", "open", "topics", "started_by", "problem", "audit_head", "cause", "part", "attachments", "recovered", "indexing", "problem_reason")
     class TopicCount(_message.Message):
         __slots__ = ("topic", "messages", "lost")
         TOPIC_FIELD_NUMBER: _ClassVar[int]
@@ -1015,6 +1019,7 @@ class Recording(_message.Message):
     ATTACHMENTS_FIELD_NUMBER: _ClassVar[int]
     RECOVERED_FIELD_NUMBER: _ClassVar[int]
     INDEXING_FIELD_NUMBER: _ClassVar[int]
+    PROBLEM_REASON_FIELD_NUMBER: _ClassVar[int]
     site: str
     robot: str
     name: str
@@ -1032,7 +1037,8 @@ class Recording(_message.Message):
     attachments: _containers.RepeatedScalarFieldContainer[str]
     recovered: bool
     indexing: float
-    def __init__(self, site: _Optional[str] = ..., robot: _Optional[str] = ..., name: _Optional[str] = ..., file: _Optional[str] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., duration: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., bytes: _Optional[int] = ..., open: _Optional[bool] = ..., topics: _Optional[_Iterable[_Union[Recording.TopicCount, _Mapping]]] = ..., started_by: _Optional[str] = ..., problem: _Optional[str] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., cause: _Optional[str] = ..., part: _Optional[int] = ..., attachments: _Optional[_Iterable[str]] = ..., recovered: _Optional[bool] = ..., indexing: _Optional[float] = ...) -> None: ...
+    problem_reason: Reason
+    def __init__(self, site: _Optional[str] = ..., robot: _Optional[str] = ..., name: _Optional[str] = ..., file: _Optional[str] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., duration: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., bytes: _Optional[int] = ..., open: _Optional[bool] = ..., topics: _Optional[_Iterable[_Union[Recording.TopicCount, _Mapping]]] = ..., started_by: _Optional[str] = ..., problem: _Optional[str] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., cause: _Optional[str] = ..., part: _Optional[int] = ..., attachments: _Optional[_Iterable[str]] = ..., recovered: _Optional[bool] = ..., indexing: _Optional[float] = ..., problem_reason: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
 
 class RecordingList(_message.Message):
     __slots__ = ("recordings", "free_bytes", "flight")
@@ -1193,7 +1199,7 @@ class ReplayRequest(_message.Message):
     def __init__(self, action: _Optional[_Union[ReplayRequest.Action, str]] = ..., position_s: _Optional[float] = ..., speed: _Optional[float] = ..., loop: _Optional[bool] = ...) -> None: ...
 
 class ReplayState(_message.Message):
-    __slots__ = ("timestamp", "robot", "file", "of_site", "of_robot", "start", "duration_s", "position_s", "speed", "playing", "loop", "text")
+    __slots__ = ("timestamp", "robot", "file", "of_site", "of_robot", "start", "duration_s", "position_s", "speed", "playing", "loop", "text", "reason")
     TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
     ROBOT_FIELD_NUMBER: _ClassVar[int]
     FILE_FIELD_NUMBER: _ClassVar[int]
@@ -1206,6 +1212,7 @@ class ReplayState(_message.Message):
     PLAYING_FIELD_NUMBER: _ClassVar[int]
     LOOP_FIELD_NUMBER: _ClassVar[int]
     TEXT_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
     timestamp: _timestamp_pb2.Timestamp
     robot: str
     file: str
@@ -1218,7 +1225,8 @@ class ReplayState(_message.Message):
     playing: bool
     loop: bool
     text: str
-    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., robot: _Optional[str] = ..., file: _Optional[str] = ..., of_site: _Optional[str] = ..., of_robot: _Optional[str] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., duration_s: _Optional[float] = ..., position_s: _Optional[float] = ..., speed: _Optional[float] = ..., playing: _Optional[bool] = ..., loop: _Optional[bool] = ..., text: _Optional[str] = ...) -> None: ...
+    reason: Reason
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., robot: _Optional[str] = ..., file: _Optional[str] = ..., of_site: _Optional[str] = ..., of_robot: _Optional[str] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., duration_s: _Optional[float] = ..., position_s: _Optional[float] = ..., speed: _Optional[float] = ..., playing: _Optional[bool] = ..., loop: _Optional[bool] = ..., text: _Optional[str] = ..., reason: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
 
 class ServiceHealth(_message.Message):
     __slots__ = ("timestamp", "service", "id", "version", "host", "pid", "started", "cpu", "memory_bytes", "open_files", "published", "received", "lost", "turned_away", "values", "robots", "zenoh_id", "ignored", "ignored_examples")

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 from robots.cells import Floor
 from robots.collision.cell import Arm
 from robots.collision.geometry import TOUCH_M
@@ -96,7 +98,7 @@ def heights_on_path(
     return found
 
 
-def floor_advice(floor: Floor, lowest_m: float) -> str:
+def floor_advice(floor: Floor, lowest_m: float) -> Reason:
     """Return advice on the site file's floor for an arm that has to go below it.
 
     Args:
@@ -105,7 +107,4 @@ def floor_advice(floor: Floor, lowest_m: float) -> str:
     assert floor.height_m is not None
     # Whole centimetres, rounded down.
     below_mm = math.floor(round(lowest_m * 1000 - 0.5, 3) / 10) * 10
-    return (
-        f"if the floor is lower than {floor.height_m * 1000:g} mm, write floor = {below_mm}.0 for the robot "
-        "in the site file; if there is none, floor = false"
-    )
+    return codes.FLOOR_ADVICE(height_mm=floor.height_m * 1000, below_mm=below_mm)

@@ -245,35 +245,32 @@ def _start_violations(joints: Joints, start: FloatArray) -> tuple[Violation, ...
     )
 
 
-def _cover_notes(cell: Cell, robot: str, others: Mapping[str, FloatArray]) -> tuple[str, ...]:
+def _cover_notes(cell: Cell, robot: str, others: Mapping[str, FloatArray]) -> tuple[Reason, ...]:
     notes = []
     for name in (robot, *(other for other in others if other != robot)):
         if bare := unshaped(cell, name):
-            owner = "" if name == robot else f" of {name}"
-            notes.append(f"not checked for collisions, because they have no shape: {', '.join(bare)}{owner}")
+            owner = "" if name == robot else f"{name}/"
+            links = ", ".join(f"{owner}{link}" for link in bare)
+            notes.append(codes.CHECK_NOTE_NO_SHAPE(links=links))
     if robot in pending(cell):
-        notes.append("links whose hulls touch are not studied yet; until then they are checked as hulls")
+        notes.append(codes.CHECK_NOTE_PENDING())
     notes += [
-        f"{name} is left out: its position is unknown"
-        for name in cell.arms
-        if name != robot and name not in others
+        codes.CHECK_NOTE_LEFT_OUT(name=name) for name in cell.arms if name != robot and name not in others
     ]
     if not len(cell.fixtures) and len(cell.arms) == 1:
-        obstacles = "no obstacle" if cell.floor is None else "only the floor"
-        also = ", no floor" if cell.floor is None else ""
-        notes.append(f"{obstacles} around the arm: its cell has no fixture{also} and no other robot")
+        notes.append(codes.CHECK_NOTE_ALONE() if cell.floor is None else codes.CHECK_NOTE_ONLY_FLOOR())
     return tuple(notes)
 
 
-def _floor_notes(cell: Cell, found: Sequence[Violation]) -> tuple[str, ...]:
+def _floor_notes(cell: Cell, found: Sequence[Violation]) -> tuple[Reason, ...]:
     heights = [each.points[0, 2] for each in found if FLOOR in each.pair]
     if not heights or cell.floor is None:
         return ()
     return (floor_advice(cell.floor, min(heights)),)
 
 
-def _unreported(runs: Runs) -> tuple[str, ...]:
-    return (f"{runs.unreported} more violations are not listed",) if runs.unreported else ()
+def _unreported(runs: Runs) -> tuple[Reason, ...]:
+    return (codes.CHECK_NOTE_MORE_VIOLATIONS(count=runs.unreported),) if runs.unreported else ()
 
 
 def _unreadable(error: ProgramError, start: FloatArray) -> CheckResult:
@@ -287,7 +284,7 @@ def _unreadable(error: ProgramError, start: FloatArray) -> CheckResult:
         for line, reason in error.problems
     )
     more = error.found - len(found)
-    notes = (f"{more} more problems are not listed",) if more else ()
+    notes = (codes.CHECK_NOTE_MORE_PROBLEMS(count=more),) if more else ()
     return _result(0.0, found, (), notes, PathSamples(len(start)))
 
 
@@ -295,7 +292,7 @@ def _result(
     duration_s: float,
     found: tuple[Violation, ...],
     steps: tuple[Step, ...],
-    notes: tuple[str, ...],
+    notes: tuple[Reason, ...],
     path: PathSamples,
 ) -> CheckResult:
     return CheckResult(

@@ -48,22 +48,21 @@ def plan_program(program: Program, arm: Arm, solver: InverseSolver | None, start
     """
     planner = _Planner(arm, solver, start)
     violations: tuple[Violation, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Reason, ...] = ()
     try:
         planner.take(program.statements)
     except _PlanEndsError as end:
         violations = (end.violation,)
-        notes = (f"nothing after line {end.violation.line} is checked: the program cannot get there",)
+        notes = (codes.CHECK_NOTE_ENDS(line=end.violation.line),)
     return Plan(tuple(planner.steps), violations, (*_bent_notes(planner.bent), *notes))
 
 
-def _bent_notes(bent: Mapping[int, float]) -> tuple[str, ...]:
+def _bent_notes(bent: Mapping[int, float]) -> tuple[Reason, ...]:
     if not bent:
         return ()
     lines = ", ".join(str(line) for line in sorted(bent)[:10]) + (", ..." if len(bent) > 10 else "")
     most = degrees(max(bent.values()))
-    text = f"between its ends the tool's axis is up to {most:.1f}° from a uniform rotation"
-    return (f"line{'s' if len(bent) > 1 else ''} {lines}: {text}: this arm cannot follow it",)
+    return (codes.CHECK_NOTE_BENT(angle_deg=most, lines=lines),)
 
 
 class _PlanEndsError(Exception):

@@ -6,6 +6,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.joints import FloatArray
 
@@ -13,12 +14,7 @@ from robots.joints import FloatArray
 LINE_M = 0.001
 LINE_DEG = 0.5
 
-INTERPOLATION = (
-    "joint moves: straight between the joint positions, all joints in phase, jerk-limited, from rest to "
-    "rest; "
-    f"lines: joint moves that keep the tool within {LINE_M * 1000:g} mm and {LINE_DEG:g}° of the line, "
-    "each from rest to rest; home: a joint move at half of the greatest speeds"
-)
+INTERPOLATION = codes.CHECK_INTERPOLATION(line_mm=LINE_M * 1000, line_deg=LINE_DEG)
 
 
 class StepKind(StrEnum):
@@ -108,7 +104,7 @@ class Plan:
 
     steps: tuple[Step, ...]
     violations: tuple[Violation, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Reason, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,8 +136,8 @@ class CheckResult:
     Attributes:
         ok: There is no violation.
         duration_s: Total of the motions, homing's rest and the waits.
-        interpolation: The assumed interpolation of the controller, as text.
-        notes: Gaps in the check's coverage, as texts.
+        interpolation: The assumed interpolation of the controller.
+        notes: Gaps in the check's coverage.
         alone: Only self-collisions were checked: the cell has no floor, no fixture and no other robot.
     """
 
@@ -149,8 +145,8 @@ class CheckResult:
     duration_s: float
     violations: tuple[Violation, ...]
     steps: tuple[Step, ...]
-    interpolation: str
-    notes: tuple[str, ...]
+    interpolation: Reason
+    notes: tuple[Reason, ...]
     path: SampledPath
     alone: bool = False
 

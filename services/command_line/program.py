@@ -58,7 +58,7 @@ def check(
     joints = cell.arms[name].joints
     others = {other: arm.joints.home for other, arm in cell.arms.items() if other != name}
     result = check_program(text, cell, name, _start(start, joints), others=others)
-    notes = list(result.notes)
+    notes = [note.text for note in result.notes]
     if others:
         notes.append(f"at home, for this check: {', '.join(others)}")
     if plot is not None:
@@ -244,7 +244,7 @@ def _result_json(result: "CheckResult", notes: list[str]) -> dict[str, Any]:
         "ok": result.ok,
         "duration_s": result.duration_s,
         "violations": [_violation_json(each) for each in result.violations],
-        "interpolation": result.interpolation,
+        "interpolation": result.interpolation.text,
         "notes": notes,
         "alone": result.alone,
     }

@@ -45,8 +45,10 @@ def answer_of(result: CheckResult, *, path: bool) -> schema.CheckAnswer:
     answer = schema.CheckAnswer(
         ok=result.ok,
         duration_s=result.duration_s,
-        interpolation=result.interpolation,
-        notes=result.notes,
+        interpolation=result.interpolation.text,
+        interpolation_reason=reason_message(result.interpolation),
+        notes=[note.text for note in result.notes],
+        note_reasons=[reason_message(note) for note in result.notes],
         alone=result.alone,
     )
     for each in result.violations:

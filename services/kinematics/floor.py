@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from robomesh.messages import reason_message
 from robomesh.schemas.robomesh_pb2 import Event
 from robots.collision import Cell
 from robots.collision.floor import floor_advice, heights_above
@@ -31,10 +32,12 @@ def floor_event(cell: Cell, robot: str, poses: Mapping[str, FloatArray]) -> Even
         return None
     assert cell.floor.height_m is not None
     height_m = cell.floor.height_m
+    advice = floor_advice(cell.floor, height_m + lowest)
     return Event(
         severity=Event.Severity.WARNING,
         code="kinematics.floor",
         source="kinematics",
-        text=f"{' and '.join(phrases)}: {floor_advice(cell.floor, height_m + lowest)}",
+        text=f"{' and '.join(phrases)}: {advice}",
+        reason=reason_message(advice),
         values={"floor_m": f"{height_m:.6g}", "lowest_m": f"{height_m + lowest:.6g}"},
     )

@@ -11,6 +11,7 @@ from robomesh import reason_codes as codes
 from robomesh import topics
 from robomesh.errors import BusError, RefusedError
 from robomesh.keys import replay_name, robot_key
+from robomesh.messages import reason_message
 from robomesh.publisher import Publisher
 from robomesh.reasons import Reason
 from robomesh.recordings.errors import RecordingError
@@ -61,7 +62,7 @@ class Replay:
     ) -> None:
         self.robot = replay_name(identity)
         self._session, self._site, self._source, self._clock = session, site, source, clock
-        self._text = ""
+        self._problem: Reason | None = None
         self._seek_due = asyncio.Event()
         self._closed = asyncio.Event()
         self._wake = asyncio.Event()
@@ -91,7 +92,8 @@ class Replay:
             speed=self._clock.speed,
             playing=self._clock.playing,
             loop=self._clock.loop,
-            text=self._text,
+            text="" if self._problem is None else self._problem.text,
+            reason=None if self._problem is None else reason_message(self._problem),
         )
         state.timestamp.GetCurrentTime()
         state.start.FromNanoseconds(source.start_ns)
@@ -114,7 +116,7 @@ class Replay:
                     await self._step()
                 except RecordingError as error:
                     log.warning("%s: %s", self.robot, error)
-                    self._text = str(error)
+                    self._problem = error.reason
                     self._clock.pause(time.monotonic())
                     self._queue.clear()
                     self._seek_due.clear()
@@ -191,7 +193,7 @@ class Replay:
                     self.close()
         except ReplayError as error:
             raise RefusedError(error.reason) from None
-        self._text = ""
+        self._problem = None
         self._wake.set()
         return self.describe()
 

@@ -65,7 +65,7 @@ class Answers:
                 recordings.recordings.append(describe_file(path))
             except RecordingError as error:
                 robot = path.parent.name if path.parent != self._folder else ""
-                recordings.recordings.append(describe_unreadable(path, robot=robot, problem=str(error)))
+                recordings.recordings.append(describe_unreadable(path, robot=robot, problem=error.reason))
         if self._folder.is_dir():
             recordings.free_bytes = shutil.disk_usage(self._folder).free
         return recordings

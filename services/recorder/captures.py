@@ -11,12 +11,14 @@ from pathlib import Path
 from robomesh import reason_codes as codes
 from robomesh.errors import KeyNameError, RefusedError
 from robomesh.keys import check_chunk
+from robomesh.reasons import Reason
 from robomesh.recordings.capture import Capture
 from robomesh.recordings.channel_names import SUFFIX
 from robomesh.recordings.errors import CaptureError
+from robomesh.recordings.files import set_problem
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wall_clock import WallClock
-from services.recorder.disk import Disk, error_text
+from services.recorder.disk import Disk, ended_by
 from services.recorder.file_writer import STATES, OnPublication, Part
 from services.recorder.finishing import Finisher, Job
 from services.recorder.settings import MIB, Settings
@@ -174,7 +176,9 @@ class RobotRecorder:
             self.part = None
             problem = await self._end(part, about={})
             self.last = part.describe()
-            self.last.open, self.last.problem = False, problem
+            self.last.open = False
+            if problem is not None:
+                set_problem(self.last, problem)
             log.info("%s/%s: recorded %s", self._settings.site, self._robot, part.capture.path.name)
             return self.last
 
@@ -211,7 +215,8 @@ class RobotRecorder:
         self.part = None
         self._files.detach(part)
         self.last = part.describe()
-        self.last.open, self.last.problem = False, f"ended: {error_text(error)}"
+        self.last.open = False
+        set_problem(self.last, ended_by(error))
         return part
 
     def describe(self) -> schema.Recording:
@@ -225,15 +230,15 @@ class RobotRecorder:
             self.last.ClearField("indexing")
         return self.last
 
-    async def _end(self, part: Part, *, about: dict[str, str]) -> str:
-        """Close a file and queue it for indexing; return the problem as text, or an empty text."""
+    async def _end(self, part: Part, *, about: dict[str, str]) -> Reason | None:
+        """Close a file and queue it for indexing; return the problem, if any."""
         try:
             await self._files.close(part)
         except OSError as error:  # the disk has already reported it
-            return f"ended: {error_text(error)}"
+            return ended_by(error)
         path = part.capture.path
         self._finisher.submit(Job(path, (path,), about))
-        return ""
+        return None
 
     def _path(self, name: str, part: int) -> Path:
         number = f".part{part}" if part > 1 else ""

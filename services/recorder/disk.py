@@ -13,6 +13,8 @@ from collections.abc import Callable, Mapping
 from enum import IntEnum
 from pathlib import Path
 
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 from robomesh.recordings import records
 from robomesh.recordings.capture import Capture
 from robomesh.recordings.recover import close_in_place
@@ -47,6 +49,13 @@ def is_recorded(level: RecordingLevel, row: Topic) -> bool:
     if row.name in _DERIVED:
         return level < RecordingLevel.STATES_ONLY
     return level < RecordingLevel.NOTHING
+
+
+def ended_by(error: OSError) -> Reason:
+    """Return the reason for which a disk error ended a recording."""
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return codes.RECORDING_DISK_FULL()
+    return codes.RECORDING_DISK_FAILED(detail=error_text(error))
 
 
 def error_text(error: OSError) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from robomesh import reason_codes as codes
 from robots.cells import FLOOR, CellDescription, CellRobot, Floor
 from robots.collision import build_cell, outside_clearance, outside_nearest, path_encounters
 from robots.collision.floor import heights_above
@@ -126,9 +127,7 @@ def test_without_a_floor_and_fixtures_only_the_arm_itself_was_checked() -> None:
     bare = checked(pt600(floor=None), "move_joints 10 0 0 0 0\n")
     assert bare.ok
     assert bare.alone
-    assert (
-        bare.notes[-1] == "no obstacle around the arm: its cell has no fixture, no floor and no other robot"
-    )
+    assert bare.notes[-1] == codes.CHECK_NOTE_ALONE()
     table = block("table", (0.1, 0.1, 0.1), placed(3.0))
     assert not checked(pt600(floor=None, fixtures=(table,)), "move_joints 10 0 0 0 0\n").alone
     assert not checked(pt600(), "move_joints 10 0 0 0 0\n").alone

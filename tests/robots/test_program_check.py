@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from robomesh import reason_codes as codes
 from robots.cells import CellDescription, CellRobot
 from robots.collision import Cell, build_cell
 from robots.collision.path import SAMPLE_M, placements_along, travelled
@@ -108,7 +109,7 @@ def test_self_collision_is_a_violation(arm_cell: Cell) -> None:
     assert touch.kind is ViolationKind.COLLISION
     assert set(touch.pair) == {"arm/base", "arm/elbow"}
     assert np.isinf(result.path.clearances).all()
-    assert result.notes == ("only the floor around the arm: its cell has no fixture and no other robot",)
+    assert result.notes == (codes.CHECK_NOTE_ONLY_FLOOR(),)
 
 
 def test_each_pass_is_a_separate_violation(shelf: Cell) -> None:
@@ -221,14 +222,12 @@ def test_another_robot_counts_at_every_position_of_its_path(tmp_path: Path) -> N
     assert check_plan(near, "arm", STRETCHED, plan, others={"other": quarter[:1]}).ok
     unknown = check_plan(near, "arm", STRETCHED, plan, others={})
     assert unknown.ok
-    assert unknown.notes == ("other is left out: its position is unknown",)
+    assert unknown.notes == (codes.CHECK_NOTE_LEFT_OUT(name="other"),)
 
 
 def test_links_without_a_shape_are_named(tmp_path: Path) -> None:
     cell = build_cell(cell_of({"arm": (bar_arm(tmp_path, bare=("base", "elbow")), placed(0))}))
-    assert (
-        "not checked for collisions, because they have no shape: base, elbow" in checked(cell, "home\n").notes
-    )
+    assert codes.CHECK_NOTE_NO_SHAPE(links="base, elbow") in checked(cell, "home\n").notes
 
 
 def test_unreadable_text_gives_violations_with_lines(arm_cell: Cell) -> None:
@@ -240,7 +239,7 @@ def test_unreadable_text_gives_violations_with_lines(arm_cell: Cell) -> None:
 def test_result_of_a_long_program_is_bounded(shelf: Cell) -> None:
     result = checked(shelf, "repeat 700\n move_joints 36 0\n move_joints 0 0\nend\n")
     assert len(result.violations) == MOST_VIOLATIONS
-    assert result.notes == ("400 more violations are not listed",)
+    assert result.notes == (codes.CHECK_NOTE_MORE_VIOLATIONS(count=400),)
     assert 10_000 <= len(result.path.times_s) <= 20_001
     assert result.path.times_s[-1] == pytest.approx(result.duration_s)
     assert (np.diff(result.path.times_s) >= 0).all()

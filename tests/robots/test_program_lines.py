@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from robomesh import reason_codes as codes
 from robots.collision import build_cell
 from robots.inverse import build_solver, natural_task
 from robots.inverse.tasks import tool_misses
@@ -62,7 +63,7 @@ def test_unreachable_line_ends_the_plan_with_a_reason() -> None:
     assert (violation.kind, violation.line) == (ViolationKind.UNREACHABLE, 2)
     assert violation.text.startswith("the line cannot be followed beyond ")
     assert " of its 1000.0 mm: its end cannot be reached: out of reach: " in violation.text
-    assert plan.notes == ("nothing after line 2 is checked: the program cannot get there",)
+    assert plan.notes == (codes.CHECK_NOTE_ENDS(line=2),)
     assert {step.line for step in plan.steps} == {1}
     ((x, y, z),) = violation.points
     assert 0.4 < x < 0.65
@@ -80,8 +81,8 @@ def test_arm_of_five_joints_reports_its_axis_deviation_on_a_line() -> None:
     plan = planned("pt600", "move_joints 30 80 -80 20 0\nmove_line 400 200 300 180 0 0\n")
     assert not plan.violations
     (note,) = plan.notes
-    assert note.startswith("line 2: between its ends the tool's axis is up to ")
-    assert note.endswith("° from a uniform rotation: this arm cannot follow it")
+    assert (note.code, note.values["lines"]) == ("check.note.bent", "2")
+    assert float(note.values["angle_deg"]) > 0.5
 
 
 def test_repeated_line_gives_bit_identical_moves() -> None:

@@ -207,7 +207,7 @@ def test_inverse_and_check_run_in_processes_that_end_with_the_service(mesh, monk
             answer = await monitor.ask(f"{key}/check/li", request, timeout_s=60.0)
             assert answer.ok, answer
             assert answer.duration_s > 1.0
-            assert "right is left out: its position is unknown" in answer.notes
+            assert codes.CHECK_NOTE_LEFT_OUT(name="right").text in answer.notes
             # The quota allows a client two concurrent checks; these two wait until the third was refused.
             monkeypatch.setattr(quotas, "_AGAIN_S", 60.0)
             started, release = asyncio.Semaphore(0), asyncio.Event()

@@ -37,7 +37,8 @@ def test_an_arm_that_is_below_the_floor_is_listed_with_the_line_to_write():
     event = floor_event(cell, "arm", {"at home": home, "where it is now": low})
     assert "at home" not in event.text
     assert event.text.startswith("where it is now arm/")
-    assert "mm below the floor: if the floor is lower than 400 mm, write floor = 360.0" in event.text
+    assert event.reason.code == "check.floor_advice"
+    assert (event.reason.values["height_mm"], event.reason.values["below_mm"]) == ("400", "360")
     assert "floor = false" in event.text
     assert event.code in RULES
     # With that line the arm is not listed.

@@ -232,7 +232,7 @@ def test_a_full_disk_ends_the_capture_with_an_event_but_not_the_recorder(mesh, t
             listed = await session.ask(LIST, timeout_s=20.0)
             rows = {row.name: row for row in listed.recordings}
             assert rows["again"].open
-            assert (rows["full"].open, rows["full"].problem) == (False, "ended: no space left on the disk")
+            assert (rows["full"].open, rows["full"].problem_reason.code) == (False, "recording.disk_full")
 
     run(main())
     assert "recording full ended: no space left on the disk; what was written is kept" in caplog.text

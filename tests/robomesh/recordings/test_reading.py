@@ -114,7 +114,7 @@ def test_truncated_file_is_read_to_its_end_or_refused_with_a_sentence(tmp_path, 
     else:
         with RecordingFile(path) as file:
             assert sum(1 for _ in file.messages()) == sum(topic.messages for topic in recording.topics)
-        assert recording.problem == "its recorder was killed: readable up to that point"
+        assert recording.problem_reason.code == "recording.killed"
     assert not words or "trial.mcap" in words
 
 

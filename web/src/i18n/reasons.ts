@@ -805,6 +805,62 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ["check.others_unknown", ["unknown: {cause}", "未知：{cause}"]],
   ["check.other_unknown", ["the position or the target of {name} ({cause})", "{name} 的位置或去向（{cause}）"]],
   ["check.others_left_out", ["unknown, so not included: {cause}", "未知：{cause}"]],
+  [
+    "check.interpolation",
+    [
+      "joint moves: straight between the joint positions, all joints in phase, jerk-limited, from rest to rest; lines: joint moves that keep the tool within {line_mm} mm and {line_deg}° of the line, each from rest to rest; home: a joint move at half of the greatest speeds",
+      "关节运动：在关节位置之间走直线，各关节同相，限制加加速度，由静止到静止；直线：由关节运动组成，工具偏离直线不超过 {line_mm} mm 和 {line_deg}°，每段由静止到静止；回零：以最大速度的一半作关节运动",
+    ],
+  ],
+  [
+    "check.note.no_shape",
+    ["not checked for collisions, because they have no shape: {links}", "未作碰撞检查，因为没有形状：{links}"],
+  ],
+  [
+    "check.note.pending",
+    [
+      "links whose hulls touch are not studied yet; until then they are checked as hulls",
+      "凸包相接触的连杆尚未研究完；在此之前按凸包检查",
+    ],
+  ],
+  ["check.note.left_out", ["{name} is left out: its position is unknown", "未计入 {name}：其位置未知"]],
+  [
+    "check.note.only_floor",
+    [
+      "only the floor around the arm: its cell has no fixture and no other robot",
+      "机械臂周围只有地面：其单元没有固定物，也没有其他机器人",
+    ],
+  ],
+  [
+    "check.note.alone",
+    [
+      "no obstacle around the arm: its cell has no fixture, no floor and no other robot",
+      "机械臂周围没有障碍物：其单元没有固定物、地面和其他机器人",
+    ],
+  ],
+  ["check.note.more_violations", ["{count} more violations are not listed", "另有 {count} 处违反未列出"]],
+  ["check.note.more_problems", ["{count} more problems are not listed", "另有 {count} 个问题未列出"]],
+  [
+    "check.note.ends",
+    ["nothing after line {line} is checked: the program cannot get there", "第 {line} 行之后未检查：程序无法到达那里"],
+  ],
+  [
+    "check.note.bent",
+    [
+      "the tool's axis is up to {angle_deg}° from a uniform rotation between the ends of lines {lines}: this arm cannot follow it",
+      "第 {lines} 行的两端之间，工具轴偏离均匀旋转最多 {angle_deg}°：此机械臂无法跟随",
+    ],
+  ],
+  [
+    "check.floor_advice",
+    [
+      "if the floor is lower than {height_mm} mm, write floor = {below_mm}.0 for the robot in the site file; if there is none, floor = false",
+      "如果地面低于 {height_mm} mm，请在站点文件中为该机器人写入 floor = {below_mm}.0；如果没有地面，请写 floor = false",
+    ],
+  ],
+  ["recording.killed", ["its recorder was killed: readable up to that point", "录制服务被强制结束：此前的部分可读"]],
+  ["recording.disk_full", ["ended: no space left on the disk", "已结束：磁盘没有剩余空间"]],
+  ["recording.disk_failed", ["ended: {detail}", "已结束：{detail}"]],
   ["other.no_position", ["its controller does not report its position", "其控制器未告知其位置"]],
   ["other.moves", ["it is moving to an unknown target", "它正在运动，去向未知"]],
   ["other.not_served", ["this gateway does not serve it", "此网关不服务于它"]],

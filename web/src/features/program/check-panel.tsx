@@ -90,7 +90,8 @@ function Verdict({ moved }: { moved: boolean }) {
 }
 
 function Notes({ answer }: { answer: CheckAnswer }) {
-  const { notes, interpolation } = answer;
+  const notes = answer.notes.map((note, index) => reasonText(answer.noteReasons[index], note));
+  const interpolation = reasonText(answer.interpolationReason, answer.interpolation);
   return (
     <>
       {notes.length > 0 && (

@@ -3,6 +3,7 @@
 import { useEffect, useMemo, useState } from "preact/hooks";
 import type { Recording } from "../../gen/robomesh_pb";
 import { DescriptionSchema } from "../../gen/robomesh_pb";
+import { reasonText } from "../../i18n/reasons";
 import { durationS, recordedViews, startMs } from "../../i18n/recording-format";
 import { r, recordedView } from "../../i18n/recordings";
 import type { Replay } from "../../mesh/replay";
@@ -53,7 +54,9 @@ export function Player({ first, second }: { first: RecordingName; second: Record
   );
   const state = replay?.state.value;
   const gone = replay?.gone ?? false;
-  const trouble = openReplay.problem || (gone ? r("player_gone") : state?.text && r("closed", { text: state.text }));
+  const trouble =
+    openReplay.problem ||
+    (gone ? r("player_gone") : state?.text && r("closed", { text: reasonText(state.reason, state.text) }));
   const events = recordedEvents.value?.list ?? NONE;
   const recorded = viewsIn(info.value);
   return (
@@ -66,7 +69,7 @@ export function Player({ first, second }: { first: RecordingName; second: Record
           <h1>{info.value?.name || first.file}</h1>
           <ReplayTag robot={info.value?.robot || (state?.ofRobot ?? "")} start={info.value ? startMs(info.value) : 0} />
           <span class="replay-words dim small">{r("replay_words")}</span>
-          {info.value?.problem && <Trouble text={info.value.problem} />}
+          {info.value?.problem && <Trouble text={reasonText(info.value.problemReason, info.value.problem)} />}
           {info.problem && <Trouble text={r("info_refused", { text: info.problem })} />}
         </div>
         {trouble && (

@@ -4,6 +4,7 @@ import type { Signal } from "@preact/signals";
 import { useState } from "preact/hooks";
 import type { Recording } from "../../gen/robomesh_pb";
 import { count, fullTime } from "../../i18n/format";
+import { reasonText } from "../../i18n/reasons";
 import {
   dateText,
   durationS,
@@ -67,7 +68,9 @@ export function RecordingCard(props: {
         {(lost || recording.problem || empty) && (
           <p class="recording-words state warning">
             <span class="shape warning" aria-hidden="true" />
-            {[recording.problem || (empty && r("nothing_written")), lost].filter(Boolean).join("; ")}
+            {[reasonText(recording.problemReason, recording.problem) || (empty && r("nothing_written")), lost]
+              .filter(Boolean)
+              .join("; ")}
           </p>
         )}
       </div>

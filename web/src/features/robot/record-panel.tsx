@@ -6,6 +6,7 @@ import { useState } from "preact/hooks";
 import type { Description, Recording } from "../../gen/robomesh_pb";
 import { RecordingSchema } from "../../gen/robomesh_pb";
 import { ageText, count } from "../../i18n/format";
+import { reasonText } from "../../i18n/reasons";
 import { durationS, lostText, messagesOf, momentText, sizeText, startedText } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
 import { viewText } from "../../i18n/texts";
@@ -179,7 +180,7 @@ function Counts({ recording }: { recording: Recording }) {
         {lost && <span class="shape warning" aria-hidden="true" />}
         {lost || r("lost_none")}
       </span>
-      {recording.problem && <span class="state warning">{recording.problem}</span>}
+      {recording.problem && <span class="state warning">{reasonText(recording.problemReason, recording.problem)}</span>}
     </p>
   );
 }
