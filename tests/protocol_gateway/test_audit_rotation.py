@@ -18,9 +18,10 @@ from protocol_gateway.audit.log import AuditLog, Entry, Outcome, read_entries, v
 from protocol_gateway.audit.persisted_state import authority_after
 from protocol_gateway.audit.search import Query, find, matches, query_of
 from protocol_gateway.authority.lease_rules import Stop
-from robomesh.errors import RefusedError
+from robomesh import reason_codes as codes
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
+from tests.refusals import refused
 
 SMALL = 2000
 HOUSE = Path(__file__).resolve().parents[2]
@@ -339,7 +340,7 @@ def test_invalid_lines_are_left_out_of_a_search(tmp_path):
 
 
 def test_a_search_for_too_many_entries_is_refused():
-    with pytest.raises(RefusedError, match="most = 10001 is too many: at most 10000"):
+    with refused(codes.AUDIT_TOO_MANY, count="10001"):
         query_of(schema.AuditQuery(most=10_001))
 
 

@@ -11,6 +11,7 @@ from protocol_gateway.checking.cell_occupancy import CellOccupancy
 from protocol_gateway.checking.policy import Policy
 from protocol_gateway.control.checks import Checks
 from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
+from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.description import load
@@ -20,6 +21,7 @@ from tests.protocol_gateway.control_bench import control_bench
 from tests.protocol_gateway.gateway_site import A, C, gateway, simulator, until
 from tests.protocol_gateway.test_checked_motion import OUT, TWO, all_checked, move, standing
 from tests.protocol_gateway.test_program_runs import RUN, ended, start, states
+from tests.refusals import refused
 
 JOINTS = joints_of(load("pt600"))
 READY = StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=True)
@@ -69,7 +71,7 @@ def test_resume_and_another_motion_are_two_units(tmp_path):
             bench.status = READY
             await bench.commands((C.MOVE_ABSOLUTE, {"joint_positions": FAR}))
             bench.status = replace(READY, activity=Activity.HOLDING)
-            with pytest.raises(RefusedError, match="two units"):
+            with refused(codes.COMMAND_TWO_UNITS):
                 await bench.commands((C.RESUME, {}), (C.MOVE_ABSOLUTE, {"joint_positions": NEAR}), first_id=2)
             assert len(bench.socket) == 1
 
@@ -128,7 +130,7 @@ def test_a_program_is_planned_from_the_robots_positions(mesh, tmp_path):
             await site.command(C.SPEED, speed_percent=5)
             await site.command(C.MOVE_ABSOLUTE, joint_positions=[radians(-60), 1.57, -1.57, 0, 0])
             await until(lambda: site.joints[0] < -0.02)
-            with pytest.raises(RefusedError, match="wait until it has stopped"):
+            with refused(codes.ROBOT_MOVES_HOME):
                 await start(site, "move_joints -20 90 -90 0 0\n")
 
     run(main(), timeout_s=60)

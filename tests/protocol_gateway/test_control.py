@@ -20,6 +20,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
 from tests.protocol_gateway.control_bench import control_bench
 from tests.protocol_gateway.gateway_site import until
+from tests.refusals import refused
 
 C = schema.CommandRequest.Command
 A = schema.LeaseRequest.Action
@@ -42,35 +43,36 @@ def test_commands_of_one_unit_are_evaluated_after_the_previous_ones(tmp_path):
             ]
             assert answer.text == "TRACE_ON, HOME, MOVE_ABSOLUTE are on the controller's socket"
             assert [name for name, _ in bench.entries()] == ["ACQUIRE", "TRACE_ON", "HOME", "MOVE_ABSOLUTE"]
-            with pytest.raises(RefusedError, match="not homed"):
+            with refused(codes.ROBOT_NOT_HOMED):
                 await bench.commands(move(*POSITIONS), first_id=4)
 
     run(main())
 
 
 @pytest.mark.parametrize(
-    ("commands", "words"),
+    ("commands", "code", "values"),
     [
-        ([(C.HOME, {}), move(200, 0, 0, 0, 0)], "waist at 200.00° is beyond its limit 150.00°"),
-        ([(C.HOME, {}), (C.HOLD, {}), move(0, 0, 0, 0, 0)], "on hold"),
-        ([(C.HOME, {}), move(0, 0, 0)], "3 joint positions, but the robot has 5"),
-        ([(C.HOME, {}), (C.RESET, {"stop_id": 7})], "stop 7 is not latched"),
+        ([(C.HOME, {}), move(200, 0, 0, 0, 0)], codes.JOINT_LIMIT, {"name": "waist", "value": "200.00°"}),
+        ([(C.HOME, {}), (C.HOLD, {}), move(0, 0, 0, 0, 0)], codes.CONTROLLER_HOLDING, {}),
+        ([(C.HOME, {}), move(0, 0, 0)], codes.JOINT_COUNT, {"count": "3"}),
+        ([(C.HOME, {}), (C.RESET, {"stop_id": 7})], codes.STOP_NOT_LATCHED, {"id": "7"}),
         # 140 degrees from home, and 20 more.
         (
             [(C.HOME, {}), move(140, 0, 0, 0, 0), (C.MOVE_RELATIVE, {"joint_positions": [0.35, 0, 0, 0, 0]})],
-            "waist at 160.05° is beyond",
+            codes.JOINT_LIMIT,
+            {"name": "waist", "value": "160.05°"},
         ),
     ],
 )
-def test_commands_of_one_unit_are_all_or_none(tmp_path, commands, words):
+def test_commands_of_one_unit_are_all_or_none(tmp_path, commands, code, values):
     async def main():
         async with control_bench(tmp_path) as bench:
             await bench.lease(A.ACQUIRE)
-            with pytest.raises(RefusedError, match=words):
+            with refused(code, **values):
                 await bench.commands(*commands)
             assert bench.socket == []
             # Its ids are used.
-            with pytest.raises(RefusedError, match="id 1 is not higher"):
+            with refused(codes.COMMAND_ID_OLD, id="1"):
                 await bench.commands((C.HOME, {}))
         asked = [outcome.value for name, outcome in bench.entries() if name not in ("ACQUIRE", "REVOKE")]
         assert asked == ["REFUSED"] * (len(commands) + 1)
@@ -84,7 +86,7 @@ def test_a_reset_in_a_unit_allows_the_motion_behind_it(tmp_path):
             await bench.lease(A.ACQUIRE)
             bench.status = StatusReceived(activity=Activity.STOPPED, mode=Mode.REMOTE, homed=True)
             bench.control.stop(by="wang", reason="fire", source="test")
-            with pytest.raises(RefusedError, match="stop 1 is latched"):
+            with refused(codes.STOP_LATCHED, id="1"):
                 await bench.commands(move(*POSITIONS))
             await bench.commands((C.RESET, {"stop_id": 1}), move(*POSITIONS), first_id=2)
             assert bench.socket[0] == b"1#COMMAND*stop@"
@@ -102,7 +104,7 @@ def test_a_stop_during_the_audit_write_forbids_the_unit(tmp_path):
             commands = asyncio.create_task(bench.commands((C.TRACE_ON, {}), (C.HOME, {})))
             await asyncio.sleep(0)  # the command waits for the disk now
             bench.control.stop(by="wang", reason="fire", source="test")
-            with pytest.raises(RefusedError, match="stop 1 is latched"):
+            with refused(codes.STOP_LATCHED, id="1"):
                 await commands
             assert bench.socket == [b"1#COMMAND*stop@"]
         failed = [name for name, outcome in bench.entries() if outcome.value == "FAILED"]
@@ -118,7 +120,7 @@ def test_a_motion_overtaken_by_hold_is_not_sent(tmp_path):
             motion = asyncio.create_task(bench.commands((C.HOME, {})))
             await asyncio.sleep(0)  # the command waits for the disk now
             hold = asyncio.create_task(bench.commands((C.HOLD, {}), first_id=2))
-            with pytest.raises(RefusedError, match="HOLD arrived before it could be sent"):
+            with refused(codes.COMMAND_HELD):
                 await motion
             await hold
             assert bench.socket == [b"1#COMMAND*hold@"]
@@ -166,10 +168,10 @@ def test_a_lost_link_during_motion_is_a_stop(tmp_path):
 def test_a_request_for_control_is_shown_until_it_is_granted(tmp_path):
     async def main():
         async with control_bench(tmp_path) as bench:
-            with pytest.raises(RefusedError, match="no operator is in control: take control"):
+            with refused(codes.LEASE_FREE):
                 await bench.lease(A.ASK, "wang")
             await bench.lease(A.ACQUIRE)
-            with pytest.raises(RefusedError, match="li is in control already"):
+            with refused(codes.LEASE_OWN):
                 await bench.lease(A.ASK)
             for reason in ("lunch", "lunch is over"):
                 await bench.lease(A.ASK, "wang", reason=reason)
@@ -211,7 +213,7 @@ def test_a_stop_reported_long_after_a_reset_is_new(tmp_path, clock):
             bench.status = StatusReceived(activity=Activity.STOPPED, mode=Mode.REMOTE, homed=True)
             await bench.commands((C.RESET, {}))
             clock.advance(0.31)
-            with pytest.raises(RefusedError, match="the controller is stopped"):
+            with refused(codes.CONTROLLER_STOPPED):
                 await bench.commands(move(*POSITIONS), first_id=2)
 
     run(main())

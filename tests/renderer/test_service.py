@@ -14,7 +14,8 @@ from renderer import frame_scheduler, post_processing, robots, service, stream
 from renderer.encoder import H264Encoder
 from renderer.errors import NoEncoderError, RendererError
 from renderer.service import Settings
-from robomesh.errors import NoAnswerError, RefusedError
+from robomesh import reason_codes as codes
+from robomesh.errors import NoAnswerError
 from robomesh.schemas.robomesh_pb2 import ControllerState, Event, KeyFrameRequest, VideoFrames
 from robomesh.session import open_session
 from robots.cells import Fixture
@@ -22,6 +23,7 @@ from services.site_file.fixtures import Fixture as FixtureRow
 from services.site_file.fixtures import fixture_shape
 from tests.cells import single_arm
 from tests.conftest import last_value, run
+from tests.refusals import refused
 from tests.renderer.renderer_site import (
     HOME,
     SIZE,
@@ -90,9 +92,7 @@ def test_key_frames_are_forced_at_most_once_a_second(mesh, tmp_path):
             for _ in range(5):
                 forced = (await monitor.ask(key, KeyFrameRequest())).forced
                 assert not forced or time.monotonic() - not_before_s >= 1.0
-            with pytest.raises(
-                RefusedError, match="no view 'behind'; there are close, far, free, front, left, top"
-            ):
+            with refused(codes.VIEW_UNKNOWN, view="behind", views="close, far, free, front, left, top"):
                 await monitor.ask(key.replace("front", "behind"), KeyFrameRequest())
 
     run(main())

@@ -10,11 +10,13 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from renderer import service
 from renderer.mp4 import FragmentedMp4
+from robomesh import reason_codes as codes
 from robomesh.errors import QuotaError, RefusedError
 from robomesh.quotas import Quotas
 from robomesh.schemas.robomesh_pb2 import Description, KeyFrameRequest, Vector3, View, ViewAnswer, ViewRequest
 from robomesh.session import open_session
 from tests.conftest import last_value, run
+from tests.refusals import refused
 from tests.renderer.renderer_site import frames, moving, picture, renderer_site
 
 ARM = "robomesh/hall/arm"
@@ -55,7 +57,7 @@ def test_a_requested_view_is_drawn_shared_and_ends_without_subscribers(mesh, tmp
             named.CopyFrom(BESIDE)
             named.name = "mine"
             assert await ask(monitor, view=named, width=240, height=200, fps=25.0) == answer
-            with pytest.raises(RefusedError, match="no capacity: 1 requested views exist"):
+            with refused(codes.VIEWS_TOO_MANY, count="1"):
                 await ask(monitor, of="top", width=240, height=200)
             # The renderer's own views do not count.
             for name in ("front", "top", "left", "free", "close", "far"):
