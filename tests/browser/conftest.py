@@ -98,13 +98,13 @@ class Plant:
 
     def start_controller(self, name, port=0, **settings):
         async def start():
-            said = self.loop.create_future()
+            address = self.loop.create_future()
             settings_ = simulator.Settings(
                 robot="pt600", listen=f"127.0.0.1:{port}", **{"rate_hz": self.rate_hz, **settings}
             )
-            task = self.loop.create_task(simulator.serve(settings_, ready=said.set_result))
-            await asyncio.wait([said, task], return_when=asyncio.FIRST_COMPLETED)
-            self.controllers[name] = (task, int((await said).rpartition(":")[2]))
+            task = self.loop.create_task(simulator.serve(settings_, ready=address.set_result))
+            await asyncio.wait([address, task], return_when=asyncio.FIRST_COMPLETED)
+            self.controllers[name] = (task, int((await address).rpartition(":")[2]))
 
         return start()
 

@@ -45,7 +45,7 @@ class Crowd:
     def __init__(self, process: "subprocess.Popen[str]") -> None:
         self._process = process
         self.watched: set[str] = set()
-        self._told = threading.Event()
+        self._started = threading.Event()
         self._listening = threading.Thread(target=self._listen, name="crowd")
         self._listening.start()
 
@@ -53,10 +53,10 @@ class Crowd:
         assert self._process.stdout
         for line in self._process.stdout:
             self.watched = set(json.loads(line))
-            self._told.set()
+            self._started.set()
 
     def wait_started(self) -> None:
-        assert self._told.wait(STARTED_S), "the crowd did not start: its traceback is above"
+        assert self._started.wait(STARTED_S), "the crowd did not start: its traceback is above"
 
     def mark(self, state: str, names: Sequence[str]) -> None:
         """Mark robots as `faulty` or `silent`; all others of the crowd are neither."""
@@ -88,9 +88,11 @@ def crowd(endpoint: str, sites: Sequence[str], count: int) -> Iterator[Crowd]:
         held.end()
 
 
-async def publish(session: Session, names: Sequence[str], said: dict[str, set[str]]) -> None:
-    """Print the robots with a subscriber of slow joint states at each change; `said` is the text of
-    `Crowd.mark`.
+async def publish(session: Session, names: Sequence[str], states: dict[str, set[str]]) -> None:
+    """Publish the robots' states; print the robots with a subscriber of slow joint states at each change.
+
+    Args:
+        states: The robots in each state that `Crowd.mark` gave them.
     """
     description = load("pt600")
     model = build_model(description)
@@ -107,32 +109,32 @@ async def publish(session: Session, names: Sequence[str], said: dict[str, set[st
     async def mesh(request: Request) -> bytes:
         return meshes[request.chunk]
 
-    tell = {}
+    publishers = {}
     for name in names:
         site, robot = name.split("/")
         for service in ("gateway", "kinematics"):
             session.declare_presence(site, robot, service)
         session.answer(site, robot, "mesh/*", mesh)
         topics = ("description", "controller", "lease", "joints/slow")
-        tell[name] = {topic: session.declare_publisher(site, robot, topic) for topic in topics}
-        tell[name]["description"].put(about)
+        publishers[name] = {topic: session.declare_publisher(site, robot, topic) for topic in topics}
+        publishers[name]["description"].put(about)
         await asyncio.sleep(0)
     loop = asyncio.get_running_loop()
-    began, beat = loop.time(), 0
+    began, health_key = loop.time(), 0
     watched = None
     while True:
-        before, watched = watched, {name for name in names if tell[name]["joints/slow"].watched}
+        before, watched = watched, {name for name in names if publishers[name]["joints/slow"].watched}
         if watched != before:
             print(json.dumps(sorted(watched)), flush=True)
         for i, name in enumerate(names):
-            if name in said["silent"]:
+            if name in states["silent"]:
                 continue
-            if (beat + i) % STATE_BEATS == 0:
-                tell[name]["controller"].put(_state(i, faulty=name in said["faulty"]))
-                tell[name]["lease"].put(_lease(i))
+            if (health_key + i) % STATE_BEATS == 0:
+                publishers[name]["controller"].put(_state(i, faulty=name in states["faulty"]))
+                publishers[name]["lease"].put(_lease(i))
             if name in watched:
-                tell[name]["joints/slow"].put(_joints(model.joints, loop.time() - began + i))
-        beat += 1
+                publishers[name]["joints/slow"].put(_joints(model.joints, loop.time() - began + i))
+        health_key += 1
         await asyncio.sleep(BEAT_S)
 
 
@@ -168,13 +170,13 @@ def _joints(joints: Joints, seconds: float) -> JointStates:
 async def main(endpoint: str, count: str, *sites: str) -> None:
     """Publish until stdin ends."""
     names = [f"{sites[i % len(sites)]}/r{i:03d}" for i in range(int(count))]
-    said: dict[str, set[str]] = {"faulty": set(), "silent": set()}
+    states: dict[str, set[str]] = {"faulty": set(), "silent": set()}
     async with open_session(SessionSettings(connect=(endpoint,), wait_s=20.0)) as session:
-        publishing = asyncio.create_task(publish(session, names, said))
+        publishing = asyncio.create_task(publish(session, names, states))
         publishing.add_done_callback(lambda task: task.cancelled() or task.result())
         while not publishing.done() and (line := await asyncio.to_thread(sys.stdin.readline)):
             state, chosen = json.loads(line)
-            said[state] = set(chosen)
+            states[state] = set(chosen)
         publishing.cancel()
         await asyncio.gather(publishing, return_exceptions=True)
 

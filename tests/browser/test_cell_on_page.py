@@ -60,7 +60,7 @@ def plant(tmp_path_factory):
         yield SimpleNamespace(address=site.console.rstrip("/"), site=site)
 
 
-def told(plant, topic):
+def newest(plant, topic):
     """Return the newest message of the mesh about the arm."""
 
     async def heard():
@@ -89,7 +89,7 @@ def test_a_clearance_that_grows_short_turns_amber_with_its_number_and_an_event_s
     sent = plant.site.command("send", "arm", "move", "25", "90", "-90", "0", "0")
     assert sent.returncode == 0, sent.stderr
     expect(row).to_have_class("margin warning", timeout=SLOWLY_MS)
-    distance = told(plant, "kinematics").clearance.distance
+    distance = newest(plant, "kinematics").clearance.distance
     assert 0.01 < distance < 0.05
     expect(row.locator(".margin-value")).to_have_text(f"{1000 * distance:.1f}\u202fmm")
     expect(page.locator(".event-list")).to_contain_text(

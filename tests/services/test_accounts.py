@@ -169,10 +169,10 @@ class Page:
     in_control = False
 
     def __init__(self):
-        self.told = []
+        self.notified = []
 
     def rights_changed(self):
-        self.told.append(1)
+        self.notified.append(1)
 
 
 def watched(signed_in, *, in_control=False):
@@ -208,12 +208,12 @@ def test_the_right_to_command_is_suspended_without_activity(sessions):
     sessions.expire(1000.0 + COMMANDS_UNTOUCHED_S - 1)
     assert signed_in.may_command
     sessions.expire(1000.0 + COMMANDS_UNTOUCHED_S + 1)
-    assert (signed_in.may_command, signed_in.resting, len(page.told)) == (False, True, 1)
+    assert (signed_in.may_command, signed_in.resting, len(page.notified)) == (False, True, 1)
     # Activity alone restores nothing: another person may be at the page.
     sessions.touched(signed_in, 1000.0 + COMMANDS_UNTOUCHED_S + 2)
     assert not signed_in.may_command
     fresh = sessions.unlock(signed_in, 5000.0)
-    assert (signed_in.may_command, len(page.told)) == (True, 2)
+    assert (signed_in.may_command, len(page.notified)) == (True, 2)
     assert sessions.find(token, 5000.0) is None
     assert sessions.find(fresh, 5000.0) is signed_in
 
@@ -304,8 +304,8 @@ def commanded(capsys, monkeypatch, *arguments, line=""):
     monkeypatch.setattr(passwords, "_hasher", cheap_hasher)
     monkeypatch.setattr("sys.stdin", SimpleNamespace(isatty=lambda: False, readline=lambda: line))
     status = command_line.run(["accounts", *map(str, arguments)])
-    told = capsys.readouterr()
-    return status, told.out + told.err
+    printed = capsys.readouterr()
+    return status, printed.out + printed.err
 
 
 def test_accounts_are_kept_from_the_command_line_with_passwords_from_standard_input(

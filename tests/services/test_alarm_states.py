@@ -21,8 +21,8 @@ RETURNED, SHELVED = Message.RETURNED, Message.SHELVED
 
 
 def alarm(name: str = "arm:link", **values: object) -> Alarm:
-    told = {"priority": Message.HIGH, "since": 0.0, "last": 0.0, "by_state": True} | values
-    return Alarm(id=name, robot="arm", source="gateway", code="link.down", text="down", **told)
+    given = {"priority": Message.HIGH, "since": 0.0, "last": 0.0, "by_state": True} | values
+    return Alarm(id=name, robot="arm", source="gateway", code="link.down", text="down", **given)
 
 
 def states(alarms: Alarms) -> dict[str, int]:
@@ -151,7 +151,7 @@ def test_alarms_are_sorted_by_urgency_with_shelved_ones_last():
 
 
 @pytest.mark.parametrize(
-    ("for_s", "reason", "said"),
+    ("for_s", "reason", "expected"),
     [
         (60.0, " ", "reason"),
         (0.0, "service", "more than 0"),
@@ -160,10 +160,10 @@ def test_alarms_are_sorted_by_urgency_with_shelved_ones_last():
         (math.nan, "service", "nan"),
     ],
 )
-def test_a_shelf_needs_a_reason_and_an_end(for_s, reason, said):
+def test_a_shelf_needs_a_reason_and_an_end(for_s, reason, expected):
     alarms = Alarms()
     alarms.activate(alarm(), 0.0)
-    with pytest.raises(AlarmError, match=said):
+    with pytest.raises(AlarmError, match=expected):
         alarms.shelve(["arm:link"], "li", 1.0, for_s=for_s, reason=reason)
     assert states(alarms) == {"arm:link": UNACKNOWLEDGED}
 
@@ -325,9 +325,9 @@ def test_an_event_dated_in_the_future_hides_and_repeats_none():
     events = EventHandler(Alarms())
 
     def event(code: str, at_s: int) -> Event:
-        told = Event(severity=Event.ERROR, code=code)
-        told.timestamp.FromSeconds(at_s)
-        return told
+        event = Event(severity=Event.ERROR, code=code)
+        event.timestamp.FromSeconds(at_s)
+        return event
 
     before, ahead, away = event("before", 900), event("ahead", 5000), event("while.away", 1010)
     events.handle(key, before, now)

@@ -20,13 +20,13 @@ def test_every_alarm_that_the_watch_can_raise_has_chinese_words_on_the_page():
 
 
 def test_every_event_without_an_alarm_has_a_chinese_text():
-    told = set()
+    warnings = set()
     for folder in ("protocol_gateway", "renderer", "services"):
         for source in (HOUSE / folder).rglob("*.py"):
             # A severity and the code behind it, as in: say(_S.INFO, "joints.back", ...)
             text = source.read_text(encoding="utf-8")
-            told |= set(re.findall(r'\bINFO\b[^"()]{0,40}"([a-z_]+\.[a-z_]+)"', text))
-    assert len(told) > 15
+            warnings |= set(re.findall(r'\bINFO\b[^"()]{0,40}"([a-z_]+\.[a-z_]+)"', text))
+    assert len(warnings) > 15
     # The page has its own texts for stops, in both languages.
     known = table("i18n/event-text.ts") | table("i18n/alarm-text.ts") | {"stop.reset"}
-    assert told - known == set()
+    assert warnings - known == set()

@@ -15,9 +15,9 @@ from services.watch.mesh import Mesh
 EPOCH = 1795348800.0
 
 
-def mesh_of(*told: ServiceHealth, site: str = "s") -> Mesh:
+def mesh_of(*reports: ServiceHealth, site: str = "s") -> Mesh:
     mesh = Mesh()
-    for health in told:
+    for health in reports:
         mesh.add_presence(PresenceKey(site, "-", health.service, health.id))
         mesh.record_health(site, health, 0.0)
     return mesh
@@ -59,23 +59,23 @@ def test_losses_are_reported_between_two_thresholds():
 
 
 @pytest.mark.parametrize(
-    ("left_s", "said"),
+    ("left_s", "expected"),
     [
         (864000 - 60.0, "expires on 2026-12-02 11:59 UTC"),
         (-60.0, "expired on 2026-11-22 11:59 UTC"),
         (float("-inf"), "expired on 1970-01-01"),
     ],
 )
-def test_a_certificate_that_expires_soon_is_reported(left_s, said):
+def test_a_certificate_that_expires_soon_is_reported(left_s, expected):
     assert found(mesh_of(health(values={"certificate_seconds": 900000.0}))) == {}
-    told = found(mesh_of(health(values={"certificate_seconds": left_s})))
-    assert said in told["-:certificate.expires:recorder.a1"]
+    texts = found(mesh_of(health(values={"certificate_seconds": left_s})))
+    assert expected in texts["-:certificate.expires:recorder.a1"]
 
 
 def test_a_router_with_a_missing_link_is_reported():
     assert found(mesh_of(health("router", values={"links": 2.0, "links_wanted": 2.0}))) == {}
-    told = found(mesh_of(health("router", values={"links": 1.0, "links_wanted": 2.0})))
-    assert "reaches 1 of the 2 routers" in told["-:router.unlinked:a1"]
+    texts = found(mesh_of(health("router", values={"links": 1.0, "links_wanted": 2.0})))
+    assert "reaches 1 of the 2 routers" in texts["-:router.unlinked:a1"]
     assert found(mesh_of(health("router", values={"links": float("nan"), "links_wanted": 2.0}))) == {}
 
 
@@ -84,8 +84,8 @@ def test_an_alarm_keeps_its_words_while_only_a_number_in_them_counts_on():
     mesh.record_clock("a1", Reading(offset_s=2.0, round_trip_s=0.01))
 
     def judged(now_s: float, left_s: float, received: int, lost: int) -> tuple[list[Condition], ...]:
-        told = health(values={"certificate_seconds": left_s}, received=received, lost=lost)
-        mesh.record_health("s", told, now_s)
+        report = health(values={"certificate_seconds": left_s}, received=received, lost=lost)
+        mesh.record_health("s", report, now_s)
         mesh.record_health("s", ServiceHealth(service="watch", id="me", host="host-b", version="1.0"), now_s)
         conditions = mesh_conditions(
             mesh,

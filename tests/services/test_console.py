@@ -298,15 +298,15 @@ def test_presence_is_sent_on_connect_and_on_each_change(mesh, page):
     async def main():
         async with console(mesh, page) as (address, _), browse(address) as first:
 
-            def told(browser):
+            def presences(browser):
                 return {(m.presence.key.rsplit("/", 1)[0], m.presence.alive) for m in browser.other}
 
             async with open_session(mesh) as gateway:
                 gateway.declare_presence("s", "r", "gateway")
-                await first.until(lambda: ("robomesh/s/r/alive/gateway", True) in told(first))
+                await first.until(lambda: ("robomesh/s/r/alive/gateway", True) in presences(first))
                 async with browse(address) as second:
-                    await second.until(lambda: ("robomesh/s/r/alive/gateway", True) in told(second))
-            await first.until(lambda: ("robomesh/s/r/alive/gateway", False) in told(first))
+                    await second.until(lambda: ("robomesh/s/r/alive/gateway", True) in presences(second))
+            await first.until(lambda: ("robomesh/s/r/alive/gateway", False) in presences(first))
 
     run(main())
 
@@ -332,8 +332,8 @@ def test_a_page_with_invalid_messages_is_closed_with_a_reason(mesh, page):
                         await browser.until(lambda: False)
                     assert closed.value.rcvd.code == 1008
                     assert words in closed.value.rcvd.reason
-                    told = next(each.answer for each in browser.other if each.HasField("answer"))
-                    assert (told.id, told.ok, told.refusal.code) == (0, False, code)
+                    answer = next(each.answer for each in browser.other if each.HasField("answer"))
+                    assert (answer.id, answer.ok, answer.refusal.code) == (0, False, code)
 
     run(main())
 

@@ -160,9 +160,9 @@ def test_a_wrong_password_and_an_unknown_name_get_the_same_refusal(mesh, page, t
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, _, _):
             wrong = await client.sign_in("li", "not the password")
-            nobody = await client.sign_in("nobody", "not the password")
-            assert wrong[0] == nobody[0] == 401
-            assert wrong[2] == nobody[2]
+            unknown_account = await client.sign_in("nobody", "not the password")
+            assert wrong[0] == unknown_account[0] == 401
+            assert wrong[2] == unknown_account[2]
             assert client.cookie == ""
 
     run(main())
@@ -312,8 +312,8 @@ def test_an_invalid_accounts_file_is_reported_and_keeps_sessions(mesh, page, tmp
             async with asyncio.timeout(10.0):
                 async for sample in events:
                     message = sample.message()
-                    told = getattr(message, "events", [message])
-                    codes += [event.code for event in told]
+                    reported = getattr(message, "events", [message])
+                    codes += [event.code for event in reported]
                     if "accounts.unreadable" in codes:
                         break
             assert (await client.get("/account/sessions"))[0] == 200
@@ -330,17 +330,17 @@ def test_signing_in_and_out_and_refusals_are_events_without_secrets(mesh, page, 
             await client.sign_in("li")
             token = client.cookie.partition("=")[2]
             await client.post("/account/sign-out")
-            told = {}
+            published = {}
             async with asyncio.timeout(10.0):
                 async for sample in events:
                     message = sample.message()
                     for event in getattr(message, "events", [message]):
-                        told[event.code] = event
-                    if len(told) == 3:
+                        published[event.code] = event
+                    if len(published) == 3:
                         break
-            assert set(told) == {"account.refused", "account.signed_in", "account.signed_out"}
-            assert told["account.signed_in"].values["account"] == "li"
-            text = " ".join(str(event) for event in told.values())
+            assert set(published) == {"account.refused", "account.signed_in", "account.signed_out"}
+            assert published["account.signed_in"].values["account"] == "li"
+            text = " ".join(str(event) for event in published.values())
             for secret in (PASSWORD, token, "guess", "wrong-field"):
                 assert secret not in text
             events.close()
@@ -385,10 +385,10 @@ def test_only_an_administrator_changes_accounts(mesh, page, tmp_path):
             assert (await li.get("/account/accounts"))[0] == 403
             await client.sign_in("chen")
             add = {"action": "add", "name": "wang", "role": "operator", "password": PASSWORD}
-            status, _, told = await client.post("/account/accounts", add)
-            assert status == 200, told
-            assert "wang" in [each["name"] for each in told["accounts"]]
-            assert "argon2" not in json.dumps(told)
+            status, _, answer = await client.post("/account/accounts", add)
+            assert status == 200, answer
+            assert "wang" in [each["name"] for each in answer["accounts"]]
+            assert "argon2" not in json.dumps(answer)
             assert (await Client(client.address).sign_in("wang"))[0] == 200
             for asked, word, code in (
                 ({"action": "remove", "name": "chen"}, "last_admin", "account.last_admin"),

@@ -37,7 +37,7 @@ async def connected(address, **where):
         writer.close()
 
 
-async def told(address, raw):
+async def status_of(address, raw):
     """Return the status of the response to raw bytes; 0 if the connection was closed without one."""
     async with connected(address) as (reader, writer), asyncio.timeout(ENDS_S):
         try:
@@ -207,7 +207,7 @@ def test_requests_that_are_too_large_or_of_two_minds_are_refused(mesh, page, tmp
                 ("a long path", http("GET", "/" + "x" * 200_000, here, []), {400}),
                 ("no HTTP at all", b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03 hello\r\n\r\n", {400}),
             ):
-                assert await told(here, raw) in allowed, what
+                assert await status_of(here, raw) in allowed, what
             await answers(client)
 
     run(main())

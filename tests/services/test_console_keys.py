@@ -34,8 +34,8 @@ def test_a_page_without_accounts_acts_as_the_console_only(secured, page):
                 answer = await browser.ask(1, f"{ARM}/lease/request/li.hall", ACQUIRE)
                 assert answer.error == "this page may send requests only as console.hall, not as li.hall"
                 assert (await browser.ask(2, f"{ARM}/lease/request/console.hall", ACQUIRE)).ok
-                said = schema.StopRequest(by="li.hall").SerializeToString()
-                assert (await browser.ask(3, f"{ARM}/stop", said)).ok
+                payload = schema.StopRequest(by="li.hall").SerializeToString()
+                assert (await browser.ask(3, f"{ARM}/stop", payload)).ok
                 assert asked == ["console.hall", "console.hall"]
 
     run(main())

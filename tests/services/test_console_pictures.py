@@ -273,8 +273,8 @@ def test_more_streams_than_there_is_room_for_are_refused_and_room_comes_back(mes
             _, _, (_, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=100)
             status, headers, body = await get(address, "/video/s/r/front.mjpeg")
             assert status == 503
-            whose = "_of" if most == "_MOST_OF_ONE" else ""
-            assert read_refusal(headers, body).code == f"view.too_many_streams{whose}"
+            suffix = "_of" if most == "_MOST_OF_ONE" else ""
+            assert read_refusal(headers, body).code == f"view.too_many_streams{suffix}"
             writer.close()
             await unwatched(images)
             head, _, (_, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=100)

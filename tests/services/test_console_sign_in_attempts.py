@@ -16,9 +16,9 @@ __all__ = ["page"]  # a fixture
 def test_too_many_attempts_wait_for_a_stated_time(mesh, page, tmp_path):
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, _, _):
-            told = [await client.sign_in("li", "not the password") for _ in range(4)]
-            assert [status for status, _, _ in told] == [401, 401, 401, 429]
-            _, headers, answer = told[-1]
+            answers = [await client.sign_in("li", "not the password") for _ in range(4)]
+            assert [status for status, _, _ in answers] == [401, 401, 401, 429]
+            _, headers, answer = answers[-1]
             assert (answer["error"], answer["refusal"]["code"]) == ("wait", "account.wait")
             assert answer["refusal"]["values"] == {"seconds": str(answer["seconds"])}
             assert int(headers["retry-after"]) == answer["seconds"] >= 1
@@ -34,13 +34,13 @@ def test_failed_sign_ins_do_not_block_a_password_within_a_session(mesh, page, tm
         async with guarded(mesh, page, tmp_path) as (client, _, _):
             await client.sign_in("li")
             stranger = Client(client.address)
-            told = [(await stranger.sign_in("li", "not the password"))[0] for _ in range(4)]
-            assert told == [401, 401, 401, 429]
+            statuses = [(await stranger.sign_in("li", "not the password"))[0] for _ in range(4)]
+            assert statuses == [401, 401, 401, 429]
             status, headers, _ = await client.post("/account/unlock", {"password": PASSWORD})
             client.keep(headers)
             assert status == 200
-            told = [(await client.post("/account/unlock", {"password": "wrong"}))[0] for _ in range(4)]
-            assert told == [401, 401, 401, 429]
+            statuses = [(await client.post("/account/unlock", {"password": "wrong"}))[0] for _ in range(4)]
+            assert statuses == [401, 401, 401, 429]
             assert (await stranger.sign_in("zhao"))[0] == 200
 
     run(main())
@@ -61,15 +61,15 @@ def test_an_unverified_attempt_is_not_a_failure(mesh, page, tmp_path):
 def test_a_forged_address_does_not_evade_the_limit(mesh, page, tmp_path):
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, _, _):
-            told = []
+            statuses = []
             for number in range(12):
                 body = {"name": f"nobody{number}", "password": "not the password"}
                 answer = await client.post(
                     "/account/sign-in", body, **{"X-Forwarded-For": f"10.0.0.{number}"}
                 )
-                told.append(answer[0])
-            assert told[:10] == [401] * 10
-            assert 429 in told
+                statuses.append(answer[0])
+            assert statuses[:10] == [401] * 10
+            assert 429 in statuses
 
     run(main())
 

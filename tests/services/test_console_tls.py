@@ -12,7 +12,7 @@ from tests.conftest import run
 from tests.services.certificates import self_signed
 from tests.services.signing_in import accounts_file
 from tests.services.test_console import console, page
-from tests.services.test_console_attacks import ENDS_S, connected, ended, http, told
+from tests.services.test_console_attacks import ENDS_S, connected, ended, http, status_of
 
 __all__ = ["page"]  # a fixture
 
@@ -44,7 +44,7 @@ def test_over_tls_the_cookie_is_for_this_host_alone_and_browsers_come_back_by_tl
             assert "set-cookie: __host-robomesh-s=" in head
             assert "; secure" in head
             # Plain HTTP, or an unfinished handshake, affects no other client.
-            assert await told(here, http("GET", "/", here, [])) == 0
+            assert await status_of(here, http("GET", "/", here, [])) == 0
 
     run(main())
 

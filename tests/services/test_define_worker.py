@@ -50,14 +50,14 @@ def test_a_hanging_worker_is_ended_and_the_next_request_is_answered(page):
     (slow,) = set(workers()) - {quick}
     os.kill(slow, signal.SIGSTOP)
     answers = []
-    asking = threading.Thread(
+    request_thread = threading.Thread(
         target=lambda: answers.append(page.post("/mesh", mesh | {"file": "meshes/wrist.wrl"}))
     )
-    asking.start()
+    request_thread.start()
     # Typing continues during it.
     assert page.post("/check", draft).status == 200
-    assert asking.is_alive()
-    asking.join(30.0)
+    assert request_thread.is_alive()
+    request_thread.join(30.0)
     assert (answers[0].status, answers[0].code) == (422, "define.too_slow")
     assert answers[0].json["text"] == "this took more than 5 s and was stopped"
     assert not alive(slow)
@@ -70,11 +70,11 @@ def test_a_killed_worker_is_replaced(page):
     (first,) = workers()
     os.kill(first, signal.SIGSTOP)
     answers = []
-    asking = threading.Thread(target=lambda: answers.append(page.post("/check", draft)))
-    asking.start()
+    request_thread = threading.Thread(target=lambda: answers.append(page.post("/check", draft)))
+    request_thread.start()
     # Before or after the worker has read the request: both must work.
     os.kill(first, signal.SIGKILL)
-    asking.join(30.0)
+    request_thread.join(30.0)
     assert answers[0].status == 200
     (second,) = workers()
     os.kill(second, signal.SIGKILL)
@@ -137,11 +137,11 @@ def test_an_abandoned_request_is_not_run(tmp_path):
     async def main():
         worker = ConfinedWorker(kept.folder, longest_s=5.0, memory_bytes=LIMITS.memory_bytes)
 
-        async def nobody():
+        async def client_is_gone():
             return False
 
         with pytest.raises(RefusedRequest, match="has disconnected"):
-            await worker.run("check", kept.folder, {}, wanted=nobody)
+            await worker.run("check", kept.folder, {}, wanted=client_is_gone)
         assert worker.pid is None
         await worker.close()
 

@@ -218,13 +218,13 @@ def test_the_dashboard_asks_for_metrics_that_there_are():
     for panel in dashboard["panels"]:
         for target in panel.get("targets", ()):
             asked |= set(re.findall(r"\b(?:robomesh|process)_[a-z_]+", target["expr"]))
-    told = {
+    published = {
         f"{prefix}{name}"
         for name in re.findall(r"`(?:robomesh_|process_)?([a-z_]+)`", METRICS)
         for prefix in ("robomesh_", "process_")
     }
     assert asked
-    assert asked <= told, asked - told
+    assert asked <= published, asked - published
 
 
 METRICS = (ROOT / "docs" / "monitoring.md").read_text(encoding="utf-8")
@@ -246,13 +246,13 @@ def test_every_alarm_says_what_to_do():
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "expected"),
     [("0.0.0.0:9100", "others can reach"), ("nonsense", "HOST:PORT is right")],
     ids=["beyond loopback", "no address"],
 )
 @pytest.mark.slow
-def test_metrics_stay_on_this_machine_unless_the_site_says_otherwise(given, said):
+def test_metrics_stay_on_this_machine_unless_the_site_says_otherwise(given, expected):
     result = robomesh("watch", "--metrics", given)
     assert result.returncode == 2
-    assert said in result.stderr
+    assert expected in result.stderr
     assert len(result.stderr.splitlines()) == 1

@@ -15,8 +15,8 @@ MONITORING = (Path(__file__).resolve().parents[2] / "docs" / "monitoring.md").re
 ALL = programs(site_file.DEMO, None, "tcp/127.0.0.1:7447")
 
 
-def places(told):
-    return {each.name: each.arguments[-1] for each in told if "--metrics" in each.arguments}
+def places(text):
+    return {each.name: each.arguments[-1] for each in text if "--metrics" in each.arguments}
 
 
 def test_every_service_of_a_site_has_a_port_of_its_own_in_the_documented_order():

@@ -284,13 +284,13 @@ def test_an_odd_token_is_ignored_counted_and_made_one_event(site):
 
 async def events_of_the_watch(site, do, key):
     """Return the watch's events for a key, until it has checked every process's health again."""
-    events, looks = [], 0
-    said = site.observer.subscribe(f"robomesh/{SITE}/-/events/watch", newest=1000, history=False)
-    beat = f"robomesh/{SITE}/-/health/watch.{site.services['watch'][1].identity}"
-    beats = site.observer.subscribe(beat, newest=10, history=False)
+    events, checks = [], 0
+    subscription = site.observer.subscribe(f"robomesh/{SITE}/-/events/watch", newest=1000, history=False)
+    health_key = f"robomesh/{SITE}/-/health/watch.{site.services['watch'][1].identity}"
+    health = site.observer.subscribe(health_key, newest=10, history=False)
 
     async def follow():
-        async for sample in said:
+        async for sample in subscription:
             message = sample.message()
             if message.code == "mesh.key_ignored" and key in message.values["key"]:
                 events.append(message)
@@ -299,12 +299,12 @@ async def events_of_the_watch(site, do, key):
     await asyncio.to_thread(do)
     try:
         async with asyncio.timeout(WITHIN_S):
-            async for _ in beats:
-                looks += bool(events)
-                if looks > 2:
+            async for _ in health:
+                checks += bool(events)
+                if checks > 2:
                     break
     finally:
-        said.close()
-        beats.close()
+        subscription.close()
+        health.close()
         await following
     return events

@@ -91,16 +91,16 @@ def test_a_running_router_follows_revoked_and_issued_certificates(tmp_path):
                     if "router.without_rights" in str(event.message()):
                         assert "li.here is connected, but has no right here" in str(event.message())
                         break
-            await until(lambda: nobody(li))
+            await until(lambda: is_empty(li))
             authority.issue(folder, "mo", Role.MONITOR)
             async with attached(endpoint, folder.person("mo")) as mo:
                 await until(lambda: there(mo, (SITE, "router")))
-                assert await nobody(li)
+                assert await is_empty(li)
 
     async def there(session, who):
         return who in await names(session)
 
-    async def nobody(session):
+    async def is_empty(session):
         return not await names(session)
 
     run(main(), timeout_s=60.0)

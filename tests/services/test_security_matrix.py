@@ -42,7 +42,7 @@ REQUESTS_OF_ONE_WORD = ("stop",)
 
 
 @dataclass
-class Somebody:
+class Party:
     """Plain Zenoh client with a certificate, without the checks of this library."""
 
     name: str
@@ -83,9 +83,9 @@ def mesh(tmp_path_factory):
     endpoint = f"tls/127.0.0.1:{free_port()}"
     opened = [zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access)))]
 
-    def attach(name: str, role: Role, file: Path) -> Somebody:
+    def attach(name: str, role: Role, file: Path) -> Party:
         opened.append(zenoh.open(one_link(endpoint, bundle(file))))
-        return Somebody(name, role, opened[-1])
+        return Party(name, role, opened[-1])
 
     try:
         everybody = {
@@ -175,15 +175,15 @@ class Arrived:
             return set(self._seen)
 
 
-def answering(somebody: Somebody, keys: list[str]) -> list[zenoh.Queryable]:
+def declare_queryables(party: Party, keys: list[str]) -> list[zenoh.Queryable]:
     def reply(query: zenoh.Query) -> None:
         with query:
-            query.reply(str(query.key_expr), somebody.name)
+            query.reply(str(query.key_expr), party.name)
 
-    return [somebody.session.declare_queryable(each, reply) for each in keys]
+    return [party.session.declare_queryable(each, reply) for each in keys]
 
 
-def asked(somebody: Somebody, keys: list[str]) -> dict[str, set[str]]:
+def asked(party: Party, keys: list[str]) -> dict[str, set[str]]:
     """Return the principals that answered each key; all keys are queried in parallel."""
     left, done = len(keys), threading.Condition()
     answers: dict[str, set[str]] = {each: set() for each in keys}
@@ -201,7 +201,7 @@ def asked(somebody: Somebody, keys: list[str]) -> dict[str, set[str]]:
             if reply.ok is not None:
                 heard.add(reply.ok.payload.to_string())
 
-        somebody.session.get(
+        party.session.get(
             each,
             zenoh.handlers.Callback(on_reply, ended),
             target=zenoh.QueryTarget.ALL,
@@ -225,7 +225,7 @@ def test_each_role_publishes_only_its_topics(mesh):
     }
     arrived = Arrived()
     subscriber = witness.session.declare_subscriber("robomesh/**", arrived)
-    answers = answering(witness, [key(OWN_ROBOT, "stop")])
+    answers = declare_queryables(witness, [key(OWN_ROBOT, "stop")])
     witness.settle()
     for who in (*everybody.values(), gone):
         for robot, (_, topic) in product((*ROBOTS, *VAGUE), PUBLISHED):
@@ -239,7 +239,7 @@ def test_each_role_publishes_only_its_topics(mesh):
 def test_each_role_makes_only_its_requests_in_its_own_name(mesh):
     everybody, witness, gone, _ = mesh
     keys = [key(OWN_ROBOT, topic) for _, topic in ASKED]
-    answers = answering(witness, keys)
+    answers = declare_queryables(witness, keys)
     witness.settle()
     for who in everybody.values():
         wanted = {key(OWN_ROBOT, topic) for row, topic in ASKED if may_ask(who.name, who.role, row, topic)}
@@ -266,7 +266,7 @@ def test_only_owners_of_a_request_and_publishers_of_a_topic_answer(mesh):
         }
     vague = [key(robot, topic) for robot, (_, topic, _) in product(VAGUE, both)]
     for who in (*everybody.values(), gone):
-        declared += answering(who, [*wanted, *vague])
+        declared += declare_queryables(who, [*wanted, *vague])
         who.settle()
     assert asked(witness, list(wanted)) == wanted
     for each in declared:
@@ -334,7 +334,7 @@ def test_a_linked_sites_router_forwards_only_its_own_site_and_people(mesh):
     subscriber = witness.session.declare_subscriber("robomesh/**", arrived)
     names = ["command/li.here", "command/li.there", "command/li.third", "lease/request/li.there", "stop"]
     names += ["views/li.here", "views/li.there", "views/li.third"]
-    answers = answering(witness, [key(OWN_ROBOT, each) for each in names])
+    answers = declare_queryables(witness, [key(OWN_ROBOT, each) for each in names])
     witness.settle()
     for site, topic in product(sites, ("joints", "events", "audit", "video/x")):
         guest.session.put(key(OWN_ROBOT, topic, site), guest.name)
@@ -352,7 +352,7 @@ def test_a_linked_sites_router_forwards_only_its_own_site_and_people(mesh):
     assert {each for each in names if not by[key(OWN_ROBOT, each)]} == {"command/li.here", "views/li.here"}
     for each in (subscriber, *answers):
         each.undeclare()
-    queryables = answering(guest, [key(OWN_ROBOT, "command/x", site) for site in sites])
+    queryables = declare_queryables(guest, [key(OWN_ROBOT, "command/x", site) for site in sites])
     guest.settle()
     by = asked(witness, [key(OWN_ROBOT, "command/x", site) for site in sites])
     assert [bool(by[key(OWN_ROBOT, "command/x", site)]) for site in sites] == [False, True, False]
@@ -395,7 +395,7 @@ def test_the_router_drops_a_message_above_the_limit_on_every_key(mesh):
         )
         for each in chain(*published.values())
     ]
-    answers = answering(witness, [key(OWN_ROBOT, "stop")])
+    answers = declare_queryables(witness, [key(OWN_ROBOT, "stop")])
     witness.settle()
     for name, keys in published.items():
         for each, mebibytes in product(keys, (9, 1)):

@@ -11,9 +11,9 @@ from services.console.errors import SignInBusyError
 from tests.conftest import run
 
 
-def filled(*whose):
+def filled(*attempts):
     queue = SignInQueue()
-    for address, name in whose:
+    for address, name in attempts:
         queue.add((address, name), address=address, name=name)
     return queue
 

@@ -289,9 +289,9 @@ def test_started_robots_are_read_back(tmp_path):
     ],
 )
 def test_an_invalid_list_of_started_robots_is_reported(tmp_path, text, words):
-    with pytest.raises(SiteFileError, match=r"started\.toml") as told:
+    with pytest.raises(SiteFileError, match=r"started\.toml") as caught:
         started(tmp_path, text)
-    assert words in str(told.value)
+    assert words in str(caught.value)
 
 
 def test_a_router_reads_the_same_values_as_other_services(tmp_path):

@@ -22,7 +22,7 @@ State = schema.ControllerState
 Alarm, Request = schema.Alarm, schema.AlarmRequest
 
 
-class Desk:
+class WatchClient:
     """A page's view: the newest alarms and mesh state, and all events of the watch."""
 
     def __init__(self, session):
@@ -65,11 +65,11 @@ class Desk:
         )
         return {each.id: each for each in answer.alarms}
 
-    async def sees(self, service):
+    async def until_present(self, service):
         """Wait until the watch has seen that service."""
         await self.until(lambda: any(each.service == service for each in self.mesh.services))
-        told = self.mesh.timestamp.ToNanoseconds()
-        await self.until(lambda: self.mesh.timestamp.ToNanoseconds() > told)
+        message = self.mesh.timestamp.ToNanoseconds()
+        await self.until(lambda: self.mesh.timestamp.ToNanoseconds() > message)
 
     def codes(self):
         return [event.code for event in self.events]
@@ -79,15 +79,15 @@ class Desk:
 async def watched(mesh, folder, *, settled_s=0.2):
     """Run a watch of site `s`, and a page that follows it."""
     async with open_session(mesh) as own, open_session(mesh) as others:
-        desk = Desk(others)
+        client = WatchClient(others)
         served = Served(service="watch", present_for=(("s", "-"),))
         async with present(own, served):
-            tasks = desk.working = [
+            tasks = client.working = [
                 asyncio.create_task(serve(own, Settings(site="s", folder=folder, settled_s=settled_s))),
-                asyncio.create_task(desk.follow()),
+                asyncio.create_task(client.follow()),
             ]
             try:
-                yield desk
+                yield client
             finally:
                 for task in tasks:
                     task.cancel()
@@ -98,30 +98,30 @@ async def watched(mesh, folder, *, settled_s=0.2):
 async def controller(session, **state):
     """Publish a gateway's `controller` of robot `arm` repeatedly; the test may change the state."""
     publisher = session.declare_publisher("s", "arm", "controller")
-    told = State(**({"link": State.UP, "activity": State.IDLE, "mode": State.REMOTE} | state))
+    message = State(**({"link": State.UP, "activity": State.IDLE, "mode": State.REMOTE} | state))
 
     async def tell():
         while True:
-            publisher.put(told)
+            publisher.put(message)
             await asyncio.sleep(0.2)
 
     task = asyncio.create_task(tell())
     try:
-        yield told
+        yield message
     finally:
         task.cancel()
 
 
 def event(severity, code, text="something", **values):
-    told = schema.Event(severity=severity, code=code, text=text, source="test", values=values)
-    told.timestamp.GetCurrentTime()
-    return told
+    message = schema.Event(severity=severity, code=code, text=text, source="test", values=values)
+    message.timestamp.GetCurrentTime()
+    return message
 
 
 def test_a_link_that_is_down_is_an_alarm_until_it_is_up_and_seen(mesh, tmp_path):
     async def main():
         async with (
-            watched(mesh, tmp_path) as desk,
+            watched(mesh, tmp_path) as client,
             open_session(mesh) as gateway,
             controller(
                 gateway,
@@ -130,18 +130,18 @@ def test_a_link_that_is_down_is_an_alarm_until_it_is_up_and_seen(mesh, tmp_path)
                 link_reasons=[reason_message(codes.LINK_CONNECTING(where="10.0.0.7:5400"))],
             ) as state,
         ):
-            await desk.until(lambda: "arm:link" in desk.alarms)
-            alarm = desk.alarms["arm:link"]
+            await client.until(lambda: "arm:link" in client.alarms)
+            alarm = client.alarms["arm:link"]
             assert alarm.cause == state.link_reasons[0]
             assert (alarm.site, alarm.robot, alarm.code) == ("s", "arm", "link.down")
             assert (alarm.priority, alarm.state) == (Alarm.HIGH, Alarm.UNACKNOWLEDGED)
             assert "10.0.0.7:5400" in alarm.text
             assert alarm.advice
-            answered = await desk.ask(action=Request.ACKNOWLEDGE, ids=["arm:link"])
+            answered = await client.ask(action=Request.ACKNOWLEDGE, ids=["arm:link"])
             assert (answered["arm:link"].state, answered["arm:link"].by) == (Alarm.ACKNOWLEDGED, "li.s")
-            await desk.until(lambda: "alarm.acknowledged" in desk.codes())
+            await client.until(lambda: "alarm.acknowledged" in client.codes())
             state.link = State.UP
-            await desk.until(lambda: not desk.alarms)
+            await client.until(lambda: not client.alarms)
 
     run(main(), timeout_s=90.0)
 
@@ -157,42 +157,42 @@ def test_a_restart_keeps_acknowledged_and_shelved_alarms(mesh, tmp_path):
                 fault="E 17",
             ) as state,
         ):
-            async with watched(mesh, tmp_path) as desk:
-                await desk.until(lambda: {"arm:link", "arm:controller.fault"} <= desk.alarms.keys())
-                await desk.ask(action=Request.ACKNOWLEDGE, ids=["arm:link"])
-                await desk.ask(
+            async with watched(mesh, tmp_path) as client:
+                await client.until(lambda: {"arm:link", "arm:controller.fault"} <= client.alarms.keys())
+                await client.ask(action=Request.ACKNOWLEDGE, ids=["arm:link"])
+                await client.ask(
                     action=Request.SHELVE, ids=["arm:controller.fault"], shelve_s=600.0, reason="service"
                 )
-            async with watched(mesh, tmp_path) as desk:
-                await desk.until(lambda: len(desk.alarms) == 2)
-                shelved = desk.alarms["arm:controller.fault"]
+            async with watched(mesh, tmp_path) as client:
+                await client.until(lambda: len(client.alarms) == 2)
+                shelved = client.alarms["arm:controller.fault"]
                 assert (shelved.state, shelved.reason, shelved.by) == (Alarm.SHELVED, "service", "li.s")
-                assert desk.alarms["arm:link"].state == Alarm.ACKNOWLEDGED
-                assert desk.alarms["arm:link"].cause.code == "several"
-                assert [each.code for each in desk.alarms["arm:link"].cause.causes] == [
+                assert client.alarms["arm:link"].state == Alarm.ACKNOWLEDGED
+                assert client.alarms["arm:link"].cause.code == "several"
+                assert [each.code for each in client.alarms["arm:link"].cause.causes] == [
                     "link.closed",
                     "link.just_ended",
                 ]
                 # An alarm from before the restart clears as if there had been none.
                 state.link, state.fault = State.UP, ""
-                await desk.until(lambda: "arm:link" not in desk.alarms)
+                await client.until(lambda: "arm:link" not in client.alarms)
 
     run(main(), timeout_s=90.0)
 
 
 def test_events_are_alarms_by_the_table_and_end_as_it_says(mesh, tmp_path):
     async def main():
-        async with watched(mesh, tmp_path) as desk, open_session(mesh) as recorder:
-            await desk.until(lambda: desk.mesh.site)
-            said = recorder.declare_publisher("s", "-", "events/recorder")
-            said.put(event(schema.Event.WARNING, "recorder.space", "little space is left"))
+        async with watched(mesh, tmp_path) as client, open_session(mesh) as recorder:
+            await client.until(lambda: client.mesh.site)
+            publisher = recorder.declare_publisher("s", "-", "events/recorder")
+            publisher.put(event(schema.Event.WARNING, "recorder.space", "little space is left"))
             ended = event(schema.Event.CRITICAL, "recorder.ended", "recording a ended")
             ended.reason.CopyFrom(reason_message(codes.LINK_CLOSED()))
-            said.put(ended)
-            said.put(event(schema.Event.WARNING, "kinematics.limit", joint="waist", limit="upper"))
-            said.put(event(schema.Event.WARNING, "kinematics.limit", joint="elbow", limit="upper"))
-            said.put(event(schema.Event.ERROR, "nobody.knows", "not in the table"))
-            said.put(event(schema.Event.INFO, "recorder.saved", "no alarm"))
+            publisher.put(ended)
+            publisher.put(event(schema.Event.WARNING, "kinematics.limit", joint="waist", limit="upper"))
+            publisher.put(event(schema.Event.WARNING, "kinematics.limit", joint="elbow", limit="upper"))
+            publisher.put(event(schema.Event.ERROR, "nobody.knows", "not in the table"))
+            publisher.put(event(schema.Event.INFO, "recorder.saved", "no alarm"))
             names = {
                 "-:recorder.space",
                 "-:recorder.ended",
@@ -200,17 +200,17 @@ def test_events_are_alarms_by_the_table_and_end_as_it_says(mesh, tmp_path):
                 "-:kinematics.limit:elbow",
                 "-:nobody.knows",
             }
-            await desk.until(lambda: desk.alarms.keys() == names)
-            assert desk.alarms["-:recorder.ended"].priority == Alarm.HIGH
-            assert desk.alarms["-:recorder.ended"].cause == ended.reason
-            assert not desk.alarms["-:recorder.space"].HasField("cause")
-            said.put(event(schema.Event.INFO, "recorder.space", "there is space again"))
-            said.put(event(schema.Event.INFO, "kinematics.limit.over", joint="waist", limit="upper"))
-            await desk.until(lambda: desk.alarms["-:recorder.space"].state == Alarm.RETURNED)
-            await desk.until(lambda: desk.alarms["-:kinematics.limit:waist"].state == Alarm.RETURNED)
-            assert desk.alarms["-:kinematics.limit:elbow"].state == Alarm.UNACKNOWLEDGED
+            await client.until(lambda: client.alarms.keys() == names)
+            assert client.alarms["-:recorder.ended"].priority == Alarm.HIGH
+            assert client.alarms["-:recorder.ended"].cause == ended.reason
+            assert not client.alarms["-:recorder.space"].HasField("cause")
+            publisher.put(event(schema.Event.INFO, "recorder.space", "there is space again"))
+            publisher.put(event(schema.Event.INFO, "kinematics.limit.over", joint="waist", limit="upper"))
+            await client.until(lambda: client.alarms["-:recorder.space"].state == Alarm.RETURNED)
+            await client.until(lambda: client.alarms["-:kinematics.limit:waist"].state == Alarm.RETURNED)
+            assert client.alarms["-:kinematics.limit:elbow"].state == Alarm.UNACKNOWLEDGED
             # An alarm that no event clears ends when it is acknowledged.
-            left = await desk.ask(action=Request.ACKNOWLEDGE, ids=sorted(names))
+            left = await client.ask(action=Request.ACKNOWLEDGE, ids=sorted(names))
             assert left.keys() == {"-:kinematics.limit:elbow"}
 
     run(main(), timeout_s=90.0)
@@ -228,14 +228,14 @@ def test_events_are_alarms_by_the_table_and_end_as_it_says(mesh, tmp_path):
 )
 def test_an_impossible_alarm_request_is_refused_with_its_code(mesh, tmp_path, request_, code):
     async def main():
-        async with watched(mesh, tmp_path) as desk:
+        async with watched(mesh, tmp_path) as client:
             with refused(code):
-                await desk.ask(**request_)
+                await client.ask(**request_)
 
     run(main(), timeout_s=60.0)
 
 
-async def seem(session, service, *, robot="-", host="host-b", version="0.1.0", ahead_s=0.0):
+async def run_remote_service(session, service, *, robot="-", host="host-b", version="0.1.0", ahead_s=0.0):
     """Run a process of another machine, with health and a clock that is ahead, until cancelled."""
     session.declare_presence("s", robot, service)
     answer_clock(session, "s", wall_ns=lambda: time.time_ns() + round(ahead_s * 1e9))
@@ -247,9 +247,9 @@ async def seem(session, service, *, robot="-", host="host-b", version="0.1.0", a
 
 
 @asynccontextmanager
-async def seeming(mesh, *args, **values):
+async def remote_service(mesh, *args, **values):
     async with open_session(mesh) as session:
-        task = asyncio.create_task(seem(session, *args, **values))
+        task = asyncio.create_task(run_remote_service(session, *args, **values))
         try:
             yield session
         finally:
@@ -259,77 +259,80 @@ async def seeming(mesh, *args, **values):
 def test_a_clock_that_is_off_is_measured_and_both_machines_are_named(mesh, tmp_path):
     async def main():
         async with (
-            watched(mesh, tmp_path) as desk,
-            seeming(mesh, "recorder", ahead_s=3.0) as other,
-            seeming(mesh, "player", host="host-c", ahead_s=-0.2) as near,
+            watched(mesh, tmp_path) as client,
+            remote_service(mesh, "recorder", ahead_s=3.0) as other,
+            remote_service(mesh, "player", host="host-c", ahead_s=-0.2) as near,
         ):
 
             def measured():
-                seen = {each.id: each for each in desk.mesh.services}
+                seen = {each.id: each for each in client.mesh.services}
                 return {other.identity, near.identity} <= {
                     name for name, each in seen.items() if each.HasField("clock_offset_s")
                 }
 
-            await desk.until(measured)
-            for each in desk.mesh.services:
+            await client.until(measured)
+            for each in client.mesh.services:
                 if each.id in (other.identity, near.identity):
                     offset = {other.identity: 3.0, near.identity: -0.2}[each.id]
                     assert abs(each.clock_offset_s - offset) <= each.round_trip_s / 2 + 1e-3
-            await desk.until(lambda: "-:clock.off:host-b" in desk.alarms)
-            cause = desk.alarms["-:clock.off:host-b"].cause
+            await client.until(lambda: "-:clock.off:host-b" in client.alarms)
+            cause = client.alarms["-:clock.off:host-b"].cause
             assert (cause.code, cause.values["host"], cause.values["seconds"]) == (
                 "clock.ahead",
                 "host-b",
                 "3.0",
             )
             assert cause.values["watch"] in {
-                each.host for each in desk.mesh.services if each.service == "watch"
+                each.host for each in client.mesh.services if each.service == "watch"
             }
-            assert "-:clock.off:host-c" not in desk.alarms
-            assert desk.codes().count("clock.off") == 1
+            assert "-:clock.off:host-c" not in client.alarms
+            assert client.codes().count("clock.off") == 1
 
     run(main(), timeout_s=90.0)
 
 
 def test_duplicate_names_and_differing_versions_are_reported_once_with_both_sides(mesh, tmp_path):
     async def main():
-        async with watched(mesh, tmp_path) as desk, seeming(mesh, "gateway", robot="arm", host="host-a"):
-            async with seeming(mesh, "gateway", robot="arm", host="host-b", version="9.9"):
-                await desk.until(lambda: "arm:mesh.twice:gateway" in desk.alarms)
-                names = desk.alarms["arm:mesh.twice:gateway"].cause.values["names"]
+        async with (
+            watched(mesh, tmp_path) as client,
+            remote_service(mesh, "gateway", robot="arm", host="host-a"),
+        ):
+            async with remote_service(mesh, "gateway", robot="arm", host="host-b", version="9.9"):
+                await client.until(lambda: "arm:mesh.twice:gateway" in client.alarms)
+                names = client.alarms["arm:mesh.twice:gateway"].cause.values["names"]
                 assert "host-a" in names
                 assert "host-b" in names
-                await desk.until(lambda: "-:mesh.versions" in desk.alarms)
-                assert "9.9: gateway (s, host-b, " in desk.alarms["-:mesh.versions"].text
-                assert "0.1.0: " in desk.alarms["-:mesh.versions"].text
-            await desk.until(lambda: {"mesh.twice.over", "mesh.versions.over"} <= set(desk.codes()))
-            assert desk.codes().count("mesh.twice") == 1
+                await client.until(lambda: "-:mesh.versions" in client.alarms)
+                assert "9.9: gateway (s, host-b, " in client.alarms["-:mesh.versions"].text
+                assert "0.1.0: " in client.alarms["-:mesh.versions"].text
+            await client.until(lambda: {"mesh.twice.over", "mesh.versions.over"} <= set(client.codes()))
+            assert client.codes().count("mesh.twice") == 1
             # The list of alarms follows the events, on another topic.
-            await desk.until(lambda: desk.alarms["arm:mesh.twice:gateway"].state == Alarm.RETURNED)
+            await client.until(lambda: client.alarms["arm:mesh.twice:gateway"].state == Alarm.RETURNED)
 
     run(main(), timeout_s=90.0)
 
 
 def test_both_watches_report_a_duplicate_site_name(mesh, tmp_path):
     async def main():
-        async with watched(mesh, tmp_path / "a") as desk, watched(mesh, tmp_path / "b"):
-            await desk.until(lambda: any(each.reason.code == "mesh.site_twice" for each in desk.events))
+        async with watched(mesh, tmp_path / "a") as client, watched(mesh, tmp_path / "b"):
+            await client.until(lambda: any(each.reason.code == "mesh.site_twice" for each in client.events))
 
     run(main(), timeout_s=60.0)
 
 
 def test_a_service_that_is_gone_is_an_alarm_until_it_is_back_or_known(mesh, tmp_path):
     async def main():
-        async with watched(mesh, tmp_path) as desk:
-            async with seeming(mesh, "recorder"):
-                await desk.sees("recorder")
-            await desk.until(lambda: "-:service.gone:recorder" in desk.alarms)
-            assert "recorder (s, host-b, " in desk.alarms["-:service.gone:recorder"].text
-            async with seeming(mesh, "recorder"):
-                await desk.until(lambda: desk.alarms["-:service.gone:recorder"].state == Alarm.RETURNED)
-            await desk.until(lambda: desk.alarms["-:service.gone:recorder"].state == Alarm.UNACKNOWLEDGED)
+        async with watched(mesh, tmp_path) as client:
+            async with remote_service(mesh, "recorder"):
+                await client.until_present("recorder")
+            await client.until(lambda: "-:service.gone:recorder" in client.alarms)
+            assert "recorder (s, host-b, " in client.alarms["-:service.gone:recorder"].text
+            async with remote_service(mesh, "recorder"):
+                await client.until(lambda: client.alarms["-:service.gone:recorder"].state == Alarm.RETURNED)
+            await client.until(lambda: client.alarms["-:service.gone:recorder"].state == Alarm.UNACKNOWLEDGED)
             # Removed for good: acknowledging the alarm ends it.
-            left = await desk.ask(action=Request.ACKNOWLEDGE, ids=["-:service.gone:recorder"])
+            left = await client.ask(action=Request.ACKNOWLEDGE, ids=["-:service.gone:recorder"])
             assert "-:service.gone:recorder" not in left
 
     run(main(), timeout_s=90.0)
@@ -337,67 +340,67 @@ def test_a_service_that_is_gone_is_an_alarm_until_it_is_back_or_known(mesh, tmp_
 
 def test_a_replaced_process_clears_its_alarms(mesh, tmp_path):
     async def main():
-        async def telling(session, text):
-            said = session.declare_publisher("s", "-", "events/recorder")
-            told = event(schema.Event.WARNING, "recorder.space", text)
-            told.source = "recorder"
-            said.put(told)
+        async def publish_warnings(session, text):
+            publisher = session.declare_publisher("s", "-", "events/recorder")
+            message = event(schema.Event.WARNING, "recorder.space", text)
+            message.source = "recorder"
+            publisher.put(message)
 
-        async with watched(mesh, tmp_path) as desk:
-            async with seeming(mesh, "recorder") as recorder:
-                await desk.sees("recorder")
-                await telling(recorder, "little space is left")
-                await desk.until(lambda: "-:recorder.space" in desk.alarms)
-                await desk.ask(action=Request.ACKNOWLEDGE, ids=["-:recorder.space"])
-            await desk.until(lambda: "-:service.gone:recorder" in desk.alarms)
-            assert "-:recorder.space" in desk.alarms, "nobody knows whether there is space again"
+        async with watched(mesh, tmp_path) as client:
+            async with remote_service(mesh, "recorder") as recorder:
+                await client.until_present("recorder")
+                await publish_warnings(recorder, "little space is left")
+                await client.until(lambda: "-:recorder.space" in client.alarms)
+                await client.ask(action=Request.ACKNOWLEDGE, ids=["-:recorder.space"])
+            await client.until(lambda: "-:service.gone:recorder" in client.alarms)
+            assert "-:recorder.space" in client.alarms, "nobody knows whether there is space again"
         # The machine of both restarts; there is more free space, and no event says so.
-        async with watched(mesh, tmp_path) as desk, seeming(mesh, "recorder") as recorder:
-            await desk.until(lambda: "-:recorder.space" in desk.alarms)
-            await desk.until(lambda: "-:recorder.space" not in desk.alarms)
-            await telling(recorder, "little space is left again")
-            await desk.until(lambda: "-:recorder.space" in desk.alarms)
+        async with watched(mesh, tmp_path) as client, remote_service(mesh, "recorder") as recorder:
+            await client.until(lambda: "-:recorder.space" in client.alarms)
+            await client.until(lambda: "-:recorder.space" not in client.alarms)
+            await publish_warnings(recorder, "little space is left again")
+            await client.until(lambda: "-:recorder.space" in client.alarms)
             await asyncio.sleep(1.0)
-            assert desk.alarms["-:recorder.space"].state == Alarm.UNACKNOWLEDGED
+            assert client.alarms["-:recorder.space"].state == Alarm.UNACKNOWLEDGED
 
     run(main(), timeout_s=120.0)
 
 
 def test_a_robot_without_a_gateway_is_forgotten_after_the_acknowledgement(mesh, tmp_path):
     async def main():
-        async with watched(mesh, tmp_path) as desk:
+        async with watched(mesh, tmp_path) as client:
             async with (
-                seeming(mesh, "gateway", robot="arm") as gateway,
+                remote_service(mesh, "gateway", robot="arm") as gateway,
                 controller(gateway, mode=State.LOCAL),
             ):
-                await desk.until(lambda: "arm:controller.local" in desk.alarms)
+                await client.until(lambda: "arm:controller.local" in client.alarms)
                 # A service that was never seen is not expected.
-                await desk.sees("gateway")
+                await client.until_present("gateway")
             gone = "-:service.gone:gateway.arm"
-            await desk.until(lambda: gone in desk.alarms)
+            await client.until(lambda: gone in client.alarms)
             # A robot may still be in the state in which its gateway disappeared.
-            assert desk.alarms["arm:controller.local"].state == Alarm.UNACKNOWLEDGED
-            await desk.ask(action=Request.ACKNOWLEDGE, ids=[gone, "arm:controller.local"])
-            await desk.until(lambda: not desk.alarms)
+            assert client.alarms["arm:controller.local"].state == Alarm.UNACKNOWLEDGED
+            await client.ask(action=Request.ACKNOWLEDGE, ids=[gone, "arm:controller.local"])
+            await client.until(lambda: not client.alarms)
 
     run(main(), timeout_s=90.0)
 
 
 def test_a_replay_raises_no_alarm(mesh, tmp_path):
     async def main():
-        async with watched(mesh, tmp_path) as desk, open_session(mesh) as others:
-            told = {
+        async with watched(mesh, tmp_path) as client, open_session(mesh) as others:
+            publishers = {
                 (robot, topic): others.declare_publisher("s", robot, topic)
                 for robot in ("replay-1", "arm")  # the replay first: it has arrived when the arm has
                 for topic in ("controller", "events", "events/kinematics")
             }
             state = State(link=State.UP, mode=State.LOCAL)
-            while not {"arm:controller.local", "arm:a", "arm:b"} <= desk.alarms.keys():
-                for (_, topic), publisher in told.items():
+            while not {"arm:controller.local", "arm:a", "arm:b"} <= client.alarms.keys():
+                for (_, topic), publisher in publishers.items():
                     code = {"events": "a", "events/kinematics": "b"}.get(topic)
                     publisher.put(event(schema.Event.ERROR, code) if code else state)
                 await asyncio.sleep(0.1)
-            assert not [name for name in desk.alarms if "replay" in name]
+            assert not [name for name in client.alarms if "replay" in name]
 
     run(main(), timeout_s=60.0)
 
@@ -409,18 +412,20 @@ def test_a_router_that_was_away_is_no_alarm_of_everybody_behind_it(tmp_path):
         mesh = SessionSettings(connect=(endpoint,), wait_s=5.0)
         router = await asyncio.to_thread(zenoh.open, router_config((endpoint,)))
         try:
-            async with watched(mesh, tmp_path, settled_s=3.0) as desk:
+            async with watched(mesh, tmp_path, settled_s=3.0) as client:
                 recorder = Served(service="recorder", present_for=(("s", "-"),))
                 async with open_session(mesh) as session, present(session, recorder):
-                    await desk.until(lambda: {"recorder", "watch"} <= {s.service for s in desk.mesh.services})
+                    await client.until(
+                        lambda: {"recorder", "watch"} <= {s.service for s in client.mesh.services}
+                    )
                     await asyncio.to_thread(router.close)
                     await asyncio.sleep(3.5)  # longer than the time for a restart
                     router = await asyncio.to_thread(zenoh.open, router_config((endpoint,)))
-                    before = desk.mesh.timestamp.ToNanoseconds()
-                    await desk.until(lambda: desk.mesh.timestamp.ToNanoseconds() > before + 5 * 10**9)
-                    assert not desk.alarms, desk.alarms
+                    before = client.mesh.timestamp.ToNanoseconds()
+                    await client.until(lambda: client.mesh.timestamp.ToNanoseconds() > before + 5 * 10**9)
+                    assert not client.alarms, client.alarms
                 # A service that really disappears is reported as before.
-                await desk.until(lambda: "-:service.gone:recorder" in desk.alarms)
+                await client.until(lambda: "-:service.gone:recorder" in client.alarms)
         finally:
             await asyncio.to_thread(router.close)
 

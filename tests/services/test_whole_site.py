@@ -302,11 +302,11 @@ def controller():
 def unit_of(controller: str) -> str:
     """Return the unit that a controller sends now."""
     host, port = controller.split(":")
-    told = b""
+    received = b""
     with socket.create_connection((host, int(port)), timeout=20.0) as connection:
-        while told.count(b"TIME") < 3:
-            told += connection.recv(4096)
-    return told.decode().split("TIME")[1]
+        while received.count(b"TIME") < 3:
+            received += connection.recv(4096)
+    return received.decode().split("TIME")[1]
 
 
 def test_ctrl_c_waits_until_what_moves_is_stopped_and_what_is_recorded_is_closed(tmp_path, controller):
@@ -433,7 +433,7 @@ def test_bad_input_is_one_line_that_names_it_and_exit_status_2(tmp_path):
     )
     mesh = tmp_path / "base.wrl"
     mesh.write_text("not a mesh")
-    said = {
+    command_lines = {
         ("up", str(tmp_path / "none.toml")): "none.toml",
         ("up", str(unreadable)): "broken.toml",
         ("kinematics", "--site", str(unknown)): "pt6000",
@@ -454,8 +454,8 @@ def test_bad_input_is_one_line_that_names_it_and_exit_status_2(tmp_path):
         ("robot", "show", "pt6000"): "pt6000",
     }
     with ThreadPoolExecutor(4) as together:
-        results = list(together.map(lambda arguments: robomesh(*arguments), said))
-    for (arguments, words), result in zip(said.items(), results, strict=True):
+        results = list(together.map(lambda arguments: robomesh(*arguments), command_lines))
+    for (arguments, words), result in zip(command_lines.items(), results, strict=True):
         assert result.returncode == 2, (arguments, result)
         assert words in result.stderr, (arguments, result.stderr)
         assert "Traceback" not in result.stderr

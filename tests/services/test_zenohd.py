@@ -26,8 +26,8 @@ pytestmark = pytest.mark.skipif(
 @contextmanager
 def zenohd(settings, folder):
     """Run zenohd with the command line of the printed instructions."""
-    said = service.write_config(settings, folder / "zenohd.json5")
-    command = re.search(r"ZENOH_RUNTIME=.* zenohd --config \S+", said)[0]
+    advice = service.write_config(settings, folder / "zenohd.json5")
+    command = re.search(r"ZENOH_RUNTIME=.* zenohd --config \S+", advice)[0]
     process = subprocess.Popen(
         ["/bin/sh", "-c", f"exec env {command}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )

@@ -110,8 +110,8 @@ def test_an_arm_of_dropped_files_gets_rows_and_limits_is_saved_started_and_moves
 
 def test_the_arm_is_drawn_where_the_server_says_that_it_is(open_page):
     page = opened(open_page, "puma560")
-    drawn, said = tools(page)
-    assert np.allclose(drawn, said, atol=1e-9)
+    drawn, reported = tools(page)
+    assert np.allclose(drawn, reported, atol=1e-9)
     page.get_by_label("Position of shoulder").last.fill("-37.5")
     page.get_by_label("Position of wrist_bend").last.fill("61")
     choose(page, 2)
@@ -305,10 +305,10 @@ def test_a_urdf_and_its_shapes_become_rows(open_page, tmp_path):
     drop(page, *((f"{link}.glb", glb) for link, glb in shapes.items()))
     expect(page.locator(".dh-table tbody tr")).to_have_count(5)
     expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "6")
-    drawn, said = tools(page)
+    drawn, reported = tools(page)
     # The home of a URDF is zero: the arm stretched out.
     assert np.allclose(drawn[:3, 3], [0.6, 0.0, 0.3], atol=1e-6)
-    assert np.allclose(drawn, said, atol=1e-9)
+    assert np.allclose(drawn, reported, atol=1e-9)
 
 
 def test_a_urdf_whose_first_axis_points_down_keeps_its_base_frame(open_page, plant):
@@ -316,19 +316,19 @@ def test_a_urdf_whose_first_axis_points_down_keeps_its_base_frame(open_page, pla
     drop(page, ("down.urdf", KUKA_LIKE.encode()))
     expect(page.locator(".dh-table tbody tr")).to_have_count(6)
     expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "7")
-    drawn, said = tools(page)
+    drawn, reported = tools(page)
     # The URDF's chain at position zero, in its base frame.
     assert np.allclose(drawn[:3, 3], [0.1 + 0.025 + 0.56 + 0.515, 0.2, 0.4 + 0.035 + 0.3], atol=1e-6)
-    assert np.allclose(drawn, said, atol=1e-9)
+    assert np.allclose(drawn, reported, atol=1e-9)
     choose(page, "base")
     assert abs(float(field(page, "base/pose/rpy/0").input_value().replace("−", "-"))) == 180.0
     field(page, "base/pose/xyz/2").fill("100")
     tab(page, "Robot")
     field(page, "units/length").select_option("m")
     settled(page)
-    drawn, said = tools(page)
+    drawn, reported = tools(page)
     assert np.allclose(drawn[2, 3], 0.735 + 0.1, atol=1e-6)
-    assert np.allclose(drawn, said, atol=1e-9)
+    assert np.allclose(drawn, reported, atol=1e-9)
     button(page, "Save").click()
     expect(page.locator(".save-state")).to_have_text("Saved")
     saved = plant.robots / "down" / "robot.toml"
@@ -401,8 +401,8 @@ def test_a_zip_holds_the_description_and_its_shapes(open_page, tmp_path):
     drop(again, ("pt500-copy.zip", download.value.path().read_bytes()))
     expect(again.locator(".dh-table")).to_contain_text("shoulder")
     expect(again.locator('.define-scene canvas[data-shapes="6"]')).to_have_count(1)
-    drawn, said = tools(again)
-    assert np.allclose(drawn, said, atol=1e-9)
+    drawn, reported = tools(again)
+    assert np.allclose(drawn, reported, atol=1e-9)
 
 
 def test_ignored_pairs_frames_constraints_and_views_are_kept(open_page, plant):
@@ -524,9 +524,9 @@ def test_other_units_say_the_same_robot(open_page):
     field(page, "units/length").select_option("m")
     field(page, "units/angle").select_option("rad")
     expect(field(page, "joint/0/d")).to_have_value("0.6604")
-    after, said = tools(page)
+    after, reported = tools(page)
     assert np.allclose(after, before, atol=1e-9)
-    assert np.allclose(after, said, atol=1e-9)
+    assert np.allclose(after, reported, atol=1e-9)
 
 
 def test_a_robot_that_is_not_here_is_said(open_page):

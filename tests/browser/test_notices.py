@@ -145,12 +145,12 @@ def test_an_exact_target_can_be_typed_and_what_is_none_is_refused_in_words(open_
     value.press("Enter")
     expect(page.locator('[data-joint="waist"]')).to_have_text("12.50°")
     expect(notice).to_have_text("Done: waist 12.50°")
-    for text, said in (
+    for text, expected in (
         ("200", "joint waist at 200.00° is beyond its limit 150.00°"),
         ("x", "“x” is no number"),
     ):
         value.click()
         value.fill(text)
         value.press("Enter")
-        expect(notice).to_contain_text(f"Not sent: {said}")
+        expect(notice).to_contain_text(f"Not sent: {expected}")
     button(page, "Release").click()
