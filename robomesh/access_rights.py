@@ -5,7 +5,7 @@ of the session's certificate, and rejects it unless a rule allows it. A client u
 explain a refusal in words, because a router rejects silently.
 
 Some rules are for Zenoh itself: keys with `@adv` are the caches and heartbeats of recovered topics, and
-`endpoints.settle` queries a key without an owner to wait for a router.
+`endpoints.wait_until_declared` queries a key without an owner to wait for a router.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -101,7 +101,7 @@ def rights(principal: Principal, site: str, border: Border = "open") -> tuple[Ru
         return (_everything(outwards=False), _everything(outwards=True))
     if principal.sites:
         return tuple(_linked_site(principal, site, border))
-    return (*_own(principal, site), _everything(outwards=True))
+    return (*_own_site_rules(principal, site), _everything(outwards=True))
 
 
 @lru_cache(4096)
@@ -167,7 +167,7 @@ def _common_names(principal: Principal) -> list[str]:
 # ----------------------------------------------------------------- this site
 
 
-def _own(principal: Principal, site: str) -> Iterator[Rule]:
+def _own_site_rules(principal: Principal, site: str) -> Iterator[Rule]:
     role, robots = principal.role, _robots_of(principal)
 
     def ours(names: Iterable[str], each: Iterable[str] = robots) -> tuple[str, ...]:
@@ -181,13 +181,15 @@ def _own(principal: Principal, site: str) -> Iterator[Rule]:
         yield Rule(acts=_ADVANCED, keys=ours(names))
     if owned := [row for row in REQUESTS.values() if role in row.owners]:
         yield Rule(acts=_ANSWER, keys=ours(row.name for row in owned))
-    yield Rule(acts=_LISTEN, keys=_heard(role))
+    yield Rule(acts=_LISTEN, keys=_subscribable(role))
     yield Rule(acts=_LOOK, keys=(f"{keys.ROOT}/**/@adv/**",))
-    yield Rule(acts=("query",), keys=tuple(_asked(role, _names_of(principal, site))))
+    yield Rule(acts=("query",), keys=tuple(_queryable(role, _names_of(principal, site))))
     yield Rule(acts=_PRESENT, keys=(f"{keys.ROOT}/*/*/alive/*/*",))
     # People are present by their sessions alone.
     present = () if role in PEOPLE else ours([f"alive/{role.value}/*"])
-    yield Rule(acts=("liveliness_token",), keys=(*present, *_held(role, _names_of(principal, site))))
+    yield Rule(
+        acts=("liveliness_token",), keys=(*present, *_session_tokens(role, _names_of(principal, site)))
+    )
     if role is Role.ROS2:
         yield from _ros()
 
@@ -223,7 +225,7 @@ def _names_of(principal: Principal, site: str) -> str:
     return f"$*.{site}" if principal.role is Role.CONSOLE else principal.name
 
 
-def _heard(role: Role) -> tuple[str, ...]:
+def _subscribable(role: Role) -> tuple[str, ...]:
     """Return the topics that a role may subscribe to, row by row.
 
     A subscriber of `robomesh/**` would make every publisher send everything.
@@ -231,7 +233,7 @@ def _heard(role: Role) -> tuple[str, ...]:
     return tuple(f"{keys.ROOT}/*/*/{row.name}" for row in TOPICS.values() if role in row.subscribers)
 
 
-def _asked(role: Role, names: str) -> Iterator[str]:
+def _queryable(role: Role, names: str) -> Iterator[str]:
     """Return the keys that a role may query, at every site."""
     yield f"{keys.ROOT}/-/-/-"
     for row in TOPICS.values():
@@ -240,14 +242,14 @@ def _asked(role: Role, names: str) -> Iterator[str]:
     for request in REQUESTS.values():
         if role in request.askers:
             # Never `**`: it would match any operator's name.
-            yield f"{keys.ROOT}/*/*/{_asked_as(request, names)}"
+            yield f"{keys.ROOT}/*/*/{_query_name(request, names)}"
 
 
-def _asked_as(row: Request, names: str) -> str:
+def _query_name(row: Request, names: str) -> str:
     return f"{row.name.rpartition('/')[0]}/{names}" if row.in_name else row.name
 
 
-def _held(role: Role, names: str) -> Iterator[str]:
+def _session_tokens(role: Role, names: str) -> Iterator[str]:
     """Return the session tokens that a role may declare: at a robot for a lease, at a site for a replay.
 
     Args:
@@ -276,13 +278,15 @@ def _linked_site(principal: Principal, site: str, border: Border) -> Iterator[Ru
     yield Rule(acts=(*_PUBLISH, "liveliness_token"), keys=brought)
     # Its users may send requests and commands here, in their own names, like our users.
     names = ("*",) if hub else tuple(f"$*.{each}" for each in principal.sites)
-    asked = dict.fromkeys(key for name in names for key in _asked(Role.CONSOLE, name))
+    asked = dict.fromkeys(key for name in names for key in _queryable(Role.CONSOLE, name))
     yield Rule(acts=("query",), keys=tuple(asked))
     yield Rule(acts=_LOOK, keys=(f"{keys.ROOT}/**/@adv/**",))
     yield Rule(acts=_PRESENT, keys=(f"{keys.ROOT}/*/*/alive/*/*",))
-    held = dict.fromkeys(key for name in names for key in _held(Role.CONSOLE, name))
+    held = dict.fromkeys(key for name in names for key in _session_tokens(Role.CONSOLE, name))
     yield Rule(acts=("liveliness_token",), keys=tuple(held))
-    yield Rule(acts=_LISTEN, keys=(f"{keys.ROOT}/**",) if border == "open" else tuple(_let_out(site)))
+    yield Rule(
+        acts=_LISTEN, keys=(f"{keys.ROOT}/**",) if border == "open" else tuple(_sent_by_slow_border(site))
+    )
     ours = f"{keys.ROOT}/{site}"
     if hub:
         # A hub represents all other sites, never ours; our site's requests do not go to it.
@@ -290,9 +294,9 @@ def _linked_site(principal: Principal, site: str, border: Border) -> Iterator[Ru
         present = tuple(f"{ours}/*/alive/{role.value}/*" for role in Role if role in SERVICES)
         own_people = f"{keys.ROOT}/*/*/alive/operator/$*.{site}.$*"
         yield Rule(acts=("liveliness_token",), keys=(*present, own_people), allow=False)
-        named = tuple(f"{ours}/*/{_asked_as(row, '*')}" for row in REQUESTS.values())
+        named = tuple(f"{ours}/*/{_query_name(row, '*')}" for row in REQUESTS.values())
         yield Rule(acts=("query",), keys=named, allow=False, outwards=True)
-        own_names = tuple(f"{keys.ROOT}/*/*/{_asked_as(row, f'$*.{site}')}" for row in _in_names())
+        own_names = tuple(f"{keys.ROOT}/*/*/{_query_name(row, f'$*.{site}')}" for row in _in_names())
         yield Rule(acts=("query",), keys=own_names, allow=False)
     if border == "open":
         yield _everything(outwards=True)
@@ -302,14 +306,14 @@ def _linked_site(principal: Principal, site: str, border: Border) -> Iterator[Ru
         keys=_everything(outwards=True).keys,
         outwards=True,
     )
-    yield Rule(acts=_PUBLISH, keys=tuple(_let_out(site)), outwards=True)
+    yield Rule(acts=_PUBLISH, keys=tuple(_sent_by_slow_border(site)), outwards=True)
 
 
 def _in_names() -> tuple[Request, ...]:
     return tuple(row for row in REQUESTS.values() if row.in_name)
 
 
-def _let_out(site: str) -> Iterator[str]:
+def _sent_by_slow_border(site: str) -> Iterator[str]:
     """Return what a slow border sends: topics without a rate, `joints/slow`, and the view `far`."""
     for row in TOPICS.values():
         if row.rate_hz is None or row.name == "joints/slow":
@@ -339,7 +343,7 @@ def refusal(principal: Principal, act: Act, key: str) -> Reason:
     if principal.role not in roles:
         return codes.RIGHT_ROLE(**what, roles=", ".join(sorted(role.value for role in roles)))
     if isinstance(row, Request) and row.in_name and act == "query":
-        own = _asked_as(row, _names_of(principal, principal.site).replace("$*", "NAME"))
+        own = _query_name(row, _names_of(principal, principal.site).replace("$*", "NAME"))
         return codes.RIGHT_NAME(**what, own=own)
     if site != principal.site:
         return codes.RIGHT_SITE(**what, site=site)

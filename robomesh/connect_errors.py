@@ -57,7 +57,7 @@ def left_s(file: Path, at_first: datetime) -> float:
     return (expires - datetime.now(UTC)).total_seconds()
 
 
-def why(endpoint: str, tls: Tls | None) -> str | None:
+def refusal_of_router(endpoint: str, tls: Tls | None) -> str | None:
     """Return why the TLS handshake with a router fails; None: it does not listen, or it accepts us."""
     protocol, _, rest = endpoint.partition("/")
     host, _, port = rest.partition("?")[0].partition("#")[0].rpartition(":")

@@ -156,7 +156,7 @@ def router_values(
     }
 
 
-def settle(session: zenoh.Session, priority: Priority) -> None:
+def wait_until_declared(session: zenoh.Session, priority: Priority) -> None:
     """Wait until the router has received all declarations, if messages of this priority could overtake them.
 
     Declarations travel on the session's first link, and Zenoh shortens keys to numbers that they declare. A

@@ -6,7 +6,7 @@ import zenoh
 from google.protobuf.message import Message
 
 from robomesh import keys
-from robomesh.endpoints import settle
+from robomesh.endpoints import wait_until_declared
 from robomesh.errors import MessageError
 from robomesh.ignored import REPLY
 from robomesh.messages import decode
@@ -30,7 +30,7 @@ async def last_values(session: Session, key_expr: str, *, timeout_s: float = 1.5
             return None
         return key, reply.ok.payload.to_bytes()
 
-    await asyncio.to_thread(settle, session.zenoh_session, row.priority)
+    await asyncio.to_thread(wait_until_declared, session.zenoh_session, row.priority)
     found = await query(session.zenoh_session, key_expr, read, priority=row.priority, timeout_s=timeout_s)
     values: dict[str, Message] = {}
     for key, payload in sorted(dict(found).items()):

@@ -13,7 +13,7 @@ import zenoh.ext
 from google.protobuf.message import Message
 
 from robomesh import keys
-from robomesh.endpoints import settle
+from robomesh.endpoints import wait_until_declared
 from robomesh.header import Header, pack
 from robomesh.messages import PROTOBUF
 from robomesh.schemas.robomesh_pb2 import VideoFrames
@@ -55,7 +55,7 @@ class Publisher:
             self._queryable = session.declare_queryable(self.key, lambda q: self._hand_over(q, on_get, loop))
         elif self.topic.history is not History.NONE:
             self._queryable = session.declare_queryable(self.key, self._answer)
-        settle(session, self.topic.priority)
+        wait_until_declared(session, self.topic.priority)
 
     def put(
         self,

@@ -70,7 +70,7 @@ class Quota:
         self._even_at: dict[str, float] = {}
 
     @contextmanager
-    def one(self, asker: str) -> Iterator[None]:
+    def in_progress(self, asker: str) -> Iterator[None]:
         """Count one request, in progress until the block ends.
 
         Raises:

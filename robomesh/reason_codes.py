@@ -565,8 +565,8 @@ CHECK_NOTE_ENDS = Code(
 )
 CHECK_NOTE_BENT = Code(
     "check.note.bent",
-    "the tool's axis is up to {angle_deg:.1f}° from a uniform rotation between the ends of lines "
-    "{lines}: this arm cannot follow it",
+    "line {lines}: between its ends the tool's axis is up to {angle_deg:.1f}° from a uniform rotation: "
+    "this arm cannot follow it",
 )
 FLOOR_ADVICE = Code(
     "check.floor_advice",

@@ -11,7 +11,7 @@ from google.protobuf.message import Message
 
 from robomesh import keys, pieces, topics
 from robomesh import reason_codes as codes
-from robomesh.endpoints import ON_THE_SECOND_LINK, settle
+from robomesh.endpoints import ON_THE_SECOND_LINK, wait_until_declared
 from robomesh.errors import (
     BrokenAnswerError,
     BusError,
@@ -55,7 +55,7 @@ async def ask_all(
     row, asked = topics.request(keys.parse_expression(key).topic), str(key)
     if row.priority in ON_THE_SECOND_LINK:
         # A thread does not keep the order of requests. No command has such a priority.
-        await asyncio.to_thread(settle, session, row.priority)
+        await asyncio.to_thread(wait_until_declared, session, row.priority)
     priorities = (row.priority, ON_THE_SECOND_LINK[0]) if row.both_links else (row.priority,)
     mark = secrets.token_bytes(MARK_BYTES) if row.both_links else None
     queries = [_query(session, asked, payload, priority, mark, timeout_s) for priority in priorities]

@@ -347,5 +347,10 @@ async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
 def _refusal(settings: SessionSettings) -> str | None:
     """Return why the first reachable router refuses the connection; None: unknown."""
     return next(
-        (reason for each in settings.connect if (reason := connect_errors.why(each, settings.tls))), None
+        (
+            reason
+            for each in settings.connect
+            if (reason := connect_errors.refusal_of_router(each, settings.tls))
+        ),
+        None,
     )

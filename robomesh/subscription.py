@@ -19,7 +19,7 @@ from google.protobuf.message import Message
 
 from robomesh import keys
 from robomesh.delay import Delay
-from robomesh.endpoints import settle
+from robomesh.endpoints import wait_until_declared
 from robomesh.errors import MessageError
 from robomesh.header import Header, unpack
 from robomesh.ignored import PUBLICATION, REPLY, Ignored
@@ -246,7 +246,7 @@ class Subscription:
                     self._take(reply, queried_at=queried_at)
             self._wake()
 
-        settle(self._session, self.topic.priority)
+        wait_until_declared(self._session, self.topic.priority)
         queried_at = time.monotonic()
         self._session.get(
             key_expr,

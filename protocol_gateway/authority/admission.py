@@ -52,7 +52,7 @@ def admit(authority: Authority, request: CommandRequest, *, operator: str, now: 
     if request.id == lease.last_id and lease.last_answer is not None and lease.last_content is not None:
         if content_of(request) == lease.last_content:
             return Verdict(lease.last_answer, repeat=True)
-        used = codes.COMMAND_ID_USED(id=request.id, what=lease.last_content.in_words())
+        used = codes.COMMAND_ID_USED(id=request.id, what=lease.last_content.description())
         return Verdict(not_sent(used))
     if request.id <= lease.last_id:
         return Verdict(not_sent(codes.COMMAND_ID_OLD(id=request.id, last=lease.last_id)))

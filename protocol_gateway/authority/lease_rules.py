@@ -138,7 +138,7 @@ class Content(NamedTuple):
     program: str = ""
     program_name: str = ""
 
-    def in_words(self) -> str:
+    def description(self) -> str:
         """Return a readable line."""
         words = [CommandRequest.Command.Name(self.command), *(f"{each:.6g}" for each in self.joint_positions)]
         if self.speed_percent is not None:

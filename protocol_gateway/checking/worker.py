@@ -44,7 +44,7 @@ def begin(cells: Cells) -> Callable[[Any], Any]:
         cell = cell_of(question.robot)
         match question:
             case Prepare(robot):
-                return Prepared(pending=bool(pending(cell)), problem=_why_not(cell, robot))
+                return Prepared(pending=bool(pending(cell)), problem=_uncheckable(cell, robot))
             case CheckMotion():
                 steps = [
                     Step(line=0, kind=StepKind.MOVE, target=np.array(target)) for target in question.targets
@@ -62,7 +62,7 @@ def begin(cells: Cells) -> Callable[[Any], Any]:
     return answer
 
 
-def _why_not(cell: Cell, robot: str) -> Reason | None:
+def _uncheckable(cell: Cell, robot: str) -> Reason | None:
     """Return why a robot's motions cannot be checked; None: they can."""
     links = cell.arms[robot].model.link_names
     if len(unshaped(cell, robot)) == len(links):

@@ -186,12 +186,12 @@ class _Scan:
         self.offset = len(MAGIC)
         self.before = b""
 
-    def knows(self, stream: IO[bytes]) -> bool:
+    def covers(self, stream: IO[bytes]) -> bool:
         """Return whether the file is the scanned one, possibly with appended data."""
         stream.seek(self.offset - len(self.before))
         return stream.read(len(self.before)) == self.before
 
-    def go_on(self, stream: IO[bytes]) -> None:
+    def scan_appended(self, stream: IO[bytes]) -> None:
         """Scan the data appended since the last call.
 
         Raises:
@@ -255,9 +255,9 @@ class _Scans:
         key = path, inode
         with self._lock:
             scan = self._scans.pop(key, None) or _Scan()  # no other thread uses it until it is put back
-        if not scan.knows(stream):
+        if not scan.covers(stream):
             scan = _Scan()
-        scan.go_on(stream)
+        scan.scan_appended(stream)
         found = scan.layout(whole=whole)
         with self._lock:
             self._scans[key] = scan

@@ -115,7 +115,7 @@ class SeriesReader:
         for topic, own in wanted.items():
             pieces = self._pieces(file, topic, topics[topic], start_ns, end_ns, points, frozenset(own))
             for name in own:
-                thinned = _thinned(name, pieces, file.layout.start_ns, start_ns, end_ns, points)
+                thinned = _combined(name, pieces, file.layout.start_ns, start_ns, end_ns, points)
                 slides = name.split("/")[1] in sliding and name.startswith(_JOINTS)
                 found[name] = replace(thinned, unit=thinned.unit.replace("rad", "m")) if slides else thinned
         return [found[name] for name in names]
@@ -225,7 +225,7 @@ def _cut(file: RecordingFile, topic: str, key: str, pieces: _Pieces) -> _Pieces:
     return pieces
 
 
-def _thinned(name: str, pieces: _Pieces, zero_ns: int, start_ns: int, end_ns: int, points: int) -> Series:
+def _combined(name: str, pieces: _Pieces, zero_ns: int, start_ns: int, end_ns: int, points: int) -> Series:
     """Combine a value's intervals into the requested number."""
     lowest, highest = pieces.lowest.get(name), pieces.highest.get(name)
     none = np.empty(0)

@@ -68,8 +68,7 @@ class Settings:
         listen: `HOST:PORT`; port 0 takes a free port.
         insecure: Accept other machines without TLS or accounts, at the site's own risk.
         accounts: File of accounts for sign-in; None: every client may use the page, under the console's own
-            name if
-            the console has a certificate.
+            name if the console has a certificate.
         certificate: With `key`: serve over TLS (PEM).
         hosts: Host names of the console, in addition to `localhost` and IP addresses.
         page: Folder of the built page.
@@ -228,8 +227,7 @@ class Hub:
         """Return the operator that a page acts as; empty if it may use any name, without certificates.
 
         The router lets a console act under every name of its site, for its accounts. Without accounts all
-        pages act
-        under the console's own name, and share its quotas.
+        pages act under the console's own name, and share its quotas.
         """
         if user is not None:
             return operator_name(user.account.name, self.settings.site)

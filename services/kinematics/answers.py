@@ -87,7 +87,7 @@ def answer_robot_requests(
             raise RefusedError(codes.CHECK_START_UNKNOWN(robot=robot))
         others, _ = cell_state.others(robot)
         question = CheckQuestion(robot, message.SerializeToString(), start, others)
-        with checks.one(request.asker):
+        with checks.in_progress(request.asker):
             return schema.CheckAnswer.FromString(await _ask_worker(workers.check, question, _CHECK_S))
 
     session.answer(site, robot, "mesh/*", answer_mesh)

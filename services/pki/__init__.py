@@ -1,8 +1,7 @@
 """A site's keys: its certificate authority, the certificates that it issued, and their rights.
 
-Reading a folder of keys needs `folder.py` only. Making certificates (`authority.py`, `certificates.py`) needs
-the
-package `cryptography`.
+Reading a folder of keys needs `folder.py` only. Making certificates (`authority.py`, `certificates.py`)
+needs the package `cryptography`.
 """
 
 from services.pki.folder import Folder

@@ -1,8 +1,7 @@
 """Operations on a site's keys: make, issue, revoke, accept from another site.
 
 Each change of the list of principals also writes the routers' rules, which a running router follows.
-Operations
-of several processes run one after the other.
+Operations of several processes run one after the other.
 """
 
 import json

@@ -17,8 +17,7 @@ def renew(folder: Folder, names: Iterable[str] = (), *, all_: bool = False) -> t
     """Renew the given names' keys and certificates, or those that expire soon; each keeps its lifetime.
 
     Without names it renews the site's own services only: a person has to hand over operators' and guests'
-    bundles,
-    and access that was granted for a limited time must not become permanent.
+    bundles, and access that was granted for a limited time must not become permanent.
 
     Args:
         all_: Without names: renew every certificate that has not expired.

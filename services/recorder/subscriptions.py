@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import zenoh
 import zenoh.ext
 
-from robomesh.endpoints import settle
+from robomesh.endpoints import wait_until_declared
 from robomesh.errors import MessageError
 from robomesh.header import Header, unpack
 from robomesh.ignored import PUBLICATION, REPLY, Ignored
@@ -120,7 +120,7 @@ class _TopicSubscription:
             self._blocked_until = 0.0
 
         try:
-            settle(self._session, self.row.priority)
+            wait_until_declared(self._session, self.row.priority)
             self._session.get(
                 self.key_expr,
                 zenoh.handlers.Callback(on_reply, on_end),

@@ -189,8 +189,7 @@ class Alarms:
 
         Raises:
             AlarmError: If the reason is missing, the time exceeds a day or an alarm does not exist; then
-                nothing
-                changes.
+                nothing changes.
         """
         if not reason.strip():
             raise AlarmError(codes.ALARM_NO_REASON())

@@ -1,8 +1,7 @@
 """Alarm rules: which events are alarms, their priority, what clears them and the advice (ISA-18.2).
 
 An alarm requires a person to act. Codes that need no action (a setting, or a fault that another alarm
-reports)
-are listed without a priority, to show that they were considered.
+reports) are listed without a priority, to show that they were considered.
 
     ended by     codes of events that clear it: "link.up"; also its own code or code + ".over" as INFO
     over after   cleared if it is not activated again within this time
@@ -29,8 +28,7 @@ class Rule:
         priority: None if it is not an alarm.
         advice: Recommended action.
         each: Name of an event value: each of its values is an alarm of its own; of "table/plate" the part
-            before
-            the slash counts.
+            before the slash counts.
     """
 
     priority: Alarm.Priority | None

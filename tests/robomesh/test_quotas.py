@@ -23,7 +23,7 @@ def use_up(quota, asker):
     """Use up a caller's quota; return how much it was."""
     for number in range(1000):
         try:
-            with quota.one(asker):
+            with quota.in_progress(asker):
                 pass
         except QuotaError:
             return number
@@ -57,18 +57,18 @@ def test_amount_charged_afterwards_blocks_until_it_refills():
 
 def test_limit_of_parallel_requests_is_released_with_each_request():
     quota = Quota("checks", at_once=2, a_minute=1e9)
-    with quota.one("li"), quota.one("li"):
+    with quota.in_progress("li"), quota.in_progress("li"):
         with (
             pytest.raises(QuotaError, match="li already has 2 requests in progress: quota checks = 2"),
-            quota.one("li"),
+            quota.in_progress("li"),
         ):
             pass
-        with quota.one("wang"):
+        with quota.in_progress("wang"):
             pass
     assert use_up(Quota("checks", at_once=2, a_minute=5), "li") == 5
-    with pytest.raises(ZeroDivisionError), quota.one("li"):
+    with pytest.raises(ZeroDivisionError), quota.in_progress("li"):
         raise ZeroDivisionError
-    with quota.one("li"), quota.one("li"):
+    with quota.in_progress("li"), quota.in_progress("li"):
         pass
 
 
@@ -89,7 +89,7 @@ def test_caller_over_its_quota_waits_or_gets_an_error_which_is_counted(mesh):
         quota = Quota("checks", a_minute=120)
 
         async def answer(request):
-            with quota.one(request.asker):
+            with quota.in_progress(request.asker):
                 return CheckAnswer(ok=True)
 
         async with open_session(mesh) as owner, open_session(mesh) as asker:

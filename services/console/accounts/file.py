@@ -7,8 +7,7 @@
     created = 2026-11-21T08:00:00Z
 
 It is written atomically and readable by its owner only. Changes hold a lock file next to it, so that the
-command
-line and the page's administrators do not overwrite each other's changes.
+command line and the page's administrators do not overwrite each other's changes.
 """
 
 import fcntl

@@ -1,10 +1,8 @@
 """Password rules, and hashing.
 
 Hashes are argon2id (RFC 9106: 64 MiB, three passes, one lane). Verification takes as long for an unknown
-name, so
-that the response time reveals no names. It runs one at a time with a bounded queue (`sign_in_queue.py`), so
-that a
-flood of sign-ins exhausts neither memory nor the event loop.
+name, so that the response time reveals no names. It runs one at a time with a bounded queue
+(`sign_in_queue.py`), so that a flood of sign-ins exhausts neither memory nor the event loop.
 """
 
 import asyncio

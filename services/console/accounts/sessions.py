@@ -1,15 +1,12 @@
 """Sessions of signed-in users, by their tokens, and the reasons that end them.
 
 A session is for watching, since control rooms watch for days: it lasts while one of its pages is open, at
-    most a
-week. The right to command is shorter: it is suspended half an hour after the last activity, and twelve hours
-after
-the last password, until the password is entered again. An operator who has control at that time keeps it: no
-motion
-stops because its operator only watched.
+most a week. The right to command is shorter: it is suspended half an hour after the last activity, and
+twelve hours after the last password, until the password is entered again. An operator who has control at
+that time keeps it: no motion stops because its operator only watched.
 
 Sessions are in memory only: after a restart of the console all users sign in again. The caller passes the
-    time.
+time.
 """
 
 import asyncio

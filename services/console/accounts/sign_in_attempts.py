@@ -73,10 +73,9 @@ class SignInLimits:
     """Limits by account name and by address.
 
     A name waits a minute at most, so that failed attempts by others cannot lock its owner out for long.
-    Unknown names
-    are counted separately, so that a flood of them evicts no real one. A password that is entered again in a
-    session is
-    counted by session, so that failed sign-ins elsewhere do not keep an operator from commanding.
+    Unknown names are counted separately, so that a flood of them evicts no real one. A password that is
+    entered again in a session is counted by session, so that failed sign-ins elsewhere do not keep an
+    operator from commanding.
     """
 
     def __init__(self) -> None:

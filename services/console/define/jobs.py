@@ -98,8 +98,7 @@ def collisions(_: Store, folder: Path, request: Json) -> Json:
     """Return how each pair of links is checked, or why it is not, like `robot check`.
 
     The description's own ignored pairs are judged as well: the page marks them as ignored, and can show the
-    effect
-    of changing that.
+    effect of changing that.
     """
     plan = plan_of(_description(folder, request["description"] | {"collision": {}}))
     return {

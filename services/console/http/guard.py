@@ -1,9 +1,8 @@
 """Request checks of the console, and the security headers of its responses.
 
-A page of another site must not reach a robot through an operator's browser. So the Host header must be one of
-the console's names (otherwise another domain could be resolved to the console: DNS rebinding), and the Origin
-of
-a WebSocket and of every changing request must be the page's own.
+A page of another site must not reach a robot through an operator's browser. So the Host header must be one
+of the console's names (otherwise another domain could be resolved to the console: DNS rebinding), and the
+Origin of a WebSocket and of every changing request must be the page's own.
 """
 
 import contextlib

@@ -4,9 +4,8 @@
     /video/<site>/<robot>/<view>.mp4      fragmented, from the shared video packets
     /image/<site>/<robot>/<view>.jpg      or .png
 
-Without a query it is the shared view; `?width=&height=&fps=` requests a view of that size and rate.
-A slow reader gets the newest picture (for MP4: continues at a key frame). The subscription ends when its
-reader
+Without a query it is the shared view; `?width=&height=&fps=` requests a view of that size and rate. A slow
+reader gets the newest picture (for MP4: continues at a key frame). The subscription ends when its reader
 disconnects or stops reading.
 """
 

@@ -1,10 +1,8 @@
 """One view as one browser watches it: reduced to what its line can carry, without added delay.
 
 If frames have to wait, the view is replaced by one of a smaller size, rate and bit rate (`Views.reduced`),
-which
-all slow browsers share. After some time without waiting, the next larger step is tried; after each failure
-the
-time is doubled.
+which all slow browsers share. After some time without waiting, the next larger step is tried; after each
+failure the time is doubled.
 """
 
 import asyncio

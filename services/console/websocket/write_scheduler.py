@@ -1,9 +1,8 @@
 """Scheduling of writes to pages: samples that arrive between two rounds are written together.
 
 A write costs about the same for one state as for ten (TLS, system call, the page's own work). With one page
-every
-state is written as it arrives; with more pages, more states share a write. The rounds use a quarter of a
-processor, as long as no page waits longer than a display's frame.
+every state is written as it arrives; with more pages, more states share a write. The rounds use a quarter of
+a processor, as long as no page waits longer than a display's frame.
 """
 
 import asyncio

@@ -216,13 +216,13 @@ def test_growing_file_is_scanned_once_and_a_replaced_file_again(tmp_path, monkey
     path.write_bytes(whole[: len(whole) // 2 + 7])
     half = layout_of(path)
     read = []
-    go_on = layout._Scan.go_on
+    scan_appended = layout._Scan.scan_appended
 
     def record_scan(scan, stream):
         read.append(scan.offset)
-        go_on(scan, stream)
+        scan_appended(scan, stream)
 
-    monkeypatch.setattr(layout._Scan, "go_on", record_scan)
+    monkeypatch.setattr(layout._Scan, "scan_appended", record_scan)
     end = len(whole) * 3 // 4
     path.write_bytes(whole[:end])
     grown = layout_of(path)

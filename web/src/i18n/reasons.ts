@@ -847,7 +847,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   [
     "check.note.bent",
     [
-      "the tool's axis is up to {angle_deg}° from a uniform rotation between the ends of lines {lines}: this arm cannot follow it",
+      "line {lines}: between its ends the tool's axis is up to {angle_deg}° from a uniform rotation: this arm cannot follow it",
       "第 {lines} 行的两端之间，工具轴偏离均匀旋转最多 {angle_deg}°：此机械臂无法跟随",
     ],
   ],
