@@ -100,7 +100,10 @@ class Subscription:
         self.topic: Topic = topic(keys.parse_expression(key_expr).topic)
         self._session = session
         self._loop = asyncio.get_running_loop()
+        # Set by the first sample after the ring was found empty: for a thread, and for the event loop.
+        self._arrived = threading.Event()
         self._ready = asyncio.Event()
+        self._awaited = False
         self._ring: deque[Sample] = deque(maxlen=newest)
         self._seen: dict[str, _Seen] = {}
         self._forgotten = _Seen(Header(0, 0, 0))  # counters of forgotten keys
@@ -126,14 +129,29 @@ class Subscription:
         return self
 
     async def __anext__(self) -> Sample:
-        while True:
-            with self._lock:
-                if self._ring:
-                    return self._ring.popleft()
-                self._ready.clear()
+        while (sample := self.take(awaited=True)) is None:
             if self._closed:
                 raise StopAsyncIteration
             await self._ready.wait()
+        return sample
+
+    def take(self, *, awaited: bool = False) -> Sample | None:
+        """Return the next sample without waiting; None: there is none. On any thread.
+
+        Args:
+            awaited: If there is none, the event loop is woken by the next one, and not only `wait`.
+        """
+        with self._lock:
+            if self._ring:
+                return self._ring.popleft()
+            self._arrived.clear()
+            self._ready.clear()
+            self._awaited = awaited
+            return None
+
+    def wait(self, timeout_s: float) -> bool:
+        """Block the calling thread until a sample arrives or the subscription is closed; False: timeout."""
+        return self._arrived.wait(timeout_s)
 
     async def next_batch(self) -> list[Sample]:
         """Wait for a sample and return all samples received; empty after `close`."""
@@ -282,7 +300,7 @@ class Subscription:
                 self._waiting.append(sample)
                 return
             self._take(sample)
-        if not self._ready.is_set():
+        if not self._arrived.is_set():
             self._wake()
 
     def _take(self, sample: zenoh.Sample, *, queried_at: float | None = None) -> None:
@@ -366,7 +384,8 @@ class Subscription:
         return message.SerializeToString(), len(entries)
 
     def _wake(self) -> None:
-        if not self._loop.is_closed():
+        self._arrived.set()
+        if self._awaited and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._ready.set)
 
 

@@ -18,8 +18,7 @@ _CLEANUP_S = 5.0
 class EventLoopThread:
     """An event loop that runs in its own thread until `close`, or until the main thread ends.
 
-    The thread is not a daemon: Python would end a daemon thread inside Zenoh's code, which aborts the
-    process.
+    The thread is not a daemon: Python ends daemon threads inside Zenoh's code, which aborts the process.
     """
 
     def __init__(self) -> None:
