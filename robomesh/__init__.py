@@ -1,1 +1,100 @@
-"""The library that all programs of the mesh share: topics, keys, messages, sessions, requests, services."""
+"""Robots on the network: read their states, control them, and open their recordings.
+
+import robomesh
+
+with robomesh.connect() as mesh:
+    for state in mesh.robot("pt600").joints():
+        print(state.time, state.positions_deg)
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from robomesh.client.blocking import Arm, Mesh, Robot
+    from robomesh.client.control import AsyncArm, CommandResult, StopResult
+    from robomesh.client.mesh import AsyncMesh, RobotNotFoundError, Service
+    from robomesh.client.robot import AsyncRobot, CheckResult, InverseResult, Violation
+    from robomesh.client.samples import Alarm, Event, JointState, Sample
+    from robomesh.client.streams import AsyncStream, StaleError, Stream
+    from robomesh.errors import (
+        BusError,
+        BusyError,
+        MessageError,
+        MotionError,
+        NoAnswerError,
+        QuotaError,
+        RefusedError,
+        SessionError,
+    )
+
+    connect = Mesh
+    connect_async = AsyncMesh
+
+# Imported when they are used: the services import parts of this package, and need no client.
+_MODULES = {
+    "client.blocking": ("Arm", "Mesh", "Robot"),
+    "client.control": ("AsyncArm", "CommandResult", "StopResult"),
+    "client.mesh": ("AsyncMesh", "RobotNotFoundError", "Service"),
+    "client.robot": ("AsyncRobot", "CheckResult", "InverseResult", "Violation"),
+    "client.samples": ("Alarm", "Event", "JointState", "Sample"),
+    "client.streams": ("AsyncStream", "StaleError", "Stream"),
+    "errors": (
+        "BusError",
+        "BusyError",
+        "MessageError",
+        "MotionError",
+        "NoAnswerError",
+        "QuotaError",
+        "RefusedError",
+        "SessionError",
+    ),
+}
+_PLACES = {name: (module, name) for module, names in _MODULES.items() for name in names}
+_PLACES["connect"] = "client.blocking", "Mesh"
+_PLACES["connect_async"] = "client.mesh", "AsyncMesh"
+
+__all__ = [
+    "Alarm",
+    "Arm",
+    "AsyncArm",
+    "AsyncMesh",
+    "AsyncRobot",
+    "AsyncStream",
+    "BusError",
+    "BusyError",
+    "CheckResult",
+    "CommandResult",
+    "Event",
+    "InverseResult",
+    "JointState",
+    "Mesh",
+    "MessageError",
+    "MotionError",
+    "NoAnswerError",
+    "QuotaError",
+    "RefusedError",
+    "Robot",
+    "RobotNotFoundError",
+    "Sample",
+    "Service",
+    "SessionError",
+    "StaleError",
+    "StopResult",
+    "Stream",
+    "Violation",
+    "connect",
+    "connect_async",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, place = _PLACES[name]
+    value = globals()[name] = getattr(import_module(f"{__name__}.{module}"), place)
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

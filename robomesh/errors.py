@@ -8,6 +8,7 @@ BusError
     ├── KeyNameError        a site, robot, topic or operator name that is invalid in a key
     ├── UnknownTopicError   a topic that is not in the table
     ├── MessageError        bytes or JSON that are not the expected message
+    ├── MotionError         a motion that ended before its target, with the reason
     └── RefusedError        a request that its owner refused, with the reason
         ├── BusyError       a request that its owner is too busy to do
         ├── QuotaError      a request over the caller's quota; it may be repeated later
@@ -41,6 +42,11 @@ class CodedError(BusError):
         super().__init__(text or str(reason))
         self.reason = codes.OTHER(detail=reason) if isinstance(reason, str) else reason
 
+    @property
+    def code(self) -> str:
+        """The reason's code: "lease.held"."""
+        return self.reason.code
+
 
 class KeyNameError(CodedError):
     """A name that is invalid in a key."""
@@ -59,6 +65,10 @@ class RefusedError(CodedError):
 
     A request's handler raises it to refuse the request; `ask` raises it at the caller.
     """
+
+
+class MotionError(CodedError):
+    """A motion or program that ended before its target: stopped, control lost, a fault."""
 
 
 class BusyError(RefusedError):

@@ -60,6 +60,12 @@ def reason_message(reason: Reason) -> schema.Reason:
     return message
 
 
+def received_reason(message: schema.Reason) -> Reason:
+    """Return the reason in a received message."""
+    causes = tuple(map(received_reason, message.causes))
+    return Reason(message.code, dict(message.values), causes, message.text)
+
+
 def decode(schema: type[AnyMessage], payload: bytes) -> AnyMessage:
     """Decode a message from protobuf bytes.
 

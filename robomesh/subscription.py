@@ -132,7 +132,7 @@ class Subscription:
         while (sample := self.take(awaited=True)) is None:
             if self._closed:
                 raise StopAsyncIteration
-            await self._ready.wait()
+            await self.arrived()
         return sample
 
     def take(self, *, awaited: bool = False) -> Sample | None:
@@ -148,6 +148,11 @@ class Subscription:
             self._ready.clear()
             self._awaited = awaited
             return None
+
+    async def arrived(self) -> None:
+        """Wait for a sample after `take` found none, or for `close`."""
+        if not self._closed:
+            await self._ready.wait()
 
     def wait(self, timeout_s: float) -> bool:
         """Block the calling thread until a sample arrives or the subscription is closed; False: timeout."""
@@ -230,6 +235,11 @@ class Subscription:
                 self._query_timer.cancel()
             self._subscriber.undeclare()
             self._wake()
+
+    def close_soon(self) -> None:
+        """Unsubscribe; on any thread."""
+        if not self._closed and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self.close)
 
     def _query_again(self) -> None:
         self._query_timer = None

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import threading
 from collections.abc import Callable, Coroutine
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -15,6 +15,22 @@ _POLL_S = 0.2
 _CLEANUP_S = 5.0
 
 
+class _ThreadForEach(ThreadPoolExecutor):
+    """An executor with a thread for each call: Python's accepts none when the main thread has ended."""
+
+    def submit(self, call: Callable[..., T], /, *arguments: Any, **options: Any) -> "Future[T]":
+        future: Future[T] = Future()
+
+        def run() -> None:
+            try:
+                future.set_result(call(*arguments, **options))
+            except BaseException as error:
+                future.set_exception(error)
+
+        threading.Thread(target=run).start()
+        return future
+
+
 class EventLoopThread:
     """An event loop that runs in its own thread until `close`, or until the main thread ends.
 
@@ -23,6 +39,7 @@ class EventLoopThread:
 
     def __init__(self) -> None:
         self._loop = asyncio.new_event_loop()
+        self._loop.set_default_executor(_ThreadForEach())
         self._closing: Callable[[], Coroutine[Any, Any, None]] | None = None
         self._thread = threading.Thread(target=self._run, name="robomesh")
         self._thread.start()

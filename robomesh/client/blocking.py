@@ -1,0 +1,276 @@
+"""The mesh for synchronous programs: the same calls as of the asynchronous classes, which wait.
+
+All calls may be used from several threads; each stream and each arm from one thread at a time.
+"""
+
+import time
+from collections.abc import Coroutine, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal, Self, TypeVar
+
+from robomesh.client.control import AsyncArm, CommandResult, Progress, StopResult
+from robomesh.client.event_loop import EventLoopThread
+from robomesh.client.mesh import AsyncMesh, Service
+from robomesh.client.robot import AsyncRobot, CheckResult, InverseResult, Matrix
+from robomesh.client.samples import Alarm, Event, JointState, Sample
+from robomesh.client.streams import AsyncStream, OnStale, Stream
+from robomesh.endpoints import DEFAULT_ROUTER
+from robomesh.schemas import robomesh_pb2 as schema
+
+T = TypeVar("T")
+
+# A thread that waits shows this several times a second.
+_ALIVE_S = 1.0
+
+
+class Arm:
+    """A controlled arm; a context manager.
+
+    Every motion call waits for the end of the motion, unless `wait=False`. If it is interrupted (Ctrl-C), or
+    the block ends with an error while a motion runs, the robot is stopped. Control lasts while calls wait,
+    and 5 s after the last one.
+
+    Raises:
+        RefusedError: Of every call: the gateway refused it, with the reason's code.
+        MotionError: Of a motion call: the motion ended before its target, with the reason's code.
+        NoAnswerError: The gateway did not answer, or fell silent.
+    """
+
+    def __init__(self, loop: EventLoopThread, arm: AsyncArm) -> None:
+        self._loop, self._arm = loop, arm
+        self._waits_s = float("-inf")
+        arm.progress = Progress(is_alive=lambda: time.monotonic() - self._waits_s < _ALIVE_S)
+
+    def __enter__(self) -> Self:
+        self._run(self._arm.__aenter__())
+        return self
+
+    def __exit__(self, error_type: type[BaseException] | None, *_: object) -> None:
+        self._run(self._arm.leave(failed=error_type is not None))
+
+    @property
+    def operator(self) -> str:
+        """Name that the robot's users see."""
+        return self._arm.operator
+
+    def home(self, *, wait: bool = True) -> CommandResult:
+        """Home the robot."""
+        return self._run(self._arm.home(wait=wait))
+
+    def move_joints(self, positions: Sequence[float], *, wait: bool = True) -> CommandResult:
+        """Move to joint positions [rad], of prismatic joints [m]."""
+        return self._run(self._arm.move_joints(positions, wait=wait))
+
+    def move_joints_deg(self, positions: Sequence[float], *, wait: bool = True) -> CommandResult:
+        """Move to joint positions in degrees, of prismatic joints in mm."""
+        return self._run(self._arm.move_joints_deg(positions, wait=wait))
+
+    def move_joints_by(self, distances: Sequence[float], *, wait: bool = True) -> CommandResult:
+        """Move every joint by a distance [rad], prismatic joints [m]."""
+        return self._run(self._arm.move_joints_by(distances, wait=wait))
+
+    def move_joints_by_deg(self, distances: Sequence[float], *, wait: bool = True) -> CommandResult:
+        """Move every joint by a distance in degrees, prismatic joints in mm."""
+        return self._run(self._arm.move_joints_by_deg(distances, wait=wait))
+
+    def run(self, program: str | Path, *, name: str = "", wait: bool = True) -> CommandResult:
+        """Run a teach program: its text, or the path of its file."""
+        return self._run(self._arm.run(program, name=name, wait=wait))
+
+    def resume(self, *, wait: bool = True) -> CommandResult:
+        """Resume the motion that `hold` paused."""
+        return self._run(self._arm.resume(wait=wait))
+
+    def wait(self) -> None:
+        """Wait for the end of the motion or program that a call with `wait=False` started."""
+        self._run(self._arm.wait())
+
+    def hold(self) -> CommandResult:
+        """Pause the motion."""
+        return self._run(self._arm.hold())
+
+    def speed(self, percent: float) -> CommandResult:
+        """Set the speed of motions, 1 to 100 %."""
+        return self._run(self._arm.speed(percent))
+
+    def trace(self, on: bool) -> CommandResult:
+        """Start or end the controller's trace, which the recorder records."""
+        return self._run(self._arm.trace(on))
+
+    def reset(self, stop_id: int | None = None) -> CommandResult:
+        """Clear a latched stop, after its cause was removed; by default the one that is latched now."""
+        return self._run(self._arm.reset(stop_id))
+
+    def stop(self, reason: str = "") -> StopResult:
+        """Request a stop, which latches. A stop request is not an emergency stop."""
+        return self._run(self._arm.stop(reason))
+
+    def renew(self) -> None:
+        """Keep control for another 5 s."""
+        self._run(self._arm.renew())
+
+    def _run(self, coroutine: Coroutine[Any, Any, T]) -> T:
+        return self._loop.run(coroutine, waiting=self._show_alive)
+
+    def _show_alive(self) -> None:
+        self._waits_s = time.monotonic()
+
+
+class Robot:
+    """A robot of the mesh. Positions are in rad, of prismatic joints in m."""
+
+    def __init__(self, loop: EventLoopThread, robot: AsyncRobot) -> None:
+        self._loop, self._robot = loop, robot
+        self.site, self.name = robot.site, robot.name
+
+    def __str__(self) -> str:
+        return str(self._robot)
+
+    def __repr__(self) -> str:
+        return repr(self._robot)
+
+    def joints(
+        self, *, slow: bool = False, buffer: int = 1, on_stale: OnStale = "raise"
+    ) -> Stream[JointState]:
+        """Return the joint states, the newest first; see `AsyncRobot.joints`."""
+        return self._stream(self._robot.joints, slow=slow, buffer=buffer, on_stale=on_stale)
+
+    def topic(self, name: str, *, buffer: int = 1, on_stale: OnStale = "raise") -> Stream[Sample]:
+        """Return the messages of a topic, the newest first: "controller", "kinematics", "lease", ..."""
+        return self._stream(self._robot.topic, name, buffer=buffer, on_stale=on_stale)
+
+    def events(self, *, history: bool = True) -> Stream[Event]:
+        """Return the events of the robot, by default beginning with the last 100 of each service."""
+        return self._stream(self._robot.events, history=history)
+
+    def last(self, name: str) -> Sample | None:
+        """Return the last message of a topic, of unknown age; None: no service has one."""
+        return self._loop.run(self._robot.last(name))
+
+    def description(self) -> schema.Description:
+        """Return the robot's description: joints with limits, links, frames, URDF."""
+        return self._loop.run(self._robot.description())
+
+    def stop(self, reason: str = "") -> StopResult:
+        """Request a stop; needs no control. It latches until an operator in control resets it.
+
+        A stop request is not an emergency stop.
+
+        Raises:
+            NoAnswerError: If no gateway answered: the robot may still move.
+        """
+        return self._loop.run(self._robot.stop(reason))
+
+    def forward(self, positions: Sequence[float]) -> Mapping[str, Matrix]:
+        """Return the placement of every link and named frame: 4 x 4, to the base frame [m]."""
+        return self._loop.run(self._robot.forward(positions))
+
+    def inverse(
+        self,
+        pose: Iterable[Any],
+        *,
+        task: Literal["5d", "6d"] | None = None,
+        near: Sequence[float] = (),
+        all_solutions: bool = False,
+    ) -> InverseResult:
+        """Return joint positions that bring the tool to a pose; see `AsyncRobot.inverse`."""
+        return self._loop.run(self._robot.inverse(pose, task=task, near=near, all_solutions=all_solutions))
+
+    def check(self, program: str | Path, *, start: Sequence[float] = (), exact: bool = False) -> CheckResult:
+        """Check a teach program: limits, speeds, collisions; see `AsyncRobot.check`."""
+        return self._loop.run(self._robot.check(program, start=start, exact=exact))
+
+    def control(self, operator: str = "", *, take: str = "") -> Arm:
+        """Return the robot's arm, controlled while `with robot.control("ops") as arm` runs.
+
+        Args:
+            operator: Name that the robot's users see; empty: the certificate's, or this process's id. With a
+                certificate only its own name is allowed.
+            take: Reason to take control from another operator, which the operator sees; empty: do not.
+        """
+        return Arm(self._loop, self._robot.control(operator, take=take))
+
+    def si(self, values: Sequence[float]) -> tuple[float, ...]:
+        """Return positions in rad and m for positions in degrees, and mm of prismatic joints."""
+        return self._loop.run(self._robot.si(values))
+
+    def degrees(self, positions: Sequence[float]) -> tuple[float, ...]:
+        """Return positions in degrees, of prismatic joints in mm, for positions in rad and m."""
+        return self._loop.run(self._robot.degrees(positions))
+
+    def _stream(self, begin: Any, *arguments: Any, **options: Any) -> Stream[Any]:
+        return blocking_stream(self._loop, lambda: begin(*arguments, **options))
+
+
+class Mesh:
+    """A connection to the mesh; a context manager. It is closed at the latest when the program ends.
+
+    Args:
+        router: Address of a router, or of several to try in order: "tcp/HOST:PORT", "tls/HOST:PORT".
+        keys: Bundle from `robomesh keys`, for a mesh with certificates.
+        timeout_s: How long to wait for a router [s]; None: forever.
+
+    Raises:
+        SessionError: If no router answers, or it does not accept the certificate.
+    """
+
+    def __init__(
+        self,
+        router: str | Sequence[str] = DEFAULT_ROUTER,
+        *,
+        keys: str | Path | None = None,
+        timeout_s: float | None = 2.0,
+    ) -> None:
+        self._mesh = AsyncMesh(router, keys=keys, timeout_s=timeout_s)
+        self._loop = EventLoopThread()
+        try:
+            self._loop.run(self._mesh.open())
+        except BaseException:
+            self._loop.close()
+            raise
+        self._loop.at_end(self._mesh.close)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Disconnect; all streams end."""
+        self._loop.close()
+
+    def robot(self, name: str) -> Robot:
+        """Return the robot that "robot" or "site/robot" names.
+
+        Raises:
+            RobotNotFoundError: If there is none, or several sites have a robot of that name.
+        """
+        return Robot(self._loop, self._loop.run(self._mesh.robot(name)))
+
+    def robots(self) -> list[Robot]:
+        """Return the robots of all sites that have a running service, by name."""
+        return [Robot(self._loop, each) for each in self._loop.run(self._mesh.robots())]
+
+    def services(self) -> list[Service]:
+        """Return the running services of all sites, by name."""
+        return self._loop.run(self._mesh.services())
+
+    def events(self, *, history: bool = True) -> Stream[Event]:
+        """Return the events of all robots, by default beginning with the last 100 of each service."""
+        return blocking_stream(self._loop, lambda: self._mesh.events(history=history))
+
+    def alarms(self) -> list[Alarm]:
+        """Return the alarms of all sites: all except ended and acknowledged ones, most urgent first."""
+        return self._loop.run(self._mesh.alarms())
+
+
+def blocking_stream(loop: EventLoopThread, begin: Any) -> Stream[Any]:
+    """Return the blocking form of a stream that must begin on the event loop."""
+
+    async def begun() -> AsyncStream[Any]:
+        stream: AsyncStream[Any] = begin()
+        await stream.prepare()
+        return stream
+
+    return loop.run(begun()).blocking()

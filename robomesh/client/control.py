@@ -1,0 +1,505 @@
+"""Control of a robot by a program: a lease that lives only while the program does.
+
+The lease is renewed while a call waits, and once more when the call returns, for 5 s. Nothing else renews it:
+if the program hangs, is stopped or killed, the lease ends, and the gateway stops a motion that may still run.
+"""
+
+import asyncio
+import contextlib
+import logging
+import time
+from collections.abc import Awaitable, Callable, Coroutine, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self, TypeVar
+
+from robomesh import reason_codes as codes
+from robomesh.errors import BusError, BusyError, MessageError, MotionError, NoAnswerError, RefusedError
+from robomesh.keys import robot_key
+from robomesh.messages import received_reason
+from robomesh.presence import OPERATOR, session_of
+from robomesh.reasons import Reason
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
+from robomesh.subscription import Sample, Subscription
+
+T = TypeVar("T")
+log = logging.getLogger(__name__)
+
+_A = schema.LeaseRequest
+_C = schema.CommandRequest
+_MOTIONS = (_C.HOME, _C.RESUME, _C.MOVE_ABSOLUTE, _C.MOVE_RELATIVE)
+
+# While a call waits; renewed four times in that time, so that the lease outlives late answers.
+_WAITING_TTL_S = 2.0
+# After a call: the longest that a gateway grants.
+_IDLE_TTL_S = 5.0
+_RENEWAL_TIMEOUT_S = 0.5
+# A command that was delayed by more than this must not move the arm.
+_VALID_S = 3.0
+_ANSWER_S = 2.0
+# The gateway plans and checks a whole program before it begins.
+_PROGRAM_S = 60.0
+# The gateway publishes `lease` and `program` each second.
+_SILENCE_S = 5.0
+# After the end of control, the gateway publishes the reason within this time.
+_REASON_S = 1.5
+# The publication of a motion's beginning arrives before or shortly after the answer to its command.
+_BEGINS_S = 1.5
+# A stopped arm comes to rest within this time.
+_REST_S, _POLL_S = 5.0, 0.2
+_WARNING = "; mind: "
+
+
+@dataclass(frozen=True)
+class StopResult:
+    """Answer to a stop.
+
+    Attributes:
+        id: Number of the latched stop; 0: none was latched.
+        sent: The stop unit is on the controller's socket; False: it is latched, and sent later.
+        text: Sentence for people.
+    """
+
+    id: int
+    sent: bool
+    text: str
+
+
+@dataclass(frozen=True)
+class CommandResult:
+    """Answer to an accepted command.
+
+    Attributes:
+        text: Sentence for people.
+        warning: Warning of the check; empty: none.
+    """
+
+    text: str
+    warning: str = ""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What a program that waits for its command may show.
+
+    Attributes:
+        on_accepted: Called with the answer of a command whose end is waited for.
+        on_step: Called with each new line of the program that the gateway runs.
+        is_alive: Returns whether the program still waits; if not, the lease is not renewed.
+        stop_reason: Reason of the stop that ends an interrupted motion.
+    """
+
+    on_accepted: Callable[[CommandResult], None] = lambda answer: None
+    on_step: Callable[[schema.ProgramState], None] = lambda state: None
+    is_alive: Callable[[], bool] = lambda: True
+    stop_reason: str = "the program was interrupted"
+
+
+class AsyncArm:
+    """A controlled arm, for asynchronous programs; an asynchronous context manager.
+
+    Every motion call waits for the end of the motion, unless `wait=False`. If it is cancelled, or the block
+    ends with an error while a motion runs, the robot is stopped.
+
+    Raises:
+        RefusedError: Of every call: the gateway refused it, with the reason's code.
+        MotionError: Of a motion call: the motion ended before its target, with the reason's code.
+        NoAnswerError: The gateway did not answer, or fell silent.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        site: str,
+        robot: str,
+        operator: str,
+        *,
+        si: Callable[[Sequence[float]], Awaitable[Sequence[float]]],
+        take: str = "",
+        progress: Progress | None = None,
+    ) -> None:
+        self._session, self._site, self._robot = session, site, robot
+        self._si, self._take = si, take
+        self.progress = Progress() if progress is None else progress
+        self.operator = operator
+        self.stopped: StopResult | None = None
+        self._lease = ""
+        self._last_id = 0
+        # Gateway's clock minus the monotonic clock, at least [ns].
+        self._clock_ns = 0
+        self._moving = False  # a motion or program was accepted, and its end was not seen yet
+        self._accepted_s = 0.0
+        self._runs_program = False
+        self._leases: Subscription | None = None
+        self._programs: Subscription | None = None
+        self._close = contextlib.ExitStack()
+
+    def __str__(self) -> str:
+        return f"{self._site}/{self._robot}"
+
+    # ---------------------------------------------------------------- control
+
+    async def __aenter__(self) -> Self:
+        with contextlib.ExitStack() as undo:
+            identity = session_of(self.operator)
+            token = self._session.declare_presence_of(self._site, self._robot, OPERATOR, identity)
+            undo.callback(token.undeclare)
+            self._leases = self._session.subscribe(self._key("lease"), newest=50)
+            undo.callback(self._leases.close)
+            self._programs = self._session.subscribe(self._key("program"), newest=200)
+            undo.callback(self._programs.close)
+            action = _A.TAKE if self._take else _A.ACQUIRE
+            request = _A(action=action, ttl_s=_IDLE_TTL_S, reason=self._take, session=identity)
+            answer = await self._session.ask(self._lease_key, request)
+            assert isinstance(answer, schema.LeaseAnswer)
+            self._lease = answer.lease
+            self._clock_ns = answer.now.ToNanoseconds() - time.monotonic_ns()
+            self._close = undo.pop_all()
+        return self
+
+    async def __aexit__(self, error_type: type[BaseException] | None, *_: object) -> None:
+        await self.leave(failed=error_type is not None)
+
+    async def leave(self, *, failed: bool) -> None:
+        """Release control.
+
+        Args:
+            failed: Stop a motion that may still run, instead of waiting for its end.
+        """
+        with self._close:
+            try:
+                if self._moving and failed:
+                    await self._stop_if_moving()
+                elif self._moving:
+                    await self.wait()
+            finally:
+                with contextlib.suppress(BusError):
+                    release = _A(action=_A.RELEASE, lease=self._lease)
+                    await self._session.ask(self._lease_key, release, timeout_s=1.0)
+
+    async def renew(self) -> None:
+        """Keep control for another 5 s.
+
+        Raises:
+            RefusedError: If control has ended.
+        """
+        await self._renew(_IDLE_TTL_S)
+
+    # ---------------------------------------------------------------- motions
+
+    async def home(self, *, wait: bool = True) -> CommandResult:
+        """Home the robot."""
+        return await self._motion(_C(command=_C.HOME), wait=wait)
+
+    async def move_joints(self, positions: Sequence[float], *, wait: bool = True) -> CommandResult:
+        """Move to joint positions [rad], of prismatic joints [m]."""
+        return await self._motion(_C(command=_C.MOVE_ABSOLUTE, joint_positions=_floats(positions)), wait=wait)
+
+    async def move_joints_deg(self, positions: Sequence[float], *, wait: bool = True) -> CommandResult:
+        """Move to joint positions in degrees, of prismatic joints in mm.
+
+        Raises:
+            NoAnswerError: Also if the robot has no description to convert them with.
+        """
+        return await self.move_joints(await self._si(_floats(positions)), wait=wait)
+
+    async def move_joints_by(self, distances: Sequence[float], *, wait: bool = True) -> CommandResult:
+        """Move every joint by a distance [rad], prismatic joints [m]."""
+        return await self._motion(_C(command=_C.MOVE_RELATIVE, joint_positions=_floats(distances)), wait=wait)
+
+    async def move_joints_by_deg(self, distances: Sequence[float], *, wait: bool = True) -> CommandResult:
+        """Move every joint by a distance in degrees, prismatic joints in mm."""
+        return await self.move_joints_by(await self._si(_floats(distances)), wait=wait)
+
+    async def run(self, program: str | Path, *, name: str = "", wait: bool = True) -> CommandResult:
+        """Run a teach program: its text, or the path of its file.
+
+        Args:
+            name: Name for display; by default the file's.
+        """
+        name = name or (program.stem if isinstance(program, Path) else "")
+        request = _C(command=_C.RUN_PROGRAM, program=program_text(program), program_name=name)
+        return await self._motion(request, wait=wait)
+
+    async def resume(self, *, wait: bool = True) -> CommandResult:
+        """Resume the motion that `hold` paused."""
+        return await self._motion(_C(command=_C.RESUME), wait=wait)
+
+    async def wait(self) -> None:
+        """Wait for the end of the motion or program that a call with `wait=False` started.
+
+        Raises:
+            MotionError: If it ended before its target.
+        """
+        if self._moving:
+            await self._guarded(self._until_ended())
+
+    # --------------------------------------------------------- other commands
+
+    async def hold(self) -> CommandResult:
+        """Pause the motion."""
+        return await self._other(_C(command=_C.HOLD))
+
+    async def speed(self, percent: float) -> CommandResult:
+        """Set the speed of motions, 1 to 100 %."""
+        return await self._other(_C(command=_C.SPEED, speed_percent=percent))
+
+    async def trace(self, on: bool) -> CommandResult:
+        """Start or end the controller's trace, which the recorder records."""
+        return await self._other(_C(command=_C.TRACE_ON if on else _C.TRACE_OFF))
+
+    async def reset(self, stop_id: int | None = None) -> CommandResult:
+        """Clear a latched stop, after its cause was removed; wait until the robot has come to rest.
+
+        Args:
+            stop_id: Number of the stop; None: the one that is latched now.
+        """
+        if stop_id is None:
+            state = await self._session.last(self._key("controller"))
+            stop_id = state.stop.id if isinstance(state, schema.ControllerState) else 0
+        deadline_s = time.monotonic() + _REST_S
+        while True:
+            try:
+                return await self._other(_C(command=_C.RESET, stop_id=stop_id))
+            except RefusedError as error:
+                if error.code != codes.STOP_MOVING.name or time.monotonic() > deadline_s:
+                    raise
+            await asyncio.sleep(_POLL_S)
+
+    async def stop(self, reason: str = "") -> StopResult:
+        """Request a stop, which latches. A stop request is not an emergency stop."""
+        self._moving = False
+        return await request_stop(self._session, self._site, self._robot, self.operator, reason)
+
+    async def _other(self, request: schema.CommandRequest) -> CommandResult:
+        return await self._guarded(self._command(request))
+
+    async def _command(self, request: schema.CommandRequest) -> CommandResult:
+        """Send a command, and return its answer."""
+        self._last_id += 1
+        within_s = _PROGRAM_S if request.command == _C.RUN_PROGRAM else _ANSWER_S
+        valid_s = max(within_s, _VALID_S)
+        request.lease, request.id = self._lease, self._last_id
+        request.not_after.FromNanoseconds(time.monotonic_ns() + self._clock_ns + round(valid_s * 1e9))
+        answer = await self._renewed(
+            self._session.ask(self._key(f"command/{self.operator}"), request, timeout_s=within_s)
+        )
+        assert isinstance(answer, schema.CommandAnswer)
+        if not answer.accepted:
+            raise RefusedError(answer.text)
+        # An earlier gateway has the warning only in its sentence.
+        return CommandResult(answer.text, answer.warning.text or answer.text.partition(_WARNING)[2])
+
+    async def _motion(self, request: schema.CommandRequest, *, wait: bool) -> CommandResult:
+        return await self._guarded(self._start(request, wait=wait))
+
+    async def _start(self, request: schema.CommandRequest, *, wait: bool) -> CommandResult:
+        for subscription in (self._leases, self._programs):
+            while subscription is not None and subscription.take() is not None:
+                pass  # states from before the motion
+        # Until the answer, the motion may or may not run.
+        self._moving = True
+        try:
+            answer = await self._command(request)
+        except RefusedError:
+            self._moving = False
+            raise
+        self._accepted_s = time.monotonic()
+        self._runs_program = request.command == _C.RUN_PROGRAM
+        if wait:
+            self.progress.on_accepted(answer)
+            await self._until_ended()
+        return answer
+
+    async def _guarded(self, waiting: Coroutine[Any, Any, T]) -> T:
+        """Wait, and stop the robot if the program is interrupted."""
+        try:
+            result = await waiting
+        except asyncio.CancelledError:
+            await self._stop_if_moving()
+            raise
+        if self.progress.is_alive():
+            with contextlib.suppress(BusError):  # the next command reports the end of control
+                await self._renew(_IDLE_TTL_S)
+        return result
+
+    async def _until_ended(self) -> None:
+        ended = self._program_ended if self._runs_program else self._motion_ended
+        await self._renewed(ended())
+        self._moving = False
+
+    async def _stop_if_moving(self) -> None:
+        if not self._moving:
+            return
+        try:
+            self.stopped = await self.stop(self.progress.stop_reason)
+        except BusError as error:
+            log.error("%s: the stop failed: %s; only the end of the lease stops it now", self, error)
+
+    # ---------------------------------------------------------------- renewal
+
+    async def _renewed(self, waiting: Coroutine[Any, Any, T]) -> T:
+        """Wait while renewing the lease.
+
+        Raises:
+            MotionError: If control ended first.
+        """
+        task = asyncio.create_task(waiting)
+        renewing = asyncio.create_task(self._renew_while_alive())
+        try:
+            await asyncio.wait((task, renewing), return_when=asyncio.FIRST_COMPLETED)
+            if not task.done():
+                # The gateway's reason follows shortly, unless another session of that name has control.
+                await asyncio.wait((task,), timeout=_REASON_S)
+            if not task.done():
+                self._moving = False
+                reason = renewing.result().reason
+                text = f"control ended before the motion did: {reason}"
+                raise MotionError(codes.PROGRAM_CONTROL_ENDED(reason), text=text)
+            return task.result()
+        finally:
+            for each in (task, renewing):
+                each.cancel()
+            await asyncio.gather(task, renewing, return_exceptions=True)
+
+    async def _renew_while_alive(self) -> RefusedError:
+        """Renew the lease until the gateway refuses; return its refusal."""
+        while True:
+            if self.progress.is_alive():
+                try:
+                    await self._renew(_WAITING_TTL_S)
+                except (NoAnswerError, BusyError):
+                    pass  # the lease outlives three late answers
+                except RefusedError as error:
+                    return error
+            await asyncio.sleep(_WAITING_TTL_S / 4)
+
+    async def _renew(self, ttl_s: float) -> None:
+        renewal = _A(action=_A.RENEW, lease=self._lease, ttl_s=ttl_s)
+        await self._session.ask(self._lease_key, renewal, timeout_s=_RENEWAL_TIMEOUT_S)
+
+    # -------------------------------------------------------------- their end
+
+    async def _motion_ended(self) -> None:
+        """Wait until the gateway reports that the holder's motion has ended.
+
+        Raises:
+            MotionError: If the robot did not arrive: another operator has control, or it was stopped.
+            NoAnswerError: If the gateway fell silent.
+        """
+        assert self._leases is not None
+        has_moved = False
+        while True:
+            sample = await self._next(self._leases, f"only its dead-man stop can stop {self} now")
+            lease = sample.message()
+            assert isinstance(lease, schema.Lease)
+            if not sample.live:
+                continue
+            if lease.holder != self.operator:
+                self._moving = False
+                reason = received_reason(lease.ended_reason) if lease.HasField("ended_reason") else None
+                text = f"control ended before the motion did: {lease.ended or 'for an unknown reason'}"
+                raise MotionError(codes.PROGRAM_CONTROL_ENDED(reason or codes.ENDED_UNKNOWN()), text=text)
+            has_moved = has_moved or lease.motion
+            if not lease.motion and (has_moved or time.monotonic() - self._accepted_s > _BEGINS_S):
+                await self._raise_if_stopped()
+                return
+
+    async def _program_ended(self) -> None:
+        """Wait until the gateway reports that the program is done and the robot at rest.
+
+        Raises:
+            MotionError: If the program ended before.
+            NoAnswerError: If the gateway fell silent.
+        """
+        assert self._programs is not None
+        line, has_run = 0, False
+        while True:
+            sample = await self._next(self._programs, f"the state of {self} is unknown")
+            program = sample.message()
+            assert isinstance(program, schema.ProgramState)
+            if not sample.live:
+                continue
+            if program.outcome == schema.ProgramState.RUNNING:
+                has_run = True
+                if program.line != line:
+                    line = program.line
+                    self.progress.on_step(program)
+            elif not has_run and time.monotonic() - self._accepted_s < _BEGINS_S:
+                continue  # of an earlier program
+            elif program.outcome == schema.ProgramState.DONE:
+                # The robot may still move to the last target: releasing control now would stop it.
+                return await self._motion_ended()
+            else:
+                self._moving = False
+                reason, text = _program_end(program, line)
+                raise MotionError(reason, text=text)
+
+    async def _next(self, subscription: Subscription, consequence: str) -> Sample:
+        try:
+            async with asyncio.timeout(_SILENCE_S):
+                return await anext(subscription)
+        except (TimeoutError, StopAsyncIteration):
+            raise NoAnswerError(f"the gateway fell silent: {consequence}") from None
+
+    async def _raise_if_stopped(self) -> None:
+        state = await self._session.last(self._key("controller"))
+        if not isinstance(state, schema.ControllerState):
+            return
+        reason: Reason | None = None
+        if state.HasField("stop"):
+            why = state.stop.reason or "stop request"
+            reason = codes.PROGRAM_STOPPED(by=state.stop.by, reason=why)
+        elif state.fault:
+            reason = codes.CONTROLLER_FAULT(fault=state.fault)
+        if reason is not None:
+            self._moving = False
+            raise MotionError(reason)
+
+    @property
+    def _lease_key(self) -> str:
+        return self._key(f"lease/request/{self.operator}")
+
+    def _key(self, name: str) -> str:
+        return robot_key(self._site, self._robot, name)
+
+
+def _program_end(program: schema.ProgramState, line: int) -> tuple[Reason, str]:
+    """Return the reason and the sentence of a program that ended early, last seen at a line."""
+    if program.outcome == schema.ProgramState.ENDED:
+        reason = received_reason(program.reason)
+        return reason, f"ended at line {program.line}: {program.text}"
+    seen = f", which was last seen at line {line}" if line else ""
+    text = f"the gateway restarted, so the program no longer runs{seen}"
+    return codes.ENDED_GATEWAY(), text
+
+
+async def request_stop(session: Session, site: str, robot: str, by: str, reason: str) -> StopResult:
+    """Request a stop of a robot in an operator's name.
+
+    Raises:
+        NoAnswerError: If no gateway answered: the robot may still move.
+    """
+    answer = await session.ask(robot_key(site, robot, "stop"), schema.StopRequest(by=by, reason=reason))
+    assert isinstance(answer, schema.StopAnswer)
+    return StopResult(answer.stop_id, answer.sent, answer.text)
+
+
+def program_text(program: str | Path) -> str:
+    """Return a program's text.
+
+    Raises:
+        MessageError: If its file cannot be read.
+    """
+    if not isinstance(program, Path):
+        return program
+    try:
+        return program.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
+        raise MessageError(f"{program}: cannot be read: {reason}") from None
+
+
+def _floats(values: Sequence[float]) -> list[float]:
+    return [float(value) for value in values]

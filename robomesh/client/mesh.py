@@ -1,0 +1,150 @@
+"""The mesh for asynchronous programs: robots, services, events and alarms of all sites."""
+
+from collections.abc import Sequence
+from contextlib import AsyncExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+from robomesh.client.connection import connected, connection_settings
+from robomesh.client.robot import AsyncRobot, events_of
+from robomesh.client.samples import Alarm, Event, alarm_of
+from robomesh.client.streams import AsyncStream
+from robomesh.endpoints import DEFAULT_ROUTER
+from robomesh.errors import BusError, SessionError
+from robomesh.keys import ROOT, WHOLE_SITE, PresenceKey
+from robomesh.last_values import last_values
+from robomesh.presence import SILENT
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
+
+
+class RobotNotFoundError(BusError):
+    """No robot on the mesh has the name, or several have it.
+
+    Attributes:
+        robots: The robots on the mesh: "site/robot".
+    """
+
+    def __init__(self, text: str, robots: Sequence[str], found: Sequence[str] = ()) -> None:
+        if found:
+            super().__init__(f"{text!r} is at several sites; say which: {', '.join(found)}")
+        else:
+            known = ", ".join(robots) or "none"
+            super().__init__(f"no robot {text!r} on the mesh; there are: {known}")
+        self.robots = tuple(robots)
+
+
+@dataclass(frozen=True)
+class Service:
+    """A running service.
+
+    Attributes:
+        robot: "-": it serves the whole site.
+        id: Of its process; new at each start.
+    """
+
+    site: str
+    robot: str
+    service: str
+    id: str
+
+
+def find_robot(present: Sequence[PresenceKey], text: str) -> tuple[str, str]:
+    """Return site and name of the robot that `robot` or `site/robot` names.
+
+    Raises:
+        RobotNotFoundError: If there is none, or several sites have a robot of that name.
+    """
+    robots = sorted({(key.site, key.robot) for key in present if key.robot != WHOLE_SITE})
+    found = [each for each in robots if text in (each[1], "/".join(each))]
+    if len(found) != 1:
+        raise RobotNotFoundError(
+            text, ["/".join(each) for each in robots], ["/".join(each) for each in found]
+        )
+    return found[0]
+
+
+class AsyncMesh:
+    """A connection to the mesh, for asynchronous programs; an asynchronous context manager.
+
+    Args:
+        router: Address of a router, or of several to try in order: "tcp/HOST:PORT", "tls/HOST:PORT".
+        keys: Bundle from `robomesh keys`, for a mesh with certificates.
+        timeout_s: How long to wait for a router [s]; None: forever.
+    """
+
+    def __init__(
+        self,
+        router: str | Sequence[str] = DEFAULT_ROUTER,
+        *,
+        keys: str | Path | None = None,
+        timeout_s: float | None = 2.0,
+    ) -> None:
+        self._where = router, None if keys is None else Path(keys), timeout_s
+        self._opened: Session | None = None
+        self._close = AsyncExitStack()
+
+    async def __aenter__(self) -> Self:
+        await self.open()
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    async def open(self) -> None:
+        """Connect; `async with` does it.
+
+        Raises:
+            SessionError: If no router answers, or it does not accept the certificate.
+        """
+        router, keys, timeout_s = self._where
+        settings = connection_settings(router, keys, wait_s=timeout_s)
+        self._opened = await self._close.enter_async_context(connected(settings))
+
+    async def close(self) -> None:
+        """Disconnect; all streams end."""
+        await self._close.aclose()
+
+    @property
+    def session(self) -> Session:
+        """The session: for what this class does not offer."""
+        if self._opened is None:
+            raise SessionError("not connected: use `async with robomesh.connect_async() as mesh`")
+        return self._opened
+
+    async def robot(self, name: str) -> AsyncRobot:
+        """Return the robot that "robot" or "site/robot" names.
+
+        Raises:
+            RobotNotFoundError: If there is none, or several sites have a robot of that name.
+        """
+        return AsyncRobot(self.session, *find_robot(await self.session.present(), name))
+
+    async def robots(self) -> list[AsyncRobot]:
+        """Return the robots of all sites that have a running service, by name."""
+        present = await self.session.present()
+        names = sorted({(key.site, key.robot) for key in present if key.robot != WHOLE_SITE})
+        return [AsyncRobot(self.session, *each) for each in names]
+
+    async def services(self) -> list[Service]:
+        """Return the running services of all sites, by name."""
+        present = await self.session.present()
+        return [Service(*key) for key in present if key.service not in SILENT]
+
+    def events(self, *, history: bool = True) -> AsyncStream[Event]:
+        """Return the events of all robots and services.
+
+        Args:
+            history: Begin with the last 100 of each service, oldest first.
+        """
+        return AsyncStream(events_of(self.session, f"{ROOT}/*/*/events/**", history=history))
+
+    async def alarms(self) -> list[Alarm]:
+        """Return the alarms of all sites: all except ended and acknowledged ones, most urgent first."""
+        lists = await last_values(self.session, f"{ROOT}/*/{WHOLE_SITE}/alarms")
+        alarms = [
+            alarm for each in lists.values() if isinstance(each, schema.AlarmList) for alarm in each.alarms
+        ]
+        alarms.sort(key=lambda alarm: (-alarm.priority, alarm.since.ToNanoseconds()))
+        return [alarm_of(alarm) for alarm in alarms]

@@ -1,0 +1,374 @@
+"""A robot of the mesh: its topics, stop, kinematics, and control."""
+
+import asyncio
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import radians
+from pathlib import Path
+from typing import Any, Literal
+
+from google.protobuf.message import Message
+
+from robomesh.client.control import AsyncArm, StopResult, program_text, request_stop
+from robomesh.client.samples import (
+    ROTARY,
+    Event,
+    JointState,
+    Sample,
+    event_of,
+    in_degrees,
+    joint_types,
+    sample_fields,
+)
+from robomesh.client.streams import AsyncStream, OnStale, Reading
+from robomesh.errors import MessageError, NoAnswerError
+from robomesh.keys import check_chunk, check_name, robot_key
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
+from robomesh.subscription import Sample as RawSample
+from robomesh.subscription import Subscription
+from robomesh.topics import topic
+
+_EVENTS = 1000
+# A check or a solution with restarts takes seconds on a busy machine.
+_KINEMATICS_TIMEOUT_S = 30.0
+
+Matrix = tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class InverseResult:
+    """Joint positions that bring the tool to a pose.
+
+    Attributes:
+        solutions: Joint positions [rad or m], the nearest first; empty: none, for the reason in `reason`.
+        residual_m, residual_rad: Distance and angle of the tool from the pose.
+        reason: Why there is no solution, for people; empty: there is one.
+        analytic: Solved in closed form, so that all solutions are known.
+    """
+
+    solutions: tuple[tuple[float, ...], ...]
+    residual_m: float
+    residual_rad: float
+    reason: str
+    analytic: bool
+
+
+@dataclass(frozen=True)
+class Violation:
+    """A place in a program that breaks a rule.
+
+    Attributes:
+        line: In the program's text, from 1.
+        time_s, until_s: From the program's start [s].
+        kind: "program", "limit", "speed", "singularity", "collision", "clearance" or "unreachable".
+        pair: The two objects: "robot/link", a fixture's name, or "the floor".
+        distance_m: Smallest distance of the pair [m]; 0: they touch; None: not a matter of distance.
+        refuses: A gateway with `check = "require"` refuses the program for it.
+        text: Sentence for people.
+    """
+
+    line: int
+    time_s: float
+    until_s: float
+    kind: str
+    pair: tuple[str, ...]
+    distance_m: float | None
+    refuses: bool
+    text: str
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """Result of the check of a program.
+
+    Attributes:
+        ok: Nothing that refuses it.
+        duration_s: Planned duration [s].
+        notes: Limits of the check, for people.
+        alone: Checked only against the arm itself: no floor, no fixture, no other robot.
+    """
+
+    ok: bool
+    duration_s: float
+    violations: tuple[Violation, ...]
+    notes: tuple[str, ...]
+    alone: bool
+
+
+class AsyncRobot:
+    """A robot of the mesh, for asynchronous programs. Positions are in rad, of prismatic joints in m."""
+
+    def __init__(self, session: Session, site: str, name: str) -> None:
+        self._session = session
+        self.site, self.name = check_name(site, "site"), check_name(name, "robot")
+        # Filled in when the description arrives; shared by all joint states.
+        self._types: dict[str, str] = {}
+
+    def __str__(self) -> str:
+        return f"{self.site}/{self.name}"
+
+    def __repr__(self) -> str:
+        return f"<robot {self}>"
+
+    # ----------------------------------------------------------------- topics
+
+    def joints(
+        self, *, slow: bool = False, buffer: int = 1, on_stale: OnStale = "raise"
+    ) -> AsyncStream[JointState]:
+        """Return the joint states, the newest first.
+
+        Args:
+            slow: The 10 Hz states for slow lines.
+            buffer: Number of states kept for a slow program; older ones are skipped, and counted.
+            on_stale: "raise": raise StaleError when no current state arrives in time. "yield": return the
+                last state again, once, with `stale` true.
+        """
+        subscription = self._subscribe("joints/slow" if slow else "joints", buffer)
+
+        def convert(sample: RawSample, stale: bool, skipped: int) -> Iterator[JointState]:
+            fields = sample_fields(sample, sample.message(), stale=stale, skipped=skipped)
+            yield JointState(**fields, types=self._types)
+
+        limit_s = subscription.topic.stale_after_s
+        reading = Reading(subscription, convert, limit_s=limit_s, on_stale=on_stale)
+        return AsyncStream(reading, self._learn_types)
+
+    def topic(self, name: str, *, buffer: int = 1, on_stale: OnStale = "raise") -> AsyncStream[Sample]:
+        """Return the messages of a topic, the newest first: "controller", "kinematics", "lease", ...
+
+        Args:
+            buffer, on_stale: As for `joints`.
+
+        Raises:
+            UnknownTopicError: If there is no such topic.
+        """
+        subscription = self._subscribe(name, buffer)
+
+        def convert(sample: RawSample, stale: bool, skipped: int) -> Iterator[Sample]:
+            yield Sample(**sample_fields(sample, sample.message(), stale=stale, skipped=skipped))
+
+        limit_s = subscription.topic.stale_after_s
+        return AsyncStream(Reading(subscription, convert, limit_s=limit_s, on_stale=on_stale))
+
+    def events(self, *, history: bool = True) -> AsyncStream[Event]:
+        """Return the events of the robot's gateway and of other services about it.
+
+        Args:
+            history: Begin with the last 100 of each service, oldest first.
+        """
+        return AsyncStream(events_of(self._session, f"robomesh/{self}/events/**", history=history))
+
+    async def last(self, name: str) -> Sample | None:
+        """Return the last message of a topic, of unknown age; None: no service has one.
+
+        Raises:
+            UnknownTopicError: If there is no such topic.
+        """
+        async with self.topic(name, on_stale="yield") as stream:
+            return await first_of(stream)
+
+    async def description(self) -> schema.Description:
+        """Return the robot's description: joints with limits, links, frames, URDF.
+
+        Raises:
+            NoAnswerError: If no kinematics service publishes it.
+        """
+        message = await self._session.last(self._key("description"))
+        if not isinstance(message, schema.Description):
+            raise NoAnswerError(f"{self} has no description: start its kinematics service")
+        self._types.clear()
+        self._types.update(joint_types(message))
+        return message
+
+    # --------------------------------------------------------------- requests
+
+    async def stop(self, reason: str = "") -> StopResult:
+        """Request a stop; needs no control. It latches until an operator in control resets it.
+
+        A stop request is not an emergency stop.
+
+        Raises:
+            NoAnswerError: If no gateway answered: the robot may still move.
+        """
+        return await request_stop(self._session, self.site, self.name, self._session.own_name, reason)
+
+    async def forward(self, positions: Sequence[float]) -> Mapping[str, Matrix]:
+        """Return the placement of every link and named frame: 4 x 4, to the base frame [m].
+
+        Args:
+            positions: [rad or m]
+
+        Raises:
+            RefusedError: If the positions do not fit the robot.
+            NoAnswerError: If no kinematics service answers.
+        """
+        request = schema.ForwardRequest(joint_positions=positions)
+        answer = await self._ask("kinematics/forward", request)
+        assert isinstance(answer, schema.ForwardAnswer)
+        placements = {each.name: _matrix(each.placement_to_base) for each in answer.links}
+        return {**placements, "tool": _matrix(answer.tool_to_base)}
+
+    async def inverse(
+        self,
+        pose: Iterable[Any],
+        *,
+        task: Literal["5d", "6d"] | None = None,
+        near: Sequence[float] = (),
+        all_solutions: bool = False,
+    ) -> InverseResult:
+        """Return joint positions that bring the tool to a pose. The robot does not move.
+
+        Args:
+            pose: 4 x 4, tool to base, by rows [m]: nested sequences, a NumPy array, or 16 numbers.
+            task: "6d": position and orientation; "5d": position and the tool's axis. None: "5d" for a robot
+                with fewer than six joints.
+            near: Joint positions to be near to [rad or m]; empty: the robot's current ones are not used.
+
+        Raises:
+            RefusedError: If the pose is invalid.
+            NoAnswerError: If no kinematics service answers.
+        """
+        if task is None:
+            task = "5d" if len((await self.description()).joints) < 6 else "6d"
+        tasks = {"5d": schema.InverseRequest.POSITION_AND_AXIS_5D, "6d": schema.InverseRequest.POSE_6D}
+        if task not in tasks:
+            raise ValueError(f"task={task!r}: '5d' or '6d' are right")
+        request = schema.InverseRequest(
+            pose=_flat(pose), task=tasks[task], near=near, all_solutions=all_solutions
+        )
+        answer = await self._ask("kinematics/inverse", request)
+        assert isinstance(answer, schema.InverseAnswer)
+        return InverseResult(
+            tuple(tuple(each.joint_positions) for each in answer.solutions),
+            answer.residual_m,
+            answer.residual_rad,
+            answer.reason,
+            answer.analytic,
+        )
+
+    async def check(
+        self, program: str | Path, *, start: Sequence[float] = (), exact: bool = False
+    ) -> CheckResult:
+        """Check a teach program: limits, speeds, collisions. The robot does not move.
+
+        Args:
+            program: The program's text, or the path of its file.
+            start: Joint positions at the start [rad or m]; empty: the robot's current ones.
+            exact: Check meshes instead of their convex hulls: slow.
+
+        Raises:
+            RefusedError: If the check is not possible.
+            NoAnswerError: If no kinematics service answers.
+        """
+        request = schema.CheckRequest(program=program_text(program), start=start, exact=exact)
+        answer = await self._ask(f"kinematics/check/{self._session.own_name}", request)
+        assert isinstance(answer, schema.CheckAnswer)
+        violations = (
+            Violation(
+                line=each.line,
+                time_s=each.time_s,
+                until_s=each.until_s,
+                kind=each.kind,
+                pair=tuple(each.pair),
+                distance_m=each.distance if each.HasField("distance") else None,
+                refuses=each.refuses,
+                text=each.text,
+            )
+            for each in answer.violations
+        )
+        return CheckResult(answer.ok, answer.duration_s, tuple(violations), tuple(answer.notes), answer.alone)
+
+    def control(self, operator: str = "", *, take: str = "") -> AsyncArm:
+        """Return the robot's arm, controlled while `async with robot.control("ops") as arm` runs.
+
+        Args:
+            operator: Name that the robot's users see; empty: the certificate's, or this process's id. With a
+                certificate only its own name is allowed.
+            take: Reason to take control from another operator, which the operator sees; empty: do not.
+        """
+        name = check_chunk(operator or self._session.own_name)
+        return AsyncArm(self._session, self.site, self.name, name, si=self.si, take=take)
+
+    # ------------------------------------------------------------------ units
+
+    async def si(self, values: Sequence[float]) -> tuple[float, ...]:
+        """Return positions in rad and m for positions in degrees, and mm of prismatic joints.
+
+        Raises:
+            MessageError: If their number is not the robot's number of joints.
+            NoAnswerError: If the robot has no description.
+        """
+        names, values = await self._named(values)
+        return tuple(
+            radians(value) if self._types[name] == ROTARY else value / 1000.0
+            for name, value in zip(names, values, strict=True)
+        )
+
+    async def degrees(self, positions: Sequence[float]) -> tuple[float, ...]:
+        """Return positions in degrees, of prismatic joints in mm, for positions in rad and m.
+
+        Raises:
+            MessageError: If their number is not the robot's number of joints.
+            NoAnswerError: If the robot has no description.
+        """
+        names, positions = await self._named(positions)
+        return in_degrees(names, positions, self._types, robot=str(self))
+
+    async def _named(self, values: Sequence[float]) -> tuple[tuple[str, ...], tuple[float, ...]]:
+        if not self._types:
+            await self.description()
+        names, values = tuple(self._types), tuple(float(value) for value in values)
+        if len(values) != len(names):
+            raise MessageError(f"{self} has {len(names)} joints ({', '.join(names)}), not {len(values)}")
+        return names, values
+
+    async def _learn_types(self) -> None:
+        try:
+            await self.description()
+        except NoAnswerError:
+            return  # only degrees need them
+
+    def _key(self, name: str) -> str:
+        return robot_key(self.site, self.name, name)
+
+    def _subscribe(self, name: str, buffer: int) -> Subscription:
+        topic(name)  # names what is wrong with it
+        return self._session.subscribe(self._key(name), newest=buffer)
+
+    async def _ask(self, name: str, request: Message) -> Message:
+        return await self._session.ask(self._key(name), request, timeout_s=_KINEMATICS_TIMEOUT_S)
+
+
+async def first_of(stream: AsyncStream[Sample]) -> Sample | None:
+    """Return the first sample of a stream that arrives within the time of a query; None: there is none."""
+    try:
+        async with asyncio.timeout(2.0):
+            return await anext(stream)
+    except (TimeoutError, StopAsyncIteration):
+        return None
+
+
+def events_of(session: Session, key_expr: str, *, history: bool) -> Reading[Event]:
+    """Return the reading of the events of a key expression."""
+
+    def convert(sample: RawSample, stale: bool, skipped: int) -> Iterator[Event]:
+        message, key = sample.message(), sample.parsed
+        if isinstance(message, schema.Event):
+            yield event_of(key.site, key.robot, message)
+        elif isinstance(message, schema.EventList):
+            yield from (event_of(key.site, key.robot, each) for each in message.events)
+
+    subscription = session.subscribe(key_expr, newest=_EVENTS, history=history)
+    return Reading(subscription, convert, limit_s=None, on_stale="raise")
+
+
+def _flat(pose: Iterable[Any]) -> list[float]:
+    values: list[float] = []
+    for each in pose:
+        values.extend(_flat(each) if isinstance(each, Iterable) else (float(each),))
+    return values
+
+
+def _matrix(values: Sequence[float]) -> Matrix:
+    return tuple(tuple(values[row : row + 4]) for row in range(0, 16, 4))

@@ -1,0 +1,226 @@
+"""Streams of messages: the newest first, without stale ones unless the program asks for them."""
+
+import asyncio
+import contextlib
+import time
+import weakref
+from collections import deque
+from collections.abc import Awaitable, Callable, Iterable
+from dataclasses import replace
+from typing import Generic, Literal, Self, TypeVar
+
+from robomesh.client.samples import Sample
+from robomesh.errors import BusError, MessageError
+from robomesh.subscription import Sample as RawSample
+from robomesh.subscription import Subscription
+
+T = TypeVar("T")
+
+OnStale = Literal["raise", "yield"]
+# The first message may take this long [s], for example over a slow line.
+_FIRST_S = 2.0
+# How often a blocked thread looks whether its stream was closed [s].
+_POLL_S = 0.5
+
+
+class StaleError(BusError):
+    """A topic without a new message for longer than its limit; the last one is not current.
+
+    Attributes:
+        last: The last message; None: none arrived.
+        silent_s: Time since the last current message, or since the stream began [s].
+    """
+
+    def __init__(self, name: str, limit_s: float, silent_s: float, last: object) -> None:
+        there = "its last message is not current" if last is not None else "it has no publisher"
+        super().__init__(
+            f"{name}: no current message for {silent_s:.1f} s (limit {limit_s:g} s): {there}. See "
+            "`robomesh list`: is the service running, and the controller connected?"
+        )
+        self.last, self.silent_s = last, silent_s
+
+
+class Reading(Generic[T]):
+    """What a stream returns, without the waiting.
+
+    Args:
+        convert: Returns the values of a sample, given `stale` and `skipped`.
+        limit_s: Age from which a message is stale [s]; None: never.
+        on_stale: "raise": leave stale messages out, and raise StaleError when the topic falls silent.
+            "yield": return them, and the last one again when the topic falls silent, with `stale` true.
+    """
+
+    def __init__(
+        self,
+        subscription: Subscription,
+        convert: Callable[[RawSample, bool, int], Iterable[T]],
+        *,
+        limit_s: float | None,
+        on_stale: OnStale,
+    ) -> None:
+        if on_stale not in ("raise", "yield"):
+            raise ValueError(f"on_stale={on_stale!r}: 'raise' or 'yield' are right")
+        self.subscription = subscription
+        self.skipped = 0
+        self._convert, self._limit_s, self._on_stale = convert, limit_s, on_stale
+        self._last: T | None = None
+        self._values: deque[T] = deque()
+        self._previous: RawSample | None = None
+        self._current_s = time.monotonic()
+        self._deadline_s = None if limit_s is None else self._current_s + max(limit_s, _FIRST_S)
+
+    def next(self, *, awaited: bool) -> T | None:
+        """Return the next value without waiting; None: there is none.
+
+        Args:
+            awaited: The event loop is woken by the next message, not only a blocked thread.
+
+        Raises:
+            StaleError: If the topic has fallen silent.
+        """
+        while not self._values and (sample := self.subscription.take(awaited=awaited)) is not None:
+            self._accept(sample)
+        if self._values:
+            return self._values.popleft()
+        return self._silence() if self._deadline_s is not None else None
+
+    def left_s(self) -> float | None:
+        """Return the time until the topic counts as silent [s]; None: never."""
+        return None if self._deadline_s is None else max(0.0, self._deadline_s - time.monotonic())
+
+    def _accept(self, sample: RawSample) -> None:
+        previous, self._previous = self._previous, sample
+        skipped = 0
+        if previous is not None and previous.header.publisher == sample.header.publisher:
+            skipped = max(0, sample.header.sequence - previous.header.sequence - 1)
+        self.skipped += skipped
+        limit_s, topic = self._limit_s, self.subscription.topic
+        # A last value of a topic with a heartbeat is at most that old; another's age is unknown.
+        late_s = sample.late_s if sample.live else topic.heartbeat_s
+        current_s = None if late_s is None else sample.received - late_s
+        stale = limit_s is not None and (current_s is None or time.monotonic() - current_s >= limit_s)
+        try:
+            values = list(self._convert(sample, stale, skipped))
+        except MessageError:
+            return  # another program's invalid message
+        if values:
+            self._last = values[-1]
+        if limit_s is not None and current_s is not None and not stale:
+            self._current_s, self._deadline_s = current_s, current_s + limit_s
+        if not stale or self._on_stale == "yield":
+            self._values.extend(values)
+
+    def _silence(self) -> T | None:
+        now = time.monotonic()
+        if self._limit_s is None or self._deadline_s is None or now < self._deadline_s:
+            return None
+        if self._on_stale == "raise":
+            self._deadline_s = now + self._limit_s  # for a program that goes on after the error
+            name = self.subscription.key_expr.partition("/")[2]
+            raise StaleError(name, self._limit_s, now - self._current_s, self._last)
+        self._deadline_s = None  # once, until the next message
+        last = self._last
+        return replace(last, stale=True, skipped=0) if isinstance(last, Sample) else last
+
+
+class AsyncStream(Generic[T]):
+    """The messages of a topic, as an asynchronous iterator; also an asynchronous context manager.
+
+    A program that is slower than the topic gets the newest message, and skips the ones before it.
+    """
+
+    def __init__(self, reading: Reading[T], prepare: Callable[[], Awaitable[None]] | None = None) -> None:
+        self._reading, self._prepare = reading, prepare
+        self._unsubscribe = weakref.finalize(self, reading.subscription.close_soon)
+
+    def __aiter__(self) -> Self:
+        return self
+
+    async def __anext__(self) -> T:
+        await self.prepare()
+        subscription = self._reading.subscription
+        while True:
+            if (value := self._reading.next(awaited=True)) is not None:
+                return value
+            if subscription.closed:
+                raise StopAsyncIteration
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(self._reading.left_s()):
+                    await subscription.arrived()
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def skipped(self) -> int:
+        """Number of messages that the stream did not return: the program was slow, or they were lost."""
+        return self._reading.skipped
+
+    @property
+    def lost(self) -> int:
+        """Number of messages that the network lost."""
+        return self._reading.subscription.total_lost
+
+    async def prepare(self) -> None:
+        """Query what the messages are converted with, once."""
+        if self._prepare is not None:
+            prepare, self._prepare = self._prepare, None
+            await prepare()
+
+    def close(self) -> None:
+        """Unsubscribe; the iterator ends."""
+        self._reading.subscription.close()
+
+    def blocking(self) -> "Stream[T]":
+        """Return this stream for a thread, instead of this one."""
+        self._unsubscribe.detach()
+        return Stream(self._reading)
+
+
+class Stream(Generic[T]):
+    """The messages of a topic, as an iterator; also a context manager.
+
+    A program that is slower than the topic gets the newest message, and skips the ones before it.
+    """
+
+    def __init__(self, reading: Reading[T]) -> None:
+        self._reading = reading
+        self._unsubscribe = weakref.finalize(self, reading.subscription.close_soon)
+        # A mesh that is not closed is closed when the main thread ends.
+        self._unsubscribe.atexit = False
+
+    def __iter__(self) -> Self:
+        return self
+
+    def __next__(self) -> T:
+        subscription = self._reading.subscription
+        while True:
+            if (value := self._reading.next(awaited=False)) is not None:
+                return value
+            if subscription.closed:
+                raise StopIteration
+            left_s = self._reading.left_s()
+            subscription.wait(_POLL_S if left_s is None else min(left_s, _POLL_S))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def skipped(self) -> int:
+        """Number of messages that the stream did not return: the program was slow, or they were lost."""
+        return self._reading.skipped
+
+    @property
+    def lost(self) -> int:
+        """Number of messages that the network lost."""
+        return self._reading.subscription.total_lost
+
+    def close(self) -> None:
+        """Unsubscribe; the iterator ends."""
+        self._reading.subscription.close_soon()

@@ -1,0 +1,190 @@
+"""`import robomesh`: states, requests and control, from a real site."""
+
+import asyncio
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+import robomesh
+from tests.site import running_site
+
+pytestmark = pytest.mark.processes
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "python.md"
+WAIT_S = 60.0
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    with running_site(tmp_path_factory.mktemp("client")) as running:
+        yield running
+
+
+@pytest.fixture
+def mesh(site):
+    with robomesh.connect(site.router, timeout_s=20.0) as connected:
+        yield connected
+
+
+@pytest.fixture
+def robot(mesh):
+    """The arm, at rest and without a latched stop afterwards."""
+    deadline = time.monotonic() + WAIT_S
+    robot = mesh.robot("arm")
+    while robot.last("description") is None and time.monotonic() < deadline:
+        time.sleep(0.1)
+    yield robot
+    with robot.control("test", take="end of the test") as arm:
+        if robot.last("controller").message.HasField("stop"):
+            arm.reset()
+        arm.speed(100)
+
+
+def test_joint_states_arrive_with_time_degrees_and_age(robot):
+    with robot.joints() as states:
+        first, second = next(states), next(states)
+    assert first.live
+    assert not first.stale
+    assert second.time_ns > first.time_ns
+    assert second.age_s < WAIT_S
+    assert first.names == tuple(joint.name for joint in robot.description().joints)
+    assert robot.si(first.positions_deg) == pytest.approx(first.positions)
+    assert first[first.names[0]] == first.positions[0]
+
+
+def test_a_slow_program_gets_the_newest_state_and_the_number_of_skipped_ones(robot):
+    with robot.joints() as states:
+        before = next(states)
+        robot.last("controller")
+        while next(states).time_ns < before.time_ns + 300_000_000:
+            time.sleep(0.1)
+        assert states.skipped > 0
+
+
+def test_an_unknown_name_is_refused_with_what_there_is(mesh, robot):
+    with pytest.raises(
+        robomesh.RobotNotFoundError, match="no robot 'nobody' on the mesh; there are: test/arm"
+    ):
+        mesh.robot("nobody")
+    with pytest.raises(robomesh.BusError, match="no topic 'joint'"):
+        robot.topic("joint")
+
+
+def test_a_silent_topic_raises_instead_of_repeating_its_last_value(robot):
+    with robot.topic("replay") as states, pytest.raises(robomesh.StaleError, match="no current message"):
+        next(states)
+
+
+def test_motions_wait_for_their_end_and_refusals_carry_their_code(robot):
+    with robot.control("ops") as arm:
+        arm.home()
+        arm.move_joints_deg([10, 80, -80, 0, 0])
+        assert next(robot.joints()).positions_deg == pytest.approx([10, 80, -80, 0, 0], abs=0.5)
+        with pytest.raises(robomesh.RefusedError) as refused:
+            arm.move_joints_deg([1000, 0, 0, 0, 0])
+        assert refused.value.code == "joints.outside"
+        with robot.control("other", take="it is needed elsewhere"):
+            pass
+        with pytest.raises(robomesh.RefusedError):
+            arm.hold()
+    assert not robot.last("controller").message.HasField("stop")
+
+
+def test_an_exception_during_a_motion_stops_the_robot(robot):
+    with pytest.raises(ZeroDivisionError), robot.control("ops") as arm:  # noqa: PT012
+        arm.speed(2)
+        arm.move_joints_deg([-100, 20, 30, 0, 0], wait=False)
+        raise ZeroDivisionError
+    assert robot.last("controller").message.stop.by == "ops"
+
+
+def test_ctrl_c_during_a_motion_stops_the_robot(robot):
+    def press():
+        for state in robot.topic("lease"):
+            if state.message.motion:
+                os.kill(os.getpid(), signal.SIGINT)
+                return
+
+    with pytest.raises(KeyboardInterrupt), robot.control("ops") as arm:  # noqa: PT012
+        arm.speed(2)
+        pressing = threading.Thread(target=press)
+        pressing.start()
+        arm.move_joints_deg([100, 20, 30, 0, 0])
+    pressing.join()
+    assert robot.last("controller").message.stop.by == "ops"
+
+
+@pytest.mark.parametrize("what", ["hung", "stopped", "killed"])
+def test_the_robot_is_stopped_when_its_script_is(robot, site, what):
+    arguments = ("-m", "tests.robomesh.unattended_script", "hung", site.router)
+    with subprocess.Popen([sys.executable, *arguments], stdout=subprocess.PIPE, text=True) as script:
+        try:
+            assert script.stdout.readline() == "moving\n"
+            if what != "hung":
+                script.send_signal(signal.SIGSTOP if what == "stopped" else signal.SIGKILL)
+            wait_for(robot, "lease", lambda lease: not lease.holder)
+            wait_for(robot, "controller", lambda state: state.HasField("stop"))
+        finally:
+            script.kill()
+
+
+def wait_for(robot, topic, condition):
+    deadline = time.monotonic() + WAIT_S
+    for state in robot.topic(topic):
+        if condition(state.message):
+            return
+        assert time.monotonic() < deadline
+
+
+def test_a_script_that_does_not_disconnect_ends(robot, site):
+    arguments = ("-m", "tests.robomesh.unattended_script", "forgetful", site.router)
+    ended = subprocess.run([sys.executable, *arguments], capture_output=True, text=True, timeout=WAIT_S)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "moving\n", "")
+
+
+def test_the_asynchronous_form_reads_and_moves(site, robot):
+    async def main():
+        async with robomesh.connect_async(site.router, timeout_s=20.0) as mesh:
+            arm_robot = await mesh.robot("test/arm")
+            async for state in arm_robot.joints():
+                assert len(state.positions_deg) == 5
+                break
+            async with arm_robot.control("ops") as arm:
+                await arm.home()
+                moving = asyncio.create_task(arm.move_joints_deg([-100, 20, 30, 0, 0]))
+                async for lease in arm_robot.topic("lease"):
+                    if lease.message.motion:
+                        break
+                moving.cancel()
+                with pytest.raises(asyncio.CancelledError):
+                    await moving
+            assert arm.stopped.sent
+
+    asyncio.run(main())
+
+
+def test_every_block_of_the_document_runs(site, robot):
+    names = {}
+    for block in re.findall(r"```python\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL):
+        connected = re.sub(r"connect(_async)?\(\)", rf"connect\1({site.router!r}, timeout_s=20.0)", block)
+        code = connected.replace('"pt600"', '"arm"')
+        exec(compile(code, str(DOCUMENT), "exec"), names)
+
+
+def test_the_document_names_everything_public():
+    text = DOCUMENT.read_text(encoding="utf-8")
+    assert [name for name in robomesh.__all__ if f"`{name}" not in text] == []
+    assert all(getattr(robomesh, name) is not None for name in robomesh.__all__)
+
+
+def test_importing_the_package_alone_imports_no_zenoh():
+    code = "import sys, robomesh; print('zenoh' in sys.modules, 'numpy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False False\n"
