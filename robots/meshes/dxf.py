@@ -63,6 +63,7 @@ class _Found:
     lines: dict[_Appearance, list[FloatArray]] = field(default_factory=dict)
     points: dict[_Appearance, list[FloatArray]] = field(default_factory=dict)
     left_out: Counter[str] = field(default_factory=Counter)
+    undrawn: dict[str, Counter[str]] = field(default_factory=dict)  # by block
     broken: dict[str, str] = field(default_factory=dict)
     entities: int = 0
     copies: int = 0
@@ -198,7 +199,9 @@ def _draw(path: Path, drawing: Any, entity: Any, above: _Appearance, found: _Fou
     if depth > 0:
         found.copied(path, _point_count(entity, kind))
     if kind == "INSERT":
+        undrawn = _undrawn(entity, found)
         for one in _copies(path, entity, found):
+            found.left_out += undrawn
             for child in one.virtual_entities(skipped_entity_callback=lambda e, _: _skip(e, found)):
                 _walk(path, drawing, child, appearance, found, depth + 1)
     elif kind in _FLAT:
@@ -222,6 +225,23 @@ def _draw(path: Path, drawing: Any, entity: Any, above: _Appearance, found: _Fou
         found.lines.setdefault(appearance, []).append(_array(curve.flattening(size / 200)))
     else:
         found.points.setdefault(appearance, []).append(_array([entity.dxf.location]))
+
+
+def _undrawn(insert: Any, found: _Found) -> Counter[str]:
+    """Remove the entities that are not drawn from a block; return their numbers.
+
+    ezdxf would copy them with each INSERT of the block: a hatch of 20,000 points, 20,000 times.
+    """
+    block = insert.block()
+    if block is None:
+        return Counter()
+    if block.name not in found.undrawn:
+        undrawn = [each for each in block if each.dxftype() not in _READ]
+        found.undrawn[block.name] = Counter(each.dxftype() for each in undrawn)
+        for each in undrawn:
+            each.destroy()
+        block.purge()
+    return found.undrawn[block.name]
 
 
 def _skip(entity: Any, found: _Found) -> None:

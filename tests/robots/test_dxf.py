@@ -172,6 +172,22 @@ def test_copies_of_a_large_entity_are_refused(
         read(tmp_path, drawing)
 
 
+def test_entities_that_are_not_drawn_are_not_copied_with_their_block(
+    tmp_path: Path, drawing: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copied: list[object] = []
+    monkeypatch.setattr(ezdxf.entities.Hatch, "copy_data", lambda *arguments: copied.append(arguments))
+    block = drawing.blocks.new("b")
+    block.add_line((0, 0), (1, 1))
+    block.add_hatch().paths.add_polyline_path(SQUARE)
+    for place in range(2):
+        drawing.modelspace().add_blockref("b", (place, 0), dxfattribs={"row_count": 3, "row_spacing": 1})
+    mesh = read(tmp_path, drawing)
+    assert not copied
+    assert mesh.warnings == ("left out: 6 HATCH",)
+    assert mesh.wires
+
+
 def test_truncated_file_is_repaired_or_rejected(tmp_path: Path, drawing: Any) -> None:
     for _ in range(5):
         drawing.modelspace().add_3dface(SQUARE)
