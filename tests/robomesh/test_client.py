@@ -105,6 +105,15 @@ def test_an_exception_during_a_motion_stops_the_robot(robot):
     assert robot.last("controller").message.stop.by == "ops"
 
 
+@pytest.fixture
+def ctrl_c():
+    """Handle SIGINT as in a terminal: a shell starts background jobs with SIGINT ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_during_a_motion_stops_the_robot(robot):
     def press():
         for state in robot.topic("lease"):
