@@ -11,13 +11,12 @@ import numpy as np
 from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 
-from robomesh import keys
 from robomesh import reason_codes as codes
-from robomesh.errors import KeyNameError
+from robomesh.recordings.channel_names import topic_name
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordingFile
-from robomesh.recordings.values import has_values, unit_of, values_of
+from robomesh.recordings.values import has_values, prismatic_joints, topic_of, unit_of, values_of
 from robomesh.schemas.robomesh_pb2 import Description
 
 POINTS, MOST_POINTS = 1000, 10_000
@@ -105,7 +104,7 @@ class SeriesReader:
         topics = topics_of_values(file)
         wanted: dict[str, list[str]] = {}
         for name in names:
-            topic = _topic_of(name, topics)
+            topic = topic_of(name, topics)
             if topic is None:
                 there = ", ".join(topics) or "none"
                 raise RecordingError(codes.RECORDING_NO_VALUE(file=file.path.name, name=name, topics=there))
@@ -115,9 +114,8 @@ class SeriesReader:
         for topic, own in wanted.items():
             pieces = self._pieces(file, topic, topics[topic], start_ns, end_ns, points, frozenset(own))
             for name in own:
-                thinned = _combined(name, pieces, file.layout.start_ns, start_ns, end_ns, points)
-                slides = name.split("/")[1] in sliding and name.startswith(_JOINTS)
-                found[name] = replace(thinned, unit=thinned.unit.replace("rad", "m")) if slides else thinned
+                combined = _combined(name, pieces, file.layout.start_ns, start_ns, end_ns, points)
+                found[name] = replace(combined, unit=unit_of(name, sliding))
         return [found[name] for name in names]
 
     def _pieces(
@@ -151,10 +149,7 @@ def topics_of_values(file: RecordingFile) -> dict[str, str]:
     found: dict[str, str] = {}
     for key in sorted(file.topics):
         if has_values(file.schema_name(key)) and file.decoder(key) is not None:
-            try:
-                found.setdefault(keys.parse_key(key).topic, key)
-            except KeyNameError:
-                found.setdefault(key.strip("/"), key)
+            found.setdefault(topic_name(key), key)
     return found
 
 
@@ -181,14 +176,9 @@ def _sliding(file: RecordingFile, names: Sequence[str]) -> frozenset[str]:
         return frozenset()
     told = file.newest(topics[0], file.layout.end_ns)
     try:
-        description = Description.FromString(b"" if told is None else told.data)
+        return prismatic_joints(Description.FromString(b"" if told is None else told.data))
     except DecodeError:
         return frozenset()
-    return frozenset(joint.name for joint in description.joints if joint.type == Description.Joint.PRISMATIC)
-
-
-def _topic_of(name: str, topics: dict[str, str]) -> str | None:
-    return max((each for each in topics if name.startswith(f"{each}/")), key=len, default=None)
 
 
 class _Values:

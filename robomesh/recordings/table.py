@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from robomesh.recordings.publisher_time import PublisherTimes, Recorded
+from robomesh.recordings.values import prismatic_joints
 from robomesh.schemas import robomesh_pb2 as schema
 
 # The tool's position is recorded less often than the joints; an older one is omitted.
@@ -77,9 +78,8 @@ def is_due(tool: Recorded, state: Recorded) -> bool:
 
 def table_of(first: JointStates, description: schema.Description | None, *, start_ns: int) -> Table:
     """Return the empty table of a recording with the joints of its first state."""
-    described = [] if description is None else description.joints
-    sliding = [joint.name for joint in described if joint.type == schema.Description.Joint.PRISMATIC]
-    return Table((joint.name for joint in first.joints), sliding, start_ns=start_ns)
+    names = (joint.name for joint in first.joints)
+    return Table(names, prismatic_joints(description), start_ns=start_ns)
 
 
 def _text(time_ns: int) -> str:

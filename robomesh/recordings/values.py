@@ -3,10 +3,12 @@
 A name is the topic below its robot, then the fields; repeated messages are identified by their `name` field.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Any
 
 from google.protobuf.descriptor import FieldDescriptor as Field
+
+from robomesh.schemas.robomesh_pb2 import Description
 
 _NUMBERS = frozenset(
     {
@@ -53,11 +55,27 @@ def values_of(schema: str, message: Any) -> Iterator[tuple[str, float]]:
         yield from _fields(message, "", _DEEPEST)
 
 
-def unit_of(name: str) -> str:
-    """Return the unit of a value by its name; empty: no unit, or unknown."""
-    first, *_, last = name.split("/")
+def topic_of(name: str, topics: Collection[str]) -> str | None:
+    """Return the topic of a value; None: it is not one of these."""
+    return max((each for each in topics if name.startswith(f"{each}/")), key=len, default=None)
+
+
+def prismatic_joints(description: Description | None) -> frozenset[str]:
+    """Return the names of the prismatic joints (unit: metre); none without a description."""
+    joints = [] if description is None else description.joints
+    return frozenset(joint.name for joint in joints if joint.type == Description.Joint.PRISMATIC)
+
+
+def unit_of(name: str, prismatic: Collection[str] = ()) -> str:
+    """Return the unit of a value by its name; empty: no unit, or unknown.
+
+    Args:
+        prismatic: Names of the robot's prismatic joints.
+    """
+    first, *between, last = name.split("/")
     if first == "joints":
-        return {"position": "rad", "velocity": "rad/s"}.get(last, "")
+        length = "m" if "/".join(between) in prismatic else "rad"
+        return {"position": length, "velocity": f"{length}/s"}.get(last, "")
     if first == "kinematics":
         if name.startswith("kinematics/tool/"):
             return "m" if len(last) == 1 else "m/s"

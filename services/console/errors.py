@@ -7,7 +7,6 @@ services.errors.ServiceError
 ├── SignInError                 a sign-in is refused
 │   └── SignInBusyError         too many sign-ins wait for verification
 ├── PageNotBuiltError           the page is not built
-├── RecordingChangedError       a recording was replaced during a download
 └── WatchError                  a browser watches an invalid key, or breaks the page's protocol
 """
 
@@ -86,7 +85,3 @@ class WatchError(ServiceError):
     def __init__(self, reason: Reason) -> None:
         super().__init__(reason.text)
         self.reason = reason
-
-
-class RecordingChangedError(ServiceError):
-    """A recording was replaced during a download."""

@@ -211,7 +211,7 @@ def test_recovery_of_an_open_recording_is_refused(tmp_path, capsys):
 
 
 def test_a_recording_of_a_site_has_one_name_for_every_command(mesh, router, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("services.command_line.recordings.fetch._LONGEST_WAIT_S", 0.1)
+    monkeypatch.setattr("robomesh.client.recorder._LONGEST_WAIT_S", 0.1)
     refusals = [None, QuotaError("more than one name may have: ask again in 30.0 s", again_s=30.0)]
 
     def check(client):

@@ -1,38 +1,41 @@
 """`robomesh recordings list` and `info`: the recordings of all sites, and the content of one."""
 
-import asyncio
 import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from datetime import datetime
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
+from robomesh.client.recorder import RecorderFile
+from robomesh.client.recording_list import (
+    RecordingInfo,
+    describe_recording,
+    find_recording,
+    list_recordings,
+)
 from robomesh.errors import BusError, SessionError
-from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.recordings.errors import RecordingError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 from services.command_line import discovery
 from services.command_line.recordings.errors import ExportError
 
-_TIMEOUT_S = 10.0
-
 
 def list_all(router: str, as_json: bool) -> None:
     """Print every recording of every site."""
 
-    async def main() -> list[Listed]:
+    async def main() -> list[RecordingInfo]:
         async with discovery.attached(router) as session:
-            return await listed(session)
+            return await list_recordings(session, on_silent=_report_silent)
 
     recordings = discovery.run(main())
-    for site, recording in recordings:
-        # A file without metadata does not name its site.
-        recording.site = recording.site or site
+    for each in recordings:
+        each.message.site = each.site
         if as_json:
-            show(recording, as_json)
+            show(each.message, as_json)
     if not as_json:
-        _print_table([recording for _, recording in recordings])
+        _print_table([each.message for each in recordings])
 
 
 def _print_table(recordings: list[schema.Recording]) -> None:
@@ -65,40 +68,7 @@ def _print_table(recordings: list[schema.Recording]) -> None:
     print("robomesh recordings info NAME shows the content of one")
 
 
-class Listed(NamedTuple):
-    """A recording and the site of its recorder."""
-
-    site: str
-    recording: schema.Recording
-
-
-async def listed(session: Session) -> list[Listed]:
-    """Return the recordings of every site, newest first, without those of recorders that do not answer.
-
-    Raises:
-        BusError: If no recorder answers.
-    """
-    sites = sorted({key.site for key in await session.present() if key.service == "recorder"})
-    answers = await asyncio.gather(*(_of_site(session, site) for site in sites), return_exceptions=True)
-    found: list[Listed] = []
-    for site, answer in zip(sites, answers, strict=True):
-        if isinstance(answer, schema.RecordingList):
-            found += [Listed(site, recording) for recording in answer.recordings]
-        elif not isinstance(answer, BusError) or all(isinstance(each, BusError) for each in answers):
-            raise answer
-        else:
-            print(f"robomesh: without the recordings of {site}: {answer}", file=sys.stderr)
-    return sorted(found, key=lambda each: each.recording.start.ToNanoseconds(), reverse=True)
-
-
-async def _of_site(session: Session, site: str) -> schema.RecordingList:
-    key = robot_key(site, WHOLE_SITE, "recordings/list")
-    answer = await session.ask(key, timeout_s=_TIMEOUT_S)
-    assert isinstance(answer, schema.RecordingList)
-    return answer
-
-
-async def found(session: Session, what: str, *, closed: bool = False) -> Listed:
+async def found(session: Session, what: str, *, closed: bool = False) -> RecordingInfo:
     """Return the newest recording that `[SITE/]NAME` or `[SITE/]FILE` names.
 
     Args:
@@ -107,15 +77,16 @@ async def found(session: Session, what: str, *, closed: bool = False) -> Listed:
     Raises:
         ExportError: If no recording has the name.
     """
-    site, _, name = what.rpartition("/")
-    for each in await listed(session):
-        recording = each.recording
-        matches = name in (recording.name, recording.file) and site in ("", each.site)
-        if matches and not (closed and recording.open):
-            return each
-    raise ExportError(
-        f"no recording {what!r}, neither a file of this machine nor in robomesh recordings list"
-    )
+    try:
+        return await find_recording(session, what, closed=closed, on_silent=_report_silent)
+    except RecordingError:
+        raise ExportError(
+            f"no recording {what!r}, neither a file of this machine nor in robomesh recordings list"
+        ) from None
+
+
+def _report_silent(site: str, error: BusError) -> None:
+    print(f"robomesh: without the recordings of {site}: {error}", file=sys.stderr)
 
 
 @asynccontextmanager
@@ -137,23 +108,12 @@ def info(what: str, router: str, as_json: bool) -> None:
 
     async def ask() -> schema.Recording:
         async with attached_for(what, router) as session:
-            site, recording = await found(session, what)
-            key = robot_key(site, WHOLE_SITE, "recordings/info")
-            answer = await session.ask(key, schema.RecordingQuery(file=recording.file), timeout_s=_TIMEOUT_S)
-            assert isinstance(answer, schema.Recording)
-            return answer
+            listed = await found(session, what)
+            asker = session.own_name
+            return await RecorderFile(session, listed.recorder_site, listed.file, asker=asker).describe()
 
-    show(_described(Path(what)) if Path(what).is_file() else discovery.run(ask()), as_json)
-
-
-def _described(file: Path) -> schema.Recording:
-    from robomesh.recordings.capture import is_being_written
-    from robomesh.recordings.files import describe_file
-
-    recording = describe_file(file)
-    if recording.problem and is_being_written(file):
-        recording.open, recording.problem = True, ""
-    return recording
+    path = Path(what)
+    show(describe_recording(path).message if path.is_file() else discovery.run(ask()), as_json)
 
 
 def show(recording: schema.Recording, as_json: bool) -> None:

@@ -73,7 +73,8 @@ async def _of_site(
     session: Session, what: str, request: schema.PlayRequest
 ) -> AsyncIterator[tuple[str, schema.ReplayState]]:
     """Let the site's player play a recording while this process is present."""
-    site, newest = await found(session, what, closed=True)
+    newest = await found(session, what, closed=True)
+    site = newest.recorder_site
     request.file, request.session = newest.file, session_of(session.own_name)
     token = session.declare_presence_of(site, WHOLE_SITE, OPERATOR, request.session)
     try:

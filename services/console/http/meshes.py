@@ -9,10 +9,10 @@ from starlette.responses import Response
 from robomesh import keys
 from robomesh import reason_codes as codes
 from robomesh.errors import BusError, QuotaError
+from robomesh.repeated_requests import ask_repeatedly
 from robomesh.session import Session
 from services.console.errors import RefusedRequest
 from services.console.http.error_responses import as_text, refused_on_the_mesh
-from services.console.http.repeated_requests import ask_repeatedly
 
 _MOST_BYTES = 256 * 1024 * 1024
 # A busy machine may lose a reply; a retry is better than an arm without a link.

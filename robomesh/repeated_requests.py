@@ -1,6 +1,6 @@
 """Requests that are repeated while the service that answers them is present.
 
-A busy machine or a slow line may lose an answer, so a browser's request is worth several attempts. If no
+A busy machine or a slow line may lose an answer, so a request is worth several attempts. If no
 service is there to answer, as for a mistyped site, it is refused after the first one.
 """
 
