@@ -10,8 +10,9 @@ import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
+from robomesh.client import recorder
 from robomesh.schemas.robomesh_pb2 import FromPage
-from services.console.http import meshes, recordings, uvicorn_server
+from services.console.http import meshes, uvicorn_server
 from services.console.http.listener import Listener
 from services.console.http.request_timeout import Connection
 from services.console.websocket import websocket_transport
@@ -125,7 +126,7 @@ TRAVERSALS = [
 def test_no_path_leads_out_of_pages_meshes_and_recordings(mesh, page, tmp_path, monkeypatch):
     # No service of this mesh answers for meshes and recordings.
     monkeypatch.setattr(meshes, "_TIMEOUTS_S", (0.2,))
-    monkeypatch.setattr(recordings, "_TIMEOUTS_S", (0.2,))
+    monkeypatch.setattr(recorder, "_TIMEOUTS_S", (0.2,))
     (page.parent / "pyproject.toml").write_text("root: secret")
 
     async def main():
