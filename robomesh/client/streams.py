@@ -123,15 +123,35 @@ class Reading(Generic[T]):
         return replace(last, stale=True, skipped=0) if isinstance(last, Sample) else last
 
 
-class AsyncStream(Generic[T]):
+class _Counted(Generic[T]):
+    """The counters of a stream, which unsubscribes when it is no longer used."""
+
+    def __init__(self, reading: Reading[T]) -> None:
+        self._reading = reading
+        self._unsubscribe = weakref.finalize(self, reading.subscription.close_soon)
+        # A mesh that is not closed is closed when the main thread ends.
+        self._unsubscribe.atexit = False
+
+    @property
+    def skipped(self) -> int:
+        """Number of messages that the stream did not return: the program was slow, or they were lost."""
+        return self._reading.skipped
+
+    @property
+    def lost(self) -> int:
+        """Number of messages that the network lost."""
+        return self._reading.subscription.total_lost
+
+
+class AsyncStream(_Counted[T]):
     """The messages of a topic, as an asynchronous iterator; also an asynchronous context manager.
 
     A program that is slower than the topic gets the newest message, and skips the ones before it.
     """
 
     def __init__(self, reading: Reading[T], prepare: Callable[[], Awaitable[None]] | None = None) -> None:
-        self._reading, self._prepare = reading, prepare
-        self._unsubscribe = weakref.finalize(self, reading.subscription.close_soon)
+        super().__init__(reading)
+        self._prepare = prepare
 
     def __aiter__(self) -> Self:
         return self
@@ -154,16 +174,6 @@ class AsyncStream(Generic[T]):
     async def __aexit__(self, *_: object) -> None:
         self.close()
 
-    @property
-    def skipped(self) -> int:
-        """Number of messages that the stream did not return: the program was slow, or they were lost."""
-        return self._reading.skipped
-
-    @property
-    def lost(self) -> int:
-        """Number of messages that the network lost."""
-        return self._reading.subscription.total_lost
-
     async def prepare(self) -> None:
         """Query what the messages are converted with, once."""
         if self._prepare is not None:
@@ -180,17 +190,11 @@ class AsyncStream(Generic[T]):
         return Stream(self._reading)
 
 
-class Stream(Generic[T]):
+class Stream(_Counted[T]):
     """The messages of a topic, as an iterator; also a context manager.
 
     A program that is slower than the topic gets the newest message, and skips the ones before it.
     """
-
-    def __init__(self, reading: Reading[T]) -> None:
-        self._reading = reading
-        self._unsubscribe = weakref.finalize(self, reading.subscription.close_soon)
-        # A mesh that is not closed is closed when the main thread ends.
-        self._unsubscribe.atexit = False
 
     def __iter__(self) -> Self:
         return self
@@ -210,16 +214,6 @@ class Stream(Generic[T]):
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-    @property
-    def skipped(self) -> int:
-        """Number of messages that the stream did not return: the program was slow, or they were lost."""
-        return self._reading.skipped
-
-    @property
-    def lost(self) -> int:
-        """Number of messages that the network lost."""
-        return self._reading.subscription.total_lost
 
     def close(self) -> None:
         """Unsubscribe; the iterator ends."""
