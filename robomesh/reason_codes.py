@@ -732,14 +732,6 @@ RECORDING_NO_ATTACHMENT = Code(
 )
 RECORDING_NO_TOPIC = Code("recording.no_topic", "{file} has no topic '{topic}'", "there are {topics}")
 RECORDING_NO_VALUE = Code("recording.no_value", "{file}: no value '{name}'; topics with values: {topics}")
-RECORDING_NO_SUCH_VALUE = Code(
-    "recording.no_such_value", "{file}: no value '{name}' in that time", "its topic has {values}"
-)
-RECORDING_NO_DESCRIPTION = Code(
-    "recording.no_description",
-    "{file} contains no description of {joints}, so the units are unknown",
-    "use the positions in rad and m",
-)
 RECORDING_CHANGED = Code("recording.changed", "{file} changed during the fetch", "fetch it again")
 RECORDING_NOT_FOUND = Code(
     "recording.not_found", "no recording '{name}' on the mesh", "there are {recordings}"

@@ -1163,20 +1163,6 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     "recording.no_value",
     ["{file}: no value '{name}'; topics with values: {topics}", "{file}：没有数值“{name}”；有数值的主题：{topics}"],
   ],
-  [
-    "recording.no_such_value",
-    [
-      "{file}: no value '{name}' in that time: its topic has {values}",
-      "{file}：该时段没有数值“{name}”：其主题有 {values}",
-    ],
-  ],
-  [
-    "recording.no_description",
-    [
-      "{file} contains no description of {joints}, so the units are unknown: use the positions in rad and m",
-      "{file}：其中没有 {joints} 的描述，单位未知：请使用以 rad 和 m 为单位的位置",
-    ],
-  ],
   ["recording.changed", ["{file} changed during the fetch: fetch it again", "{file} 在获取期间已更改：请重新获取"]],
   [
     "recording.not_found",
