@@ -326,8 +326,8 @@ async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
             if timed_out:
                 raise SessionError(
                     reason
-                    or f"no router at {routers}: start one (robomesh up, robomesh router) or name another "
-                    "with --connect"
+                    or f"no router at {routers}: start one (robomesh up, robomesh router) or give "
+                    "another address (--connect)"
                 ) from None
             if not logged:
                 log.warning("%s", reason or f"no router at {routers} yet: waiting for one")

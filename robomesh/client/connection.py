@@ -20,8 +20,13 @@ def own_identity(keys: Path | None) -> Identity | None:
         return None
     identity = read_identity(keys)
     if identity is None:
-        raise SessionError(f"--keys {keys}: it names no owner: use a bundle that robomesh keys issue wrote")
+        raise SessionError(f"{keys} names no owner: use a bundle that robomesh keys issue wrote")
     return identity
+
+
+def addresses(text: str) -> tuple[str, ...]:
+    """Return the addresses in a text with commas."""
+    return tuple(part for each in text.split(",") if (part := each.strip()))
 
 
 def connection_settings(
@@ -37,18 +42,16 @@ def connection_settings(
     Raises:
         SessionError: If the file is not a bundle, or a router is not reached by TLS.
     """
-    if isinstance(routers, str):
-        routers = routers.split(",")
-    addresses = tuple(part for each in routers if (part := each.strip()))
+    named = addresses(routers) if isinstance(routers, str) else tuple(routers)
     identity = own_identity(keys)
     if identity is None or keys is None:
-        return SessionSettings(connect=addresses, wait_s=wait_s)
-    if addresses == (DEFAULT_ROUTER,):
-        addresses = identity.routers or (DEFAULT_ROUTER.replace("tcp/", "tls/"),)
-    for each in addresses:
+        return SessionSettings(connect=named, wait_s=wait_s)
+    if named == (DEFAULT_ROUTER,):
+        named = identity.routers or (DEFAULT_ROUTER.replace("tcp/", "tls/"),)
+    for each in named:
         if not each.startswith(("tls/", "quic/")):
-            raise SessionError(f"--connect {each}: --keys needs TLS to the router: tls/HOST:PORT")
-    return SessionSettings(connect=addresses, tls=bundle(keys), wait_s=wait_s)
+            raise SessionError(f"{each}: a certificate needs TLS to the router: tls/HOST:PORT")
+    return SessionSettings(connect=named, tls=bundle(keys), wait_s=wait_s)
 
 
 @asynccontextmanager

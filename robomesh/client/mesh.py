@@ -24,15 +24,24 @@ class RobotNotFoundError(BusError):
 
     Attributes:
         robots: The robots on the mesh: "site/robot".
+        found: Those that have the name; empty: none.
+        gone_sites: Sites that are gone with all of their robots, if the caller looked for them.
     """
 
     def __init__(self, text: str, robots: Sequence[str], found: Sequence[str] = ()) -> None:
-        if found:
-            super().__init__(f"{text!r} is at several sites; say which: {', '.join(found)}")
-        else:
-            known = ", ".join(robots) or "none"
-            super().__init__(f"no robot {text!r} on the mesh; there are: {known}")
-        self.robots = tuple(robots)
+        super().__init__(text)
+        self.robots, self.found = tuple(robots), tuple(found)
+        self.gone_sites: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        if self.found:
+            return f"{self.args[0]!r} is at several sites; say which: {', '.join(self.found)}"
+        gone = (
+            f"; gone, with all of its robots: site {', site '.join(self.gone_sites)}"
+            if self.gone_sites
+            else ""
+        )
+        return f"no robot {self.args[0]!r} on the mesh; there are: {', '.join(self.robots) or 'none'}{gone}"
 
 
 @dataclass(frozen=True)

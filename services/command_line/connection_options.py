@@ -7,11 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.main import get_command
 
-from robomesh.certificate_identity import Identity, read_identity
-from robomesh.endpoints import DEFAULT_ROUTER, bundle
-from robomesh.errors import SessionError
-
 if TYPE_CHECKING:
+    from robomesh.certificate_identity import Identity
     from robomesh.session import SessionSettings
 
 _KEYS: ContextVar[Path | None] = ContextVar("keys", default=None)
@@ -53,24 +50,15 @@ def _keep(value: Path | None) -> Path | None:
     return value
 
 
-def own_identity() -> Identity | None:
+def own_identity() -> "Identity | None":
     """Return the identity in the certificate of `--keys`; None: no `--keys`.
 
     Raises:
         SessionError: If the file cannot be read, or is not a bundle.
     """
-    file = _KEYS.get()
-    if file is None:
-        return None
-    identity = read_identity(file)
-    if identity is None:
-        raise SessionError(f"--keys {file}: it names no owner: use a bundle that robomesh keys issue wrote")
-    return identity
+    from robomesh.client import connection
 
-
-def addresses(connect: str) -> tuple[str, ...]:
-    """Return the routers that `--connect` names."""
-    return tuple(part for each in connect.split(",") if (part := each.strip()))
+    return connection.own_identity(_KEYS.get())
 
 
 def with_keys(connect: str, *, wait_s: float | None = None) -> "SessionSettings | None":
@@ -79,22 +67,15 @@ def with_keys(connect: str, *, wait_s: float | None = None) -> "SessionSettings 
     Raises:
         SessionError: If the file is not a bundle, or a router is not reached by TLS.
     """
-    from robomesh.session import SessionSettings
-
-    identity, file = own_identity(), _KEYS.get()
-    if identity is None or file is None:
-        return None
-    routers = addresses(connect)
-    if routers == (DEFAULT_ROUTER,):
-        routers = identity.routers or (DEFAULT_ROUTER.replace("tcp/", "tls/"),)
-    for each in routers:
-        if not each.startswith(("tls/", "quic/")):
-            raise SessionError(f"--connect {each}: --keys needs TLS to the router: tls/HOST:PORT")
-    return SessionSettings(connect=routers, tls=bundle(file), wait_s=wait_s)
+    return None if _KEYS.get() is None else attachment(connect, wait_s=wait_s)
 
 
 def attachment(connect: str, *, wait_s: float | None = None) -> "SessionSettings":
-    """Return session settings for one command, with the certificate of `--keys` if given."""
-    from robomesh.session import SessionSettings
+    """Return session settings for one command, with the certificate of `--keys` if given.
 
-    return with_keys(connect, wait_s=wait_s) or SessionSettings(connect=addresses(connect), wait_s=wait_s)
+    Raises:
+        SessionError: If the file is not a bundle, or a router is not reached by TLS.
+    """
+    from robomesh.client.connection import connection_settings
+
+    return connection_settings(connect, _KEYS.get(), wait_s=wait_s)

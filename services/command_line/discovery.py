@@ -8,13 +8,12 @@ from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
 from typing import Any, NamedTuple, TypeVar
 
-from robomesh.errors import SessionError
-from robomesh.keys import WHOLE_SITE
-from robomesh.session import Session, open_session
+from robomesh.client.connection import connected
+from robomesh.client.mesh import RobotNotFoundError, find_robot
+from robomesh.session import Session
 from robomesh.texts import DIRECTION
 from services.command_line.alarm_lists import gone_sites, lists
 from services.command_line.connection_options import attachment, own_identity
-from services.errors import ServiceError
 
 T = TypeVar("T")
 
@@ -31,10 +30,6 @@ class Robot(NamedTuple):
         return f"{self.site}/{self.name}"
 
 
-class NoSuchRobotError(ServiceError):
-    """No robot on the mesh has the name, or several have it."""
-
-
 def run(main: Coroutine[Any, Any, T]) -> T:
     """Run a command's coroutine."""
     return asyncio.run(main)
@@ -47,13 +42,7 @@ async def attached(router: str) -> AsyncIterator[Session]:
     Raises:
         SessionError: If no router answers, or the router shows nothing to the certificate of `--keys`.
     """
-    async with open_session(attachment(router, wait_s=0.0)) as session:
-        # A router without rules for the name accepts the session and hides everything, itself too.
-        if session.principal is not None and not await session.present():
-            raise SessionError(
-                f"the router shows {session.principal.name} nothing: its certificate was revoked, or the "
-                "router has not read this site's list yet (robomesh keys list)"
-            )
+    async with connected(attachment(router, wait_s=0.0)) as session:
         yield session
 
 
@@ -61,19 +50,16 @@ async def find(session: Session, text: str) -> Robot:
     """Return the robot that `robot` or `site/robot` names.
 
     Raises:
-        NoSuchRobotError: If there is none, or several sites have a robot of that name.
+        RobotNotFoundError: If there is none, or several sites have a robot of that name.
     """
     alive = await session.present()
-    robots = sorted({Robot(key.site, key.robot) for key in alive if key.robot != WHOLE_SITE})
-    found = [robot for robot in robots if text in (robot.name, str(robot))]
-    if len(found) == 1:
-        return found[0]
-    known = ", ".join(map(str, robots)) or "none"
-    if not found:
-        gone = sorted(gone_sites(await lists(session)).keys() - {key.site for key in alive})
-        lost = f"; gone, with all of its robots: site {', site '.join(gone)}" if gone else ""
-        raise NoSuchRobotError(f"no robot {text!r} on the mesh; there are: {known}{lost}")
-    raise NoSuchRobotError(f"{text!r} is at several sites; say which: {', '.join(map(str, found))}")
+    try:
+        return Robot(*find_robot(alive, text))
+    except RobotNotFoundError as error:
+        if not error.found:
+            gone = gone_sites(await lists(session)).keys() - {key.site for key in alive}
+            error.gone_sites = tuple(sorted(gone))
+        raise
 
 
 def print_json(value: Any) -> None:

@@ -4,6 +4,7 @@ import asyncio
 
 import pytest
 
+from robomesh.client.mesh import RobotNotFoundError
 from robomesh.keys import PresenceKey
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
@@ -57,9 +58,7 @@ def test_the_error_for_an_unknown_robot_names_gone_sites(mesh):
             watch.declare_publisher("shanghai", "-", "alarms").put(SHANGHAI)
             while not await lists(monitor):
                 await asyncio.sleep(0.02)
-            with pytest.raises(
-                discovery.NoSuchRobotError, match=r"no robot 'beijing/pt500-1'.*; gone.*beijing"
-            ):
+            with pytest.raises(RobotNotFoundError, match=r"no robot 'beijing/pt500-1'.*; gone.*beijing"):
                 await discovery.find(monitor, "beijing/pt500-1")
 
     run(main())

@@ -24,7 +24,7 @@ def doctor(
 ) -> int | None:
     """Check this machine, and say how to fix what is missing."""
     if security:
-        from services.command_line.connection_options import addresses
+        from robomesh.client.connection import addresses
         from services.command_line.doctor import security as check
 
         return check.run(keys_folder(folder, quiet=as_json), addresses(routers), as_json)

@@ -4,10 +4,11 @@ from importlib import import_module
 from pathlib import Path
 
 from robomesh import service
+from robomesh.client.connection import addresses
 from robomesh.endpoints import DEFAULT_ROUTER
 from robomesh.keys import WHOLE_SITE, check_name
 from robomesh.session import SessionSettings
-from services.command_line.connection_options import addresses, with_keys
+from services.command_line.connection_options import with_keys
 from services.command_line.site.controllers import ControllerError
 from services.command_line.site.router import metrics_address
 from services.command_line.site.services import SERVICES, Options
