@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from robomesh.client.blocking import Arm, Mesh, Robot
-    from robomesh.client.control import AsyncArm, CommandResult, StopResult
+    from robomesh.client.commands import CommandResult, StopResult
+    from robomesh.client.control import AsyncArm
     from robomesh.client.mesh import AsyncMesh, RobotNotFoundError, Service
     from robomesh.client.robot import AsyncRobot, CheckResult, InverseResult, Violation
     from robomesh.client.samples import Alarm, Event, JointState, Sample
@@ -34,7 +35,8 @@ if TYPE_CHECKING:
 # Imported when they are used: the services import parts of this package, and need no client.
 _MODULES = {
     "client.blocking": ("Arm", "Mesh", "Robot"),
-    "client.control": ("AsyncArm", "CommandResult", "StopResult"),
+    "client.commands": ("CommandResult", "StopResult"),
+    "client.control": ("AsyncArm",),
     "client.mesh": ("AsyncMesh", "RobotNotFoundError", "Service"),
     "client.robot": ("AsyncRobot", "CheckResult", "InverseResult", "Violation"),
     "client.samples": ("Alarm", "Event", "JointState", "Sample"),

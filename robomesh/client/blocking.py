@@ -8,7 +8,8 @@ from collections.abc import Coroutine, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, Self, TypeVar
 
-from robomesh.client.control import AsyncArm, CommandResult, Progress, StopResult
+from robomesh.client.commands import CommandResult, Progress, StopResult
+from robomesh.client.control import AsyncArm
 from robomesh.client.event_loop import EventLoopThread
 from robomesh.client.mesh import AsyncMesh, Service
 from robomesh.client.robot import AsyncRobot, CheckResult, InverseResult, Matrix

@@ -9,12 +9,12 @@ import contextlib
 import logging
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from robomesh import reason_codes as codes
-from robomesh.errors import BusError, BusyError, MessageError, MotionError, NoAnswerError, RefusedError
+from robomesh.client.commands import CommandResult, Progress, StopResult, program_text, request_stop
+from robomesh.errors import BusError, BusyError, MotionError, NoAnswerError, RefusedError
 from robomesh.keys import robot_key
 from robomesh.messages import received_reason
 from robomesh.presence import OPERATOR, session_of
@@ -49,51 +49,6 @@ _BEGINS_S = 1.5
 # A stopped arm comes to rest within this time.
 _REST_S, _POLL_S = 5.0, 0.2
 _WARNING = "; mind: "
-
-
-@dataclass(frozen=True)
-class StopResult:
-    """Answer to a stop.
-
-    Attributes:
-        id: Number of the latched stop; 0: none was latched.
-        sent: The stop unit is on the controller's socket; False: it is latched, and sent later.
-        text: Sentence for people.
-    """
-
-    id: int
-    sent: bool
-    text: str
-
-
-@dataclass(frozen=True)
-class CommandResult:
-    """Answer to an accepted command.
-
-    Attributes:
-        text: Sentence for people.
-        warning: Warning of the check; empty: none.
-    """
-
-    text: str
-    warning: str = ""
-
-
-@dataclass(frozen=True)
-class Progress:
-    """What a program that waits for its command may show.
-
-    Attributes:
-        on_accepted: Called with the answer of a command whose end is waited for.
-        on_step: Called with each new line of the program that the gateway runs.
-        is_alive: Returns whether the program still waits; if not, the lease is not renewed.
-        stop_reason: Reason of the stop that ends an interrupted motion.
-    """
-
-    on_accepted: Callable[[CommandResult], None] = lambda answer: None
-    on_step: Callable[[schema.ProgramState], None] = lambda state: None
-    is_alive: Callable[[], bool] = lambda: True
-    stop_reason: str = "the program was interrupted"
 
 
 class AsyncArm:
@@ -473,32 +428,6 @@ def _program_end(program: schema.ProgramState, line: int) -> tuple[Reason, str]:
     seen = f", which was last seen at line {line}" if line else ""
     text = f"the gateway restarted, so the program no longer runs{seen}"
     return codes.ENDED_GATEWAY(), text
-
-
-async def request_stop(session: Session, site: str, robot: str, by: str, reason: str) -> StopResult:
-    """Request a stop of a robot in an operator's name.
-
-    Raises:
-        NoAnswerError: If no gateway answered: the robot may still move.
-    """
-    answer = await session.ask(robot_key(site, robot, "stop"), schema.StopRequest(by=by, reason=reason))
-    assert isinstance(answer, schema.StopAnswer)
-    return StopResult(answer.stop_id, answer.sent, answer.text)
-
-
-def program_text(program: str | Path) -> str:
-    """Return a program's text.
-
-    Raises:
-        MessageError: If its file cannot be read.
-    """
-    if not isinstance(program, Path):
-        return program
-    try:
-        return program.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-        raise MessageError(f"{program}: cannot be read: {reason}") from None
 
 
 def _floats(values: Sequence[float]) -> list[float]:

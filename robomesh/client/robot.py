@@ -9,7 +9,8 @@ from typing import Any, Literal
 
 from google.protobuf.message import Message
 
-from robomesh.client.control import AsyncArm, StopResult, program_text, request_stop
+from robomesh.client.commands import StopResult, program_text, request_stop
+from robomesh.client.control import AsyncArm
 from robomesh.client.samples import (
     ROTARY,
     Event,
@@ -223,7 +224,7 @@ class AsyncRobot:
             pose: 4 x 4, tool to base, by rows [m]: nested sequences, a NumPy array, or 16 numbers.
             task: "6d": position and orientation; "5d": position and the tool's axis. None: "5d" for a robot
                 with fewer than six joints.
-            near: Joint positions to be near to [rad or m]; empty: the robot's current ones are not used.
+            near: Joint positions that the solution should be near to [rad or m]; empty: no preference.
 
         Raises:
             RefusedError: If the pose is invalid.

@@ -41,7 +41,7 @@ class StaleError(BusError):
 
 
 class Reading(Generic[T]):
-    """What a stream returns, without the waiting.
+    """Selection of the values that a stream returns; it never waits.
 
     Args:
         convert: Returns the values of a sample, given `stale` and `skipped`.
