@@ -24,7 +24,7 @@ class Sample:
 
     Attributes:
         site, robot, topic: Parts of its key; robot "-": the whole site.
-        message: The protobuf message; a list message for the history of `events` and `audit`.
+        message: The protobuf message of the topic; a list message for the history of `events` and `audit`.
         time_ns: Publisher's time, ns since the Unix epoch.
         sequence: Publisher's number; gaps are messages that did not arrive.
         live: Received as a publication; False: the last value, from before the subscription.
@@ -38,7 +38,8 @@ class Sample:
     site: str
     robot: str
     topic: str
-    message: Message
+    # Not `Message`: a type checker would accept no field of it.
+    message: Any
     time_ns: int
     sequence: int
     live: bool

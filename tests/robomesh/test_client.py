@@ -2,7 +2,6 @@
 
 import asyncio
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -177,14 +176,6 @@ def test_the_asynchronous_form_reads_and_moves(site, robot):
             assert arm.stopped.sent
 
     asyncio.run(main())
-
-
-def test_every_block_of_the_document_runs(site, robot):
-    names = {}
-    for block in re.findall(r"```python\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL):
-        connected = re.sub(r"connect(_async)?\(\)", rf"connect\1({site.router!r}, timeout_s=20.0)", block)
-        code = connected.replace('"pt600"', '"arm"')
-        exec(compile(code, str(DOCUMENT), "exec"), names)
 
 
 def test_the_document_names_everything_public():
