@@ -14,14 +14,12 @@ from typing import Any, Self, TypeVar
 
 from robomesh import reason_codes as codes
 from robomesh.client.commands import CommandResult, Progress, StopResult, program_text, request_stop
+from robomesh.client.motion_reports import MotionReports
 from robomesh.errors import BusError, BusyError, MotionError, NoAnswerError, RefusedError
 from robomesh.keys import robot_key
-from robomesh.messages import received_reason
 from robomesh.presence import OPERATOR, session_of
-from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
-from robomesh.subscription import Sample, Subscription
 
 T = TypeVar("T")
 log = logging.getLogger(__name__)
@@ -36,16 +34,11 @@ _WAITING_TTL_S = 2.0
 _IDLE_TTL_S = 5.0
 _RENEWAL_TIMEOUT_S = 0.5
 # A command that was delayed by more than this must not move the arm.
-_VALID_S = 3.0
-_ANSWER_S = 2.0
+_ANSWER_S = 3.0
 # The gateway plans and checks a whole program before it begins.
 _PROGRAM_S = 60.0
-# The gateway publishes `lease` and `program` each second.
-_SILENCE_S = 5.0
 # After the end of control, the gateway publishes the reason within this time.
 _REASON_S = 1.5
-# The publication of a motion's beginning arrives before or shortly after the answer to its command.
-_BEGINS_S = 1.5
 # A stopped arm comes to rest within this time.
 _REST_S, _POLL_S = 5.0, 0.2
 _WARNING = "; mind: "
@@ -72,11 +65,10 @@ class AsyncArm:
         *,
         si: Callable[[Sequence[float]], Awaitable[Sequence[float]]],
         take: str = "",
-        progress: Progress | None = None,
     ) -> None:
-        self._session, self._site, self._robot = session, site, robot
+        self._session, self.site, self.robot = session, site, robot
         self._si, self._take = si, take
-        self.progress = Progress() if progress is None else progress
+        self.progress = Progress()
         self.operator = operator
         self.stopped: StopResult | None = None
         self._lease = ""
@@ -86,24 +78,21 @@ class AsyncArm:
         self._moving = False  # a motion or program was accepted, and its end was not seen yet
         self._accepted_s = 0.0
         self._runs_program = False
-        self._leases: Subscription | None = None
-        self._programs: Subscription | None = None
+        self._reports: MotionReports | None = None
         self._close = contextlib.ExitStack()
 
     def __str__(self) -> str:
-        return f"{self._site}/{self._robot}"
+        return f"{self.site}/{self.robot}"
 
     # ---------------------------------------------------------------- control
 
     async def __aenter__(self) -> Self:
         with contextlib.ExitStack() as undo:
             identity = session_of(self.operator)
-            token = self._session.declare_presence_of(self._site, self._robot, OPERATOR, identity)
+            token = self._session.declare_presence_of(self.site, self.robot, OPERATOR, identity)
             undo.callback(token.undeclare)
-            self._leases = self._session.subscribe(self._key("lease"), newest=50)
-            undo.callback(self._leases.close)
-            self._programs = self._session.subscribe(self._key("program"), newest=200)
-            undo.callback(self._programs.close)
+            self._reports = MotionReports(self._session, self.site, self.robot, self.operator)
+            undo.callback(self._reports.close)
             action = _A.TAKE if self._take else _A.ACQUIRE
             request = _A(action=action, ttl_s=_IDLE_TTL_S, reason=self._take, session=identity)
             answer = await self._session.ask(self._lease_key, request)
@@ -124,9 +113,9 @@ class AsyncArm:
         """
         with self._close:
             try:
-                if self._moving and failed:
-                    await self._stop_if_moving()
-                elif self._moving:
+                if failed:
+                    await self._stop_if_moving("its program ended with an error")
+                else:
                     await self.wait()
             finally:
                 with contextlib.suppress(BusError):
@@ -225,7 +214,7 @@ class AsyncArm:
     async def stop(self, reason: str = "") -> StopResult:
         """Request a stop, which latches. A stop request is not an emergency stop."""
         self._moving = False
-        return await request_stop(self._session, self._site, self._robot, self.operator, reason)
+        return await request_stop(self._session, self.site, self.robot, self.operator, reason)
 
     async def _other(self, request: schema.CommandRequest) -> CommandResult:
         return await self._guarded(self._command(request))
@@ -234,9 +223,8 @@ class AsyncArm:
         """Send a command, and return its answer."""
         self._last_id += 1
         within_s = _PROGRAM_S if request.command == _C.RUN_PROGRAM else _ANSWER_S
-        valid_s = max(within_s, _VALID_S)
         request.lease, request.id = self._lease, self._last_id
-        request.not_after.FromNanoseconds(time.monotonic_ns() + self._clock_ns + round(valid_s * 1e9))
+        request.not_after.FromNanoseconds(time.monotonic_ns() + self._clock_ns + round(within_s * 1e9))
         answer = await self._renewed(
             self._session.ask(self._key(f"command/{self.operator}"), request, timeout_s=within_s)
         )
@@ -250,15 +238,14 @@ class AsyncArm:
         return await self._guarded(self._start(request, wait=wait))
 
     async def _start(self, request: schema.CommandRequest, *, wait: bool) -> CommandResult:
-        for subscription in (self._leases, self._programs):
-            while subscription is not None and subscription.take() is not None:
-                pass  # states from before the motion
+        assert self._reports is not None
+        self._reports.forget()
         # Until the answer, the motion may or may not run.
-        self._moving = True
+        moved, self._moving = self._moving, True
         try:
             answer = await self._command(request)
         except RefusedError:
-            self._moving = False
+            self._moving = moved
             raise
         self._accepted_s = time.monotonic()
         self._runs_program = request.command == _C.RUN_PROGRAM
@@ -272,7 +259,10 @@ class AsyncArm:
         try:
             result = await waiting
         except asyncio.CancelledError:
-            await self._stop_if_moving()
+            await self._stop_if_moving(self.progress.stop_reason)
+            raise
+        except MotionError:
+            self._moving = False
             raise
         if self.progress.is_alive():
             with contextlib.suppress(BusError):  # the next command reports the end of control
@@ -280,17 +270,23 @@ class AsyncArm:
         return result
 
     async def _until_ended(self) -> None:
-        ended = self._program_ended if self._runs_program else self._motion_ended
-        await self._renewed(ended())
+        assert self._reports is not None
+        if self._runs_program:
+            ended = self._reports.program_ended(self._accepted_s, self.progress.on_step)
+        else:
+            ended = self._reports.motion_ended(self._accepted_s)
+        await self._renewed(ended)
         self._moving = False
 
-    async def _stop_if_moving(self) -> None:
+    async def _stop_if_moving(self, reason: str) -> None:
         if not self._moving:
             return
         try:
-            self.stopped = await self.stop(self.progress.stop_reason)
+            self.stopped = await self.stop(reason)
         except BusError as error:
-            log.error("%s: the stop failed: %s; only the end of the lease stops it now", self, error)
+            text = f"the stop failed: {error}; only the end of the lease stops it now"
+            log.error("%s: %s", self, text)
+            self.stopped = StopResult(0, False, text)
 
     # ---------------------------------------------------------------- renewal
 
@@ -308,7 +304,6 @@ class AsyncArm:
                 # The gateway's reason follows shortly, unless another session of that name has control.
                 await asyncio.wait((task,), timeout=_REASON_S)
             if not task.done():
-                self._moving = False
                 reason = renewing.result().reason
                 text = f"control ended before the motion did: {reason}"
                 raise MotionError(codes.PROGRAM_CONTROL_ENDED(reason), text=text)
@@ -334,100 +329,12 @@ class AsyncArm:
         renewal = _A(action=_A.RENEW, lease=self._lease, ttl_s=ttl_s)
         await self._session.ask(self._lease_key, renewal, timeout_s=_RENEWAL_TIMEOUT_S)
 
-    # -------------------------------------------------------------- their end
-
-    async def _motion_ended(self) -> None:
-        """Wait until the gateway reports that the holder's motion has ended.
-
-        Raises:
-            MotionError: If the robot did not arrive: another operator has control, or it was stopped.
-            NoAnswerError: If the gateway fell silent.
-        """
-        assert self._leases is not None
-        has_moved = False
-        while True:
-            sample = await self._next(self._leases, f"only its dead-man stop can stop {self} now")
-            lease = sample.message()
-            assert isinstance(lease, schema.Lease)
-            if not sample.live:
-                continue
-            if lease.holder != self.operator:
-                self._moving = False
-                reason = received_reason(lease.ended_reason) if lease.HasField("ended_reason") else None
-                text = f"control ended before the motion did: {lease.ended or 'for an unknown reason'}"
-                raise MotionError(codes.PROGRAM_CONTROL_ENDED(reason or codes.ENDED_UNKNOWN()), text=text)
-            has_moved = has_moved or lease.motion
-            if not lease.motion and (has_moved or time.monotonic() - self._accepted_s > _BEGINS_S):
-                await self._raise_if_stopped()
-                return
-
-    async def _program_ended(self) -> None:
-        """Wait until the gateway reports that the program is done and the robot at rest.
-
-        Raises:
-            MotionError: If the program ended before.
-            NoAnswerError: If the gateway fell silent.
-        """
-        assert self._programs is not None
-        line, has_run = 0, False
-        while True:
-            sample = await self._next(self._programs, f"the state of {self} is unknown")
-            program = sample.message()
-            assert isinstance(program, schema.ProgramState)
-            if not sample.live:
-                continue
-            if program.outcome == schema.ProgramState.RUNNING:
-                has_run = True
-                if program.line != line:
-                    line = program.line
-                    self.progress.on_step(program)
-            elif not has_run and time.monotonic() - self._accepted_s < _BEGINS_S:
-                continue  # of an earlier program
-            elif program.outcome == schema.ProgramState.DONE:
-                # The robot may still move to the last target: releasing control now would stop it.
-                return await self._motion_ended()
-            else:
-                self._moving = False
-                reason, text = _program_end(program, line)
-                raise MotionError(reason, text=text)
-
-    async def _next(self, subscription: Subscription, consequence: str) -> Sample:
-        try:
-            async with asyncio.timeout(_SILENCE_S):
-                return await anext(subscription)
-        except (TimeoutError, StopAsyncIteration):
-            raise NoAnswerError(f"the gateway fell silent: {consequence}") from None
-
-    async def _raise_if_stopped(self) -> None:
-        state = await self._session.last(self._key("controller"))
-        if not isinstance(state, schema.ControllerState):
-            return
-        reason: Reason | None = None
-        if state.HasField("stop"):
-            why = state.stop.reason or "stop request"
-            reason = codes.PROGRAM_STOPPED(by=state.stop.by, reason=why)
-        elif state.fault:
-            reason = codes.CONTROLLER_FAULT(fault=state.fault)
-        if reason is not None:
-            self._moving = False
-            raise MotionError(reason)
-
     @property
     def _lease_key(self) -> str:
         return self._key(f"lease/request/{self.operator}")
 
     def _key(self, name: str) -> str:
-        return robot_key(self._site, self._robot, name)
-
-
-def _program_end(program: schema.ProgramState, line: int) -> tuple[Reason, str]:
-    """Return the reason and the sentence of a program that ended early, last seen at a line."""
-    if program.outcome == schema.ProgramState.ENDED:
-        reason = received_reason(program.reason)
-        return reason, f"ended at line {program.line}: {program.text}"
-    seen = f", which was last seen at line {line}" if line else ""
-    text = f"the gateway restarted, so the program no longer runs{seen}"
-    return codes.ENDED_GATEWAY(), text
+        return robot_key(self.site, self.robot, name)
 
 
 def _floats(values: Sequence[float]) -> list[float]:

@@ -104,6 +104,15 @@ def test_an_exception_during_a_motion_stops_the_robot(robot):
     assert robot.last("controller").message.stop.by == "ops"
 
 
+def test_a_refused_motion_leaves_the_one_before_it_running_and_guarded(robot):
+    with pytest.raises(robomesh.RefusedError) as refused, robot.control("ops") as arm:  # noqa: PT012
+        arm.speed(2)
+        arm.move_joints_deg([-100, 20, 30, 0, 0], wait=False)
+        arm.move_joints_deg([1000, 0, 0, 0, 0])
+    assert refused.value.code == "joints.outside"
+    assert robot.last("controller").message.stop.by == "ops"  # not the gateway, at the end of control
+
+
 @pytest.fixture
 def ctrl_c():
     """Handle SIGINT as in a terminal: a shell starts background jobs with SIGINT ignored."""
