@@ -55,5 +55,6 @@ def test_every_example_stands_in_the_readme():
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     for example in (ROOT / "examples").glob("*.py"):
         assert example.name in readme
-    program = (ROOT / "examples" / "joints.py").read_text(encoding="utf-8")
-    assert program.rpartition('"""\n')[2].strip() in readme
+    # `tests/robomesh/test_client.py` runs it.
+    first = (ROOT / "docs" / "python.md").read_text(encoding="utf-8").partition("```\n")[0]
+    assert first.partition("```python\n")[2] in readme

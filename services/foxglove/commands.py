@@ -1,15 +1,14 @@
 """Commands as Foxglove services: stop for every client, the others in the name of one operator.
 
 A client has control only while it is subscribed to a channel of the robot. A closed panel or a lost
-connection releases control, and the robot's gateway stops the motion.
+connection stops its motion and releases control.
 """
 
 import asyncio
+import contextlib
 import json
 import logging
-import time
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -17,18 +16,13 @@ import foxglove
 from foxglove import MessageSchema, Schema, ServiceRequest, ServiceSchema
 
 from robomesh import reason_codes as codes
-from robomesh.errors import BusError, MessageError, RefusedError
+from robomesh.client.commands import CommandResult, Progress, request_stop
+from robomesh.client.control import AsyncArm
+from robomesh.client.robot import AsyncRobot
+from robomesh.errors import BusError, MessageError, MotionError, RefusedError
 from robomesh.keys import robot_key
-from robomesh.lease import Control, control
 from robomesh.messages import JSON, decode_request
-from robomesh.schemas.robomesh_pb2 import (
-    CommandAnswer,
-    CommandRequest,
-    ControllerState,
-    Lease,
-    StopAnswer,
-    StopRequest,
-)
+from robomesh.schemas.robomesh_pb2 import CommandRequest
 from robomesh.session import Session
 
 log = logging.getLogger(__name__)
@@ -36,13 +30,17 @@ log = logging.getLogger(__name__)
 _RobotKey = tuple[str, str]
 _Watches = Callable[[int, str, str], bool]
 
-_COMMANDS = ("home", "hold", "resume", "reset", "speed", "move_absolute", "move_relative")
-_MOTIONS = (
-    CommandRequest.HOME,
-    CommandRequest.RESUME,
-    CommandRequest.MOVE_ABSOLUTE,
-    CommandRequest.MOVE_RELATIVE,
-)
+_MOTIONS: dict[str, Callable[[AsyncArm, CommandRequest], Awaitable[CommandResult]]] = {
+    "home": lambda arm, request: arm.home(wait=False),
+    "resume": lambda arm, request: arm.resume(wait=False),
+    "move_absolute": lambda arm, request: arm.move_joints(request.joint_positions, wait=False),
+    "move_relative": lambda arm, request: arm.move_joints_by(request.joint_positions, wait=False),
+}
+_COMMANDS = _MOTIONS | {
+    "hold": lambda arm, request: arm.hold(),
+    "reset": lambda arm, request: arm.reset(),
+    "speed": lambda arm, request: arm.speed(request.speed_percent),
+}
 _NUMBERS = {"type": "array", "items": {"type": "number"}, "description": "rad, or m for a prismatic joint"}
 # Fields of each request; any other field is refused.
 _FIELDS: dict[str, dict[str, Any]] = {
@@ -57,28 +55,7 @@ _ANSWER = {
     "code": {"type": "string", "description": "of a refusal"},
     "values": {"type": "object", "description": "of a refusal: the parameters of its sentence"},
 }
-_LATEST_NS = 3_000_000_000
-_ANSWER_S = 5.0
-# `lease` is published each second; without it for this long, the gateway is offline.
-_LEASE_TIMEOUT_S = 5.0
 _POLL_S = 0.2
-
-
-@dataclass
-class _ControlSession:
-    """Control that a client has while its motion runs."""
-
-    client: int
-    control: Control
-    commands: int = 0
-    since_ns: int = field(default_factory=time.monotonic_ns)
-
-    def stamp(self, request: CommandRequest) -> None:
-        """Set a command's lease, number and expiry; a late command must not move the arm."""
-        self.commands += 1
-        request.lease, request.id = self.control.lease, self.commands
-        now_ns = self.control.now_ns + time.monotonic_ns() - self.since_ns
-        request.not_after.FromNanoseconds(now_ns + _LATEST_NS)
 
 
 class Commands:
@@ -92,7 +69,8 @@ class Commands:
     def __init__(self, session: Session, operator: str, watches: _Watches) -> None:
         self._session, self._operator, self._watches = session, operator, watches
         self._loop = asyncio.get_running_loop()
-        self._holding: dict[_RobotKey, _ControlSession] = {}
+        # Client and arm, while the client's motion runs.
+        self._moving: dict[_RobotKey, tuple[int, AsyncArm]] = {}
         self._tasks: set[asyncio.Task[None]] = set()
 
     def of(self, site: str, robot: str) -> list[foxglove.Service]:
@@ -120,105 +98,62 @@ class Commands:
             reason = str(_values("stop", payload).get("reason", ""))
         except RefusedError:
             reason = ""  # an invalid reason must not prevent the stop
-        request = StopRequest(by=self._operator or "foxglove", reason=reason or "stop in Foxglove")
-        answer = await self._session.ask(robot_key(site, robot, "stop"), request)
-        assert isinstance(answer, StopAnswer)
-        return answer.sent, answer.text
+        by = self._operator or "foxglove"
+        stopped = await request_stop(self._session, site, robot, by, reason or "stop in Foxglove")
+        return stopped.sent, stopped.text
 
     async def _command(
         self, site: str, robot: str, client: int, payload: bytes, *, name: str
     ) -> tuple[bool, str]:
         values = _values(name, payload) | {"command": name.upper()}
         request = decode_request(CommandRequest, json.dumps(values).encode(), JSON)
-        if request.command == CommandRequest.RESET:
-            request.stop_id = await self._latched_stop(site, robot)
-        holding = self._holding.get((site, robot))
-        if holding is not None and holding.client == client:
-            return await self._send(site, robot, holding, request)
-        if request.command in _MOTIONS and not self._watches(client, site, robot):
+        moving = self._moving.get((site, robot))
+        if moving is not None and moving[0] == client:
+            return True, (await _COMMANDS[name](moving[1], request)).text
+        if name in _MOTIONS and not self._watches(client, site, robot):
             return False, (
                 f"this client is not subscribed to {site}/{robot}: open its joints before it moves"
             )
-        answered: asyncio.Future[tuple[bool, str]] = self._loop.create_future()
-        task = self._loop.create_task(self._run_in_control(site, robot, client, request, answered))
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
-        return await answered
+        arm = AsyncRobot(self._session, site, robot).control(self._operator)
+        arm.progress = Progress(stop_reason="the Foxglove client in control has left")
+        async with contextlib.AsyncExitStack() as control:
+            await control.enter_async_context(arm)
+            answer = await _COMMANDS[name](arm, request)
+            if name in _MOTIONS:
+                task = self._loop.create_task(self._keep_control(client, arm, control.pop_all()))
+                self._tasks.add(task)
+                task.add_done_callback(self._tasks.discard)
+        return True, answer.text
 
-    async def _run_in_control(
-        self,
-        site: str,
-        robot: str,
-        client: int,
-        request: CommandRequest,
-        answered: "asyncio.Future[tuple[bool, str]]",
-    ) -> None:
-        """Take control, send the command, and keep control until the motion ends or the client leaves."""
-        holding: _ControlSession | None = None
+    async def _keep_control(self, client: int, arm: AsyncArm, control: contextlib.AsyncExitStack) -> None:
+        """Keep control until the motion ends or the client leaves; then release it, and stop the robot."""
+        moving = self._moving[arm.site, arm.robot] = client, arm
         try:
-            async with control(self._session, site, robot, self._operator) as acquired:
-                holding = _ControlSession(client, acquired)
-                answer = await self._send(site, robot, holding, request)
-                moves = answer[0] and request.command in _MOTIONS
-                if moves:
-                    self._holding[site, robot] = holding
-                answered.set_result(answer)
-                if moves:
-                    await self._wait_for_motion(site, robot, holding)
+            async with control:
+                await self._until_ended(client, arm)
+        except MotionError as error:
+            log.info("%s: %s", arm, error)
         except BusError as error:
-            if answered.done():
-                log.warning("%s/%s: %s", site, robot, error)
-            else:
-                answered.set_exception(error)
+            log.warning("%s: %s", arm, error)
         finally:
-            # Another client's session stays if this client's was refused.
-            if holding is not None and self._holding.get((site, robot)) is holding:
-                del self._holding[site, robot]
-            if not answered.done():
-                answered.cancel()
+            # Control may have been taken away, and acquired for another client since.
+            if self._moving.get((arm.site, arm.robot)) is moving:
+                del self._moving[arm.site, arm.robot]
 
-    async def _send(
-        self, site: str, robot: str, holding: _ControlSession, request: CommandRequest
-    ) -> tuple[bool, str]:
-        holding.stamp(request)
-        key = robot_key(site, robot, f"command/{self._operator}")
-        answer = await self._session.ask(key, request, timeout_s=_ANSWER_S)
-        assert isinstance(answer, CommandAnswer)
-        return answer.accepted, answer.text
-
-    async def _wait_for_motion(self, site: str, robot: str, holding: _ControlSession) -> None:
-        over = asyncio.create_task(self._motion_ended(site, robot))
+    async def _until_ended(self, client: int, arm: AsyncArm) -> None:
+        ended = asyncio.create_task(arm.wait())
         try:
-            while not over.done() and not holding.control.renewing.done():
-                await asyncio.wait((over, holding.control.renewing), timeout=_POLL_S)
-                if not self._watches(holding.client, site, robot):
-                    log.warning("%s/%s: the client in control has left: control is released", site, robot)
-                    return
+            while self._watches(client, arm.site, arm.robot):
+                done, _ = await asyncio.wait((ended,), timeout=_POLL_S)
+                if done:
+                    return await ended
+            log.warning("%s: the client in control has left: the robot is stopped", arm)
         finally:
-            over.cancel()
-
-    async def _motion_ended(self, site: str, robot: str) -> None:
-        """Return when the gateway reports that the holder's motion has ended, or stops reporting."""
-        leases = self._session.subscribe(robot_key(site, robot, "lease"), newest=20)
-        try:
-            while True:
-                async with asyncio.timeout(_LEASE_TIMEOUT_S):
-                    sample = await anext(leases)
-                lease = sample.message()
-                assert isinstance(lease, Lease)
-                if sample.live and not (lease.motion and lease.holder == self._operator):
-                    return
-        except (TimeoutError, BusError) as error:
-            log.warning("%s/%s: the gateway is silent: %s", site, robot, error or "no lease is published")
-        finally:
-            leases.close()
-
-    async def _latched_stop(self, site: str, robot: str) -> int:
-        state = await self._session.last(robot_key(site, robot, "controller"))
-        return state.stop.id if isinstance(state, ControllerState) else 0
+            ended.cancel()  # stops the robot
+            await asyncio.gather(ended, return_exceptions=True)
 
     async def close(self) -> None:
-        """Release all control; the gateways stop running motions."""
+        """Stop running motions, and release all control."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)

@@ -10,8 +10,8 @@ import zenoh
 from protocol_gateway import gateway
 from protocol_gateway.audit.log import Outcome
 from protocol_gateway.audit.search import Query, find
+from robomesh.client.robot import AsyncRobot
 from robomesh.endpoints import bundle, router_config
-from robomesh.lease import control
 from robomesh.session import SessionSettings, open_session
 from robomesh.topics import Role
 from services.command_line.doctor import security
@@ -80,10 +80,13 @@ async def doctor_beside_control(folder, endpoint, audit_folder):
     """Return the doctor's exit status while an operator has and keeps control."""
     async with gateway_of(folder, endpoint, audit_folder):
         mesh = SessionSettings(connect=(endpoint,), tls=bundle(folder.person("li")), wait_s=20.0)
-        async with open_session(mesh) as session, control(session, SITE, "arm", "li.hall") as held:
-            status = await asyncio.to_thread(security.run, folder, (endpoint,), False)
-            assert not held.renewing.done()
-    return status
+        async with open_session(mesh) as session, AsyncRobot(session, SITE, "arm").control("li.hall") as arm:
+            probing = asyncio.create_task(asyncio.to_thread(security.run, folder, (endpoint,), False))
+            while not probing.done():
+                await arm.renew()
+                await asyncio.wait((probing,), timeout=1.0)
+            await arm.renew()
+    return await probing
 
 
 @pytest.mark.slow

@@ -5,9 +5,10 @@ import os
 import signal
 import sys
 
+import pytest
+
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
-from robomesh.lease import control
 from robomesh.requests import ask_all
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
@@ -17,6 +18,9 @@ from tests.conftest import run
 from tests.protocol_gateway.gateway_site import A, until
 
 KEY = "robomesh/hall/arm/lease/request/li"
+RUNNING = schema.ProgramState(
+    outcome=schema.ProgramState.RUNNING, line=2, statement="wait 1", step=7, steps=90
+)
 
 
 class Owner:
@@ -39,43 +43,17 @@ class Owner:
         return schema.LeaseAnswer(lease="secret")
 
 
-def test_a_busy_renewal_is_repeated_and_a_refused_one_ends_control(mesh):
-    async def main():
-        async with open_session(mesh) as gateway, open_session(mesh) as li, open_session(mesh) as eve:
-            owner = Owner(gateway)
-            async with control(li, "hall", "arm", "li") as own:
-                assert own.lease == "secret"
-                await until(lambda: owner.renewed)
-                asks, asked = schema.LeaseRequest(action=A.ASK).SerializeToString(), []
-                async with asyncio.timeout(40):
-                    while owner.waiting < 16:
-                        one = ask_all(eve.zenoh_session, KEY, asks, timeout_s=20.0)
-                        asked.append(asyncio.create_task(one))
-                        await asyncio.sleep(0.01)
-                before = owner.renewed
-                # Two renewals, each repeated for half a second.
-                await asyncio.wait((own.renewing,), timeout=2.2)
-                assert owner.renewed == before
-                assert not own.renewing.done()
-                owner.end.set()
-                await until(lambda: owner.renewed > before)
-                owner.taken = True
-                assert await own.renewing == "eve has control"
-                await asyncio.gather(*asked)
-
-    run(main())
-
-
 class Gateway(Owner):
     """A gateway that also accepts commands: it answers a program when `ready` is set."""
 
-    def __init__(self, session, *states, text="RUN_PROGRAM: it runs"):
+    def __init__(self, session, *states, text="RUN_PROGRAM: it runs", stops=True):
         super().__init__(session)
         self.asked, self.stops, self.ready = [], [], asyncio.Event()
         self._states, self._text = states, text
         self._program = session.declare_publisher("hall", "arm", "program")
         session.answer("hall", "arm", "command/*", self._command)
-        session.answer("hall", "arm", "stop", self._stop)
+        if stops:
+            session.answer("hall", "arm", "stop", self._stop)
 
     async def _command(self, request):
         self.asked.append(request.message)
@@ -96,14 +74,38 @@ class Gateway(Owner):
 
 def sent(li):
     """Start a task with `robomesh send hall/arm run`, and return it."""
-    request = schema.CommandRequest(command=schema.CommandRequest.RUN_PROGRAM, program="home")
-    robot = discovery.Robot("hall", "arm")
+    run = send.send_and_wait(li, discovery.Robot("hall", "arm"), "li", lambda arm: arm.run("home"))
+    return asyncio.create_task(run)
 
+
+def test_a_busy_renewal_is_repeated_and_a_refused_one_ends_control(mesh):
     async def main():
-        async with control(li, *robot, "li") as own:
-            return await send._send_and_wait(li, robot, "li", request, own.renewing)
+        async with open_session(mesh) as session, open_session(mesh) as li, open_session(mesh) as eve:
+            gateway = Gateway(session, RUNNING)
+            gateway.ready.set()
+            publishing = asyncio.create_task(gateway.publish_states())
+            outcome = sent(li)
+            await until(lambda: gateway.asked and gateway.renewed)
+            asks, asked = schema.LeaseRequest(action=A.ASK).SerializeToString(), []
+            async with asyncio.timeout(40):
+                while gateway.waiting < 16:
+                    one = ask_all(eve.zenoh_session, KEY, asks, timeout_s=20.0)
+                    asked.append(asyncio.create_task(one))
+                    await asyncio.sleep(0.01)
+            before = gateway.renewed
+            # Two renewals, each repeated for half a second.
+            await asyncio.wait((outcome,), timeout=2.2)
+            assert gateway.renewed == before
+            assert not outcome.done()
+            gateway.end.set()
+            await until(lambda: gateway.renewed > before)
+            gateway.taken = True
+            assert await outcome == (False, "control ended before the motion did: eve has control", "")
+            assert gateway.stops == []
+            await asyncio.gather(*asked)
+            publishing.cancel()
 
-    return asyncio.create_task(main())
+    run(main())
 
 
 def test_ctrl_c_stops_a_program_during_its_check(mesh):
@@ -120,9 +122,25 @@ def test_ctrl_c_stops_a_program_during_its_check(mesh):
     run(main())
 
 
-RUNNING = schema.ProgramState(
-    outcome=schema.ProgramState.RUNNING, line=2, statement="wait 1", step=7, steps=90
-)
+@pytest.mark.slow
+def test_a_silent_gateway_is_reported_with_advice_and_an_unanswered_stop_in_words(mesh):
+    async def main():
+        async with open_session(mesh) as session, open_session(mesh) as li:
+            gateway = Gateway(session, stops=False)
+            gateway.ready.set()
+            accepted, text, _ = await sent(li)
+            assert not accepted
+            assert text.startswith(
+                "the gateway fell silent: the state of hall/arm is unknown. `robomesh send"
+            )
+            interrupted = sent(li)
+            await until(lambda: len(gateway.asked) == 2)
+            signal.raise_signal(signal.SIGINT)
+            accepted, text, _ = await interrupted
+            assert not accepted
+            assert text.startswith("interrupted: the stop failed: no answer to robomesh/hall/arm/stop")
+
+    run(main())
 
 
 def test_a_gateway_restart_is_reported_with_advice_and_warnings_are_printed_first(mesh, capsys):
