@@ -75,7 +75,7 @@ def read_identity(path: Path) -> Identity | None:
         return Identity(
             name=lines["Name"],
             role=Role(lines["Role"]),
-            expires=datetime.fromisoformat(lines["Expires"]) if "Expires" in lines else None,
+            expires=datetime.fromisoformat(lines["Expires"]).astimezone(UTC) if "Expires" in lines else None,
             robots=frozenset(_listed(lines["Robots"])) if "Robots" in lines else None,
             routers=_listed(lines.get("Routers", "")),
         )

@@ -6,6 +6,7 @@ Python's TLS, which reports the reason.
 
 import socket
 import ssl
+from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -15,6 +16,8 @@ from robomesh.errors import SessionError
 
 _TIMEOUT_S = 2.0
 _SOON = timedelta(days=5)
+_KEYS = "--keys FILE; in Python keys=FILE"
+_NO_TLS = "name the port of a router with TLS, or tcp/HOST:PORT"
 # Time to wait after the handshake for an alert about our certificate [s].
 _VERDICT_S = 0.5
 
@@ -23,13 +26,20 @@ def own_certificate(tls: Tls | None, now: datetime | None = None) -> tuple[Ident
     """Return the identity of our certificate, and a warning if it expires soon.
 
     Raises:
-        SessionError: If a file cannot be read, or the certificate has expired.
+        SessionError: If a file cannot be read or is damaged, or the certificate has expired.
     """
     if tls is None:
         return None, None
     for file in (tls.ca, tls.key):
         read_identity(file)
     identity = read_identity(tls.certificate)
+    try:
+        _context(tls)
+    except (ssl.SSLError, ValueError) as error:
+        mismatch = getattr(error, "reason", "") == "KEY_VALUES_MISMATCH"
+        problem = "the key is of another certificate" if mismatch else "a part is missing or damaged"
+        files = ", ".join(str(file) for file in dict.fromkeys((tls.certificate, tls.key, tls.ca)))
+        raise SessionError(f"{files}: {problem}: copy the bundle of robomesh keys again") from None
     if identity is None or identity.expires is None:
         return identity, None
     left = identity.expires - (now or datetime.now(UTC))
@@ -63,46 +73,57 @@ def refusal_of_router(endpoint: str, tls: Tls | None) -> str | None:
     host, _, port = rest.partition("?")[0].partition("#")[0].rpartition(":")
     if protocol not in ("tcp", "tls") or not port.isdigit():
         return None
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-    context.check_hostname = False
-    context.verify_mode = ssl.CERT_NONE
     plain = protocol == "tcp"
     try:
-        if tls is not None and not plain:
-            context.load_verify_locations(tls.ca)
-            context.load_cert_chain(tls.certificate, tls.key)
-            context.verify_mode = ssl.CERT_REQUIRED
-        with (
-            # A server without TLS may wait forever for the rest of what it takes for a message.
-            socket.create_connection(
-                (host.strip("[]"), int(port)), _VERDICT_S if plain else _TIMEOUT_S
-            ) as raw,
-            context.wrap_socket(raw) as link,
-        ):
-            if plain:
-                return f"{endpoint} accepts only TLS: name a certificate with --keys FILE"
-            link.settimeout(_VERDICT_S)
-            link.recv(1)
-    except ssl.SSLCertVerificationError as error:
-        assert tls is not None
-        return f"{endpoint} has a certificate that {tls.ca} did not sign: {error.verify_message}"
-    except ssl.SSLError as error:
-        return None if plain else _verdict(endpoint, tls, error)
+        # A server without TLS may wait forever for the rest of what it takes for a message.
+        raw = socket.create_connection((host.strip("[]"), int(port)), _VERDICT_S if plain else _TIMEOUT_S)
     except (OSError, OverflowError, UnicodeError):  # no such port, no such name
-        pass
+        return None
+    with raw:
+        try:
+            with _context(None if plain else tls).wrap_socket(raw) as link:
+                if plain:
+                    return f"{endpoint} accepts only TLS: name a certificate ({_KEYS})"
+                link.settimeout(_VERDICT_S)
+                with suppress(TimeoutError):  # no alert
+                    link.recv(1)
+        except TimeoutError:
+            return None if plain else f"{endpoint} accepts connections, but does not answer: {_NO_TLS}"
+        except ssl.SSLCertVerificationError as error:
+            assert tls is not None
+            return f"{endpoint} has a certificate that {tls.ca} did not sign: {error.verify_message}"
+        except ssl.SSLError as error:
+            return None if plain else _verdict(endpoint, tls, error)
+        except OSError:
+            pass
     return None
+
+
+def _context(tls: Tls | None) -> ssl.SSLContext:
+    """Return the context of a client with these certificates; None: of one that accepts any server.
+
+    Raises:
+        ssl.SSLError: If a certificate or key is damaged or missing, or they do not belong together.
+    """
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname = False
+    if tls is None:
+        context.verify_mode = ssl.CERT_NONE
+    else:
+        context.load_verify_locations(tls.ca)
+        # With a password OpenSSL does not ask the terminal for one.
+        context.load_cert_chain(tls.certificate, tls.key, password="")
+    return context
 
 
 def _verdict(endpoint: str, tls: Tls | None, error: ssl.SSLError) -> str | None:
     reason = (error.reason or "").lower()
     if "alert" not in reason:
-        return (
-            f"{endpoint} does not speak TLS: use tcp/HOST:PORT instead" if "wrong_version" in reason else None
-        )
+        return f"{endpoint} does not speak TLS: {_NO_TLS}" if "wrong_version" in reason else None
     alert = reason.rpartition("alert_")[2].replace("_", " ")
     shown = "no certificate" if tls is None else f"the certificate in {tls.certificate}"
     known = {
-        "certificate required": "it needs one: --keys FILE",
+        "certificate required": f"it needs one ({_KEYS})",
         "unknown ca": "another site's authority signed it",
         "certificate expired": "it has expired: robomesh keys renew",
         "certificate revoked": "it was revoked",

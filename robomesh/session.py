@@ -321,7 +321,9 @@ async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
             break
         except zenoh.ZError:
             timed_out = deadline is not None and loop.time() >= deadline
-            diagnose = timed_out or (settings.tls is not None and not logged)
+            # With a deadline the error gives the reason; a script would print it twice.
+            to_log = deadline is None and not logged
+            diagnose = timed_out or (settings.tls is not None and to_log)
             reason = await asyncio.to_thread(_refusal, settings) if diagnose else None
             if timed_out:
                 raise SessionError(
@@ -329,7 +331,7 @@ async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
                     or f"no router at {routers}: start one (robomesh up, robomesh router) or give "
                     "another address (--connect)"
                 ) from None
-            if not logged:
+            if to_log:
                 log.warning("%s", reason or f"no router at {routers} yet: waiting for one")
                 logged = True
             await asyncio.sleep(_RETRY_S)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from robomesh.certificate_identity import Identity, read_identity
 from robomesh.endpoints import DEFAULT_ROUTER, bundle
-from robomesh.errors import SessionError
+from robomesh.errors import NoAnswerError, SessionError
 from robomesh.session import Session, SessionSettings, open_session
 
 
@@ -40,9 +40,11 @@ def connection_settings(
         wait_s: How long to wait for a router [s]; None: forever.
 
     Raises:
-        SessionError: If the file is not a bundle, or a router is not reached by TLS.
+        SessionError: If no router is named, the file is not a bundle, or a router is not reached by TLS.
     """
     named = addresses(routers) if isinstance(routers, str) else tuple(routers)
+    if not named:
+        raise SessionError(f"no router is named: an address is {DEFAULT_ROUTER}")
     identity = own_identity(keys)
     if identity is None or keys is None:
         return SessionSettings(connect=named, wait_s=wait_s)
@@ -63,9 +65,14 @@ async def connected(settings: SessionSettings) -> AsyncIterator[Session]:
     """
     async with open_session(settings) as session:
         # A router without rules for the name accepts the session and hides everything, itself too.
-        if session.principal is not None and not await session.present():
-            raise SessionError(
-                f"the router shows {session.principal.name} nothing: its certificate was revoked, or the "
-                "router has not read this site's list yet (robomesh keys list)"
-            )
+        if session.principal is not None:
+            try:
+                shown = await session.present()
+            except NoAnswerError as error:
+                raise SessionError(f"the router closed the connection or is restarting: {error}") from None
+            if not shown:
+                raise SessionError(
+                    f"the router shows {session.principal.name} nothing: its certificate was revoked, or the "
+                    "router has not read this site's list yet (robomesh keys list)"
+                )
         yield session
