@@ -11,10 +11,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from robomesh.client.blocking import Arm, Mesh, Robot
+    from robomesh.client.blocking import Arm, Mesh, Recording, Robot, open_recording
     from robomesh.client.commands import CommandResult, StopResult
     from robomesh.client.control import AsyncArm
     from robomesh.client.mesh import AsyncMesh, RobotNotFoundError, Service
+    from robomesh.client.recorded_values import RecordedJoints, RecordedValues
+    from robomesh.client.recording import AsyncRecording, RecordedSample
+    from robomesh.client.recording_list import RecordedTopic, RecordingInfo
     from robomesh.client.robot import AsyncRobot, CheckResult, InverseResult, Violation
     from robomesh.client.samples import Alarm, Event, JointState, Sample
     from robomesh.client.streams import AsyncStream, StaleError, Stream
@@ -28,16 +31,20 @@ if TYPE_CHECKING:
         RefusedError,
         SessionError,
     )
+    from robomesh.recordings.errors import RecordingError
 
     connect = Mesh
     connect_async = AsyncMesh
 
 # Imported when they are used: the services import parts of this package, and need no client.
 _MODULES = {
-    "client.blocking": ("Arm", "Mesh", "Robot"),
+    "client.blocking": ("Arm", "Mesh", "Recording", "Robot", "open_recording"),
     "client.commands": ("CommandResult", "StopResult"),
     "client.control": ("AsyncArm",),
     "client.mesh": ("AsyncMesh", "RobotNotFoundError", "Service"),
+    "client.recorded_values": ("RecordedJoints", "RecordedValues"),
+    "client.recording": ("AsyncRecording", "RecordedSample"),
+    "client.recording_list": ("RecordedTopic", "RecordingInfo"),
     "client.robot": ("AsyncRobot", "CheckResult", "InverseResult", "Violation"),
     "client.samples": ("Alarm", "Event", "JointState", "Sample"),
     "client.streams": ("AsyncStream", "StaleError", "Stream"),
@@ -51,6 +58,7 @@ _MODULES = {
         "RefusedError",
         "SessionError",
     ),
+    "recordings.errors": ("RecordingError",),
 }
 _PLACES = {name: (module, name) for module, names in _MODULES.items() for name in names}
 _PLACES["connect"] = "client.blocking", "Mesh"
@@ -61,6 +69,7 @@ __all__ = [
     "Arm",
     "AsyncArm",
     "AsyncMesh",
+    "AsyncRecording",
     "AsyncRobot",
     "AsyncStream",
     "BusError",
@@ -75,6 +84,13 @@ __all__ = [
     "MotionError",
     "NoAnswerError",
     "QuotaError",
+    "RecordedJoints",
+    "RecordedSample",
+    "RecordedTopic",
+    "RecordedValues",
+    "Recording",
+    "RecordingError",
+    "RecordingInfo",
     "RefusedError",
     "Robot",
     "RobotNotFoundError",
@@ -87,6 +103,7 @@ __all__ = [
     "Violation",
     "connect",
     "connect_async",
+    "open_recording",
 ]
 
 

@@ -9,6 +9,7 @@ BusError
     ├── UnknownTopicError   a topic that is not in the table
     ├── MessageError        bytes or JSON that are not the expected message
     ├── MotionError         a motion that ended before its target, with the reason
+    ├── RecordingsError     errors of recordings, in robomesh.recordings.errors
     └── RefusedError        a request that its owner refused, with the reason
         ├── BusyError       a request that its owner is too busy to do
         ├── QuotaError      a request over the caller's quota; it may be repeated later

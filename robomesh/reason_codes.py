@@ -731,7 +731,7 @@ RECORDING_NO_ATTACHMENT = Code(
     "recording.no_attachment", "{file} has no attachment '{name}'", "there are {attachments}"
 )
 RECORDING_NO_TOPIC = Code("recording.no_topic", "{file} has no topic '{topic}'", "there are {topics}")
-RECORDING_NO_VALUE = Code("recording.no_value", "{file}: no value '{name}'; topics with values: {topics}")
+RECORDING_NO_VALUE = Code("recording.no_value", "{file} has no value '{name}'", "there are {topics}")
 RECORDING_CHANGED = Code("recording.changed", "{file} changed during the fetch", "fetch it again")
 RECORDING_NOT_FOUND = Code(
     "recording.not_found", "no recording '{name}' on the mesh", "there are {recordings}"

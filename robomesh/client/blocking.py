@@ -4,7 +4,7 @@ All calls may be used from several threads; each stream and each arm from one th
 """
 
 import time
-from collections.abc import Coroutine, Iterable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, Self, TypeVar
 
@@ -12,6 +12,9 @@ from robomesh.client.commands import CommandResult, Progress, StopResult
 from robomesh.client.control import AsyncArm
 from robomesh.client.event_loop import EventLoopThread
 from robomesh.client.mesh import AsyncMesh, Service
+from robomesh.client.recorded_values import RecordedJoints, RecordedValues
+from robomesh.client.recording import AsyncRecording, DiskSource, RecordedSample
+from robomesh.client.recording_list import RecordingInfo
 from robomesh.client.robot import AsyncRobot, CheckResult, InverseResult, Matrix
 from robomesh.client.samples import Alarm, Event, JointState, Sample
 from robomesh.client.streams import AsyncStream, OnStale, Stream
@@ -203,6 +206,77 @@ class Robot:
         return blocking_stream(self._loop, lambda: begin(*arguments, **options))
 
 
+class Recording:
+    """A recording.
+
+    `start_s` and `end_s` of its functions limit the time since the recording's start, on the recorder's
+    clock [s], both included; None: its start or end. Messages that cannot be decoded are left out, with a
+    warning in the log.
+
+    Raises:
+        RecordingError: Of every function: the file is damaged, changed, or lacks what was requested.
+        BusError: Of every function, over the mesh: the recorder refuses or does not answer.
+
+    Attributes:
+        info: Description of the recording.
+    """
+
+    def __init__(self, recording: AsyncRecording, run: Callable[[Coroutine[Any, Any, Any]], Any]) -> None:
+        self._recording, self._run = recording, run
+        self.info = recording.info
+
+    def __repr__(self) -> str:
+        return repr(self._recording)
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """The recorded topics."""
+        return self._recording.topics
+
+    def value_names(self) -> list[str]:
+        """Return the names of the recorded values, as `values` takes them: "kinematics/tool/x"."""
+        names: list[str] = self._run(self._recording.value_names())
+        return names
+
+    def joints(self, *, start_s: float | None = None, end_s: float | None = None) -> RecordedJoints:
+        """Return the joint states."""
+        joints: RecordedJoints = self._run(self._recording.joints(start_s=start_s, end_s=end_s))
+        return joints
+
+    def values(
+        self, *names: str, start_s: float | None = None, end_s: float | None = None
+    ) -> dict[str, RecordedValues]:
+        """Return values over time, at the full rate of their topics, by name."""
+        values: dict[str, RecordedValues]
+        values = self._run(self._recording.values(*names, start_s=start_s, end_s=end_s))
+        return values
+
+    def events(self, *, start_s: float | None = None, end_s: float | None = None) -> list[Event]:
+        """Return the events of all services, in the order of their times."""
+        events: list[Event] = self._run(self._recording.events(start_s=start_s, end_s=end_s))
+        return events
+
+    def messages(
+        self, topic: str, *, start_s: float | None = None, end_s: float | None = None
+    ) -> Iterator[RecordedSample]:
+        """Yield the messages of a topic, in the order of their receive times."""
+        pages = self._recording.sample_pages(topic, start_s=start_s, end_s=end_s)
+        try:
+            while (samples := self._run(_next_of(pages))) is not None:
+                yield from samples
+        finally:
+            self._run(pages.aclose())
+
+
+def open_recording(path: str | Path) -> Recording:
+    """Return the recording in a file of this machine; also of one that is still being written.
+
+    Raises:
+        RecordingError: If no part of it can be read.
+    """
+    return Recording(AsyncRecording(DiskSource(Path(path))), _run_now)
+
+
 class Mesh:
     """A connection to the mesh; a context manager. It is closed at the latest when the program ends.
 
@@ -264,6 +338,44 @@ class Mesh:
     def alarms(self) -> list[Alarm]:
         """Return the alarms of all sites: all except ended and acknowledged ones, most urgent first."""
         return self._loop.run(self._mesh.alarms())
+
+    def recordings(self) -> list[RecordingInfo]:
+        """Return the recordings of all sites, newest first, without those of recorders that do not answer."""
+        return self._loop.run(self._mesh.recordings())
+
+    def open_recording(self, recording: str | RecordingInfo) -> Recording:
+        """Return a recording of a site, which is read through the mesh as it is needed.
+
+        Args:
+            recording: "name", "site/name" or "site/file", the newest of that name; or one of `recordings`.
+
+        Raises:
+            RecordingError: If no recording has the name; the text lists the newest ones.
+        """
+        return Recording(self._loop.run(self._mesh.open_recording(recording)), self._loop.run)
+
+    def fetch_recording(self, recording: str | RecordingInfo, out: str | Path = ".") -> Path:
+        """Copy a recording's file to this machine, and return its path; an interrupted copy is resumed.
+
+        Args:
+            recording: As for `open_recording`.
+            out: Path of the copy, or a folder.
+        """
+        return self._loop.run(self._mesh.fetch_recording(recording, out))
+
+
+async def _next_of(pages: AsyncIterator[T]) -> T | None:
+    return await anext(pages, None)
+
+
+def _run_now(coroutine: Coroutine[Any, Any, T]) -> T:
+    """Return the result of a coroutine that never waits."""
+    try:
+        coroutine.send(None)
+    except StopIteration as end:
+        result: T = end.value
+        return result
+    raise RuntimeError("a coroutine that reads a file waited")
 
 
 def blocking_stream(loop: EventLoopThread, begin: Any) -> Stream[Any]:

@@ -7,6 +7,9 @@ from pathlib import Path
 from typing import Self
 
 from robomesh.client.connection import connected, connection_settings
+from robomesh.client.recorder import RecorderFile
+from robomesh.client.recording import AsyncRecording, MeshSource
+from robomesh.client.recording_list import RecordingInfo, find_recording, list_recordings, recording_info
 from robomesh.client.robot import AsyncRobot, events_of
 from robomesh.client.samples import Alarm, Event, alarm_of
 from robomesh.client.streams import AsyncStream
@@ -157,3 +160,45 @@ class AsyncMesh:
         ]
         alarms.sort(key=lambda alarm: (-alarm.priority, alarm.since.ToNanoseconds()))
         return [alarm_of(alarm) for alarm in alarms]
+
+    async def recordings(self) -> list[RecordingInfo]:
+        """Return the recordings of all sites, newest first, without those of recorders that do not answer.
+
+        Raises:
+            BusError: If no recorder answers.
+        """
+        return await list_recordings(self.session)
+
+    async def open_recording(self, recording: str | RecordingInfo) -> AsyncRecording:
+        """Return a recording of a site, which is read through the mesh as it is needed.
+
+        Args:
+            recording: "name", "site/name" or "site/file", the newest of that name; or one of `recordings`.
+
+        Raises:
+            RecordingError: If no recording has the name; the text lists the newest ones.
+            BusError: If its recorder refuses or does not answer.
+        """
+        file, site = await self._recorder_file(recording)
+        return AsyncRecording(MeshSource(file, recording_info(await file.describe(), site)))
+
+    async def fetch_recording(self, recording: str | RecordingInfo, out: str | Path = ".") -> Path:
+        """Copy a recording's file to this machine, and return its path; an interrupted copy is resumed.
+
+        Args:
+            recording: As for `open_recording`.
+            out: Path of the copy, or a folder.
+
+        Raises:
+            RecordingError: If no recording has the name, or the file changes meanwhile.
+            BusError: If its recorder refuses or does not answer.
+            OSError: If the copy cannot be written.
+        """
+        file, _ = await self._recorder_file(recording)
+        return (await file.fetch(Path(out))).file
+
+    async def _recorder_file(self, recording: str | RecordingInfo) -> tuple[RecorderFile, str]:
+        if isinstance(recording, str):
+            recording = await find_recording(self.session, recording)
+        site = recording.recorder_site
+        return RecorderFile(self.session, site, recording.file, asker=self.session.own_name), site

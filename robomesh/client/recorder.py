@@ -1,6 +1,7 @@
 """Requests to a recorder for one of its files: its description, messages of a topic, bytes."""
 
 import asyncio
+import contextlib
 import hashlib
 import logging
 from collections.abc import AsyncIterator, Callable
@@ -10,7 +11,7 @@ from typing import NamedTuple
 from google.protobuf.message import Message
 
 from robomesh import reason_codes as codes
-from robomesh.errors import QuotaError
+from robomesh.errors import QuotaError, RefusedError
 from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.recordings.errors import RecordingError
 from robomesh.repeated_requests import ask_repeatedly
@@ -22,6 +23,8 @@ log = logging.getLogger(__name__)
 # The first one is short, because a request to a site without a recorder ends after it.
 _TIMEOUTS_S = (2.0, 5.0, 10.0, 20.0)
 _MESSAGES, _PIECE = 2000, 1 << 20
+# A recording's file gets an index once, soon after its end.
+_VERSIONS = 3
 # A quota counts one minute: after that some of it is free again.
 _LONGEST_WAIT_S = 60.0
 
@@ -110,7 +113,12 @@ class RecorderFile:
             BusError: If the recorder refuses or does not answer.
         """
         while begin < end:
-            piece = await self.piece(offset=begin, length=min(_PIECE, end - begin), wait=True)
+            try:
+                piece = await self.piece(offset=begin, length=min(_PIECE, end - begin), wait=True)
+            except RefusedError as error:
+                if error.code == codes.RECORDING_NO_BYTE.name:  # the new version is shorter
+                    raise RecordingError(codes.RECORDING_CHANGED(file=self.name)) from None
+                raise
             if piece.version != version or not piece.data:
                 raise RecordingError(codes.RECORDING_CHANGED(file=self.name))
             begin += len(piece.data)
@@ -158,15 +166,27 @@ class RecorderFile:
             if last is not None:
                 request.start.FromNanoseconds(last.received_ns)
 
+    async def value_names(self) -> list[str]:
+        """Return the names of the recorded values; wait for the quota.
+
+        Raises:
+            BusError: If the recorder refuses or does not answer.
+        """
+        answer = await self._ask(f"series/{self._asker}", schema.SeriesRequest(file=self.name), wait=True)
+        assert isinstance(answer, schema.SeriesAnswer)
+        return list(answer.known)
+
     async def fetch(self, out: Path, *, on_progress: Callable[[float], None] = lambda share: None) -> Fetched:
         """Copy the file; resume an earlier fetch of the same version.
+
+        If the file changes meanwhile, as when a closed recording gets its index, copy the new version.
 
         Args:
             out: Path of the copy, or a folder.
             on_progress: Called with the fetched share, from 0 to 1.
 
         Raises:
-            RecordingError: If the file changes meanwhile, or its name is not a plain file name.
+            RecordingError: If the file changes again and again, or its name is not a plain file name.
             BusError: If the recorder refuses or does not answer.
             OSError: If the copy cannot be written.
         """
@@ -176,16 +196,26 @@ class RecorderFile:
                 f"the recorder of {self._site} names the file {self.name!r}, which is not a plain file name"
             )
         out = out / self.name if await asyncio.to_thread(out.is_dir) else out
+        for _ in range(_VERSIONS - 1):
+            with contextlib.suppress(RecordingError):
+                return await self._fetch_version(out, on_progress)
+        return await self._fetch_version(out, on_progress)
+
+    async def _fetch_version(self, out: Path, on_progress: Callable[[float], None]) -> Fetched:
         first = await self.piece(wait=True)
         # With the version in the name, a fetch never resumes another version's file.
         version = hashlib.sha256(first.version.encode()).hexdigest()[:12]
         partial = out.with_name(f".{out.name}.{version}.part")
         at = begun = partial.stat().st_size if partial.exists() else 0
-        with partial.open("ab") as stream:
-            async for data in self.pieces(begun, first.total, version=first.version):
-                stream.write(data)
-                at += len(data)
-                on_progress(at / first.total)
+        try:
+            with partial.open("ab") as stream:
+                async for data in self.pieces(begun, first.total, version=first.version):
+                    stream.write(data)
+                    at += len(data)
+                    on_progress(at / first.total)
+        except RecordingError:
+            partial.unlink(missing_ok=True)
+            raise
         partial.replace(out)
         return Fetched(out, begun, first.total)
 

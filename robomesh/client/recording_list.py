@@ -49,7 +49,7 @@ class RecordingInfo:
         recorder_site: Site whose recorder has the file; empty: it is a file on this machine.
         file: Name of the file.
         start_ns: Zero of the recording's time axis, ns since the Unix epoch: receive time of the first
-            message. For a recording that is still being written, its recorder reports the request's time.
+            message.
         duration_s: [s]
         bytes: Size of the file.
         open: It is still being written.

@@ -98,6 +98,11 @@ class Capture:
         """Size of the file when all waiting bytes are written."""
         return self._end
 
+    @property
+    def first_ns(self) -> int:
+        """Receive time of the first message, ns since the Unix epoch; without messages that of the start."""
+        return self._contents.start_ns or self.start_ns
+
     def add(self, key: str, topic: Topic, header: Header, payload: bytes, *, received_ns: int) -> None:
         """Add a received publication.
 

@@ -1,27 +1,17 @@
 """Errors of recordings.
 
-RecordingsError
+RecordingsError             a CodedError
 ├── CaptureError            a capture that cannot be written
 └── RecordingError          a file that is not a recording, or lacks a requested part
 """
 
 from robomesh import reason_codes as codes
+from robomesh.errors import CodedError
 from robomesh.reasons import Reason
 
 
-class RecordingsError(Exception):
-    """Base of the errors of recordings; the text is one line for people.
-
-    Args:
-        reason: A reason from the table; a plain text, as of a damaged file, has the code `other`.
-
-    Attributes:
-        reason: The code and its parameters.
-    """
-
-    def __init__(self, reason: Reason | str) -> None:
-        super().__init__(reason)
-        self.reason = codes.OTHER(detail=reason) if isinstance(reason, str) else reason
+class RecordingsError(CodedError):
+    """Base of the errors of recordings."""
 
 
 class CaptureError(RecordingsError):

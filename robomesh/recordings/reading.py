@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import IO, Any, NamedTuple, Self
 
+from google.protobuf.timestamp_pb2 import Timestamp
 from mcap.opcode import Opcode
 from mcap_protobuf.decoder import DecoderFactory
 
@@ -96,6 +97,32 @@ class RecordingFile:
             return DecoderFactory().decoder_for(channel.message_encoding, schema)
         except (*DAMAGE, TypeError):
             return None
+
+    def clip(self, start_ns: int | None, end_ns: int | None) -> tuple[int, int]:
+        """Return the part of a range of receive times (both included) that the file contains [ns].
+
+        Args:
+            start_ns, end_ns: ns since the Unix epoch; None: the file's first or last message.
+
+        Raises:
+            RecordingError: If the range ends before it begins, or is outside the recording.
+        """
+        first, last = self.layout.start_ns, self.layout.end_ns
+        begin, end = first if start_ns is None else start_ns, last if end_ns is None else end_ns
+        if start_ns is not None and end_ns is not None and end < begin:
+            raise RecordingError(codes.RECORDING_TIMES())
+        if last and (begin > last or end < first):
+            begin, end = (begin, max(begin, end)) if begin > last else (min(begin, end), end)
+            raise RecordingError(
+                codes.RECORDING_OUTSIDE(
+                    file=self.path.name,
+                    start=_text(begin),
+                    end=_text(end),
+                    first=_text(first),
+                    last=_text(last),
+                )
+            )
+        return max(begin, first), min(end, last)
 
     def messages(
         self,
@@ -277,3 +304,9 @@ class RecordingFile:
 
 def _has(block: Block, wanted: frozenset[int] | None) -> bool:
     return wanted is None or block.channels is None or not wanted.isdisjoint(block.channels)
+
+
+def _text(time_ns: int) -> str:
+    timestamp = Timestamp()
+    timestamp.FromNanoseconds(time_ns)
+    return timestamp.ToJsonString()

@@ -106,7 +106,7 @@ class SeriesReader:
         for name in names:
             topic = topic_of(name, topics)
             if topic is None:
-                there = ", ".join(topics) or "none"
+                there = ", ".join(f"{topic}/..." for topic in topics) or "none"
                 raise RecordingError(codes.RECORDING_NO_VALUE(file=file.path.name, name=name, topics=there))
             wanted.setdefault(topic, []).append(name)
         sliding = _sliding(file, names)

@@ -74,11 +74,10 @@ def _known_errors() -> tuple[type[Exception], ...]:
     from protocol_gateway.errors import ProtocolGatewayError
     from renderer.errors import RendererError
     from robomesh.errors import BusError
-    from robomesh.recordings.errors import RecordingsError
     from robots.errors import RobotError
     from services.errors import ServiceError
 
-    return (BusError, ProtocolGatewayError, RecordingsError, RendererError, RobotError, ServiceError)
+    return (BusError, ProtocolGatewayError, RendererError, RobotError, ServiceError)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from google.protobuf.message import Message
-from google.protobuf.timestamp_pb2 import Timestamp
 
 from robomesh import reason_codes as codes
 from robomesh.recordings.channel_names import SUFFIX
@@ -150,28 +149,9 @@ def _times(file: RecordingFile, request: schema.RangeRequest | schema.SeriesRequ
     Raises:
         RecordingError: If the range is invalid or outside the recording.
     """
-    first, last = file.layout.start_ns, file.layout.end_ns
     try:
-        start_ns = request.start.ToNanoseconds() if request.HasField("start") else first
-        end_ns = request.end.ToNanoseconds() if request.HasField("end") else last
+        start_ns = request.start.ToNanoseconds() if request.HasField("start") else None
+        end_ns = request.end.ToNanoseconds() if request.HasField("end") else None
     except ValueError as error:
         raise RecordingError(f"{file.path.name}: invalid time: {error}") from None
-    if request.HasField("start") and request.HasField("end") and end_ns < start_ns:
-        raise RecordingError(codes.RECORDING_TIMES())
-    if last and (start_ns > last or end_ns < first):
-        raise RecordingError(
-            codes.RECORDING_OUTSIDE(
-                file=file.path.name,
-                start=_text(start_ns),
-                end=_text(end_ns),
-                first=_text(first),
-                last=_text(last),
-            )
-        )
-    return max(start_ns, first), min(end_ns, last)
-
-
-def _text(time_ns: int) -> str:
-    timestamp = Timestamp()
-    timestamp.FromNanoseconds(time_ns)
-    return timestamp.ToJsonString()
+    return file.clip(start_ns, end_ns)

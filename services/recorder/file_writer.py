@@ -84,7 +84,7 @@ class Part:
             bytes=capture.size,
             attachments=capture.attached,
         )
-        recording.start.FromNanoseconds(capture.start_ns)
+        recording.start.FromNanoseconds(capture.first_ns)
         recording.duration.FromNanoseconds(time.monotonic_ns() - self._begun_ns)
         missed = self.missed
         for key in sorted(capture.counts.keys() | missed.keys()):

@@ -187,6 +187,44 @@ def test_the_asynchronous_form_reads_and_moves(site, robot):
     asyncio.run(main())
 
 
+def test_a_recording_of_a_site_is_the_same_over_the_mesh_and_as_a_file(mesh, site, robot, tmp_path):
+    arguments = ("record", "arm", "--name", "notes", "--view", "-", "--connect", site.router)
+    with subprocess.Popen([sys.executable, "-m", "services.command_line.main", *arguments]) as recording:
+        try:
+            wait_for(robot, "recording", lambda state: state.name == "notes" and state.open)
+            with robot.control("ops") as arm:
+                arm.home()
+            opened = mesh.open_recording("test/notes")
+            assert opened.info.open
+            while not len(opened.joints()):
+                time.sleep(0.1)
+            while_open = opened.joints()
+            recording.send_signal(signal.SIGINT)
+            assert recording.wait(WAIT_S) == 0
+        finally:
+            recording.kill()
+    wait_for(robot, "recording", lambda state: state.name == "notes" and not state.open)
+    deadline = time.monotonic() + WAIT_S
+    while (info := mesh.recordings()[0]).open:
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    over_mesh, on_disk = (
+        mesh.open_recording(info),
+        robomesh.open_recording(mesh.fetch_recording(info, tmp_path)),
+    )
+    states, same = over_mesh.joints(), on_disk.joints()
+    assert states.units == ("rad",) * 5
+    assert len(states) > 10
+    assert states.time_ns.tolist() == same.time_ns.tolist()
+    assert states.positions_deg.tolist() == same.positions_deg.tolist()
+    assert while_open.time_s.tolist() == states.time_s[: len(while_open)].tolist()
+    assert [event.code for event in over_mesh.events()] == [event.code for event in on_disk.events()]
+    tool = over_mesh.values("kinematics/tool/x")["kinematics/tool/x"]
+    assert (tool.unit, len(tool) > 3) == ("m", True)
+    with pytest.raises(robomesh.RecordingError, match="there are test/notes"):
+        mesh.open_recording("other/notes")
+
+
 def test_the_document_names_everything_public():
     text = DOCUMENT.read_text(encoding="utf-8")
     assert [name for name in robomesh.__all__ if f"`{name}" not in text] == []

@@ -1161,7 +1161,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ],
   [
     "recording.no_value",
-    ["{file}: no value '{name}'; topics with values: {topics}", "{file}：没有数值“{name}”；有数值的主题：{topics}"],
+    ["{file} has no value '{name}': there are {topics}", "{file} 没有数值“{name}”：现有 {topics}"],
   ],
   ["recording.changed", ["{file} changed during the fetch: fetch it again", "{file} 在获取期间已更改：请重新获取"]],
   [

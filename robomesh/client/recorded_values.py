@@ -1,0 +1,240 @@
+"""Joint states and values of a recording as NumPy arrays, collected message by message."""
+
+from array import array
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import nan
+from typing import TYPE_CHECKING, Any
+
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from google.protobuf.message import Message
+
+from robomesh.client.samples import PRISMATIC, ROTARY
+from robomesh.recordings.errors import RecordingError
+from robomesh.recordings.publisher_time import PublisherTimes, Recorded
+from robomesh.recordings.values import unit_of, values_of
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    FloatArray = NDArray[np.float64]
+    IntArray = NDArray[np.int64]
+
+_UNITS = {ROTARY: "rad", PRISMATIC: "m"}
+# Positions that no message contains: other programs' states may name some joints only.
+_MOST_ABSENT = 1_000_000
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Recorded:
+    """Times of n recorded messages, in the order of their receive times.
+
+    Attributes:
+        time_ns: (n,) publisher's times, ns since the Unix epoch.
+        time_s: (n,) publisher's times since the recording's start, on its recorder's clock [s].
+        received_ns: (n,) receive times on the recorder's clock, ns since the Unix epoch.
+        sequence: (n,) publisher's numbers; gaps are messages that were not recorded.
+    """
+
+    time_ns: "IntArray"
+    time_s: "FloatArray"
+    received_ns: "IntArray"
+    sequence: "IntArray"
+
+    def __len__(self) -> int:
+        return len(self.time_ns)
+
+    @property
+    def time(self) -> "NDArray[np.datetime64]":
+        """(n,) publisher's times, UTC, to the nanosecond."""
+        return self.time_ns.astype("datetime64[ns]")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RecordedJoints(_Recorded):
+    """Recorded joint states: n states of k joints, one row for each state.
+
+    Attributes:
+        time_ns, time_s, received_ns, sequence: (n,), as of `RecordedValues`.
+        names: Names of the joints, in the order of the first state.
+        units: Units of their positions: "rad", or "m" if prismatic; "": the recording does not describe it.
+        positions: (n, k) [rad or m]; NaN: absent.
+        velocities: (n, k) [rad/s or m/s]; NaN: absent.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    positions: "FloatArray"
+    velocities: "FloatArray"
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} states of {', '.join(self.names) or 'no joints'}>"
+
+    @property
+    def positions_deg(self) -> "FloatArray":
+        """(n, k) positions in degrees, of prismatic joints in mm.
+
+        Raises:
+            RecordingError: If the recording does not describe a joint, so that its unit is unknown.
+        """
+        import numpy as np
+
+        unknown = ", ".join(name for name, unit in zip(self.names, self.units, strict=True) if not unit)
+        if unknown:
+            raise RecordingError(
+                f"the recording has no description of {unknown} to convert its position with: use "
+                "`positions` (rad, m)"
+            )
+        factors = np.array([1000.0 if unit == "m" else 180.0 / np.pi for unit in self.units])
+        positions: FloatArray = self.positions * factors
+        return positions
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RecordedValues(_Recorded):
+    """A recorded value: the n messages that contain it.
+
+    Attributes:
+        time_ns: (n,) publisher's times, ns since the Unix epoch.
+        time_s: (n,) publisher's times since the recording's start, on its recorder's clock [s].
+        received_ns: (n,) receive times on the recorder's clock, ns since the Unix epoch.
+        sequence: (n,) publisher's numbers; gaps are messages that were not recorded.
+        name: "kinematics/tool/x".
+        unit: "m"; "": none, or unknown.
+        values: (n,)
+    """
+
+    name: str
+    unit: str
+    values: "FloatArray"
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} values of {self.name}{self.unit and f' [{self.unit}]'}>"
+
+
+class _Times:
+    """Times of messages of one topic."""
+
+    def __init__(self, start_ns: int) -> None:
+        self._start_ns = start_ns
+        self._publisher_times = PublisherTimes()
+        self._sources, self._received, self._sequence = array("q"), array("q"), array("q")
+        self._since_start = array("d")
+
+    def since_start_s(self, message: Recorded) -> float:
+        """Return the publisher's time since the recording's start [s]."""
+        return (self._publisher_times.of(message) - self._start_ns) * 1e-9
+
+    def add(self, message: Recorded, since_start_s: float) -> None:
+        """Add a message."""
+        self._sources.append(message.source_ns)
+        self._received.append(message.received_ns)
+        self._sequence.append(message.sequence)
+        self._since_start.append(since_start_s)
+
+    def arrays(self) -> dict[str, Any]:
+        """Return the arrays of a `_Recorded`."""
+        import numpy as np
+
+        return {
+            "time_ns": np.asarray(self._sources),
+            "time_s": np.asarray(self._since_start),
+            "received_ns": np.asarray(self._received),
+            "sequence": np.asarray(self._sequence),
+        }
+
+
+class JointsCollector:
+    """Joint states, as they are read.
+
+    Args:
+        types: Type of each described joint: "rotary" or "prismatic".
+        start_ns: Start of the recording, ns since the Unix epoch.
+    """
+
+    def __init__(self, types: Mapping[str, str], *, start_ns: int) -> None:
+        self._types = types
+        self._times = _Times(start_ns)
+        self._names: tuple[str, ...] = ()
+        self._positions, self._velocities = array("d"), array("d")
+        self._present = 0
+
+    def add(self, message: Recorded, state: Message) -> None:
+        """Add a state.
+
+        Raises:
+            RecordingError: If the states have too few joints of the first one.
+        """
+        assert isinstance(state, JointStates)
+        self._times.add(message, self._times.since_start_s(message))
+        joints: list[Any] = list(state.joints)
+        names = tuple([joint.name for joint in joints])
+        if not self._names:
+            self._names = names
+        if names != self._names:
+            by_name = dict(zip(names, joints, strict=True))
+            joints = [by_name.get(name) for name in self._names]
+            self._present += sum(joint is not None for joint in joints)
+        else:
+            self._present += len(joints)
+        self._positions.extend([nan if joint is None else joint.position for joint in joints])
+        self._velocities.extend(
+            [joint.velocity if joint and joint.HasField("velocity") else nan for joint in joints]
+        )
+        if len(self._positions) - self._present > max(_MOST_ABSENT, self._present):
+            raise RecordingError("its joint states contain too few of the first state's joints for a table")
+
+    def collected(self) -> RecordedJoints:
+        """Return the states."""
+        import numpy as np
+
+        times = self._times.arrays()
+        shape = len(times["time_ns"]), len(self._names)
+        return RecordedJoints(
+            **times,
+            names=self._names,
+            units=tuple(_UNITS.get(self._types.get(name, ""), "") for name in self._names),
+            positions=np.asarray(self._positions).reshape(shape),
+            velocities=np.asarray(self._velocities).reshape(shape),
+        )
+
+
+class ValuesCollector:
+    """Values of one topic, as they are read.
+
+    Args:
+        topic: "kinematics".
+        names: Names of the values, which begin with the topic.
+        start_ns: Start of the recording, ns since the Unix epoch.
+    """
+
+    def __init__(self, topic: str, names: Iterable[str], *, start_ns: int) -> None:
+        self._topic = topic
+        self._all_times = _Times(start_ns)
+        self._wanted = {name: (_Times(start_ns), array("d")) for name in names}
+
+    def add(self, message: Recorded, decoded: Message) -> None:
+        """Add a message's values."""
+        since_start_s = self._all_times.since_start_s(message)
+        for own, value in values_of(decoded.DESCRIPTOR.full_name, decoded):
+            if (wanted := self._wanted.get(f"{self._topic}/{own}")) is not None:
+                times, values = wanted
+                times.add(message, since_start_s)
+                values.append(value)
+
+    def collected(self, types: Mapping[str, str]) -> dict[str, RecordedValues]:
+        """Return the values by name.
+
+        Args:
+            types: Type of each described joint: "rotary" or "prismatic".
+        """
+        import numpy as np
+
+        prismatic = {joint for joint, kind in types.items() if kind == PRISMATIC}
+        return {
+            name: RecordedValues(
+                **times.arrays(), name=name, unit=unit_of(name, prismatic), values=np.asarray(values)
+            )
+            for name, (times, values) in self._wanted.items()
+        }

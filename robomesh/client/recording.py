@@ -1,0 +1,362 @@
+"""A recording: its joint states and values as NumPy arrays, its events, and messages of any topic.
+
+It is a file of this machine, or one in the folder of a site's recorder, which is read through the mesh.
+"""
+
+import logging
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from itertools import islice
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from google.protobuf.message import DecodeError, Message
+
+from robomesh import reason_codes as codes
+from robomesh.client.recorded_values import JointsCollector, RecordedJoints, RecordedValues, ValuesCollector
+from robomesh.client.recorder import RecorderFile
+from robomesh.client.recording_list import RecordingInfo, describe_recording
+from robomesh.client.samples import Event, event_of, joint_types
+from robomesh.errors import KeyNameError
+from robomesh.keys import parse_key
+from robomesh.recordings.errors import RecordingError
+from robomesh.recordings.publisher_time import Recorded
+from robomesh.recordings.values import topic_of
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.topics import TOPICS
+
+log = logging.getLogger(__name__)
+
+Decoder = Callable[[bytes], Message]
+
+_SCHEMAS = {row.schema.DESCRIPTOR.full_name: row.schema for row in TOPICS.values()}
+_PAGE = 2000
+# What one call reads into memory: a small file must not fill it. States compress to a tenth.
+_MOST_BYTES, _MOST_TIMES_THE_FILE = 256 << 20, 200
+_MOST_NAMED = 10
+_MOST_S = 1e9
+# What an array of integers can represent.
+_LAST_NS = (1 << 63) - 1
+_JOINTS, _EVENT, _DESCRIPTION = "foxglove.JointStates", "robomesh.Event", "robomesh.Description"
+
+
+class RecordedBytes(Recorded, Protocol):
+    """A recorded message."""
+
+    @property
+    def data(self) -> bytes:
+        """Its bytes."""
+        ...
+
+
+class Page(NamedTuple):
+    """Some messages of a topic.
+
+    Attributes:
+        schema: Full name of their schema: "foxglove.JointStates"; empty: none.
+        decode: Decodes their bytes; None: unknown schema.
+    """
+
+    schema: str
+    decode: Decoder | None
+    messages: Sequence[RecordedBytes]
+
+
+class Source(Protocol):
+    """Place from which a recording is read."""
+
+    @property
+    def info(self) -> RecordingInfo:
+        """Description of the recording."""
+        ...
+
+    def pages(self, key: str, start_ns: int | None, end_ns: int | None) -> AsyncGenerator[Page]:
+        """Yield a channel's messages between two receive times (both included), in their order.
+
+        Raises:
+            RecordingError: If it cannot be read.
+            BusError: If its recorder refuses or does not answer.
+        """
+        ...
+
+    async def value_names(self) -> list[str]:
+        """Return the names of the recorded values.
+
+        Raises:
+            RecordingError: If it cannot be read.
+            BusError: If its recorder refuses or does not answer.
+        """
+        ...
+
+
+class DiskSource:
+    """A file of this machine. Its functions never wait, so that a caller needs no event loop.
+
+    Raises:
+        RecordingError: If no part of it can be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.info = describe_recording(path)
+        self._path = path
+
+    async def pages(self, key: str, start_ns: int | None, end_ns: int | None) -> AsyncGenerator[Page]:
+        """See `Source`."""
+        from robomesh.recordings.reading import RecordingFile
+
+        with RecordingFile(self._path) as file:
+            first_ns, last_ns = file.clip(start_ns, end_ns)
+            name = file.schema_name(key)
+            decode = file.decoder(key)
+            if decode is not None:
+                decode = _decoder(name) or decode
+            messages = file.messages([key], start_ns=first_ns, end_ns=last_ns + 1)
+            while page := list(islice(messages, _PAGE)):
+                yield Page(name, decode, page)
+
+    async def value_names(self) -> list[str]:
+        """See `Source`."""
+        from robomesh.recordings.reading import RecordingFile
+        from robomesh.recordings.series import known_values
+
+        with RecordingFile(self._path) as file:
+            return known_values(file)
+
+
+class MeshSource:
+    """A file in the folder of a site's recorder."""
+
+    def __init__(self, file: RecorderFile, info: RecordingInfo) -> None:
+        self._file, self.info = file, info
+
+    async def pages(self, key: str, start_ns: int | None, end_ns: int | None) -> AsyncGenerator[Page]:
+        """See `Source`."""
+        async for page in self._file.pages(key, start_ns=start_ns, end_ns=end_ns):
+            yield Page(page.schema, _decoder(page.schema), page.messages)
+
+    async def value_names(self) -> list[str]:
+        """See `Source`."""
+        return await self._file.value_names()
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordedSample:
+    """A recorded message.
+
+    Attributes:
+        site, robot, topic: Parts of its key; of another program's channel, `topic` is its whole name.
+        message: The protobuf message; None: its schema is unknown, or it is damaged.
+        data: Its bytes.
+        schema: Full name of its schema: "foxglove.JointStates".
+        time_ns: Publisher's time, ns since the Unix epoch.
+        received_ns: Receive time on the recorder's clock, ns since the Unix epoch.
+        sequence: Publisher's number; gaps are messages that were not recorded.
+    """
+
+    site: str
+    robot: str
+    topic: str
+    message: Message | None
+    data: bytes = field(repr=False)
+    schema: str
+    time_ns: int
+    received_ns: int
+    sequence: int
+
+    @property
+    def time(self) -> datetime:
+        """Publisher's time in UTC, to the microsecond."""
+        second, rest_ns = divmod(self.time_ns, 1_000_000_000)
+        return datetime.fromtimestamp(second, tz=UTC).replace(microsecond=rest_ns // 1000)
+
+
+class AsyncRecording:
+    """A recording, for asynchronous programs.
+
+    `start_s` and `end_s` of its functions limit the time since the recording's start, on the recorder's
+    clock [s], both included; None: its start or end. Messages that cannot be decoded are left out, with a
+    warning in the log.
+
+    Raises:
+        RecordingError: Of every function: the file is damaged, changed, or lacks what was requested.
+        BusError: Of every function, over the mesh: the recorder refuses or does not answer.
+
+    Attributes:
+        info: Description of the recording.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self.info = source.info
+        self._types: dict[str, str] | None = None
+
+    def __repr__(self) -> str:
+        return f"<recording {self.info.name!r} of {self.info.site}/{self.info.robot}>"
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """The recorded topics."""
+        return tuple(topic.name for topic in self.info.topics if topic.messages)
+
+    async def value_names(self) -> list[str]:
+        """Return the names of the recorded values, as `values` takes them: "kinematics/tool/x"."""
+        return await self._source.value_names()
+
+    async def joints(self, *, start_s: float | None = None, end_s: float | None = None) -> RecordedJoints:
+        """Return the joint states."""
+        found = JointsCollector(await self._joint_types(), start_ns=self.info.start_ns)
+        async for recorded, message in self._decoded(self._key("joints"), start_s, end_s, _JOINTS):
+            found.add(recorded, message)
+        return found.collected()
+
+    async def values(
+        self, *names: str, start_s: float | None = None, end_s: float | None = None
+    ) -> dict[str, RecordedValues]:
+        """Return values over time, at the full rate of their topics, by name."""
+        wanted: dict[str, list[str]] = {}
+        for name in names:
+            topic = topic_of(name, self.topics)
+            if topic is None:
+                raise self._no_value(name, [f"{each}/..." for each in self.topics])
+            wanted.setdefault(topic, []).append(name)
+        types = await self._joint_types()
+        found: dict[str, RecordedValues] = {}
+        for topic, own in wanted.items():
+            collector = ValuesCollector(topic, own, start_ns=self.info.start_ns)
+            async for recorded, message in self._decoded(self._key(topic), start_s, end_s):
+                collector.add(recorded, message)
+            found |= collector.collected(types)
+        if missing := [name for name in names if not len(found[name])]:
+            known = await self.value_names()
+            if unknown := [name for name in missing if name not in known]:
+                raise self._no_value(unknown[0], known)
+        return {name: found[name] for name in names}
+
+    async def events(self, *, start_s: float | None = None, end_s: float | None = None) -> list[Event]:
+        """Return the events of all services, in the order of their times."""
+        found: list[Event] = []
+        for topic in self.info.topics:
+            if topic.messages and (topic.name == "events" or topic.name.startswith("events/")):
+                site, robot, _ = _parts(topic.key)
+                async for _, event in self._decoded(topic.key, start_s, end_s, _EVENT):
+                    assert isinstance(event, schema.Event)
+                    found.append(event_of(site, robot, event))
+        return sorted(found, key=lambda event: event.time)
+
+    async def messages(
+        self, topic: str, *, start_s: float | None = None, end_s: float | None = None
+    ) -> AsyncIterator[RecordedSample]:
+        """Yield the messages of a topic, in the order of their receive times."""
+        async for samples in self.sample_pages(topic, start_s=start_s, end_s=end_s):
+            for sample in samples:
+                yield sample
+
+    async def sample_pages(
+        self, topic: str, *, start_s: float | None = None, end_s: float | None = None
+    ) -> AsyncGenerator[list[RecordedSample]]:
+        """Yield the messages of a topic as `messages`, in lists of up to some thousand."""
+        key = self._key(topic)
+        site, robot, name = _parts(key)
+        async for page in self._pages(key, start_s, end_s):
+            yield [
+                RecordedSample(
+                    site=site,
+                    robot=robot,
+                    topic=name,
+                    message=_decoded(page, each.data),
+                    data=each.data,
+                    schema=page.schema,
+                    time_ns=each.source_ns,
+                    received_ns=each.received_ns,
+                    sequence=each.sequence,
+                )
+                for each in page.messages
+            ]
+
+    def _key(self, topic: str) -> str:
+        """Return the name of a topic's channel; a channel's whole name is itself."""
+        recorded = [each for each in self.info.topics if each.messages]
+        found = [each.key for each in recorded if topic in (each.name, each.key)]
+        if len(found) == 1:
+            return found[0]
+        there = found or [each.name for each in recorded]
+        raise RecordingError(
+            codes.RECORDING_NO_TOPIC(file=self.info.file, topic=topic, topics=", ".join(there) or "none")
+        )
+
+    def _no_value(self, name: str, known: Sequence[str]) -> RecordingError:
+        topic = topic_of(name, self.topics) or ""
+        known = sorted(known, key=lambda each: not each.startswith(topic))
+        there = ", ".join(known[:_MOST_NAMED]) + (", ..." if len(known) > _MOST_NAMED else "")
+        reason = codes.RECORDING_NO_VALUE(file=self.info.file, name=name, topics=there or "none")
+        return RecordingError(reason)
+
+    async def _joint_types(self) -> dict[str, str]:
+        """Return the type of each joint, from the last description."""
+        if self._types is None:
+            self._types = {}
+            if "description" in self.topics:
+                async for _, message in self._decoded(self._key("description"), None, None, _DESCRIPTION):
+                    assert isinstance(message, schema.Description)
+                    self._types = joint_types(message)
+        return self._types
+
+    def _pages(self, key: str, start_s: float | None, end_s: float | None) -> AsyncGenerator[Page]:
+        return self._source.pages(key, self._time_ns(start_s), self._time_ns(end_s))
+
+    def _time_ns(self, since_start_s: float | None) -> int | None:
+        if since_start_s is None:
+            return None
+        if not abs(since_start_s) < _MOST_S:
+            raise RecordingError(f"{since_start_s!r} is not a time since the recording's start [s]")
+        return self.info.start_ns + round(since_start_s * 1e9)
+
+    async def _decoded(
+        self, key: str, start_s: float | None, end_s: float | None, wanted: str = ""
+    ) -> AsyncIterator[tuple[Recorded, Message]]:
+        """Yield a channel's messages of the wanted schema; empty: of any schema.
+
+        Raises:
+            RecordingError: If they are too many for one result, or a time is out of range.
+        """
+        left_out = total = 0
+        most = _MOST_BYTES + _MOST_TIMES_THE_FILE * self.info.bytes
+        async for page in self._pages(key, start_s, end_s):
+            for each in page.messages:
+                message = _decoded(page, each.data) if wanted in ("", page.schema) else None
+                if message is None:
+                    left_out += 1
+                    continue
+                total += len(each.data)
+                if max(each.source_ns, each.received_ns) > _LAST_NS:
+                    raise RecordingError(f"{self.info.file}: a message of {key} has a time out of range")
+                yield each, message
+            if total > most:
+                raise RecordingError(
+                    f"{self.info.file}: its messages of {key} have more than {most >> 20} MiB: read them one "
+                    "after the other, with `messages`"
+                )
+        if left_out:
+            log.warning("%s: %d messages of %s cannot be read: left out", self.info.file, left_out, key)
+
+
+def _decoder(name: str) -> Decoder | None:
+    known = _SCHEMAS.get(name)
+    return None if known is None else known.FromString
+
+
+def _decoded(page: Page, data: bytes) -> Message | None:
+    if page.decode is None:
+        return None
+    try:
+        return page.decode(data)
+    except (DecodeError, ValueError):
+        return None
+
+
+def _parts(key: str) -> tuple[str, str, str]:
+    try:
+        return parse_key(key)
+    except KeyNameError:
+        return "", "", key.strip("/")

@@ -1,0 +1,246 @@
+"""Recordings as NumPy arrays: a file of this machine, beside the mcap package's reader and the CSV table."""
+
+import csv
+import logging
+import tracemalloc
+
+import numpy as np
+import pytest
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
+from mcap_protobuf.decoder import DecoderFactory
+from mcap_protobuf.schema import register_schema
+
+import robomesh
+from robomesh import reason_codes as codes
+from robomesh.header import Header
+from robomesh.recordings.capture import Capture
+from robomesh.recordings.reading import RecordingFile
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.topics import topic
+from services.command_line.recordings.span import Span
+from services.command_line.recordings.tables import write_table
+from tests.recordings import START_NS, Written, joints, write_recording
+
+_Joint = schema.Description.Joint
+DESCRIPTION = schema.Description(
+    joints=[_Joint(name="waist", type=_Joint.ROTARY), _Joint(name="lift", type=_Joint.PRISMATIC)]
+)
+
+
+@pytest.fixture
+def path(tmp_path):
+    """A file with a rotary and a prismatic joint, 3 s at 100 Hz."""
+    with Written(tmp_path / "trial.mcap") as file:
+        file.put("description", DESCRIPTION, 0.0)
+        for number in range(300):
+            state = joints(waist=number / 100, lift=-number / 50)
+            state.joints[0].velocity = 1.0
+            file.put("joints", state, number / 100)
+            tool = schema.KinematicState(tool_to_base=[1, 0, 0, number, *[0.0] * 12])
+            if number % 5 == 0:
+                if number == 100:
+                    tool.clearance.distance = 0.25
+                file.put("kinematics", tool, number / 100)
+    return tmp_path / "trial.mcap"
+
+
+def test_joints_are_what_the_mcap_packages_reader_reads(path):
+    with path.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        read = [each[2:] for each in reader.iter_decoded_messages(["robomesh/site/arm/joints"])]
+    states = robomesh.open_recording(path).joints()
+    assert states.names == ("waist", "lift")
+    assert states.units == ("rad", "m")
+    assert states.time_ns.tolist() == [message.publish_time for message, _ in read]
+    assert states.received_ns.tolist() == [message.log_time for message, _ in read]
+    assert states.sequence.tolist() == [message.sequence for message, _ in read]
+    assert states.positions.tolist() == [[j.position for j in state.joints] for _, state in read]
+    assert states.velocities[:, 0].tolist() == [1.0] * 300
+    assert np.isnan(states.velocities[:, 1]).all()
+    assert states.positions_deg[100].tolist() == pytest.approx([np.degrees(1.0), -2000.0])
+    assert states.time[0] == np.datetime64(int(states.time_ns[0]), "ns")
+    assert len(states) == 300
+
+
+def test_joints_have_the_rows_and_times_of_the_csv_table(path, tmp_path):
+    with RecordingFile(path) as file:
+        write_table(file, Span(file.layout.start_ns, file.layout.end_ns), tmp_path / "joints.csv")
+    header, *rows = csv.reader((tmp_path / "joints.csv").read_text(encoding="utf-8").splitlines())
+    states = robomesh.open_recording(path).joints()
+    column = {name: [row[header.index(name)] for row in rows] for name in header}
+    assert [f"{each:.9f}" for each in states.time_s] == column["t [s]"]
+    assert [repr(each) for each in states.positions[:, 0].tolist()] == column["waist [rad]"]
+    assert [repr(each) for each in states.positions[:, 1].tolist()] == column["lift [m]"]
+
+
+def test_a_range_counts_from_the_recordings_start_and_includes_both_ends(path):
+    recording = robomesh.open_recording(path)
+    states = recording.joints(start_s=1.0, end_s=1.5)
+    assert (states.received_ns[[0, -1]] - START_NS).tolist() == [1_000_000_000, 1_500_000_000]
+    assert states.time_s[0] == pytest.approx(1.0, abs=1e-5)
+    for start_s in (1000.0, float("nan"), 1e300):
+        with pytest.raises(robomesh.RecordingError):
+            recording.joints(start_s=start_s)
+    with pytest.raises(robomesh.RecordingError) as outside:
+        recording.joints(start_s=2.0, end_s=1.0)
+    assert outside.value.code == codes.RECORDING_TIMES.name
+
+
+def test_values_have_the_full_rate_of_their_topics_and_a_unit(path):
+    recording = robomesh.open_recording(path)
+    values = recording.values("kinematics/tool/x", "joints/lift/position", "kinematics/clearance")
+    assert {name: (each.unit, len(each)) for name, each in values.items()} == {
+        "kinematics/tool/x": ("m", 60),
+        "joints/lift/position": ("m", 300),
+        "kinematics/clearance": ("m", 1),
+    }
+    assert values["kinematics/tool/x"].values.tolist() == list(range(0, 300, 5))
+    assert values["kinematics/clearance"].time_s.tolist() == pytest.approx([1.0], abs=1e-5)
+    assert len(recording.values("kinematics/clearance", end_s=0.5)["kinematics/clearance"]) == 0
+    assert "kinematics/tool/x" in recording.value_names()
+
+
+@pytest.mark.parametrize("name", ["kinematics/tool/q", "power/x", "joints"])
+def test_an_unknown_value_is_refused_with_the_names_there_are(path, name):
+    with pytest.raises(robomesh.RecordingError) as refused:
+        robomesh.open_recording(path).values(name)
+    assert refused.value.code == codes.RECORDING_NO_VALUE.name
+    there = refused.value.reason.values["topics"]
+    assert there.startswith("kinematics/tool/x" if name == "kinematics/tool/q" else "description/..., joints")
+
+
+def test_messages_and_events_are_decoded(tmp_path):
+    path = write_recording(tmp_path / "trial.mcap")
+    recording = robomesh.open_recording(path)
+    assert recording.topics == ("controller", "description", "events", "frames", "joints", "video/front")
+    assert [event.code for event in recording.events(start_s=1.0)] == ["second.1", "second.2", "second.3"]
+    first, *others = recording.messages("controller")
+    assert (first.site, first.robot, first.topic) == ("site", "arm", "controller")
+    assert (first.message.rate_hz, first.received_ns) == (100.0, START_NS)
+    assert first.time.microsecond == 999_999
+    assert len(others) == 3
+    assert next(iter(recording.messages("robomesh/site/arm/joints"))).message.joints[1].name == "elbow"
+    with pytest.raises(robomesh.RecordingError) as missing:
+        list(recording.messages("lease"))
+    assert missing.value.code == codes.RECORDING_NO_TOPIC.name
+
+
+def test_another_programs_file_with_two_robots_and_json_is_read_as_far_as_it_can_be(tmp_path, caplog):
+    path = tmp_path / "other.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        states = register_schema(writer, JointStates)
+        for robot in ("a", "b"):
+            channel = writer.register_channel(f"/{robot}/joints", "protobuf", states)
+            for number in range(3):
+                data = joints(one=number).SerializeToString()
+                writer.add_message(channel, START_NS + number, data, START_NS + number)
+        json = writer.register_schema("foxglove.JointStates", "jsonschema", b"{}")
+        channel = writer.register_channel("joints", "json", json)
+        writer.add_message(channel, START_NS, b'{"joints":[]}', START_NS)
+        writer.finish()
+    recording = robomesh.open_recording(path)
+    assert [sample.message.joints[0].position for sample in recording.messages("/a/joints")] == [0, 1, 2]
+    with caplog.at_level(logging.WARNING):
+        assert len(recording.joints()) == 0
+    assert "1 messages of joints cannot be read" in caplog.text
+    (sample,) = recording.messages("joints")
+    assert (sample.message, sample.data) == (None, b'{"joints":[]}')
+    assert recording.values("a/joints/one/position")["a/joints/one/position"].values.tolist() == [0, 1, 2]
+
+
+def test_a_file_that_is_still_being_written_has_what_was_written(tmp_path):
+    path = tmp_path / "open.mcap"
+    capture = Capture(path, {"site": "site", "robot": "arm", "name": "open"}, start_ns=START_NS)
+    try:
+        for number in range(2, 5):
+            header = Header(source_time_ns=START_NS + number, sequence=number, publisher=1)
+            data = joints(waist=number).SerializeToString()
+            capture.add(
+                "robomesh/site/arm/joints", topic("joints"), header, data, received_ns=START_NS + number
+            )
+        capture.hand_over()
+        capture.write_out()
+        assert capture.first_ns == START_NS + 2
+        recording = robomesh.open_recording(path)
+        assert recording.info.open
+        assert recording.joints().sequence.tolist() == [2, 3, 4]
+        assert recording.joints().time_s[0] == 0.0
+    finally:
+        capture.give_up()
+
+
+def test_a_truncated_file_is_read_up_to_its_end(path, tmp_path):
+    cut, data, counts = tmp_path / "cut.mcap", path.read_bytes(), []
+    for keep in range(0, len(data), 1777):
+        cut.write_bytes(data[:keep])
+        try:
+            states = robomesh.open_recording(cut).joints()
+        except robomesh.RecordingError:
+            counts.append(0)
+        else:
+            counts.append(len(states))
+            assert states.positions[:, 0].tolist() == pytest.approx(np.arange(len(states)) / 100)
+    assert counts == sorted(counts)
+    assert len({count for count in counts if 0 < count < 300}) > 3
+
+
+def test_what_is_no_recording_is_refused(tmp_path):
+    for path, code in ((tmp_path / "gone.mcap", "recording.file"), (tmp_path, "recording.file")):
+        with pytest.raises(robomesh.RecordingError) as refused:
+            robomesh.open_recording(path)
+        assert refused.value.code == code
+    (tmp_path / "text.mcap").write_text("words")
+    with pytest.raises(robomesh.RecordingError) as refused:
+        robomesh.open_recording(str(tmp_path / "text.mcap"))
+    assert refused.value.code == "recording.not_mcap"
+
+
+def _write(path, states):
+    """Write joint states in one compressed chunk."""
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=1 << 30, compression=CompressionType.ZSTD)
+        writer.start()
+        channel = writer.register_channel(
+            "robomesh/site/arm/joints", "protobuf", register_schema(writer, JointStates)
+        )
+        for number, state in enumerate(states):
+            writer.add_message(channel, START_NS + number, state.SerializeToString(), START_NS + number)
+        writer.finish()
+    return path
+
+
+def test_a_small_file_whose_states_lack_most_joints_does_not_fill_the_memory(tmp_path):
+    first = joints(**{f"j{number}": 0.0 for number in range(20_000)})
+    path = _write(tmp_path / "wide.mcap", [first, *[joints()] * 50_000])
+    tracemalloc.start()
+    try:
+        with pytest.raises(robomesh.RecordingError, match="too few of the first state's joints"):
+            robomesh.open_recording(path).joints()
+        assert tracemalloc.get_traced_memory()[1] < 200 << 20
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_small_file_that_unpacks_to_much_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("robomesh.client.recording._MOST_BYTES", 1 << 20)
+    monkeypatch.setattr("robomesh.client.recording._MOST_TIMES_THE_FILE", 0)
+    path = _write(tmp_path / "long.mcap", [joints(waist=0.0, elbow=0.0)] * 60_000)
+    recording = robomesh.open_recording(path)
+    with pytest.raises(robomesh.RecordingError, match="one after the other"):
+        recording.joints()
+    assert sum(1 for _ in recording.messages("joints")) == 60_000
+
+
+def test_a_time_out_of_range_is_refused(tmp_path):
+    with (tmp_path / "late.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        channel = writer.register_channel("joints", "protobuf", register_schema(writer, JointStates))
+        writer.add_message(channel, START_NS, joints(waist=1).SerializeToString(), (1 << 64) - 1)
+        writer.finish()
+    with pytest.raises(robomesh.RecordingError, match="a time out of range"):
+        robomesh.open_recording(tmp_path / "late.mcap").joints()
