@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from robomesh.schemas import robomesh_pb2 as schema
+from tests.recordings import Written, joints
 from tests.site import running_site
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
@@ -97,3 +99,18 @@ def test_inverse_says_where_the_joints_must_be_or_why_they_cannot(site, place, s
     assert words in end
     assert all(line.startswith("waist ") for line in solutions)
     assert bool(solutions) is (status == 0)
+
+
+def test_plot_draws_a_recording(tmp_path):
+    path, picture = tmp_path / "trial.mcap", tmp_path / "trial.png"
+    with Written(path) as file:
+        for number in range(100):
+            state = schema.KinematicState(tool_to_base=[1, 0, 0, 0.5, 0, 1, 0, 0.1, 0, 0, 1, 0.2, 0, 0, 0, 1])
+            file.put("joints", joints(waist=number / 100, elbow=-number / 100), number / 100)
+            file.put("kinematics", state, number / 100)
+        described = (schema.Description.Joint(name=name, type="ROTARY") for name in ("waist", "elbow"))
+        file.put("description", schema.Description(joints=described), 1.0)
+    subprocess.run(
+        [sys.executable, str(EXAMPLES / "plot.py"), str(path), str(picture)], check=True, timeout=60
+    )
+    assert picture.read_bytes().startswith(b"\x89PNG")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from google.protobuf.message import DecodeError, Message
 
@@ -157,7 +157,7 @@ class RecordedSample:
     site: str
     robot: str
     topic: str
-    message: Message | None
+    message: Any
     data: bytes = field(repr=False)
     schema: str
     time_ns: int

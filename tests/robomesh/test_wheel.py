@@ -1,6 +1,7 @@
 """The wheel in an environment of its own: `docs/python.md` runs there, and is a typed program."""
 
 import re
+import signal
 import subprocess
 import sys
 import zipfile
@@ -50,14 +51,30 @@ def python(wheel, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def router(tmp_path_factory):
-    """Yield the address of a site's router whose arm can be controlled."""
+    """Yield the address of a site's router whose arm can be controlled, with the recording "trial"."""
     robots = ONE_ARM.replace('"arm"', '"pt600"')
     with running_site(tmp_path_factory.mktemp("site"), robots=robots) as site:
         with robomesh.connect(site.router, timeout_s=20.0) as mesh:
             wait_until(
                 lambda: any(each.last("description") and each.last("controller") for each in mesh.robots())
             )
+            record(site, mesh.robot("pt600"))
         yield site.router
+
+
+def record(site, robot):
+    """Record some seconds."""
+    arguments = ("record", "pt600", "--name", "trial", "--view", "-", "--connect", site.router)
+    with subprocess.Popen([sys.executable, "-m", "services.command_line.main", *arguments]) as recording:
+        try:
+            for state in robot.topic("recording", on_stale="yield"):
+                length_s = state.message.duration.ToNanoseconds() * 1e-9
+                if state.message.open and state.message.name == "trial" and length_s > 3.0:
+                    break
+            recording.send_signal(signal.SIGINT)
+            assert recording.wait(WAIT_S) == 0
+        finally:
+            recording.kill()
 
 
 def program(folder, router=None):
