@@ -40,7 +40,7 @@ if __name__ == "__main__":
 
 from benchmarks.latency import free_port, process, service, summary, until_connectable
 from benchmarks.stops_beside import stops_beside
-from robomesh.errors import BusError, RefusedError
+from robomesh.errors import RefusedError, RobomeshError
 from robomesh.messages import PROTOBUF
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session, SessionSettings, open_session
@@ -253,7 +253,7 @@ async def stops(endpoint: str, controller: Controller, number: int) -> dict[str,
             came = await asyncio.to_thread(controller.wait_for_stop, before, 10.0)
             if came is not None:
                 delays.append(came - asked)
-            with contextlib.suppress(BusError):
+            with contextlib.suppress(RobomeshError):
                 await answer
             # Stops closer than 0.1 s share a unit.
             await asyncio.sleep(random.uniform(0.11, 0.15))

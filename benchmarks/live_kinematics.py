@@ -25,7 +25,7 @@ from typing import Any
 from latency import free_port, service, summary, until_connectable
 from plant import RATE_HZ, cpu_s, rss_mib, running_controllers, until
 
-from robomesh.errors import BusError
+from robomesh.errors import RobomeshError
 from robomesh.schemas.robomesh_pb2 import CheckRequest, KinematicState
 from robomesh.session import Session, SessionSettings, open_session
 from robomesh.subscription import Sample, Subscription
@@ -144,7 +144,7 @@ async def take(states: Subscription, came: list[tuple[Sample, int]]) -> None:
 
 async def ask_checks(session: Session, checked: list[float]) -> None:
     while True:
-        with contextlib.suppress(BusError):
+        with contextlib.suppress(RobomeshError):
             await session.ask(
                 f"robomesh/bench/arm-0/kinematics/check/{session.own_name}",
                 CheckRequest(program=PROGRAM),

@@ -14,7 +14,7 @@ from renderer.appearance import appearance_of, mesh_name
 from renderer.cache import store_glb, stored_glb
 from renderer.errors import RendererError
 from renderer.robot_state import Ages, RobotState
-from robomesh.errors import BusError, MessageError
+from robomesh.errors import MessageError, RobomeshError
 from robomesh.keys import ROOT, is_replay, robot_key
 from robomesh.schemas.robomesh_pb2 import ControllerState, Description, KinematicState
 from robomesh.session import Session
@@ -153,7 +153,7 @@ class Robots:
         while robot in self._forgotten and robot in self._providers:
             try:
                 description = await self._session.last(key)
-            except BusError as error:
+            except RobomeshError as error:
                 log.warning("%s: %s", key, error)
                 return
             if isinstance(description, Description) and robot in self._forgotten:
@@ -193,7 +193,7 @@ class Robots:
         while glb is None:
             try:
                 glb = await self._session.ask_bytes(key, timeout_s=_MESH_TIMEOUT_S)
-            except BusError as error:
+            except RobomeshError as error:
                 if not warned:
                     log.warning("mesh of %s: %s; requests are repeated", body.name, error)
                     warned = True

@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from robomesh.client.samples import Alarm, Event, JointState, Sample
     from robomesh.client.streams import AsyncStream, StaleError, Stream
     from robomesh.errors import (
-        BusError,
         BusyError,
         MessageError,
         MotionError,
         NoAnswerError,
         QuotaError,
         RefusedError,
+        RobomeshError,
         SessionError,
     )
     from robomesh.recordings.errors import RecordingError
@@ -49,7 +49,7 @@ _MODULES = {
     "client.samples": ("Alarm", "Event", "JointState", "Sample"),
     "client.streams": ("AsyncStream", "StaleError", "Stream"),
     "errors": (
-        "BusError",
+        "RobomeshError",
         "BusyError",
         "MessageError",
         "MotionError",
@@ -72,7 +72,6 @@ __all__ = [
     "AsyncRecording",
     "AsyncRobot",
     "AsyncStream",
-    "BusError",
     "BusyError",
     "CheckResult",
     "CommandResult",
@@ -92,6 +91,7 @@ __all__ = [
     "RecordingError",
     "RecordingInfo",
     "RefusedError",
+    "RobomeshError",
     "Robot",
     "RobotNotFoundError",
     "Sample",

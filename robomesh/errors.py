@@ -1,6 +1,6 @@
 """Errors of the library.
 
-BusError
+RobomeshError
 ├── SessionError            a session that cannot be opened with its settings
 ├── NoAnswerError           a request without an answer in time
 │   └── BrokenAnswerError   a long answer that ended early
@@ -20,15 +20,15 @@ from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 
 
-class BusError(Exception):
+class RobomeshError(Exception):
     """Base of the library's errors; the text is one line for people."""
 
 
-class SessionError(BusError):
+class SessionError(RobomeshError):
     """A session that cannot be opened with its settings."""
 
 
-class CodedError(BusError):
+class CodedError(RobomeshError):
     """An error with a reason of the table.
 
     Args:

@@ -14,12 +14,12 @@ from robomesh import reason_codes as codes
 from robomesh.endpoints import ON_THE_SECOND_LINK, wait_until_declared
 from robomesh.errors import (
     BrokenAnswerError,
-    BusError,
     BusyError,
     MessageError,
     NoAnswerError,
     QuotaError,
     RefusedError,
+    RobomeshError,
 )
 from robomesh.messages import PROTOBUF, TEXT, decode
 from robomesh.reasons import Reason, pairs_of, reason_of
@@ -167,13 +167,13 @@ async def ask_bytes(
     raise NoAnswerError(codes.NO_ANSWER(key=key, seconds=timeout_s))
 
 
-def answer_of(owner: str, answer: bytes | None, refused: BusError | None) -> Answer:
+def answer_of(owner: str, answer: bytes | None, refused: RobomeshError | None) -> Answer:
     """Return one owner's decoded answer, or its error; bytes that cannot be decoded are an error too."""
     if answer is None:
         return Answer(owner, None, None if refused is None else str(refused))
     try:
         return Answer(owner, decode_answer(owner, answer), None)
-    except BusError as error:  # one invalid answer must not hide the others
+    except RobomeshError as error:  # one invalid answer must not hide the others
         return Answer(owner, None, str(error))
 
 

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, BinaryIO
 
 from robomesh import reason_codes as codes
-from robomesh.errors import BusError, CodedError
+from robomesh.errors import CodedError, RobomeshError
 from robomesh.memory_limit import MEMORY_BYTES, limit_memory
 
 _START_S = 60.0
@@ -38,7 +38,7 @@ class WorkerTimeoutError(WorkerError):
     """No answer in time; the process was killed."""
 
 
-class HandlerError(BusError):
+class HandlerError(RobomeshError):
     """An error of an untrusted worker's handler; the text is that of its exception."""
 
 

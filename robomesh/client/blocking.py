@@ -215,7 +215,7 @@ class Recording:
 
     Raises:
         RecordingError: Of every function: the file is damaged, changed, or lacks what was requested.
-        BusError: Of every function, over the mesh: the recorder refuses or does not answer.
+        RobomeshError: Of every function, over the mesh: the recorder refuses or does not answer.
 
     Attributes:
         info: Description of the recording.

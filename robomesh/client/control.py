@@ -15,7 +15,7 @@ from typing import Any, Self, TypeVar
 from robomesh import reason_codes as codes
 from robomesh.client.commands import CommandResult, Progress, StopResult, program_text, request_stop
 from robomesh.client.motion_reports import MotionReports
-from robomesh.errors import BusError, BusyError, MotionError, NoAnswerError, RefusedError
+from robomesh.errors import BusyError, MotionError, NoAnswerError, RefusedError, RobomeshError
 from robomesh.keys import robot_key
 from robomesh.presence import OPERATOR, session_of
 from robomesh.schemas import robomesh_pb2 as schema
@@ -118,7 +118,7 @@ class AsyncArm:
                 else:
                     await self.wait()
             finally:
-                with contextlib.suppress(BusError):
+                with contextlib.suppress(RobomeshError):
                     release = _A(action=_A.RELEASE, lease=self._lease)
                     await self._session.ask(self._lease_key, release, timeout_s=1.0)
 
@@ -265,7 +265,7 @@ class AsyncArm:
             self._moving = False
             raise
         if self.progress.is_alive():
-            with contextlib.suppress(BusError):  # the next command reports the end of control
+            with contextlib.suppress(RobomeshError):  # the next command reports the end of control
                 await self._renew(_IDLE_TTL_S)
         return result
 
@@ -283,7 +283,7 @@ class AsyncArm:
             return
         try:
             self.stopped = await self.stop(reason)
-        except BusError as error:
+        except RobomeshError as error:
             text = f"the stop failed: {error}; only the end of the lease stops it now"
             log.error("%s: %s", self, text)
             self.stopped = StopResult(0, False, text)

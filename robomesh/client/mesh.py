@@ -14,7 +14,7 @@ from robomesh.client.robot import AsyncRobot, events_of
 from robomesh.client.samples import Alarm, Event, alarm_of
 from robomesh.client.streams import AsyncStream
 from robomesh.endpoints import DEFAULT_ROUTER
-from robomesh.errors import BusError, SessionError
+from robomesh.errors import RobomeshError, SessionError
 from robomesh.keys import ROOT, WHOLE_SITE, PresenceKey
 from robomesh.last_values import last_values
 from robomesh.presence import SILENT
@@ -22,7 +22,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 
 
-class RobotNotFoundError(BusError):
+class RobotNotFoundError(RobomeshError):
     """No robot on the mesh has the name, or several have it.
 
     Attributes:
@@ -165,7 +165,7 @@ class AsyncMesh:
         """Return the recordings of all sites, newest first, without those of recorders that do not answer.
 
         Raises:
-            BusError: If no recorder answers.
+            RobomeshError: If no recorder answers.
         """
         return await list_recordings(self.session)
 
@@ -177,7 +177,7 @@ class AsyncMesh:
 
         Raises:
             RecordingError: If no recording has the name; the text lists the newest ones.
-            BusError: If its recorder refuses or does not answer.
+            RobomeshError: If its recorder refuses or does not answer.
         """
         file, site = await self._recorder_file(recording)
         return AsyncRecording(MeshSource(file, recording_info(await file.describe(), site)))
@@ -191,7 +191,7 @@ class AsyncMesh:
 
         Raises:
             RecordingError: If no recording has the name, or the file changes meanwhile.
-            BusError: If its recorder refuses or does not answer.
+            RobomeshError: If its recorder refuses or does not answer.
             OSError: If the copy cannot be written.
         """
         file, _ = await self._recorder_file(recording)

@@ -83,7 +83,7 @@ class RecorderFile:
         """Return the description of the recording.
 
         Raises:
-            BusError: If the recorder refuses or does not answer.
+            RobomeshError: If the recorder refuses or does not answer.
         """
         answer = await self._ask("info", schema.RecordingQuery(file=self.name))
         assert isinstance(answer, schema.Recording)
@@ -98,7 +98,7 @@ class RecorderFile:
             wait: Wait for the quota.
 
         Raises:
-            BusError: If the recorder refuses or does not answer.
+            RobomeshError: If the recorder refuses or does not answer.
         """
         request = schema.PieceRequest(file=self.name, offset=offset, length=length, attachment=attachment)
         answer = await self._ask(f"piece/{self._asker}", request, wait=wait)
@@ -110,7 +110,7 @@ class RecorderFile:
 
         Raises:
             RecordingError: If the file has another version: `recording.changed`.
-            BusError: If the recorder refuses or does not answer.
+            RobomeshError: If the recorder refuses or does not answer.
         """
         while begin < end:
             try:
@@ -137,7 +137,7 @@ class RecorderFile:
 
         Raises:
             RecordingError: If the file was replaced meanwhile: `recording.changed`.
-            BusError: If the recorder refuses or does not answer.
+            RobomeshError: If the recorder refuses or does not answer.
         """
         request = schema.RangeRequest(file=self.name, topic=topic, most=_MESSAGES)
         if start_ns is not None:
@@ -170,7 +170,7 @@ class RecorderFile:
         """Return the names of the recorded values; wait for the quota.
 
         Raises:
-            BusError: If the recorder refuses or does not answer.
+            RobomeshError: If the recorder refuses or does not answer.
         """
         answer = await self._ask(f"series/{self._asker}", schema.SeriesRequest(file=self.name), wait=True)
         assert isinstance(answer, schema.SeriesAnswer)
@@ -187,7 +187,7 @@ class RecorderFile:
 
         Raises:
             RecordingError: If the file changes again and again, or its name is not a plain file name.
-            BusError: If the recorder refuses or does not answer.
+            RobomeshError: If the recorder refuses or does not answer.
             OSError: If the copy cannot be written.
         """
         # The name comes from another machine: accept no path.

@@ -76,7 +76,7 @@ class Source(Protocol):
 
         Raises:
             RecordingError: If it cannot be read.
-            BusError: If its recorder refuses or does not answer.
+            RobomeshError: If its recorder refuses or does not answer.
         """
         ...
 
@@ -85,7 +85,7 @@ class Source(Protocol):
 
         Raises:
             RecordingError: If it cannot be read.
-            BusError: If its recorder refuses or does not answer.
+            RobomeshError: If its recorder refuses or does not answer.
         """
         ...
 
@@ -180,7 +180,7 @@ class AsyncRecording:
 
     Raises:
         RecordingError: Of every function: the file is damaged, changed, or lacks what was requested.
-        BusError: Of every function, over the mesh: the recorder refuses or does not answer.
+        RobomeshError: Of every function, over the mesh: the recorder refuses or does not answer.
 
     Attributes:
         info: Description of the recording.

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from robomesh import reason_codes as codes
-from robomesh.errors import BusError
+from robomesh.errors import RobomeshError
 from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.recordings.channel_names import topic_name
 from robomesh.recordings.errors import RecordingError
@@ -106,12 +106,12 @@ def recording_info(message: schema.Recording, recorder_site: str = "") -> Record
     )
 
 
-def _log_silent(site: str, error: BusError) -> None:
+def _log_silent(site: str, error: RobomeshError) -> None:
     log.warning("without the recordings of %s: %s", site, error)
 
 
 async def list_recordings(
-    session: Session, *, on_silent: Callable[[str, BusError], None] = _log_silent
+    session: Session, *, on_silent: Callable[[str, RobomeshError], None] = _log_silent
 ) -> list[RecordingInfo]:
     """Return the recordings of every site, newest first, without those of recorders that do not answer.
 
@@ -119,7 +119,7 @@ async def list_recordings(
         on_silent: Called with the site of a recorder that does not answer.
 
     Raises:
-        BusError: If no recorder answers.
+        RobomeshError: If no recorder answers.
     """
     sites = sorted({key.site for key in await session.present() if key.service == "recorder"})
     answers = await asyncio.gather(*(_of_site(session, site) for site in sites), return_exceptions=True)
@@ -127,7 +127,9 @@ async def list_recordings(
     for site, answer in zip(sites, answers, strict=True):
         if isinstance(answer, schema.RecordingList):
             found += [recording_info(recording, site) for recording in answer.recordings]
-        elif not isinstance(answer, BusError) or all(isinstance(each, BusError) for each in answers):
+        elif not isinstance(answer, RobomeshError) or all(
+            isinstance(each, RobomeshError) for each in answers
+        ):
             raise answer
         else:
             on_silent(site, answer)
@@ -146,7 +148,7 @@ async def find_recording(
     what: str,
     *,
     closed: bool = False,
-    on_silent: Callable[[str, BusError], None] = _log_silent,
+    on_silent: Callable[[str, RobomeshError], None] = _log_silent,
 ) -> RecordingInfo:
     """Return the newest recording that `[SITE/]NAME` or `[SITE/]FILE` names.
 
@@ -156,7 +158,7 @@ async def find_recording(
 
     Raises:
         RecordingError: If no recording has the name; the text lists the newest ones.
-        BusError: If no recorder answers.
+        RobomeshError: If no recorder answers.
     """
     site, _, name = what.rpartition("/")
     recordings = await list_recordings(session, on_silent=on_silent)

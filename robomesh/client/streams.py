@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Generic, Literal, Self, TypeVar
 
 from robomesh.client.samples import Sample
-from robomesh.errors import BusError, MessageError
+from robomesh.errors import MessageError, RobomeshError
 from robomesh.subscription import Sample as RawSample
 from robomesh.subscription import Subscription
 
@@ -23,7 +23,7 @@ _FIRST_S = 2.0
 _POLL_S = 0.5
 
 
-class StaleError(BusError):
+class StaleError(RobomeshError):
     """A topic without a new message for longer than its limit; the last one is not current.
 
     Attributes:

@@ -73,11 +73,11 @@ def _failed(text: str) -> int:
 def _known_errors() -> tuple[type[Exception], ...]:
     from protocol_gateway.errors import ProtocolGatewayError
     from renderer.errors import RendererError
-    from robomesh.errors import BusError
+    from robomesh.errors import RobomeshError
     from robots.errors import RobotError
     from services.errors import ServiceError
 
-    return (BusError, ProtocolGatewayError, RendererError, RobotError, ServiceError)
+    return (RobomeshError, ProtocolGatewayError, RendererError, RobotError, ServiceError)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import foxglove
 from foxglove.websocket import Capability, ChannelView, Client, ServerListener, WebSocketServer
 
-from robomesh.errors import BusError
+from robomesh.errors import RobomeshError
 from robomesh.keys import WHOLE_SITE, PresenceKey, every_robot
 from robomesh.presence import SILENT
 from robomesh.schemas.robomesh_pb2 import Description
@@ -72,7 +72,7 @@ class Bridge:
                     self._removals[robot] = self._loop.call_later(
                         self.settings.gone_after_s, self._remove, *robot
                     )
-            except BusError as error:
+            except RobomeshError as error:
                 log.debug("%s: %s", presence, error)
 
     async def follow_descriptions(self) -> None:
@@ -85,7 +85,7 @@ class Bridge:
                 if self._is_shown(*robot):
                     self._add(*robot)
                     self.channels.describe(*robot, description)
-            except BusError as error:
+            except RobomeshError as error:
                 log.warning("%s: %s", sample.key, error)
 
     def _is_shown(self, site: str, robot: str) -> bool:

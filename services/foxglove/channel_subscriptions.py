@@ -8,7 +8,7 @@ from typing import Any
 
 import foxglove
 
-from robomesh.errors import BusError
+from robomesh.errors import RobomeshError
 from robomesh.keys import parse_expression
 from robomesh.schemas.robomesh_pb2 import KeyFrameRequest
 from robomesh.session import Session
@@ -107,7 +107,7 @@ class TopicChannel:
     async def _ask_for_key_frame(self) -> None:
         try:
             await self._session.ask(f"{self._keys[0]}/keyframe/{self._session.own_name}", KeyFrameRequest())
-        except BusError as error:
+        except RobomeshError as error:
             log.debug("no key frame on %s: %s", self._keys[0], error)
 
 

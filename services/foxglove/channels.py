@@ -80,7 +80,7 @@ class Channels:
         """Add the video channels of a robot's views, and the robot to the common description.
 
         Raises:
-            BusError: If a view's name is invalid in a key.
+            RobomeshError: If a view's name is invalid in a key.
         """
         views = dict.fromkeys((*(view.name for view in description.views), *_VIEWS))
         for view in views:

@@ -19,7 +19,7 @@ from robomesh import reason_codes as codes
 from robomesh.client.commands import CommandResult, Progress, request_stop
 from robomesh.client.control import AsyncArm
 from robomesh.client.robot import AsyncRobot
-from robomesh.errors import BusError, MessageError, MotionError, RefusedError
+from robomesh.errors import MessageError, MotionError, RefusedError, RobomeshError
 from robomesh.keys import robot_key
 from robomesh.messages import JSON, decode_request
 from robomesh.schemas.robomesh_pb2 import CommandRequest
@@ -133,7 +133,7 @@ class Commands:
                 await self._until_ended(client, arm)
         except MotionError as error:
             log.info("%s: %s", arm, error)
-        except BusError as error:
+        except RobomeshError as error:
             log.warning("%s: %s", arm, error)
         finally:
             # Control may have been taken away, and acquired for another client since.

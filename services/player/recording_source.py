@@ -9,7 +9,7 @@ from google.protobuf.message import DecodeError
 
 from robomesh import reason_codes as codes
 from robomesh import topics
-from robomesh.errors import BusError
+from robomesh.errors import RobomeshError
 from robomesh.keys import Key, parse_key
 from robomesh.publisher import LIST_LENGTH
 from robomesh.recordings.publisher_time import PublisherTimes
@@ -190,7 +190,7 @@ def _topics_of_robot(file: RecordingFile) -> dict[str, Key]:
         try:
             key = parse_key(name)
             row = topics.topic(key.topic)
-        except BusError:
+        except RobomeshError:
             continue
         first = next(iter(found.values()), key)
         same = (key.site, key.robot) == (first.site, first.robot)

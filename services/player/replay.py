@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from robomesh import reason_codes as codes
 from robomesh import topics
-from robomesh.errors import BusError, RefusedError
+from robomesh.errors import RefusedError, RobomeshError
 from robomesh.keys import replay_name, robot_key
 from robomesh.messages import reason_message
 from robomesh.publisher import Publisher
@@ -161,7 +161,7 @@ class Replay:
     async def _mesh_of_robot(self, name: str, missing: Reason) -> bytes:
         """Fetch a mesh from the recorded robot, if it is online: old recordings contain no meshes."""
         of = (self._source.of_site, self._source.of_robot)
-        with contextlib.suppress(BusError):
+        with contextlib.suppress(RobomeshError):
             if any((each.site, each.robot) == of for each in await self._session.present()):
                 return await self._session.ask_bytes(
                     robot_key(*of, f"mesh/{name}"), timeout_s=_MESH_TIMEOUT_S

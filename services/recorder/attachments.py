@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from robomesh.errors import BusError
+from robomesh.errors import RobomeshError
 from robomesh.header import Header
 from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.schemas import robomesh_pb2 as schema
@@ -85,7 +85,7 @@ class DescriptionCache:
                 robot = sample.parsed.robot
                 try:
                     description = sample.message()
-                except BusError:
+                except RobomeshError:
                     continue
                 assert isinstance(description, schema.Description)
                 if not description.HasField("replay"):
@@ -108,7 +108,7 @@ class DescriptionCache:
                 try:
                     key = robot_key(self._site, robot, f"mesh/{name}")
                     data = await self._session.ask_bytes(key, timeout_s=_MESH_WITHIN_S)
-                except BusError:
+                except RobomeshError:
                     continue  # the description still holds its name and hash
                 self._meshes[sha256] = data
             meshes[name] = data
@@ -124,7 +124,7 @@ async def picture(session: Session, site: str, robot: str) -> Attachment | None:
             async with asyncio.timeout(_PICTURE_WITHIN_S):
                 image: Any = (await anext(subscription)).message()
             return Attachment("thumbnail.jpg", "image/jpeg", image.data)
-        except (TimeoutError, StopAsyncIteration, BusError):
+        except (TimeoutError, StopAsyncIteration, RobomeshError):
             continue
         finally:
             subscription.close()

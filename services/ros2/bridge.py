@@ -10,7 +10,7 @@ import numpy as np
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from robomesh.errors import BusError
+from robomesh.errors import RobomeshError
 from robomesh.keys import Key, every_robot
 from robomesh.schemas.robomesh_pb2 import Description
 from robomesh.session import Session
@@ -110,7 +110,7 @@ class Bridge:
                 continue
             try:
                 description = sample.message()
-            except BusError as error:
+            except RobomeshError as error:
                 log.debug("%s: %s", sample.key, error)
                 continue
             assert isinstance(description, Description)

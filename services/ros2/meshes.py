@@ -6,7 +6,7 @@ import logging
 from pathlib import Path
 
 from robomesh.atomic_write import write_atomically
-from robomesh.errors import BusError
+from robomesh.errors import RobomeshError
 from robomesh.keys import robot_key
 from robomesh.schemas.robomesh_pb2 import Description
 from robomesh.session import Session
@@ -41,7 +41,7 @@ class Meshes:
             if hashlib.sha256(data).hexdigest() != sha256:
                 return None
             await asyncio.to_thread(_save, path, data)
-        except (BusError, OSError) as error:
+        except (RobomeshError, OSError) as error:
             log.warning("no mesh %s of %s/%s: %s", mesh, site, robot, error)
             return None
         return path

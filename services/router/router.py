@@ -20,7 +20,7 @@ import zenoh
 
 from robomesh.certificate_identity import read_identity
 from robomesh.endpoints import Link, Tls, first_line, router_config, router_values
-from robomesh.errors import BusError
+from robomesh.errors import RobomeshError
 from robomesh.schemas.robomesh_pb2 import Event
 from robomesh.session import SessionSettings
 from services.errors import ListenError, ServiceError
@@ -119,7 +119,7 @@ async def serve(settings: Settings, *, ready: Callable[[str], None] | None = Non
                 wanted = read_access(settings.access)
                 _check_keys(settings.tls)
                 router_config(settings.listen, settings.connect, settings.tls, wanted, settings.line_bps)
-            except (AccessError, BusError) as error:
+            except (AccessError, RobomeshError) as error:
                 status.publish_event(Event.ERROR, "rules", f"{error}; {_KEEPS_CURRENT}")
                 continue
             others = await asyncio.to_thread(neighbours, router, settings.tls)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import zenoh
 
-from robomesh.errors import BusError
+from robomesh.errors import RobomeshError
 from robomesh.health import Served, present
 from robomesh.keys import WHOLE_SITE
 from robomesh.schemas import robomesh_pb2 as schema
@@ -68,7 +68,7 @@ class StatusPublisher:
                 publisher = session.declare_publisher(site, WHOLE_SITE, f"events/{SERVICE}")
                 while True:
                     publisher.put(await self._queue.get())
-        except BusError as error:
+        except RobomeshError as error:
             log.error("the router cannot publish its status: %s", error)
 
 

@@ -72,7 +72,7 @@ def test_an_unknown_name_is_refused_with_what_there_is(mesh, robot):
         robomesh.RobotNotFoundError, match="no robot 'nobody' on the mesh; there are: test/arm"
     ):
         mesh.robot("nobody")
-    with pytest.raises(robomesh.BusError, match="no topic 'joint'"):
+    with pytest.raises(robomesh.RobomeshError, match="no topic 'joint'"):
         robot.topic("joint")
 
 

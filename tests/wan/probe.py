@@ -20,7 +20,7 @@ from google.protobuf import json_format
 
 from robomesh import messages
 from robomesh.endpoints import bundle
-from robomesh.errors import BusError, NoAnswerError
+from robomesh.errors import NoAnswerError, RobomeshError
 from robomesh.messages import PROTOBUF
 from robomesh.server import Request
 from robomesh.session import Session, SessionSettings, open_session
@@ -90,7 +90,7 @@ class Probe:
         try:
             message = json_format.ParseDict(values, schema())
             answer = await self._session.ask(key, message, timeout_s=timeout_s)
-        except BusError as error:
+        except RobomeshError as error:
             return {"error": str(error), "began": began, "took_s": time.monotonic() - began}
         return {"answer": as_json(answer), "began": began, "took_s": time.monotonic() - began}
 
@@ -127,7 +127,7 @@ class Probe:
         began = time.monotonic()
         try:
             sha256 = hashlib.sha256(await self._session.ask_bytes(key, timeout_s=timeout_s)).hexdigest()
-        except BusError as error:
+        except RobomeshError as error:
             return {"error": str(error), "took_s": time.monotonic() - began}
         return {"sha256": sha256, "took_s": time.monotonic() - began}
 

@@ -113,7 +113,7 @@ def _ports() -> list[Finding]:
 
 def _is_router(port: int) -> bool:
     """Return whether a Zenoh router answers on the port, by TCP or, with `--keys`, by TLS."""
-    from robomesh.errors import BusError
+    from robomesh.errors import RobomeshError
     from services.command_line import discovery
 
     async def answers() -> bool:
@@ -122,7 +122,7 @@ def _is_router(port: int) -> bool:
 
     try:
         return discovery.run(answers())
-    except (BusError, TimeoutError):
+    except (RobomeshError, TimeoutError):
         return False
 
 

@@ -3,7 +3,7 @@
 import asyncio
 
 from robomesh import keys, presence
-from robomesh.errors import BusError
+from robomesh.errors import RobomeshError
 from robomesh.keys import PresenceKey
 from robomesh.schemas.robomesh_pb2 import ClockRequest
 from robomesh.session import Session
@@ -30,7 +30,7 @@ async def _problem_of(text: str, connect: str) -> str | None:
         async with discovery.attached(connect) as session:
             # A router is alive if a session attaches to it.
             return None if service == _ROUTER else await _silent_processes(session, tokens)
-    except BusError as error:
+    except RobomeshError as error:
         return str(error)
 
 
@@ -48,6 +48,6 @@ async def _answers(session: Session, who: PresenceKey) -> bool:
     try:
         key = keys.robot_key(who.site, keys.WHOLE_SITE, f"clock/{who.id}")
         await session.ask(key, ClockRequest(), timeout_s=_WITHIN_S)
-    except BusError:
+    except RobomeshError:
         return False
     return True

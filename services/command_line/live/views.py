@@ -3,7 +3,7 @@
 import contextlib
 from typing import NamedTuple
 
-from robomesh.errors import BusError, NoAnswerError
+from robomesh.errors import NoAnswerError, RobomeshError
 from robomesh.keys import check_chunk, robot_key
 from robomesh.schemas.robomesh_pb2 import KeyFrameRequest, ViewAnswer, ViewRequest
 from robomesh.session import Session
@@ -60,7 +60,7 @@ def _views_key(session: Session, robot: discovery.Robot) -> str:
 
 async def _rate(session: Session, robot: discovery.Robot, name: str) -> float:
     """Return a view's highest rate [1/s]; 0: a recording's view, without a renderer."""
-    with contextlib.suppress(BusError):
+    with contextlib.suppress(RobomeshError):
         answer = await session.ask(
             _views_key(session, robot), ViewRequest(of=name), timeout_s=_RATE_TIMEOUT_S
         )

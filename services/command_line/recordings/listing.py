@@ -14,7 +14,7 @@ from robomesh.client.recording_list import (
     find_recording,
     list_recordings,
 )
-from robomesh.errors import BusError, SessionError
+from robomesh.errors import RobomeshError, SessionError
 from robomesh.recordings.errors import RecordingError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
@@ -85,7 +85,7 @@ async def found(session: Session, what: str, *, closed: bool = False) -> Recordi
         ) from None
 
 
-def _report_silent(site: str, error: BusError) -> None:
+def _report_silent(site: str, error: RobomeshError) -> None:
     print(f"robomesh: without the recordings of {site}: {error}", file=sys.stderr)
 
 

@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
-from robomesh.errors import BusError
+from robomesh.errors import RobomeshError
 from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.presence import OPERATOR, session_of
 from robomesh.schemas import robomesh_pb2 as schema
@@ -84,7 +84,7 @@ async def _of_site(
         try:
             yield site, state
         finally:
-            with contextlib.suppress(BusError):
+            with contextlib.suppress(RobomeshError):
                 end = schema.ReplayRequest(action=schema.ReplayRequest.CLOSE)
                 await session.ask(robot_key(site, state.robot, "replay/request"), end)
     finally:

@@ -14,7 +14,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 
 from robomesh import reason_codes as codes
-from robomesh.errors import BusError, BusyError, CodedError, NoAnswerError, QuotaError, RefusedError
+from robomesh.errors import BusyError, CodedError, NoAnswerError, QuotaError, RefusedError, RobomeshError
 from robomesh.messages import reason_message, to_json
 from robomesh.reasons import to_parameters
 from services.console.errors import RefusedRequest
@@ -48,7 +48,7 @@ def _headers(refused: RefusedRequest) -> dict[str, str]:
     return {"Cache-Control": "no-store"} | again
 
 
-def refused_on_the_mesh(error: BusError) -> RefusedRequest:
+def refused_on_the_mesh(error: RobomeshError) -> RefusedRequest:
     """Return the refusal for a request that failed on the mesh."""
     match error:
         case QuotaError():

@@ -8,7 +8,7 @@ from starlette.responses import Response
 
 from robomesh import keys
 from robomesh import reason_codes as codes
-from robomesh.errors import BusError, QuotaError
+from robomesh.errors import QuotaError, RobomeshError
 from robomesh.repeated_requests import ask_repeatedly
 from robomesh.session import Session
 from services.console.errors import RefusedRequest
@@ -56,7 +56,7 @@ async def mesh_response(request: Request, session: Session, cache: MeshCache) ->
             data = await ask_repeatedly(
                 session, key, lambda timeout_s: session.ask_bytes(key, timeout_s=timeout_s), _TIMEOUTS_S
             )
-        except BusError as error:
+        except RobomeshError as error:
             refused = refused_on_the_mesh(error)
             if isinstance(error, QuotaError):
                 refused.status = 503  # pages retry after 503

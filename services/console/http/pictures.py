@@ -32,7 +32,7 @@ from renderer.errors import Mp4Error
 from renderer.mp4 import FragmentedMp4
 from robomesh import keys
 from robomesh import reason_codes as codes
-from robomesh.errors import BusError, BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError
+from robomesh.errors import BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError, RobomeshError
 from robomesh.schemas.robomesh_pb2 import VideoFrames, ViewRequest
 from robomesh.subscription import Sample
 from services.console.errors import RefusedRequest
@@ -162,7 +162,7 @@ class Pictures:
             # Find out whether the view or the size was rejected.
             status = 404
             if any(size):
-                with contextlib.suppress(BusError):
+                with contextlib.suppress(RobomeshError):
                     await self.views.ask(robot, ViewRequest(of=view), self.asker(request.scope))
                     status = 400
             raise RefusedRequest(status, error.reason) from None

@@ -24,7 +24,7 @@ from starlette.types import Scope
 
 from robomesh import reason_codes as codes
 from robomesh.client.recorder import RangeMessage, RecorderFile
-from robomesh.errors import BusError
+from robomesh.errors import RobomeshError
 from robomesh.recordings.channel_names import topic_name
 from robomesh.recordings.table import Table, is_due, table_of
 from robomesh.schemas import robomesh_pb2 as schema
@@ -196,4 +196,4 @@ def _answered(handler: Handler) -> Handler:
 
 
 def _refused(error: Exception) -> RefusedRequest | None:
-    return refused_on_the_mesh(error) if isinstance(error, BusError) else None
+    return refused_on_the_mesh(error) if isinstance(error, RobomeshError) else None

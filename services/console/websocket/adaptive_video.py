@@ -12,7 +12,7 @@ import math
 import time
 from collections.abc import AsyncIterator, Callable
 
-from robomesh.errors import BusError
+from robomesh.errors import RobomeshError
 from robomesh.subscription import Sample
 from services.console.requested_views import LOWEST_STEP, Views
 from services.console.websocket.framing import SampleBatch
@@ -129,7 +129,7 @@ class AdaptiveVideo:
     async def _change(self, step: int) -> None:
         try:
             source = await self._views.reduced(self.key, step, self._asker)
-        except BusError as error:
+        except RobomeshError as error:
             # Not available: frames are dropped instead, and the video continues at key frames.
             log.debug("%s is not reduced: %s", self.key, error)
             self._refused_at = time.monotonic()

@@ -14,7 +14,7 @@ from google.protobuf.message import DecodeError
 
 from robomesh import keys
 from robomesh import reason_codes as codes
-from robomesh.errors import BusError, RefusedError
+from robomesh.errors import RefusedError, RobomeshError
 from robomesh.presence import OPERATOR, session_of
 from robomesh.schemas.robomesh_pb2 import LeaseRequest
 from robomesh.session import Session
@@ -67,7 +67,7 @@ class OperatorPresence:
             self._tokens[site, robot] = self._session.declare_presence_of(site, robot, OPERATOR, self.id)
         try:
             yield
-        except BusError:
+        except RobomeshError:
             # Refused or not answered; if it was granted without an answer, no client will use it.
             if new:
                 self._end(site, robot)

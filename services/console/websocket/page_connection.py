@@ -16,7 +16,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from robomesh import keys, topics
 from robomesh import reason_codes as codes
-from robomesh.errors import BusError, BusyError, NoAnswerError, RefusedError
+from robomesh.errors import BusyError, NoAnswerError, RefusedError, RobomeshError
 from robomesh.messages import reason_message
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import FromPage, KeyFrameRequest, ToPage, ViewAnswer, ViewRequest
@@ -231,7 +231,7 @@ class Browser:
         async def ask() -> None:
             try:
                 await self._session.ask(f"{key}/keyframe/{self._asker}", KeyFrameRequest())
-            except BusError as error:
+            except RobomeshError as error:
                 log.debug("no key frame on %s: %s", key, error)
 
         self._keep(ask())
