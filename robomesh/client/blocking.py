@@ -238,9 +238,11 @@ class Recording:
         names: list[str] = self._run(self._recording.value_names())
         return names
 
-    def joints(self, *, start_s: float | None = None, end_s: float | None = None) -> RecordedJoints:
-        """Return the joint states."""
-        joints: RecordedJoints = self._run(self._recording.joints(start_s=start_s, end_s=end_s))
+    def joints(
+        self, topic: str = "joints", *, start_s: float | None = None, end_s: float | None = None
+    ) -> RecordedJoints:
+        """Return the joint states of a topic, with the schema foxglove.JointStates."""
+        joints: RecordedJoints = self._run(self._recording.joints(topic, start_s=start_s, end_s=end_s))
         return joints
 
     def values(

@@ -178,7 +178,9 @@ class JointsCollector:
             self._present += sum(joint is not None for joint in joints)
         else:
             self._present += len(joints)
-        self._positions.extend([nan if joint is None else joint.position for joint in joints])
+        self._positions.extend(
+            [joint.position if joint and joint.HasField("position") else nan for joint in joints]
+        )
         self._velocities.extend(
             [joint.velocity if joint and joint.HasField("velocity") else nan for joint in joints]
         )

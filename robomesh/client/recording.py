@@ -192,7 +192,8 @@ class AsyncRecording:
         self._types: dict[str, str] | None = None
 
     def __repr__(self) -> str:
-        return f"<recording {self.info.name!r} of {self.info.site}/{self.info.robot}>"
+        of = f" of {self.info.site}/{self.info.robot}" if self.info.robot else ""
+        return f"<recording {self.info.name!r}{of}>"
 
     @property
     def topics(self) -> tuple[str, ...]:
@@ -203,10 +204,12 @@ class AsyncRecording:
         """Return the names of the recorded values, as `values` takes them: "kinematics/tool/x"."""
         return await self._source.value_names()
 
-    async def joints(self, *, start_s: float | None = None, end_s: float | None = None) -> RecordedJoints:
-        """Return the joint states."""
+    async def joints(
+        self, topic: str = "joints", *, start_s: float | None = None, end_s: float | None = None
+    ) -> RecordedJoints:
+        """Return the joint states of a topic, with the schema foxglove.JointStates."""
         found = JointsCollector(await self._joint_types(), start_ns=self.info.start_ns)
-        async for recorded, message in self._decoded(self._key("joints"), start_s, end_s, _JOINTS):
+        async for recorded, message in self._decoded(self._key(topic), start_s, end_s, _JOINTS):
             found.add(recorded, message)
         return found.collected()
 

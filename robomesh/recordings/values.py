@@ -46,7 +46,8 @@ def values_of(schema: str, message: Any) -> Iterator[tuple[str, float]]:
     """Yield the numbers of a message with their names below its topic."""
     if schema == "foxglove.JointStates":
         for joint in message.joints:
-            yield f"{joint.name}/position", joint.position
+            if joint.HasField("position"):
+                yield f"{joint.name}/position", joint.position
             if joint.HasField("velocity"):
                 yield f"{joint.name}/velocity", joint.velocity
     elif schema == "robomesh.KinematicState":

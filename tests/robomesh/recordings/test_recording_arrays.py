@@ -6,7 +6,11 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from foxglove import open_mcap
+from foxglove.channels import JointStatesChannel
+from foxglove.mcap import MCAPCompression, MCAPWriteOptions
+from foxglove.messages import JointState, JointStates
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates as JointStatesMessage
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from mcap_protobuf.decoder import DecoderFactory
@@ -132,7 +136,7 @@ def test_another_programs_file_with_two_robots_and_json_is_read_as_far_as_it_can
     with path.open("wb") as stream:
         writer = Writer(stream)
         writer.start()
-        states = register_schema(writer, JointStates)
+        states = register_schema(writer, JointStatesMessage)
         for robot in ("a", "b"):
             channel = writer.register_channel(f"/{robot}/joints", "protobuf", states)
             for number in range(3):
@@ -150,6 +154,25 @@ def test_another_programs_file_with_two_robots_and_json_is_read_as_far_as_it_can
     (sample,) = recording.messages("joints")
     assert (sample.message, sample.data) == (None, b'{"joints":[]}')
     assert recording.values("a/joints/one/position")["a/joints/one/position"].values.tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize("compression", [MCAPCompression.Zstd, MCAPCompression.Lz4, None])
+def test_a_file_of_foxgloves_sdk_is_read(tmp_path, compression):
+    path = tmp_path / "sdk.mcap"
+    with open_mcap(path, writer_options=MCAPWriteOptions(compression=compression)):
+        channel = JointStatesChannel("/left/joint_states")
+        for number in range(500):
+            moved = [JointState(name="a", position=number), JointState(name="b", velocity=1.0)]
+            channel.log(JointStates(joints=moved), log_time=START_NS + number * 10_000_000)
+        channel.close()
+    recording = robomesh.open_recording(path)
+    states = recording.joints("left/joint_states")
+    assert states.names == ("a", "b")
+    assert states.positions[:, 0].tolist() == list(range(500))
+    assert np.isnan(states.positions[:, 1]).all()
+    assert states.velocities[:, 1].tolist() == [1.0] * 500
+    assert states.time_s[-1] == pytest.approx(4.99)
+    assert recording.value_names() == ["left/joint_states/a/position", "left/joint_states/b/velocity"]
 
 
 def test_a_file_that_is_still_being_written_has_what_was_written(tmp_path):
@@ -205,7 +228,7 @@ def _write(path, states):
         writer = Writer(stream, chunk_size=1 << 30, compression=CompressionType.ZSTD)
         writer.start()
         channel = writer.register_channel(
-            "robomesh/site/arm/joints", "protobuf", register_schema(writer, JointStates)
+            "robomesh/site/arm/joints", "protobuf", register_schema(writer, JointStatesMessage)
         )
         for number, state in enumerate(states):
             writer.add_message(channel, START_NS + number, state.SerializeToString(), START_NS + number)
@@ -239,7 +262,7 @@ def test_a_time_out_of_range_is_refused(tmp_path):
     with (tmp_path / "late.mcap").open("wb") as stream:
         writer = Writer(stream)
         writer.start()
-        channel = writer.register_channel("joints", "protobuf", register_schema(writer, JointStates))
+        channel = writer.register_channel("joints", "protobuf", register_schema(writer, JointStatesMessage))
         writer.add_message(channel, START_NS, joints(waist=1).SerializeToString(), (1 << 64) - 1)
         writer.finish()
     with pytest.raises(robomesh.RecordingError, match="a time out of range"):
