@@ -1,9 +1,13 @@
 """Documents that agree with the code."""
 
+import inspect
 import re
 from pathlib import Path
 
-from tests import make_site_file, make_topics
+import pytest
+
+import robomesh
+from tests import make_python_reference, make_site_file, make_topics
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -14,6 +18,28 @@ def test_the_reference_of_topics_is_the_topic_table():
 
 def test_the_reference_of_the_site_file_is_its_models():
     assert make_site_file.FILE.read_text(encoding="utf-8") == make_site_file.document()
+
+
+def test_the_reference_of_the_python_package_is_the_package():
+    written = make_python_reference.FILE.read_text(encoding="utf-8")
+    assert written == make_python_reference.document(), (
+        "the public part of `import robomesh` changed: if programs still run, write the reference anew"
+    )
+    assert make_python_reference.missing() == set()
+
+
+@pytest.mark.parametrize("name", ["Arm", "Mesh", "Recording", "Robot"])
+def test_the_synchronous_and_asynchronous_forms_have_the_same_calls(name):
+    forms = getattr(robomesh, name), getattr(robomesh, f"Async{name}")
+    calls = [
+        {
+            call: [(each.name, each.default) for each in inspect.signature(function).parameters.values()]
+            for call, function in inspect.getmembers(form, inspect.isfunction)
+            if not call.startswith("_") and call not in make_python_reference.INTERNAL | {"open"}
+        }
+        for form in forms
+    ]
+    assert calls[0] == calls[1]
 
 
 def test_architecture_is_short_and_names_folders_and_files_that_exist():

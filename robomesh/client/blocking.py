@@ -121,7 +121,11 @@ class Arm:
 
 
 class Robot:
-    """A robot of the mesh. Positions are in rad, of prismatic joints in m."""
+    """A robot of the mesh. Positions are in rad, of prismatic joints in m.
+
+    Attributes:
+        site, name: Its site and its name there.
+    """
 
     def __init__(self, loop: EventLoopThread, robot: AsyncRobot) -> None:
         self._loop, self._robot = loop, robot

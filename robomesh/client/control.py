@@ -54,6 +54,11 @@ class AsyncArm:
         RefusedError: Of every call: the gateway refused it, with the reason's code.
         MotionError: Of a motion call: the motion ended before its target, with the reason's code.
         NoAnswerError: The gateway did not answer, or fell silent.
+
+    Attributes:
+        operator: Name that the robot's users see.
+        stopped: Answer to the stop that ended an interrupted motion; None: there was none.
+        progress: Callbacks while a command runs.
     """
 
     def __init__(

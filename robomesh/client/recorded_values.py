@@ -55,8 +55,9 @@ class _Recorded:
 class RecordedJoints(_Recorded):
     """Recorded joint states: n states of k joints, one row for each state.
 
+    `time_ns`, `time`, `received_ns` and `time_s` are its times, (n,); `sequence` has the publisher's numbers.
+
     Attributes:
-        time_ns, time_s, received_ns, sequence: (n,), as of `RecordedValues`.
         names: Names of the joints, in the order of the first state.
         units: Units of their positions: "rad", or "m" if prismatic; "": the recording does not describe it.
         positions: (n, k) [rad or m]; NaN: absent.
@@ -93,13 +94,9 @@ class RecordedJoints(_Recorded):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RecordedValues(_Recorded):
-    """A recorded value: the n messages that contain it.
+    """A recorded value: the n messages that contain it, with their times as in `RecordedJoints`.
 
     Attributes:
-        time_ns: (n,) publisher's times, ns since the Unix epoch.
-        time_s: (n,) publisher's times since the recording's start, on its recorder's clock [s].
-        received_ns: (n,) receive times on the recorder's clock, ns since the Unix epoch.
-        sequence: (n,) publisher's numbers; gaps are messages that were not recorded.
         name: "kinematics/tool/x".
         unit: "m"; "": none, or unknown.
         values: (n,)

@@ -98,7 +98,11 @@ class CheckResult:
 
 
 class AsyncRobot:
-    """A robot of the mesh, for asynchronous programs. Positions are in rad, of prismatic joints in m."""
+    """A robot of the mesh, for asynchronous programs. Positions are in rad, of prismatic joints in m.
+
+    Attributes:
+        site, name: Its site and its name there.
+    """
 
     def __init__(self, session: Session, site: str, name: str) -> None:
         self._session = session
