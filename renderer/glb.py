@@ -1,4 +1,4 @@
-"""Reader of GLB, the format of published meshes, to arrays.
+"""Reader of GLB, the format of published meshes, to arrays with z up.
 
 Reads triangles, node placements, base colours, roughness and metalness, but no textures, skins or
 animations: a link is one rigid, painted body. Source: glTF 2.0, Khronos Group.
@@ -21,12 +21,13 @@ _BINARY_CHUNK = 0x004E4942
 _TRIANGLES = 4
 
 _COMPONENTS: dict[int, str] = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_Y_UP_TO_Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Triangles of one material, in the file's frame.
+    """Triangles of one material, z up.
 
     Attributes:
         positions: (v, 3) float64 [m].
@@ -87,31 +88,38 @@ def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
 
 
 def _surfaces(document: dict[str, Any], binary: bytes) -> Iterator[Surface]:
-    for mesh_number, node_to_file in _meshes(document):
+    for mesh_number, node_to_z_up in _meshes(document):
         for primitive in document["meshes"][mesh_number]["primitives"]:
             if primitive.get("mode", _TRIANGLES) == _TRIANGLES:
-                yield _surface(document, binary, primitive, node_to_file)
+                yield _surface(document, binary, primitive, node_to_z_up)
 
 
 def _meshes(document: dict[str, Any]) -> Iterator[tuple[int, NDArray[np.float64]]]:
-    """Yield (mesh number, node_to_file) of every node with a mesh."""
+    """Yield (mesh number, node_to_z_up) of every node with a mesh."""
     nodes, scenes = document.get("nodes", []), document.get("scenes", [])
     children = {child for node in nodes for child in node.get("children", [])}
     roots = [number for number in range(len(nodes)) if number not in children]
     if scenes:
         roots = scenes[document.get("scene", 0)].get("nodes", [])
-    waiting = [(number, np.eye(4)) for number in roots]
+    waiting = [(number, _file_to_z_up(document)) for number in roots]
     visits = 0
     while waiting:
         visits += 1
         if visits > len(nodes):
             raise GlbError("the GLB's nodes form a cycle")
-        number, parent_to_file = waiting.pop()
+        number, parent_to_z_up = waiting.pop()
         node = nodes[number]
-        node_to_file = parent_to_file @ _placement(node)
+        node_to_z_up = parent_to_z_up @ _placement(node)
         if "mesh" in node:
-            yield node["mesh"], node_to_file
-        waiting += [(child, node_to_file) for child in node.get("children", [])]
+            yield node["mesh"], node_to_z_up
+        waiting += [(child, node_to_z_up) for child in node.get("children", [])]
+
+
+def _file_to_z_up(document: dict[str, Any]) -> NDArray[np.float64]:
+    extras = document.get("asset", {}).get("extras", {})
+    if isinstance(extras, dict) and extras.get("robomesh") == {"up": "z"}:
+        return np.eye(4)  # from before 2026-11, for example in a recording
+    return _Y_UP_TO_Z_UP
 
 
 def _placement(node: dict[str, Any]) -> NDArray[np.float64]:
@@ -132,7 +140,7 @@ def _placement(node: dict[str, Any]) -> NDArray[np.float64]:
 
 
 def _surface(
-    document: dict[str, Any], binary: bytes, primitive: dict[str, Any], node_to_file: NDArray[np.float64]
+    document: dict[str, Any], binary: bytes, primitive: dict[str, Any], node_to_z_up: NDArray[np.float64]
 ) -> Surface:
     attributes = primitive["attributes"]
     positions = _accessor(document, binary, attributes["POSITION"])
@@ -147,9 +155,9 @@ def _surface(
     normals = None
     if "NORMAL" in attributes:
         # Normals need the inverse transpose: otherwise a scaled node would tilt them.
-        normals = _accessor(document, binary, attributes["NORMAL"]) @ np.linalg.inv(node_to_file[:3, :3])
+        normals = _accessor(document, binary, attributes["NORMAL"]) @ np.linalg.inv(node_to_z_up[:3, :3])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    if np.linalg.det(node_to_file[:3, :3]) < 0:
+    if np.linalg.det(node_to_z_up[:3, :3]) < 0:
         triangles = triangles[:, ::-1]
     color, roughness, metallic = _material(document, primitive.get("material"))
     colors = None
@@ -161,7 +169,7 @@ def _surface(
         low = colors[:, :3] <= 0.0031308
         colors[:, :3] = np.where(low, 12.92 * colors[:, :3], 1.055 * colors[:, :3] ** (1 / 2.4) - 0.055)
     return Surface(
-        positions=positions @ node_to_file[:3, :3].T + node_to_file[:3, 3],
+        positions=positions @ node_to_z_up[:3, :3].T + node_to_z_up[:3, 3],
         normals=normals,
         triangles=triangles,
         color=color,

@@ -1,6 +1,6 @@
 """A robot's links as GLB, for the network and for URDF.
 
-Each link's mesh is in the link's frame [m], z up (not glTF's y up), in the description's colours. Finished
+Each link's mesh is in the link's frame [m], turned to glTF's y up, in the description's colours. Finished
 files are in the user's cache, keyed by the content that they were made from.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from robomesh.atomic_write import write_atomically
 from robots.kinematic_tree import Shape, tree_of
-from robots.meshes.mesh import PAINT, Mesh, Part, Wire, transformed_mesh
+from robots.meshes.mesh import PAINT, Y_UP_TO_Z_UP, Mesh, Part, Wire, transformed_mesh
 from robots.meshes.read import read_mesh
 from robots.meshes.simplify import lightened
 from robots.meshes.write_glb import glb_of
@@ -36,7 +36,7 @@ __all__ = [
 logger = logging.getLogger(__name__)
 
 # Part of each cache key. Increment it when the same mesh file should give another GLB.
-_VERSION = 4
+_VERSION = 5
 # Links are sent to phones too, and no screen shows more.
 MOST_TRIANGLES = 200_000
 
@@ -185,6 +185,9 @@ def _placed(shape: Shape) -> Mesh:
     placement = shape.shape_to_link
     if shape.in_stated_unit and mesh.unit_m is not None:
         placement = placement @ np.diag([mesh.unit_m, mesh.unit_m, mesh.unit_m, 1.0])
+        # As in ROS, from RViz of 2025 on: glTF is turned, COLLADA is not.
+        if mesh.up == "y" and isinstance(shape.mesh, Path) and shape.mesh.suffix.lower() in (".glb", ".gltf"):
+            placement = placement @ Y_UP_TO_Z_UP
     mesh = transformed_mesh(mesh, placement)
     names = {part.material.name for part in mesh.parts}
     return replace(

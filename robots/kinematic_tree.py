@@ -93,7 +93,7 @@ class Shape:
         color: Colour of the materials named "paint", or of all materials if none has this name; None keeps
             the mesh's colours.
         opacity: 0 to 1; None keeps the mesh's opacity.
-        in_stated_unit: Apply the unit that the file states, if any (a URDF's COLLADA).
+        in_stated_unit: Apply the unit that the file states, if any (COLLADA), and turn glTF's y up to z up.
         within: Read only files below this folder when the mesh file names them; None: any folder.
     """
 

@@ -24,7 +24,8 @@ MAX_DRAWN = 30_000_000
 # trimesh makes a mesh for each material, which takes milliseconds.
 _MOST_MATERIALS = 2000
 _JSON_CHUNK = 0x4E4F534A
-OWN_MARK = "robomesh"
+# `asset.extras["robomesh"]` of GLB by our writer; before 2026-11 it was {"up": "z"}, and nothing was turned.
+TURNED_MARK = {"up": "y", "content_up": "z"}
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,7 @@ class Declared:
     Attributes:
         unit_m: Length of the file's unit [m]; None if the file does not state one.
         up: Upward axis, "y" or "z"; empty if the file does not state one.
+        turned: Our writer turned the content from z up to y up; turning it back gives `up`.
         textures: Image by material name.
         base_colors: Linear colour and opacity by material name; trimesh would round them to bytes.
         linear: The colours are linear light, not sRGB.
@@ -44,6 +46,7 @@ class Declared:
 
     unit_m: float | None = None
     up: str = ""
+    turned: bool = False
     textures: Mapping[str, str] = field(default_factory=dict)
     base_colors: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     linear: bool = False
@@ -268,7 +271,7 @@ def _gltf_declared(path: Path, document: dict[str, Any]) -> Declared:
     _check_drawn(path, document)
     asset = document.get("asset")
     extras = asset.get("extras") if isinstance(asset, dict) else None
-    own = isinstance(extras, dict) and OWN_MARK in extras
+    own = extras.get("robomesh") if isinstance(extras, dict) else None
     addresses = [
         str(item["uri"])
         for item in _list(document, "buffers")
@@ -286,6 +289,7 @@ def _gltf_declared(path: Path, document: dict[str, Any]) -> Declared:
     return Declared(
         unit_m=1.0,
         up="z" if own else "y",
+        turned=own == TURNED_MARK,
         textures=textures,
         base_colors=_gltf_base_colors(document),
         linear=True,

@@ -16,6 +16,8 @@ Color = tuple[float, float, float]
 PAINT = "paint"
 _MIXERS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
 _NO_ROTATION = np.eye(3)
+# (4, 4): x stays, y becomes z.
+Y_UP_TO_Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 
 @dataclass(frozen=True)

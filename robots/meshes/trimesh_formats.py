@@ -18,6 +18,7 @@ import numpy as np
 from robots.errors import MeshError
 from robots.meshes.declared_size import Declared, read_declared
 from robots.meshes.mesh import (
+    Y_UP_TO_Z_UP,
     Color,
     FloatArray,
     IndexArray,
@@ -117,6 +118,8 @@ def _parts(scene: Any, declared: Declared) -> Iterator[Part | Wire]:
         placement, key = scene.graph[node]
         shape = scene.geometry[key]
         matrix = np.asarray(placement, dtype=np.float64)
+        if declared.turned:
+            matrix = Y_UP_TO_Z_UP @ matrix
         if hasattr(shape, "faces"):
             yield transformed(_part(str(key), shape, declared), matrix)
         else:

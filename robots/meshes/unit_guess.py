@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robots.meshes.mesh import FloatArray, Mesh, bounds
+from robots.meshes.mesh import Y_UP_TO_Z_UP, FloatArray, Mesh, bounds
 
 # A robot's link, from a small wrist to a long boom [m].
 LEAST_M, MOST_M = 0.005, 5.0
@@ -57,9 +57,7 @@ def file_to_link(found: Guess) -> FloatArray:
     """Return the (4, 4) transform from the file's units and axes to metres, z up."""
     matrix = np.diag([found.scale_m, found.scale_m, found.scale_m, 1.0])
     if found.up == "y":
-        turned = np.eye(4)
-        turned[1:3, 1:3] = [[0.0, -1.0], [1.0, 0.0]]  # y to z, z to -y
-        matrix = turned @ matrix
+        matrix = Y_UP_TO_Z_UP @ matrix
     return matrix
 
 

@@ -1,7 +1,7 @@
 """GLB writer: triangles, lines and points, with the colours of materials and vertices.
 
-glTF defines y as up. A robot's axes are z up and are not rotated; `asset.extras` marks that for our reader.
-The same mesh gives the same bytes. Source: glTF 2.0, Khronos Group.
+glTF defines y as up, and a robot's axes are z up: the root node turns them. The same mesh gives the same
+bytes. Source: glTF 2.0, Khronos Group, 3.4.
 """
 
 import json
@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.meshes.declared_size import OWN_MARK
-from robots.meshes.mesh import Color, FloatArray, Material, Mesh, Part, Wire
+from robots.meshes.declared_size import TURNED_MARK
+from robots.meshes.mesh import Y_UP_TO_Z_UP, Color, FloatArray, Material, Mesh, Part, Wire
 
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _FLOAT, _UINT = 5126, 5125
@@ -135,12 +135,16 @@ def _material(shape: Part | Wire, number: int, both: bool, blended: bool) -> dic
 
 
 def _packed(document: _Document) -> bytes:
-    asset = {"version": "2.0", "generator": "robomesh", "extras": {OWN_MARK: {"up": "z"}}}
     content: dict[str, Any] = {
-        "asset": asset,
+        "asset": {"version": "2.0", "generator": "robomesh", "extras": {"robomesh": TURNED_MARK}},
         "scene": 0,
-        "scenes": [{"nodes": list(range(len(document.nodes)))} if document.nodes else {}],
+        "scenes": [{}],
     }
+    if document.nodes:
+        # The matrix, by columns, has only 0 and 1: turning back gives the same numbers.
+        root = {"name": "z up", "matrix": Y_UP_TO_Z_UP.ravel().tolist()}
+        content["scenes"] = [{"nodes": [len(document.nodes)]}]
+        document.nodes.append({**root, "children": list(range(len(document.nodes)))})
     # glTF allows no empty lists.
     for key, items in (
         ("nodes", document.nodes),

@@ -103,7 +103,6 @@ class Shapes:
         if path.suffix.lower() != ".stl":
             color, opacity = None, None
         scale = numbers(element, "scale", 3, f"{what} mesh", "1 1 1")
-        # As in ROS, the unit that COLLADA states is used, its upward axis is not.
         return Shape(path, placement @ np.diag([*scale, 1.0]), color, opacity, in_stated_unit=True)
 
 

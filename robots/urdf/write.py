@@ -67,7 +67,7 @@ def tree_urdf(
     """
     robot = Xml.Element("robot", name=name)
     robot.append(
-        Xml.Comment(" Efforts are not known: 0. Meshes are in metres, z upwards, in their link's frame. ")
+        Xml.Comment(" Efforts are not known: 0. Meshes are glTF: metres, y up; z up in their link's frame. ")
     )
     # Existing links and joints keep their names; those added for URDF get unused names.
     links = {link.name for link in tree.links}

@@ -41,8 +41,16 @@ export async function loadModel(
     await new Promise((resolve) => setTimeout(resolve, ASK_AGAIN_MS));
   }
   if (!wanted() || !glb) return null;
-  const { scene } = await new GLTFLoader().parseAsync(glb, "");
+  const scene = await readGlb(glb);
   return wanted() ? scene : null;
+}
+
+/** Read a GLB, turned from glTF's y up to the robot's z up. @throws Error if it is invalid. */
+export async function readGlb(glb: ArrayBuffer): Promise<THREE.Group> {
+  const { scene, asset } = await new GLTFLoader().parseAsync(glb, "");
+  // From before 2026-11, for example in a recording: it was never turned.
+  if (asset.extras?.robomesh?.up !== "z") scene.rotation.x = Math.PI / 2;
+  return scene;
 }
 
 /** Fetch a GLB; on a temporary failure report why and return null. */

@@ -2,10 +2,10 @@
 
 import * as THREE from "three";
 import type { TransformControls } from "three/addons/controls/TransformControls.js";
-import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
 import type { DhRow } from "../../scene/forward-kinematics";
 import { makeGizmo } from "../../scene/gizmo";
+import { readGlb } from "../../scene/models";
 import { lights, palette, surround } from "../../scene/surroundings";
 import { Viewpoint } from "../../scene/viewpoint";
 import {
@@ -213,7 +213,7 @@ export class DefineScene {
     let model = this.models.get(sha);
     if (!model) {
       model = glb(sha).then(async (bytes) => {
-        const { scene } = await new GLTFLoader().parseAsync(bytes, "");
+        const scene = await readGlb(bytes);
         scene.traverse((part) => {
           if (!(part instanceof THREE.Mesh)) return;
           if (!part.geometry.getAttribute("normal")) part.geometry = toCreasedNormals(part.geometry, CREASE_ANGLE);

