@@ -8,8 +8,9 @@ import hashlib
 import json
 import logging
 import os
+import struct
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -17,7 +18,7 @@ import numpy as np
 
 from robomesh.atomic_write import write_atomically
 from robots.kinematic_tree import Shape, tree_of
-from robots.meshes.mesh import PAINT, Y_UP_TO_Z_UP, Mesh, Part, Wire, transformed_mesh
+from robots.meshes.mesh import PAINT, Y_UP_TO_Z_UP, Color, Mesh, Part, Wire, transformed_mesh
 from robots.meshes.read import read_mesh
 from robots.meshes.simplify import lightened
 from robots.meshes.write_glb import glb_of
@@ -30,13 +31,15 @@ __all__ = [
     "glb_of",
     "link_mesh",
     "link_meshes",
+    "main_color_of",
+    "main_colors",
     "shapes_glb",
 ]
 
 logger = logging.getLogger(__name__)
 
 # Part of each cache key. Increment it when the same mesh file should give another GLB.
-_VERSION = 5
+_VERSION = 6
 # Links are sent to phones too, and no screen shows more.
 MOST_TRIANGLES = 200_000
 
@@ -73,6 +76,23 @@ def shapes_glb(shapes: tuple[Shape, ...], *, cache: Path | None = None) -> bytes
         MeshError: If a mesh file cannot be read.
     """
     return _cached_glb(shapes, cache_folder() if cache is None else cache)
+
+
+def main_colors(meshes: Mapping[str, bytes]) -> dict[str, Color]:
+    """Return the colour that covers most of each GLB of ours."""
+    found = {name: main_color_of(glb) for name, glb in meshes.items()}
+    return {name: color for name, color in found.items() if color is not None}
+
+
+def main_color_of(glb: bytes) -> Color | None:
+    """Return the colour that covers most of a mesh of ours; None: it has none, or is of another program."""
+    try:
+        (size,) = struct.unpack_from("<I", glb, 12)
+        own = json.loads(glb[20 : 20 + size])["asset"]["extras"]["robomesh"]
+        red, green, blue = (float(each) for each in own["main_color"])
+    except (ValueError, KeyError, TypeError, struct.error):
+        return None
+    return red, green, blue
 
 
 def cache_folder() -> Path:

@@ -6,6 +6,9 @@ from renderer.appearance import floor_of
 from robomesh.schemas.robomesh_pb2 import Description
 from robots.urdf.viewers import Fixture, Viewed
 
+# Of a fixture without a colour, as on the page.
+_FIXTURE_COLOR = "#6f7c88"
+
 
 def meshes_of(description: Description) -> dict[str, str]:
     """Return the hash (SHA-256, hex) of each mesh of a description, by the mesh's name."""
@@ -23,7 +26,9 @@ def viewer_robot(site: str, robot: str, description: Description, uri: Callable[
     """
     mesh_of = {link.name: link.mesh for link in description.links}
     fixtures = (
-        Fixture(each.name, tuple(each.fixture_to_site), uri(each.mesh) if each.mesh else None)
+        Fixture(
+            each.name, tuple(each.fixture_to_site), uri(each.mesh) if each.mesh else None, _rgba(each.color)
+        )
         for each in description.fixtures
     )
     return Viewed(
@@ -35,3 +40,9 @@ def viewer_robot(site: str, robot: str, description: Description, uri: Callable[
         tuple(fixtures),
         floor_of(description),
     )
+
+
+def _rgba(color: str) -> str:
+    """Return "#rrggbb" as URDF's colour."""
+    shades = (int((color or _FIXTURE_COLOR)[at : at + 2], 16) / 255 for at in (1, 3, 5))
+    return " ".join(f"{shade:.4g}" for shade in (*shades, 1.0))

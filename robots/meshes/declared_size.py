@@ -24,7 +24,7 @@ MAX_DRAWN = 30_000_000
 # trimesh makes a mesh for each material, which takes milliseconds.
 _MOST_MATERIALS = 2000
 _JSON_CHUNK = 0x4E4F534A
-# `asset.extras["robomesh"]` of GLB by our writer; before 2026-11 it was {"up": "z"}, and nothing was turned.
+# In `asset.extras["robomesh"]` of our GLB; before 2026-11 it was {"up": "z"}, and nothing was turned.
 TURNED_MARK = {"up": "y", "content_up": "z"}
 
 
@@ -289,7 +289,7 @@ def _gltf_declared(path: Path, document: dict[str, Any]) -> Declared:
     return Declared(
         unit_m=1.0,
         up="z" if own else "y",
-        turned=own == TURNED_MARK,
+        turned=isinstance(own, dict) and own.items() >= TURNED_MARK.items(),
         textures=textures,
         base_colors=_gltf_base_colors(document),
         linear=True,

@@ -59,7 +59,21 @@ def glb_of(mesh: Mesh) -> bytes:
     for wire in mesh.wires:
         if len(wire.vertices):
             _add(document, wire, wire.segments, _LINES if len(wire.segments) else _POINTS, False)
-    return _packed(document)
+    return _packed(document, main_color(mesh))
+
+
+def main_color(mesh: Mesh) -> Color | None:
+    """Return the colour that covers most of a mesh; None: it has no triangles."""
+    areas: dict[Color, float] = {}
+    for part in mesh.parts:
+        corners = part.vertices[part.triangles]
+        doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        color = part.material.diffuse
+        if part.colors is not None and len(part.colors):
+            red, green, blue, _ = part.colors.mean(axis=0).tolist()
+            color = (red, green, blue)
+        areas[color] = areas.get(color, 0.0) + float(np.linalg.norm(doubled, axis=1).sum())
+    return max(areas, key=lambda color: areas[color], default=None)
 
 
 def merged(parts: Iterable[Part]) -> list[Part]:
@@ -134,9 +148,10 @@ def _material(shape: Part | Wire, number: int, both: bool, blended: bool) -> dic
     return found
 
 
-def _packed(document: _Document) -> bytes:
+def _packed(document: _Document, main: Color | None) -> bytes:
+    own = TURNED_MARK if main is None else {**TURNED_MARK, "main_color": [round(each, 4) for each in main]}
     content: dict[str, Any] = {
-        "asset": {"version": "2.0", "generator": "robomesh", "extras": {"robomesh": TURNED_MARK}},
+        "asset": {"version": "2.0", "generator": "robomesh", "extras": {"robomesh": own}},
         "scene": 0,
         "scenes": [{}],
     }

@@ -24,11 +24,13 @@ class Fixture:
     Attributes:
         pose: Fixture to site, 16 numbers by rows.
         uri: Address of the mesh; None: no mesh.
+        color: "r g b a", each 0 to 1; empty: the mesh's own.
     """
 
     name: str
     pose: Sequence[float]
     uri: str | None
+    color: str = ""
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class Viewed:
 
 
 def prefixed(urdf: str, prefix: str, mesh_uri: MeshUri, *, joints: bool = False) -> Xml.Element:
-    """Return a URDF with prefixed link names, in which each link shows its mesh only.
+    """Return a URDF with prefixed link names, in which each link shows its mesh only, in its colour.
 
     Args:
         prefix: Prefix of the links, `<site>/<robot>/`.
@@ -69,9 +71,10 @@ def prefixed(urdf: str, prefix: str, mesh_uri: MeshUri, *, joints: bool = False)
     for link in root.iter("link"):
         name = link.get("name", "")
         link.set("name", prefix + name)
+        color = link.find("visual/material/color")
         for shape in (*link.findall("visual"), *link.findall("collision")):
             link.remove(shape)
-        _show(link, mesh_uri(name))
+        _show(link, mesh_uri(name), "" if color is None else color.get("rgba", ""))
     for end in (*root.iter("parent"), *root.iter("child")):
         end.set("link", prefix + end.get("link", ""))
     if joints:
@@ -101,7 +104,7 @@ def together(robots: Iterable[Viewed], *, plain_joints: bool) -> str:
             _fixed(whole, WORLD, site)
     fixtures = {(robot.site, each.name): each for robot in known for each in robot.fixtures}
     for (site, name), fixture in sorted(fixtures.items(), key=lambda each: each[0]):
-        _show(Xml.SubElement(whole, "link", name=f"{site}/{name}"), fixture.uri)
+        _show(Xml.SubElement(whole, "link", name=f"{site}/{name}"), fixture.uri, fixture.color)
         _fixed(whole, site, f"{site}/{name}", fixture.pose)
     _add_floors(whole, known)
     for robot in known:
@@ -155,10 +158,13 @@ def _add_floors(whole: Xml.Element, robots: Sequence[Viewed]) -> None:
         _fixed(whole, site, name, pose)
 
 
-def _show(link: Xml.Element, uri: str | None) -> None:
+def _show(link: Xml.Element, uri: str | None, color: str) -> None:
     if uri:
-        geometry = Xml.SubElement(Xml.SubElement(link, "visual"), "geometry")
-        Xml.SubElement(geometry, "mesh", filename=uri)
+        visual = Xml.SubElement(link, "visual")
+        Xml.SubElement(Xml.SubElement(visual, "geometry"), "mesh", filename=uri)
+        if color:
+            material = Xml.SubElement(visual, "material", name=f"{link.get('name')} color")
+            Xml.SubElement(material, "color", rgba=color)
 
 
 def _fixed(whole: Xml.Element, parent: str, child: str, pose: Sequence[float] = ()) -> None:

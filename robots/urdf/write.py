@@ -9,11 +9,13 @@ links and joints; links that were fixed together are attached to the first of th
 import xml.etree.ElementTree as Xml
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
 from robots.joints import joints_of
 from robots.kinematic_tree import BASE, Tree, TreeJoint, TreeLink, named_frames, tree_of
+from robots.meshes.mesh import Color
 from robots.poses import FloatArray, inverse, rotation_rpy
 from robots.schema import JointType, RobotDescription
 
@@ -33,6 +35,7 @@ def to_urdf(
     *,
     mesh_uri: Callable[[str], str] = glb_beside,
     collision_uri: Callable[[str], str] | None = None,
+    colors: Mapping[str, Color] | None = None,
 ) -> str:
     """Return a description as URDF text that refers to the meshes of `robots.glb.link_meshes`.
 
@@ -41,6 +44,7 @@ def to_urdf(
     Args:
         mesh_uri: Returns the address of a link's GLB by the link's name.
         collision_uri: The same for the GLB of `robots.glb.collision_meshes`; None: `mesh_uri` for both.
+        colors: Colours of links, sRGB: Foxglove's viewer ignores those of GLB.
     """
     tree = tree_of(description)
     joints = joints_of(description)
@@ -48,7 +52,8 @@ def to_urdf(
         tree.free, joints.lower, joints.upper, joints.max_speed, strict=True
     ):
         tree = _with_limits(tree, number, float(lower), float(upper), float(speed))
-    return tree_urdf(description.name, tree, named_frames(description), mesh_uri, collision_uri)
+    frames = named_frames(description)
+    return tree_urdf(description.name, tree, frames, mesh_uri, collision_uri, colors=colors or {})
 
 
 def tree_urdf(
@@ -57,13 +62,15 @@ def tree_urdf(
     frames: Mapping[str, tuple[str, FloatArray]] | None = None,
     mesh_uri: Callable[[str], str] = glb_beside,
     collision_uri: Callable[[str], str] | None = collision_beside,
+    *,
+    colors: Mapping[str, Color] = MappingProxyType({}),
 ) -> str:
     """Return a tree of joints and links as URDF text.
 
     Args:
         frames: Named frames without a link: the link that carries each, and its (4, 4) pose there [m].
         mesh_uri: Returns the address of the GLB of a link with a shape, by the link's name.
-        collision_uri: See `to_urdf`.
+        collision_uri, colors: See `to_urdf`.
     """
     robot = Xml.Element("robot", name=name)
     robot.append(
@@ -86,7 +93,7 @@ def tree_urdf(
         if joint is not None:
             _add_joint(robot, tree, joint, carriers[joint.parent], carrier)
         for link in here:
-            _add_link(robot, link, mesh_uri, collision_uri or mesh_uri)
+            _add_link(robot, link, mesh_uri, collision_uri or mesh_uri, colors.get(link.name))
             if link.name != carrier:
                 on, on_to_joint = carriers.get(number, (carrier, np.eye(4)))
                 _add_fixed(robot, on, link.name, inverse(on_to_joint) @ link.link_to_joint, taken_joints)
@@ -119,12 +126,16 @@ def _add_link(
     link: TreeLink,
     mesh_uri: Callable[[str], str],
     collision_uri: Callable[[str], str],
+    color: Color | None,
 ) -> None:
     element = Xml.SubElement(robot, "link", name=link.name)
     uses = {"visual": mesh_uri, "collision": collision_uri if link.collision else mesh_uri}
     for use, address in uses.items() if link.shapes else ():
-        geometry = Xml.SubElement(Xml.SubElement(element, use), "geometry")
-        Xml.SubElement(geometry, "mesh", filename=address(link.name))
+        shape = Xml.SubElement(element, use)
+        Xml.SubElement(Xml.SubElement(shape, "geometry"), "mesh", filename=address(link.name))
+        if use == "visual" and color is not None:
+            material = Xml.SubElement(shape, "material", name=f"{link.name} color")
+            Xml.SubElement(material, "color", rgba=" ".join(f"{each:.4g}" for each in (*color, 1.0)))
 
 
 def _add_joint(

@@ -102,8 +102,8 @@ def convert(
 def _placement(mesh: "Mesh", ending: str, scale: float | None, up: str | None) -> Any:
     """Return the transform to OUT's units and axes.
 
-    GLB is in metres with y up, turned from z up, from the file's own units or a guess; other formats keep units and axes unless
-    options change them.
+    GLB is in metres, from the file's own units or a guess, and the writer turns z up to y up; other formats
+    keep units and axes unless options change them.
     """
     from robots.meshes.unit_guess import file_to_link, guess
 

@@ -12,7 +12,7 @@ from robomesh.worker import Worker
 from robots.cells import CellDescription
 from robots.collision import Cell, build_cell
 from robots.description import load
-from robots.glb import link_meshes
+from robots.glb import link_meshes, main_colors
 from robots.model import build_model
 from robots.singularity import reach_of
 from robots.urdf.write import to_urdf
@@ -97,7 +97,7 @@ async def _serve_robot(
     )
     message = describe(
         description,
-        urdf=to_urdf(description),
+        urdf=to_urdf(description, colors=main_colors(meshes)),
         meshes=meshes,
         base_to_site=robot.base_to_site,
         cell=settings.cell,

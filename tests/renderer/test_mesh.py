@@ -50,8 +50,9 @@ def test_a_node_places_its_mesh():
     quarter_turn_about_z = [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
     node = {"translation": [1.0, 2.0, 3.0], "rotation": quarter_turn_about_z, "scale": [2.0, 1.0, 1.0]}
     positions = prepared(cube(0.5, node=node)).positions
-    assert positions.min(axis=0) == pytest.approx([0.5, 1.0, 2.5], abs=1e-6)
-    assert positions.max(axis=0) == pytest.approx([1.5, 3.0, 3.5], abs=1e-6)
+    # x 0.5 to 1.5, y 1 to 3, z 2.5 to 3.5 in the file, where y is up.
+    assert positions.min(axis=0) == pytest.approx([0.5, -3.5, 1.0], abs=1e-6)
+    assert positions.max(axis=0) == pytest.approx([1.5, -2.5, 3.0], abs=1e-6)
 
 
 def test_a_mirrored_node_still_shows_its_outside():

@@ -8,17 +8,20 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 import trimesh
 
 from renderer.glb import read_glb
 from robots.description import load
-from robots.glb import link_mesh
+from robots.glb import link_mesh, link_meshes, main_colors
 from robots.kinematic_tree import tree_of
 from robots.meshes.mesh import Material, Mesh, Part, Wire, bounds
 from robots.meshes.normals import creased
 from robots.meshes.read import read_mesh
 from robots.meshes.solids import box
 from robots.meshes.write_glb import glb_of
+from robots.urdf.viewers import prefixed
+from robots.urdf.write import to_urdf
 from web import build_page
 
 # Reads the paths in argv; prints, for each, the validator's errors and warnings and three.js's bounding box.
@@ -123,3 +126,27 @@ def test_gltf_of_other_programs_in_a_urdf_is_turned_as_rviz_turns_it(tmp_path: P
     link = tree_of(load(tmp_path / "arm.urdf")).links[0]
     low, high = bounds(link_mesh(link.shapes))
     np.testing.assert_allclose(high - low, [1, 3, 2], atol=1e-9)
+
+
+def test_a_urdf_has_the_colour_that_covers_most_of_each_link() -> None:
+    description = load("pt600")
+    urdf = to_urdf(description, colors=main_colors(link_meshes(description)))
+    robot = prefixed(urdf, "site/arm/", lambda link: f"{link}.glb")
+    colors = {
+        link.get("name"): [float(each) for each in color.get("rgba", "").split()]
+        for link in robot.iter("link")
+        for color in link.findall("visual/material/color")
+    }
+    orange, dark = [0.85, 0.51, 0.17, 1.0], [0.21, 0.23, 0.24, 1.0]
+    assert colors["site/arm/column"] == pytest.approx(orange, abs=0.01)
+    assert colors["site/arm/base"] == pytest.approx(dark, abs=0.02)
+    assert len(colors) == 6
+
+
+def test_glb_of_another_program_has_no_main_colour() -> None:
+    assert main_colors({"a": b"", "b": b"glTF" + bytes(40), "c": glb_of(Mesh())}) == {}
+    parts = (
+        a_box((1.0, 0.0, 0.0)),
+        replace(a_box(), material=Material("small"), triangles=np.array([[0, 1, 2]])),
+    )
+    assert main_colors({"d": glb_of(Mesh(parts))}) == {"d": (1.0, 0.0, 0.0)}

@@ -156,7 +156,7 @@ def _cell(value: float) -> str:
 def export(robot: _Robot, folder: Annotated[Path, typer.Argument(metavar="FOLDER")]) -> None:
     """Write a robot as URDF with GLB meshes."""
     from robots.description import load
-    from robots.glb import collision_meshes, link_meshes
+    from robots.glb import collision_meshes, link_meshes, main_colors
     from robots.urdf.write import collision_beside, glb_beside, to_urdf
 
     description = load(robot)
@@ -167,13 +167,15 @@ def export(robot: _Robot, folder: Annotated[Path, typer.Argument(metavar="FOLDER
         raise ExportFolderError(
             f"{folder}: holds another robot ({there}), whose meshes would be overwritten: choose a new folder"
         )
-    files = {glb_beside(link): glb for link, glb in link_meshes(description).items()}
+    meshes = link_meshes(description)
+    files = {glb_beside(link): glb for link, glb in meshes.items()}
     files |= {collision_beside(link): glb for link, glb in collision_meshes(description).items()}
     try:
         (folder / "meshes").mkdir(parents=True, exist_ok=True)
         for path, glb in files.items():
             (folder / path).write_bytes(glb)
-        urdf.write_text(to_urdf(description, collision_uri=collision_beside), encoding="utf-8")
+        text = to_urdf(description, collision_uri=collision_beside, colors=main_colors(meshes))
+        urdf.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ExportFolderError(f"{folder}: cannot be written: {error.strerror}") from None
     print(urdf)
