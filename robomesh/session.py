@@ -296,6 +296,13 @@ class Session:
         await asyncio.to_thread(self.zenoh_session.close)
         for connection in self._extra.values():
             await asyncio.to_thread(connection.close)
+        # An interrupted exit does not wait for threads, and would end Python inside Zenoh's code.
+        await asyncio.to_thread(self._join)
+
+    def _join(self) -> None:
+        for declared in self._declared:
+            if isinstance(declared, Subscription):
+                declared.join()
 
 
 @asynccontextmanager

@@ -236,6 +236,10 @@ class Subscription:
             self._subscriber.undeclare()
             self._wake()
 
+    def join(self) -> None:
+        """Wait until a closed subscription's thread has ended."""
+        self._thread.join()
+
     def close_soon(self) -> None:
         """Unsubscribe; on any thread."""
         if not self._closed and not self._loop.is_closed():

@@ -1,11 +1,14 @@
 """An event loop in its own thread, for callers that block."""
 
 import asyncio
+import atexit
 import contextlib
 import threading
 from collections.abc import Callable, Coroutine
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, TypeVar
+
+from robomesh.errors import RobomeshError, SessionError
 
 T = TypeVar("T")
 
@@ -22,6 +25,8 @@ class _ThreadForEach(ThreadPoolExecutor):
         future: Future[T] = Future()
 
         def run() -> None:
+            if not future.set_running_or_notify_cancel():
+                return
             try:
                 future.set_result(call(*arguments, **options))
             except BaseException as error:
@@ -41,8 +46,11 @@ class EventLoopThread:
         self._loop = asyncio.new_event_loop()
         self._loop.set_default_executor(_ThreadForEach())
         self._closing: Callable[[], Coroutine[Any, Any, None]] | None = None
+        self._ended = False
         self._thread = threading.Thread(target=self._run, name="robomesh")
         self._thread.start()
+        # An interrupted exit does not wait for threads, and ends Python inside Zenoh's code.
+        atexit.register(self._close_at_exit)
 
     def at_end(self, close: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Set what runs before the loop ends."""
@@ -58,11 +66,11 @@ class EventLoopThread:
             waiting: Called several times a second by the waiting thread.
 
         Raises:
-            RuntimeError: If the loop has been closed.
+            SessionError: If the loop has been closed, or is closed before the coroutine ends.
         """
-        if self._loop.is_closed() or not self._thread.is_alive():
+        if self._has_ended():
             coroutine.close()
-            raise RuntimeError("the connection is closed: call robomesh.connect() again")
+            raise _closed()
         result: Future[T] = Future()
         tasks: list[asyncio.Task[T]] = []
 
@@ -74,19 +82,25 @@ class EventLoopThread:
             for task in tasks:
                 task.cancel()
 
-        self._loop.call_soon_threadsafe(start)
         try:
+            self._loop.call_soon_threadsafe(start)
             while True:
                 waiting()
                 with contextlib.suppress(TimeoutError):
                     return result.result(timeout=_POLL_S)
                 if result.done():  # the coroutine itself timed out
                     return result.result()
-        except BaseException:
-            if not result.done():
-                self._loop.call_soon_threadsafe(cancel)
+                if not self._thread.is_alive():  # it ended before it started the coroutine
+                    coroutine.close()
+                    raise _closed()
+        except BaseException as error:
+            if not result.done() and self._thread.is_alive():
+                with contextlib.suppress(RuntimeError):  # the loop has just ended
+                    self._loop.call_soon_threadsafe(cancel)
                 with contextlib.suppress(Exception):
                     result.exception(timeout=_CLEANUP_S)
+            if self._has_ended() and isinstance(error, Exception) and not isinstance(error, RobomeshError):
+                raise _closed() from None
             raise
 
     def close(self) -> None:
@@ -95,6 +109,15 @@ class EventLoopThread:
             with contextlib.suppress(RuntimeError):  # the loop has just ended
                 self._loop.call_soon_threadsafe(self._loop.stop)
             self._thread.join()
+        atexit.unregister(self._close_at_exit)
+
+    def _has_ended(self) -> bool:
+        return self._ended or not self._thread.is_alive()
+
+    def _close_at_exit(self) -> None:
+        while self._thread.is_alive():
+            with contextlib.suppress(KeyboardInterrupt):
+                self.close()
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
@@ -102,6 +125,7 @@ class EventLoopThread:
         try:
             self._loop.run_forever()
         finally:
+            self._ended = True
             end_with_main.cancel()
             self._loop.run_until_complete(self._end())
             self._loop.close()
@@ -128,3 +152,7 @@ def _transfer(task: asyncio.Task[T], result: "Future[T]") -> None:
         result.set_exception(error)
     else:
         result.set_result(task.result())
+
+
+def _closed() -> SessionError:
+    return SessionError("the connection is closed: call robomesh.connect() again")

@@ -1,0 +1,169 @@
+"""`import robomesh` beside faulty programs: invalid messages, closed connections, interrupted exits."""
+
+import asyncio
+import contextlib
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+import zenoh
+
+import robomesh
+from robomesh.client.event_loop import EventLoopThread
+from robomesh.endpoints import client_config
+from robomesh.header import Header, pack
+from robomesh.schemas import robomesh_pb2 as schema
+
+WAIT_S = 60.0
+JOINTS = "robomesh/site/arm/joints"
+
+
+class Publisher:
+    """A program that publishes what it likes."""
+
+    def __init__(self, session, key, number=1):
+        self._session, self._key, self._number = session, key, number
+
+    def put(self, message, sequence):
+        header = Header(self._number, sequence, time.time_ns())
+        data = message if isinstance(message, bytes) else message.SerializeToString()
+        self._session.put(self._key, data, attachment=pack(header))
+
+
+@pytest.fixture
+def plain(router):
+    with zenoh.open(client_config((router,))) as session:
+        yield session
+
+
+@pytest.fixture
+def mesh(router):
+    with robomesh.connect(router, timeout_s=20.0) as connected:
+        yield connected
+
+
+@pytest.fixture
+def robot(mesh, plain):
+    """An arm with a description."""
+    types = schema.Description.Joint(name="waist", type=schema.Description.Joint.ROTARY)
+    description = schema.Description(joints=[types]).SerializeToString()
+    key = "robomesh/site/arm/description"
+
+    def describe(query):
+        with query:
+            query.reply(key, description, attachment=pack(Header(1, 1, time.time_ns())))
+
+    with (
+        plain.liveliness().declare_token("robomesh/site/arm/alive/gateway/1"),
+        plain.declare_queryable(key, describe),
+    ):
+        while not mesh.robots():
+            pass
+        yield mesh.robot("arm")
+
+
+def received(stream, publisher, message, first=1):
+    """Return the stream's first value after publications that repeat until it arrives."""
+    found = []
+
+    def read():
+        while not found:
+            with contextlib.suppress(robomesh.StaleError):
+                found.append(next(stream))
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    sequence = first
+    while reader.is_alive():
+        publisher.put(message, sequence)
+        sequence += 1
+        reader.join(0.05)
+    return found[0]
+
+
+def test_calls_of_other_threads_end_with_a_clear_error_when_the_mesh_is_closed(router, robot):
+    mesh = robomesh.connect(router, timeout_s=20.0)
+    same, errors, called = mesh.robot("arm"), [], threading.Semaphore(0)
+
+    def call():
+        try:
+            while True:
+                same.last("controller")
+                same.description()
+                called.release()
+        except Exception as error:
+            errors.append(error)
+
+    callers = [threading.Thread(target=call) for _ in range(4)]
+    for caller in callers:
+        caller.start()
+    for _ in range(2):
+        assert called.acquire(timeout=WAIT_S)
+    mesh.close()
+    for caller in callers:
+        caller.join(WAIT_S)
+    assert [type(error) for error in errors] == [robomesh.SessionError] * 4
+    with pytest.raises(robomesh.SessionError, match="the connection is closed"):
+        same.last("controller")
+
+
+def test_an_interrupted_call_of_a_function_that_blocks_leaves_no_traceback(monkeypatch):
+    loop, begun, release = EventLoopThread(), threading.Event(), threading.Event()
+    threads, faults = [], []
+    monkeypatch.setattr(threading, "excepthook", faults.append)
+
+    def block():
+        threads.append(threading.current_thread())
+        begun.set()
+        release.wait(WAIT_S)
+
+    def interrupt():
+        if begun.is_set():
+            raise KeyboardInterrupt
+
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            loop.run(asyncio.to_thread(block), waiting=interrupt)
+    finally:
+        release.set()
+        loop.close()
+    threads[0].join(WAIT_S)
+    assert faults == []
+
+
+SCRIPT = """
+import os, signal, sys, threading, time
+import robomesh
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+mesh = robomesh.connect(sys.argv[1], timeout_s=20.0)
+streams = [mesh.events(history=False) for _ in range(20)]
+for stream in streams:
+    next(stream)
+
+def interrupt():
+    threading.main_thread().join()
+    for _ in range(30):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.01)
+
+threading.Thread(target=interrupt).start()
+"""
+
+
+@pytest.mark.slow
+def test_ctrl_c_while_python_exits_does_not_abort_the_process(router, plain):
+    arguments = [sys.executable, "-c", SCRIPT, router]
+    publisher = Publisher(plain, "robomesh/site/arm/events/watch")
+    with subprocess.Popen(arguments, stderr=subprocess.PIPE, text=True) as script:
+        sequence, deadline = 0, time.monotonic() + WAIT_S
+        while script.poll() is None:
+            assert time.monotonic() < deadline
+            sequence += 1
+            publisher.put(schema.Event(code="again"), sequence)
+            time.sleep(0.001)
+        faults = script.stderr.read()
+    assert script.returncode in (0, -signal.SIGINT), faults
