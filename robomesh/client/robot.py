@@ -1,6 +1,7 @@
 """A robot of the mesh: its topics, stop, kinematics, and control."""
 
 import asyncio
+import contextlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import radians
@@ -21,7 +22,7 @@ from robomesh.client.samples import (
     joint_types,
     sample_fields,
 )
-from robomesh.client.streams import AsyncStream, OnStale, Reading
+from robomesh.client.streams import AsyncStream, OnStale, Reading, check_options
 from robomesh.errors import MessageError, NoAnswerError
 from robomesh.keys import check_chunk, check_name, robot_key
 from robomesh.schemas import robomesh_pb2 as schema
@@ -129,7 +130,7 @@ class AsyncRobot:
             on_stale: "raise": raise StaleError when no current state arrives in time. "yield": return the
                 last state again, once, with `stale` true.
         """
-        subscription = self._subscribe("joints/slow" if slow else "joints", buffer)
+        subscription = self._subscribe("joints/slow" if slow else "joints", buffer, on_stale)
 
         def convert(sample: RawSample, stale: bool, skipped: int) -> Iterator[JointState]:
             fields = sample_fields(sample, sample.message(), stale=stale, skipped=skipped)
@@ -148,7 +149,7 @@ class AsyncRobot:
         Raises:
             UnknownTopicError: If there is no such topic.
         """
-        subscription = self._subscribe(name, buffer)
+        subscription = self._subscribe(name, buffer, on_stale)
 
         def convert(sample: RawSample, stale: bool, skipped: int) -> Iterator[Sample]:
             yield Sample(**sample_fields(sample, sample.message(), stale=stale, skipped=skipped))
@@ -337,8 +338,9 @@ class AsyncRobot:
     def _key(self, name: str) -> str:
         return robot_key(self.site, self.name, name)
 
-    def _subscribe(self, name: str, buffer: int) -> Subscription:
+    def _subscribe(self, name: str, buffer: int, on_stale: OnStale) -> Subscription:
         topic(name)  # names what is wrong with it
+        check_options(buffer, on_stale)
         return self._session.subscribe(self._key(name), newest=buffer)
 
     async def _ask(self, name: str, request: Message) -> Message:
@@ -359,10 +361,12 @@ def events_of(session: Session, key_expr: str, *, history: bool) -> Reading[Even
 
     def convert(sample: RawSample, stale: bool, skipped: int) -> Iterator[Event]:
         message, key = sample.message(), sample.parsed
-        if isinstance(message, schema.Event):
-            yield event_of(key.site, key.robot, message)
-        elif isinstance(message, schema.EventList):
-            yield from (event_of(key.site, key.robot, each) for each in message.events)
+        events: Iterable[schema.Event] = (message,) if isinstance(message, schema.Event) else ()
+        if isinstance(message, schema.EventList):
+            events = message.events
+        for event in events:
+            with contextlib.suppress(MessageError):  # one invalid event hides no other one
+                yield event_of(key.site, key.robot, event)
 
     subscription = session.subscribe(key_expr, newest=_EVENTS, history=history)
     return Reading(subscription, convert, limit_s=None, on_stale="raise")

@@ -10,6 +10,7 @@ from typing import Any
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.message import Message
+from google.protobuf.timestamp_pb2 import Timestamp
 
 from robomesh.errors import MessageError
 from robomesh.schemas import robomesh_pb2 as schema
@@ -31,8 +32,8 @@ class Sample:
         received_s: Time of arrival on this process's monotonic clock, minus the measured delay [s];
             None: unknown, for a last value.
         stale: The message was older than the topic's limit, or of unknown age, when the stream returned it.
-        skipped: Number of messages since the previous one of this stream that the stream did not return,
-            because the program was slow or the network lost them.
+        skipped: Number of messages since the previous one of its key that the stream did not return, because
+            the program was slow, the network lost them, or they were stale.
     """
 
     site: str
@@ -210,12 +211,16 @@ def sample_fields(sample: RawSample, message: Message, *, stale: bool, skipped: 
 
 
 def event_of(site: str, robot: str, event: schema.Event) -> Event:
-    """Return an event of a robot."""
+    """Return an event of a robot.
+
+    Raises:
+        MessageError: If its time is out of range.
+    """
     return Event(
         site=site,
         robot=robot,
-        time=event.timestamp.ToDatetime(tzinfo=UTC),
-        severity=schema.Event.Severity.Name(event.severity).lower(),
+        time=_utc(event.timestamp),
+        severity=_name_of(schema.Event.Severity, event.severity),
         code=event.code,
         text=event.text,
         source=event.source,
@@ -224,16 +229,33 @@ def event_of(site: str, robot: str, event: schema.Event) -> Event:
 
 
 def alarm_of(alarm: schema.Alarm) -> Alarm:
-    """Return an alarm of a site's list."""
+    """Return an alarm of a site's list.
+
+    Raises:
+        MessageError: If its time is out of range.
+    """
     return Alarm(
         id=alarm.id,
         site=alarm.site,
         robot=alarm.robot,
-        since=alarm.since.ToDatetime(tzinfo=UTC),
-        priority=schema.Alarm.Priority.Name(alarm.priority).lower(),
-        state=schema.Alarm.State.Name(alarm.state).lower(),
+        since=_utc(alarm.since),
+        priority=_name_of(schema.Alarm.Priority, alarm.priority),
+        state=_name_of(schema.Alarm.State, alarm.state),
         code=alarm.code,
         text=alarm.text,
         advice=alarm.advice,
         by=alarm.by,
     )
+
+
+def _utc(timestamp: Timestamp) -> datetime:
+    try:
+        return timestamp.ToDatetime(tzinfo=UTC)
+    except (ValueError, OverflowError):
+        raise MessageError("a time is out of range") from None
+
+
+def _name_of(values: Any, number: int) -> str:
+    """Return the name of an enum's value; of a value that a newer program added, its number."""
+    name: str = values.Name(number).lower() if number in values.values() else str(number)
+    return name

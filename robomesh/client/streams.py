@@ -10,7 +10,8 @@ from dataclasses import replace
 from typing import Generic, Literal, Self, TypeVar
 
 from robomesh.client.samples import Sample
-from robomesh.errors import MessageError, RobomeshError
+from robomesh.errors import MessageError, RobomeshError, UnknownTopicError
+from robomesh.header import Header
 from robomesh.subscription import Sample as RawSample
 from robomesh.subscription import Subscription
 
@@ -19,6 +20,8 @@ T = TypeVar("T")
 OnStale = Literal["raise", "yield"]
 # The first message may take this long [s], for example over a slow line.
 _FIRST_S = 2.0
+# Messages that a stream can keep for a slow program.
+_MOST_KEPT = 1_000_000
 # How often a blocked thread looks whether its stream was closed [s].
 _POLL_S = 0.5
 
@@ -40,6 +43,18 @@ class StaleError(RobomeshError):
         self.last, self.silent_s = last, silent_s
 
 
+def check_options(buffer: int, on_stale: OnStale) -> None:
+    """Check the options of a stream.
+
+    Raises:
+        ValueError: If one is invalid.
+    """
+    if not isinstance(buffer, int) or not 1 <= buffer <= _MOST_KEPT:
+        raise ValueError(f"buffer={buffer!r}: a whole number from 1 to {_MOST_KEPT} is right")
+    if on_stale not in ("raise", "yield"):
+        raise ValueError(f"on_stale={on_stale!r}: 'raise' or 'yield' are right")
+
+
 class Reading(Generic[T]):
     """Selection of the values that a stream returns; it never waits.
 
@@ -58,14 +73,13 @@ class Reading(Generic[T]):
         limit_s: float | None,
         on_stale: OnStale,
     ) -> None:
-        if on_stale not in ("raise", "yield"):
-            raise ValueError(f"on_stale={on_stale!r}: 'raise' or 'yield' are right")
         self.subscription = subscription
         self.skipped = 0
         self._convert, self._limit_s, self._on_stale = convert, limit_s, on_stale
         self._last: T | None = None
         self._values: deque[T] = deque()
-        self._previous: RawSample | None = None
+        # Of the last message of each key that the stream returned.
+        self._returned: dict[str, Header] = {}
         self._current_s = time.monotonic()
         self._deadline_s = None if limit_s is None else self._current_s + max(limit_s, _FIRST_S)
 
@@ -82,6 +96,8 @@ class Reading(Generic[T]):
             self._accept(sample)
         if self._values:
             return self._values.popleft()
+        if self.subscription.closed:
+            return None
         return self._silence() if self._deadline_s is not None else None
 
     def left_s(self) -> float | None:
@@ -89,11 +105,10 @@ class Reading(Generic[T]):
         return None if self._deadline_s is None else max(0.0, self._deadline_s - time.monotonic())
 
     def _accept(self, sample: RawSample) -> None:
-        previous, self._previous = self._previous, sample
-        skipped = 0
-        if previous is not None and previous.header.publisher == sample.header.publisher:
-            skipped = max(0, sample.header.sequence - previous.header.sequence - 1)
-        self.skipped += skipped
+        returned, header = self._returned.get(sample.key), sample.header
+        if returned is None or returned.publisher != header.publisher:
+            returned = None
+        skipped = 0 if returned is None else max(0, header.sequence - returned.sequence - 1)
         limit_s, topic = self._limit_s, self.subscription.topic
         # A last value of a topic with a heartbeat is at most that old; another's age is unknown.
         late_s = sample.late_s if sample.live else topic.heartbeat_s
@@ -101,14 +116,18 @@ class Reading(Generic[T]):
         stale = limit_s is not None and (current_s is None or time.monotonic() - current_s >= limit_s)
         try:
             values = list(self._convert(sample, stale, skipped))
-        except MessageError:
+        except (MessageError, UnknownTopicError):
             return  # another program's invalid message
         if values:
             self._last = values[-1]
         if limit_s is not None and current_s is not None and not stale:
             self._current_s, self._deadline_s = current_s, current_s + limit_s
         if not stale or self._on_stale == "yield":
+            self._returned[sample.key] = header
+            self.skipped += skipped
             self._values.extend(values)
+        elif returned is None and sample.live:
+            self._returned[sample.key] = header._replace(sequence=header.sequence - 1)  # counts as skipped
 
     def _silence(self) -> T | None:
         now = time.monotonic()
@@ -134,7 +153,7 @@ class _Counted(Generic[T]):
 
     @property
     def skipped(self) -> int:
-        """Number of messages that the stream did not return: the program was slow, or they were lost."""
+        """Number of messages that the stream did not return: they were skipped, lost, or stale."""
         return self._reading.skipped
 
     @property

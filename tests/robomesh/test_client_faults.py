@@ -16,6 +16,7 @@ from robomesh.client.event_loop import EventLoopThread
 from robomesh.endpoints import client_config
 from robomesh.header import Header, pack
 from robomesh.schemas import robomesh_pb2 as schema
+from tests.recordings import joints
 
 WAIT_S = 60.0
 JOINTS = "robomesh/site/arm/joints"
@@ -82,6 +83,56 @@ def received(stream, publisher, message, first=1):
         sequence += 1
         reader.join(0.05)
     return found[0]
+
+
+@pytest.mark.parametrize("buffer", [0, -1, 1.5, 10**30, "2"])
+def test_an_invalid_buffer_is_refused(robot, buffer):
+    with pytest.raises(ValueError, match="buffer="):
+        robot.joints(buffer=buffer)
+    with pytest.raises(ValueError, match="on_stale="):
+        robot.joints(on_stale="ignore")
+
+
+def test_states_that_grew_stale_in_the_buffer_are_counted_as_skipped(robot, plain):
+    publisher = Publisher(plain, JOINTS)
+    with robot.joints(buffer=1000) as states:
+        first = received(states, publisher, joints(waist=0))
+        for sequence in range(1000, 1100):
+            publisher.put(joints(waist=1), sequence)
+        time.sleep(1.5)  # longer than the limit of stale states
+        state = received(states, publisher, joints(waist=2), first=1100)
+        assert state["waist"] == 2
+        assert state.skipped == state.sequence - first.sequence - 1
+        assert states.skipped == state.skipped
+
+
+def test_an_invalid_message_hides_no_state_and_no_loss(robot, plain):
+    publisher, other = Publisher(plain, JOINTS), Publisher(plain, JOINTS, number=2)
+    with robot.joints() as states:
+        first = received(states, publisher, joints(waist=0))
+        for sequence in range(5):
+            other.put(b"\xff\xff", sequence)
+        state = received(states, publisher, joints(waist=2), first=1000)
+        assert state.skipped == state.sequence - first.sequence - 1
+
+
+def test_an_invalid_event_ends_no_stream_of_events(robot, mesh, plain):
+    odd = schema.Event(code="odd")
+    odd.timestamp.seconds = 1 << 62
+    newer = schema.Event(code="newer", severity=99)  # of a program that knows more severities
+    for stream in (robot.events(history=False), mesh.events(history=False)):
+        with stream:
+            Publisher(plain, "robomesh/site/arm/events/of/two").put(odd, 1)
+            Publisher(plain, "robomesh/site/arm/events/gateway").put(odd, 1)
+            event = received(stream, Publisher(plain, "robomesh/site/arm/events/watch"), newer)
+            assert (event.code, event.severity) == ("newer", "99")
+
+
+def test_a_closed_stream_ends_without_an_error(robot):
+    states = robot.joints()
+    states.close()
+    time.sleep(2.5)  # longer than the limit of the first state
+    assert list(states) == []
 
 
 def test_calls_of_other_threads_end_with_a_clear_error_when_the_mesh_is_closed(router, robot):
