@@ -1,6 +1,7 @@
 """Answers to commands and stops, callbacks while a command runs, and the text of a teach program."""
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterable, Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,6 +9,11 @@ from robomesh.errors import MessageError
 from robomesh.keys import robot_key
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
+from robomesh.texts import one_line
+
+# The services' limits are lower; a longer text is lost on its way to them.
+_LONGEST_PROGRAM = 1 << 20
+_LONGEST_SHOWN = 100
 
 
 @dataclass(frozen=True)
@@ -58,10 +64,14 @@ class Progress:
 async def request_stop(session: Session, site: str, robot: str, by: str, reason: str) -> StopResult:
     """Request a stop of a robot in an operator's name.
 
+    Args:
+        reason: For people; a reason that is too long or no valid text does not prevent the stop.
+
     Raises:
         NoAnswerError: If no gateway answered: the robot may still move.
     """
-    answer = await session.ask(robot_key(site, robot, "stop"), schema.StopRequest(by=by, reason=reason))
+    request = schema.StopRequest(by=by, reason=one_line(str(reason)))
+    answer = await session.ask(robot_key(site, robot, "stop"), request)
     assert isinstance(answer, schema.StopAnswer)
     return StopResult(answer.stop_id, answer.sent, answer.text)
 
@@ -70,12 +80,40 @@ def program_text(program: str | Path) -> str:
     """Return a program's text.
 
     Raises:
-        MessageError: If its file cannot be read.
+        MessageError: If its file cannot be read, or it is too long or not UTF-8 text.
     """
-    if not isinstance(program, Path):
-        return program
     try:
-        return program.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-        raise MessageError(f"{program}: cannot be read: {reason}") from None
+        if isinstance(program, Path):
+            with program.open("rb") as stream:
+                text = stream.read(_LONGEST_PROGRAM + 1).decode()
+        else:
+            text = program
+            text.encode()
+    except UnicodeError:
+        raise MessageError(f"{_name(program)}: cannot be read: it is not UTF-8 text") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise MessageError(f"{_name(program)}: cannot be read: {reason}") from None
+    if len(text) > _LONGEST_PROGRAM:
+        raise MessageError(
+            f"{_name(program)}: has more than {_LONGEST_PROGRAM >> 20} MiB, and is not a program"
+        )
+    return text
+
+
+def numbers(values: Iterable[float]) -> list[float]:
+    """Return joint positions or distances as numbers.
+
+    Raises:
+        MessageError: If they are not a sequence of numbers.
+    """
+    # Iterable too, but not in the order of the joints: the characters of a text, the keys of a mapping.
+    if not isinstance(values, str | bytes | bytearray | Mapping | Set):
+        with contextlib.suppress(TypeError, ValueError, OverflowError):
+            return [float(value) for value in values]
+    shown = one_line(repr(values), _LONGEST_SHOWN)
+    raise MessageError(f"{shown} is not a sequence of numbers, one for each joint")
+
+
+def _name(program: str | Path) -> str:
+    return str(program) if isinstance(program, Path) else "the program"

@@ -13,13 +13,21 @@ from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from robomesh import reason_codes as codes
-from robomesh.client.commands import CommandResult, Progress, StopResult, program_text, request_stop
+from robomesh.client.commands import (
+    CommandResult,
+    Progress,
+    StopResult,
+    numbers,
+    program_text,
+    request_stop,
+)
 from robomesh.client.motion_reports import MotionReports
-from robomesh.errors import BusyError, MotionError, NoAnswerError, RefusedError, RobomeshError
+from robomesh.errors import BusyError, MessageError, MotionError, NoAnswerError, RefusedError, RobomeshError
 from robomesh.keys import robot_key
 from robomesh.presence import OPERATOR, session_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
+from robomesh.texts import one_line
 
 T = TypeVar("T")
 log = logging.getLogger(__name__)
@@ -72,7 +80,7 @@ class AsyncArm:
         take: str = "",
     ) -> None:
         self._session, self.site, self.robot = session, site, robot
-        self._si, self._take = si, take
+        self._si, self._take = si, one_line(take)
         self.progress = Progress()
         self.operator = operator
         self.stopped: StopResult | None = None
@@ -96,13 +104,13 @@ class AsyncArm:
             identity = session_of(self.operator)
             token = self._session.declare_presence_of(self.site, self.robot, OPERATOR, identity)
             undo.callback(token.undeclare)
-            self._reports = MotionReports(self._session, self.site, self.robot, self.operator)
-            undo.callback(self._reports.close)
+            reports = MotionReports(self._session, self.site, self.robot, self.operator)
+            undo.callback(reports.close)
             action = _A.TAKE if self._take else _A.ACQUIRE
             request = _A(action=action, ttl_s=_IDLE_TTL_S, reason=self._take, session=identity)
             answer = await self._session.ask(self._lease_key, request)
             assert isinstance(answer, schema.LeaseAnswer)
-            self._lease = answer.lease
+            self._reports, self._lease = reports, answer.lease
             self._clock_ns = answer.now.ToNanoseconds() - time.monotonic_ns()
             self._close = undo.pop_all()
         return self
@@ -143,7 +151,7 @@ class AsyncArm:
 
     async def move_joints(self, positions: Sequence[float], *, wait: bool = True) -> CommandResult:
         """Move to joint positions [rad], of prismatic joints [m]."""
-        return await self._motion(_C(command=_C.MOVE_ABSOLUTE, joint_positions=_floats(positions)), wait=wait)
+        return await self._motion(_C(command=_C.MOVE_ABSOLUTE, joint_positions=numbers(positions)), wait=wait)
 
     async def move_joints_deg(self, positions: Sequence[float], *, wait: bool = True) -> CommandResult:
         """Move to joint positions in degrees, of prismatic joints in mm.
@@ -151,15 +159,15 @@ class AsyncArm:
         Raises:
             NoAnswerError: Also if the robot has no description to convert them with.
         """
-        return await self.move_joints(await self._si(_floats(positions)), wait=wait)
+        return await self.move_joints(await self._si(numbers(positions)), wait=wait)
 
     async def move_joints_by(self, distances: Sequence[float], *, wait: bool = True) -> CommandResult:
         """Move every joint by a distance [rad], prismatic joints [m]."""
-        return await self._motion(_C(command=_C.MOVE_RELATIVE, joint_positions=_floats(distances)), wait=wait)
+        return await self._motion(_C(command=_C.MOVE_RELATIVE, joint_positions=numbers(distances)), wait=wait)
 
     async def move_joints_by_deg(self, distances: Sequence[float], *, wait: bool = True) -> CommandResult:
         """Move every joint by a distance in degrees, prismatic joints in mm."""
-        return await self.move_joints_by(await self._si(_floats(distances)), wait=wait)
+        return await self.move_joints_by(await self._si(numbers(distances)), wait=wait)
 
     async def run(self, program: str | Path, *, name: str = "", wait: bool = True) -> CommandResult:
         """Run a teach program: its text, or the path of its file.
@@ -218,8 +226,9 @@ class AsyncArm:
 
     async def stop(self, reason: str = "") -> StopResult:
         """Request a stop, which latches. A stop request is not an emergency stop."""
+        result = await request_stop(self._session, self.site, self.robot, self.operator, reason)
         self._moving = False
-        return await request_stop(self._session, self.site, self.robot, self.operator, reason)
+        return result
 
     async def _other(self, request: schema.CommandRequest) -> CommandResult:
         return await self._guarded(self._command(request))
@@ -243,7 +252,8 @@ class AsyncArm:
         return await self._guarded(self._start(request, wait=wait))
 
     async def _start(self, request: schema.CommandRequest, *, wait: bool) -> CommandResult:
-        assert self._reports is not None
+        if self._reports is None:
+            raise MessageError(f"{self} is not in control: use `with robot.control(...) as arm`")
         self._reports.forget()
         # Until the answer, the motion may or may not run.
         moved, self._moving = self._moving, True
@@ -340,7 +350,3 @@ class AsyncArm:
 
     def _key(self, name: str) -> str:
         return robot_key(self.site, self.robot, name)
-
-
-def _floats(values: Sequence[float]) -> list[float]:
-    return [float(value) for value in values]

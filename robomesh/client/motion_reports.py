@@ -36,7 +36,7 @@ class MotionReports:
     def forget(self) -> None:
         """Discard the reports from before a command."""
         for subscription in (self._leases, self._programs):
-            while subscription.take() is not None:
+            while subscription.take(awaited=True) is not None:
                 pass
 
     async def motion_ended(self, accepted_s: float) -> None:

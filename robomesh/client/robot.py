@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from google.protobuf.message import Message
 
-from robomesh.client.commands import StopResult, program_text, request_stop
+from robomesh.client.commands import StopResult, numbers, program_text, request_stop
 from robomesh.client.control import AsyncArm
 from robomesh.client.samples import (
     ROTARY,
@@ -209,7 +209,7 @@ class AsyncRobot:
             RefusedError: If the positions do not fit the robot.
             NoAnswerError: If no kinematics service answers.
         """
-        request = schema.ForwardRequest(joint_positions=positions)
+        request = schema.ForwardRequest(joint_positions=numbers(positions))
         answer = await self._ask("kinematics/forward", request)
         assert isinstance(answer, schema.ForwardAnswer)
         placements = {each.name: _matrix(each.placement_to_base) for each in answer.links}
@@ -241,7 +241,7 @@ class AsyncRobot:
         if task not in tasks:
             raise ValueError(f"task={task!r}: '5d' or '6d' are right")
         request = schema.InverseRequest(
-            pose=_flat(pose), task=tasks[task], near=near, all_solutions=all_solutions
+            pose=_flat(pose), task=tasks[task], near=numbers(near), all_solutions=all_solutions
         )
         answer = await self._ask("kinematics/inverse", request)
         assert isinstance(answer, schema.InverseAnswer)
@@ -267,7 +267,7 @@ class AsyncRobot:
             RefusedError: If the check is not possible.
             NoAnswerError: If no kinematics service answers.
         """
-        request = schema.CheckRequest(program=program_text(program), start=start, exact=exact)
+        request = schema.CheckRequest(program=program_text(program), start=numbers(start), exact=exact)
         answer = await self._ask(f"kinematics/check/{self._session.own_name}", request)
         assert isinstance(answer, schema.CheckAnswer)
         violations = (
@@ -324,7 +324,7 @@ class AsyncRobot:
     async def _named(self, values: Sequence[float]) -> tuple[tuple[str, ...], tuple[float, ...]]:
         if not self._types:
             await self.description()
-        names, values = tuple(self._types), tuple(float(value) for value in values)
+        names, values = tuple(self._types), tuple(numbers(values))
         if len(values) != len(names):
             raise MessageError(f"{self} has {len(names)} joints ({', '.join(names)}), not {len(values)}")
         return names, values
@@ -373,10 +373,10 @@ def events_of(session: Session, key_expr: str, *, history: bool) -> Reading[Even
 
 
 def _flat(pose: Iterable[Any]) -> list[float]:
-    values: list[float] = []
-    for each in pose:
-        values.extend(_flat(each) if isinstance(each, Iterable) else (float(each),))
-    return values
+    values: list[Any] = []
+    for row in pose:
+        values.extend(row if isinstance(row, Iterable) else (row,))
+    return numbers(values)
 
 
 def _matrix(values: Sequence[float]) -> Matrix:

@@ -12,6 +12,7 @@ import pytest
 import zenoh
 
 import robomesh
+from robomesh.client.commands import numbers, program_text
 from robomesh.client.event_loop import EventLoopThread
 from robomesh.endpoints import client_config
 from robomesh.header import Header, pack
@@ -218,3 +219,32 @@ def test_ctrl_c_while_python_exits_does_not_abort_the_process(router, plain):
             time.sleep(0.001)
         faults = script.stderr.read()
     assert script.returncode in (0, -signal.SIGINT), faults
+
+
+@pytest.mark.parametrize(
+    "values", ["12345", b"\0\0\0\0\0", {0: 1, 1: 1}, {1.0, 2.0}, [[0.0]], ["a"], [10**400], None]
+)
+def test_what_is_no_sequence_of_numbers_is_no_position(values):
+    with pytest.raises(robomesh.MessageError, match="not a sequence of numbers"):
+        numbers(values)
+
+
+def test_a_program_that_is_no_text_or_endless_is_refused(tmp_path):
+    (tmp_path / "long").write_bytes(b"home\n" * 300_000)
+    for program in ("home \ud800", "home\n" * 300_000, tmp_path / "long", tmp_path / "a\0b", tmp_path):
+        with pytest.raises(robomesh.MessageError):
+            program_text(program)
+
+
+def test_no_reason_prevents_a_stop(robot, plain):
+    requests = []
+
+    def stop(query):
+        with query:
+            requests.append(schema.StopRequest.FromString(query.payload.to_bytes()))
+            query.reply(str(query.key_expr), schema.StopAnswer(stop_id=1, sent=True).SerializeToString())
+
+    with plain.declare_queryable("robomesh/site/arm/stop", stop):
+        for reason in ("\ud800", "x" * 10_000_000, ValueError("no"), "two\nlines"):
+            assert robot.stop(reason).sent
+    assert all(request.reason for request in requests)
