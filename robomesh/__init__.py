@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from robomesh.client.streams import AsyncStream, StaleError, Stream
     from robomesh.errors import (
         BusyError,
+        KeyNameError,
         MessageError,
         MotionError,
         NoAnswerError,
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
         RefusedError,
         RobomeshError,
         SessionError,
+        UnknownTopicError,
     )
     from robomesh.recordings.errors import RecordingError
 
@@ -51,12 +53,14 @@ _MODULES = {
     "errors": (
         "RobomeshError",
         "BusyError",
+        "KeyNameError",
         "MessageError",
         "MotionError",
         "NoAnswerError",
         "QuotaError",
         "RefusedError",
         "SessionError",
+        "UnknownTopicError",
     ),
     "recordings.errors": ("RecordingError",),
 }
@@ -78,6 +82,7 @@ __all__ = [
     "Event",
     "InverseResult",
     "JointState",
+    "KeyNameError",
     "Mesh",
     "MessageError",
     "MotionError",
@@ -100,6 +105,7 @@ __all__ = [
     "StaleError",
     "StopResult",
     "Stream",
+    "UnknownTopicError",
     "Violation",
     "connect",
     "connect_async",

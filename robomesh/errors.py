@@ -83,7 +83,7 @@ class QuotaError(RefusedError):
         again_s: Time until the quota allows the request again, as the owner estimates it [s].
     """
 
-    def __init__(self, reason: Reason | str, *, again_s: float) -> None:
+    def __init__(self, reason: Reason | str, *, again_s: float = 0.0) -> None:
         super().__init__(reason)
         self.again_s = again_s
 

@@ -336,7 +336,7 @@ async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
                 raise SessionError(
                     reason
                     or f"no router at {routers}: start one (robomesh up, robomesh router) or give "
-                    "another address (--connect)"
+                    "another address"
                 ) from None
             if to_log:
                 log.warning("%s", reason or f"no router at {routers} yet: waiting for one")

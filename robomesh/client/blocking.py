@@ -113,8 +113,18 @@ class Arm:
         """Keep control for another 5 s."""
         self._run(self._arm.renew())
 
+    def __repr__(self) -> str:
+        return repr(self._arm)
+
     def _run(self, coroutine: Coroutine[Any, Any, T]) -> T:
-        return self._loop.run(coroutine, waiting=self._show_alive)
+        stopped = self._arm.stopped
+        try:
+            return self._loop.run(coroutine, waiting=self._show_alive)
+        except KeyboardInterrupt as error:
+            if (now := self._arm.stopped) is not None and now is not stopped:
+                latched = "; `arm.reset()` clears the stop" if now.id else ""
+                error.add_note(f"{self._arm}: {now.text}{latched}")
+            raise
 
     def _show_alive(self) -> None:
         self._waits_s = time.monotonic()
@@ -140,11 +150,25 @@ class Robot:
     def joints(
         self, *, slow: bool = False, buffer: int = 1, on_stale: OnStale = "raise"
     ) -> Stream[JointState]:
-        """Return the joint states, the newest first; see `AsyncRobot.joints`."""
+        """Return the joint states, the newest first; `next(robot.joints())` is the present one.
+
+        Args:
+            slow: The 10 Hz states for slow lines.
+            buffer: Number of states kept for a slow program; older ones are skipped, and counted.
+            on_stale: "raise": raise StaleError when no current state arrives in time. "yield": return the
+                last state again, once, with `stale` true.
+        """
         return self._stream(self._robot.joints, slow=slow, buffer=buffer, on_stale=on_stale)
 
     def topic(self, name: str, *, buffer: int = 1, on_stale: OnStale = "raise") -> Stream[Sample]:
-        """Return the messages of a topic, the newest first: "controller", "kinematics", "lease", ..."""
+        """Return the messages of a topic, the newest first: "controller", "kinematics", "lease", ...
+
+        Args:
+            buffer, on_stale: As for `joints`.
+
+        Raises:
+            UnknownTopicError: If there is no such topic.
+        """
         return self._stream(self._robot.topic, name, buffer=buffer, on_stale=on_stale)
 
     def events(self, *, history: bool = True) -> Stream[Event]:
@@ -170,7 +194,11 @@ class Robot:
         return self._loop.run(self._robot.stop(reason))
 
     def forward(self, positions: Sequence[float]) -> Mapping[str, Matrix]:
-        """Return the placement of every link and named frame: 4 x 4, to the base frame [m]."""
+        """Return the placement of every link and named frame: 4 x 4, to the base frame [m].
+
+        Args:
+            positions: [rad], of prismatic joints [m]; `si` converts degrees.
+        """
         return self._loop.run(self._robot.forward(positions))
 
     def inverse(
@@ -181,11 +209,24 @@ class Robot:
         near: Sequence[float] = (),
         all_solutions: bool = False,
     ) -> InverseResult:
-        """Return joint positions that bring the tool to a pose; see `AsyncRobot.inverse`."""
+        """Return joint positions that bring the tool to a pose. The robot does not move.
+
+        Args:
+            pose: 4 x 4, tool to base, by rows [m]: nested sequences, a NumPy array, or 16 numbers.
+            task: "6d": position and orientation; "5d": position and the tool's axis. None: "5d" for a robot
+                with fewer than six joints.
+            near: Joint positions that the solution should be near to [rad or m]; empty: no preference.
+        """
         return self._loop.run(self._robot.inverse(pose, task=task, near=near, all_solutions=all_solutions))
 
     def check(self, program: str | Path, *, start: Sequence[float] = (), exact: bool = False) -> CheckResult:
-        """Check a teach program: limits, speeds, collisions; see `AsyncRobot.check`."""
+        """Check a teach program: limits, speeds, collisions. The robot does not move.
+
+        Args:
+            program: The program's text, or the `Path` of its file.
+            start: Joint positions at the start [rad or m]; empty: the robot's current ones.
+            exact: Check meshes instead of their convex hulls: slow.
+        """
         return self._loop.run(self._robot.check(program, start=start, exact=exact))
 
     def control(self, operator: str = "", *, take: str = "") -> Arm:
@@ -233,9 +274,9 @@ class Recording:
         return repr(self._recording)
 
     @property
-    def topics(self) -> tuple[str, ...]:
-        """The recorded topics."""
-        return self._recording.topics
+    def topic_names(self) -> tuple[str, ...]:
+        """Names of the recorded topics; `info.topics` describes them."""
+        return self._recording.topic_names
 
     def value_names(self) -> list[str]:
         """Return the names of the recorded values, as `values` takes them: "kinematics/tool/x"."""
@@ -316,6 +357,9 @@ class Mesh:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def __repr__(self) -> str:
+        return repr(self._mesh)
 
     def close(self) -> None:
         """Disconnect; all streams end."""

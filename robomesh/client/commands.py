@@ -89,6 +89,10 @@ def program_text(program: str | Path) -> str:
         else:
             text = program
             text.encode()
+            if text.endswith(".program") and "\n" not in text:
+                raise MessageError(
+                    f"{text!r} names a file, and is not a program's text: write Path({text!r})"
+                )
     except UnicodeError:
         raise MessageError(f"{_name(program)}: cannot be read: it is not UTF-8 text") from None
     except (OSError, ValueError) as error:

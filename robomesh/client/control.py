@@ -9,6 +9,7 @@ import contextlib
 import logging
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
@@ -96,6 +97,9 @@ class AsyncArm:
 
     def __str__(self) -> str:
         return f"{self.site}/{self.robot}"
+
+    def __repr__(self) -> str:
+        return f"<arm of {self}, for {self.operator}>"
 
     # ---------------------------------------------------------------- control
 
@@ -267,6 +271,7 @@ class AsyncArm:
         if wait:
             self.progress.on_accepted(answer)
             await self._until_ended()
+            return replace(answer, text="done")
         return answer
 
     async def _guarded(self, waiting: Coroutine[Any, Any, T]) -> T:

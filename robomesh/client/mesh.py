@@ -1,10 +1,10 @@
 """The mesh for asynchronous programs: robots, services, events and alarms of all sites."""
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from robomesh.client.connection import connected, connection_settings
 from robomesh.client.recorder import RecorderFile
@@ -32,7 +32,7 @@ class RobotNotFoundError(RobomeshError):
     """
 
     def __init__(self, text: str, robots: Sequence[str], found: Sequence[str] = ()) -> None:
-        super().__init__(text)
+        super().__init__(text, robots, found)
         self.robots, self.found = tuple(robots), tuple(found)
         self.gone_sites: tuple[str, ...] = ()
 
@@ -97,6 +97,9 @@ class AsyncMesh:
         self._opened: Session | None = None
         self._close = AsyncExitStack()
 
+    def __await__(self) -> Generator[Any, None, Self]:
+        return self.__aenter__().__await__()
+
     async def __aenter__(self) -> Self:
         await self.open()
         return self
@@ -105,11 +108,13 @@ class AsyncMesh:
         await self.close()
 
     async def open(self) -> None:
-        """Connect; `async with` does it.
+        """Connect, unless connected; `async with` and `await robomesh.connect_async()` do it.
 
         Raises:
             SessionError: If no router answers, or it does not accept the certificate.
         """
+        if self._opened is not None:
+            return
         router, keys, timeout_s = self._where
         settings = connection_settings(router, keys, wait_s=timeout_s)
         self._opened = await self._close.enter_async_context(connected(settings))
@@ -117,6 +122,9 @@ class AsyncMesh:
     async def close(self) -> None:
         """Disconnect; all streams end."""
         await self._close.aclose()
+
+    def __repr__(self) -> str:
+        return f"<mesh at {self._where[0]}>"
 
     @property
     def session(self) -> Session:

@@ -101,7 +101,10 @@ class MotionReports:
             async with asyncio.timeout(_SILENCE_S):
                 return await anext(subscription)
         except (TimeoutError, StopAsyncIteration):
-            raise NoAnswerError(f"the gateway fell silent: {consequence}") from None
+            raise NoAnswerError(
+                codes.GATEWAY_SILENT(robot=self._robot, seconds=_SILENCE_S),
+                text=f"the gateway fell silent: {consequence}",
+            ) from None
 
     async def _raise_if_stopped(self) -> None:
         state = await self._session.last(self._controller_key)

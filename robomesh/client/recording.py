@@ -3,8 +3,9 @@
 It is a file of this machine, or one in the folder of a site's recorder, which is read through the mesh.
 """
 
+import contextlib
 import logging
-from collections.abc import AsyncGenerator, AsyncIterator, Callable, Sequence
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from itertools import islice
@@ -18,7 +19,7 @@ from robomesh.client.recorded_values import JointsCollector, RecordedJoints, Rec
 from robomesh.client.recorder import RecorderFile
 from robomesh.client.recording_list import RecordingInfo, describe_recording
 from robomesh.client.samples import Event, event_of, joint_types
-from robomesh.errors import KeyNameError
+from robomesh.errors import KeyNameError, RefusedError
 from robomesh.keys import parse_key
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.publisher_time import Recorded
@@ -132,12 +133,14 @@ class MeshSource:
 
     async def pages(self, key: str, start_ns: int | None, end_ns: int | None) -> AsyncGenerator[Page]:
         """See `Source`."""
-        async for page in self._file.pages(key, start_ns=start_ns, end_ns=end_ns):
-            yield Page(page.schema, _decoder(page.schema), page.messages)
+        with _as_recording_errors():
+            async for page in self._file.pages(key, start_ns=start_ns, end_ns=end_ns):
+                yield Page(page.schema, _decoder(page.schema), page.messages)
 
     async def value_names(self) -> list[str]:
         """See `Source`."""
-        return await self._file.value_names()
+        with _as_recording_errors():
+            return await self._file.value_names()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,7 +160,7 @@ class RecordedSample:
     site: str
     robot: str
     topic: str
-    message: Any
+    message: Any = field(repr=False)
     data: bytes = field(repr=False)
     schema: str
     time_ns: int
@@ -196,8 +199,8 @@ class AsyncRecording:
         return f"<recording {self.info.name!r}{of}>"
 
     @property
-    def topics(self) -> tuple[str, ...]:
-        """The recorded topics."""
+    def topic_names(self) -> tuple[str, ...]:
+        """Names of the recorded topics; `info.topics` describes them."""
         return tuple(topic.name for topic in self.info.topics if topic.messages)
 
     async def value_names(self) -> list[str]:
@@ -219,9 +222,9 @@ class AsyncRecording:
         """Return values over time, at the full rate of their topics, by name."""
         wanted: dict[str, list[str]] = {}
         for name in names:
-            topic = topic_of(name, self.topics)
+            topic = topic_of(name, self.topic_names)
             if topic is None:
-                raise self._no_value(name, [f"{each}/..." for each in self.topics])
+                raise self._no_value(name, [f"{each}/..." for each in self.topic_names])
             wanted.setdefault(topic, []).append(name)
         types = await self._joint_types()
         found: dict[str, RecordedValues] = {}
@@ -289,7 +292,7 @@ class AsyncRecording:
         )
 
     def _no_value(self, name: str, known: Sequence[str]) -> RecordingError:
-        topic = topic_of(name, self.topics) or ""
+        topic = topic_of(name, self.topic_names) or ""
         known = sorted(known, key=lambda each: not each.startswith(topic))
         there = ", ".join(known[:_MOST_NAMED]) + (", ..." if len(known) > _MOST_NAMED else "")
         reason = codes.RECORDING_NO_VALUE(file=self.info.file, name=name, topics=there or "none")
@@ -299,7 +302,7 @@ class AsyncRecording:
         """Return the type of each joint, from the last description."""
         if self._types is None:
             self._types = {}
-            if "description" in self.topics:
+            if "description" in self.topic_names:
                 async for _, message in self._decoded(self._key("description"), None, None, _DESCRIPTION):
                     assert isinstance(message, schema.Description)
                     self._types = joint_types(message)
@@ -342,6 +345,17 @@ class AsyncRecording:
                 )
         if left_out:
             log.warning("%s: %d messages of %s cannot be read: left out", self.info.file, left_out, key)
+
+
+@contextlib.contextmanager
+def _as_recording_errors() -> Iterator[None]:
+    """Raise a recorder's refusal of a file as the error that a file on this machine raises."""
+    try:
+        yield
+    except RefusedError as error:
+        if not error.code.startswith("recording."):
+            raise
+        raise RecordingError(error.reason) from None
 
 
 def _decoder(name: str) -> Decoder | None:

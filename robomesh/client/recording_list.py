@@ -39,7 +39,7 @@ class RecordedTopic:
     lost: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RecordingInfo:
     """Description of a recording.
 
@@ -72,8 +72,12 @@ class RecordingInfo:
     problem: str
     recovered: bool
     part: int
-    topics: tuple[RecordedTopic, ...] = field(repr=False)
+    topics: tuple[RecordedTopic, ...]
     message: schema.Recording = field(repr=False, compare=False)
+
+    def __repr__(self) -> str:
+        of = f" of {self.site}/{self.robot}" if self.robot else ""
+        return f"<recording {self.name!r}{of}, {self.start:%Y-%m-%d %H:%M:%S} UTC, {self.duration_s:.1f} s>"
 
     @property
     def start(self) -> datetime:

@@ -6,10 +6,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import radians
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.message import Message
 
+from robomesh import reason_codes as codes
 from robomesh.client.commands import StopResult, numbers, program_text, request_stop
 from robomesh.client.control import AsyncArm
 from robomesh.client.samples import (
@@ -130,15 +132,8 @@ class AsyncRobot:
             on_stale: "raise": raise StaleError when no current state arrives in time. "yield": return the
                 last state again, once, with `stale` true.
         """
-        subscription = self._subscribe("joints/slow" if slow else "joints", buffer, on_stale)
-
-        def convert(sample: RawSample, stale: bool, skipped: int) -> Iterator[JointState]:
-            fields = sample_fields(sample, sample.message(), stale=stale, skipped=skipped)
-            yield JointState(**fields, types=self._types)
-
-        limit_s = subscription.topic.stale_after_s
-        reading = Reading(subscription, convert, limit_s=limit_s, on_stale=on_stale)
-        return AsyncStream(reading, self._learn_types)
+        states = self.topic("joints/slow" if slow else "joints", buffer=buffer, on_stale=on_stale)
+        return cast("AsyncStream[JointState]", states)
 
     def topic(self, name: str, *, buffer: int = 1, on_stale: OnStale = "raise") -> AsyncStream[Sample]:
         """Return the messages of a topic, the newest first: "controller", "kinematics", "lease", ...
@@ -150,12 +145,15 @@ class AsyncRobot:
             UnknownTopicError: If there is no such topic.
         """
         subscription = self._subscribe(name, buffer, on_stale)
+        of_joints = subscription.topic.schema is JointStates
 
         def convert(sample: RawSample, stale: bool, skipped: int) -> Iterator[Sample]:
-            yield Sample(**sample_fields(sample, sample.message(), stale=stale, skipped=skipped))
+            fields = sample_fields(sample, sample.message(), stale=stale, skipped=skipped)
+            yield JointState(**fields, types=self._types) if of_joints else Sample(**fields)
 
         limit_s = subscription.topic.stale_after_s
-        return AsyncStream(Reading(subscription, convert, limit_s=limit_s, on_stale=on_stale))
+        reading = Reading(subscription, convert, limit_s=limit_s, on_stale=on_stale)
+        return AsyncStream(reading, self._learn_types if of_joints else None)
 
     def events(self, *, history: bool = True) -> AsyncStream[Event]:
         """Return the events of the robot's gateway and of other services about it.
@@ -172,6 +170,7 @@ class AsyncRobot:
             UnknownTopicError: If there is no such topic.
         """
         async with self.topic(name, on_stale="yield") as stream:
+            await stream.prepare()
             return await first_of(stream)
 
     async def description(self) -> schema.Description:
@@ -326,7 +325,8 @@ class AsyncRobot:
             await self.description()
         names, values = tuple(self._types), tuple(numbers(values))
         if len(values) != len(names):
-            raise MessageError(f"{self} has {len(names)} joints ({', '.join(names)}), not {len(values)}")
+            given = {"count": len(values), "joints": len(names), "names": ", ".join(names)}
+            raise MessageError(codes.JOINT_COUNT(**given))
         return names, values
 
     async def _learn_types(self) -> None:

@@ -40,7 +40,7 @@ class Sample:
     robot: str
     topic: str
     # Not `Message`: a type checker would accept no field of it.
-    message: Any
+    message: Any = field(repr=False)
     time_ns: int
     sequence: int
     live: bool
@@ -60,7 +60,7 @@ class Sample:
         return None if self.received_s is None else max(0.0, time.monotonic() - self.received_s)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class JointState(Sample):
     """Positions and velocities of a robot's joints.
 
@@ -69,6 +69,12 @@ class JointState(Sample):
     """
 
     types: Mapping[str, str] | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        joints = ", ".join(
+            f"{name} {value:.4g}" for name, value in zip(self.names, self.positions, strict=True)
+        )
+        return f"<state of {self.site}/{self.robot} at {self.time:%H:%M:%S.%f}: {joints} [rad, m]>"
 
     @cached_property
     def names(self) -> tuple[str, ...]:

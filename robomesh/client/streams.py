@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import math
 import time
 import weakref
 from collections import deque
@@ -35,12 +36,16 @@ class StaleError(RobomeshError):
     """
 
     def __init__(self, name: str, limit_s: float, silent_s: float, last: object) -> None:
+        super().__init__(name, limit_s, silent_s, last)
+        self.last, self.silent_s = last, silent_s
+
+    def __str__(self) -> str:
+        name, limit_s, silent_s, last = self.args
         there = "its last message is not current" if last is not None else "it has no publisher"
-        super().__init__(
+        return (
             f"{name}: no current message for {silent_s:.1f} s (limit {limit_s:g} s): {there}. See "
             "`robomesh list`: is the service running, and the controller connected?"
         )
-        self.last, self.silent_s = last, silent_s
 
 
 def check_options(buffer: int, on_stale: OnStale) -> None:
@@ -151,6 +156,10 @@ class _Counted(Generic[T]):
         # A mesh that is not closed is closed when the main thread ends.
         self._unsubscribe.atexit = False
 
+    def __repr__(self) -> str:
+        subscription = self._reading.subscription
+        return f"<{'closed ' if subscription.closed else ''}stream of {subscription.key_expr}>"
+
     @property
     def skipped(self) -> int:
         """Number of messages that the stream did not return: they were skipped, lost, or stale."""
@@ -219,14 +228,31 @@ class Stream(_Counted[T]):
         return self
 
     def __next__(self) -> T:
+        return self.next(timeout_s=None)
+
+    def next(self, *, timeout_s: float | None) -> T:
+        """Wait for the next message, and return it.
+
+        Args:
+            timeout_s: How long to wait [s]; None: without a limit, as `next(stream)` does.
+
+        Raises:
+            TimeoutError: If none arrived in time.
+            StaleError: If the topic has fallen silent.
+            StopIteration: If the stream was closed.
+        """
         subscription = self._reading.subscription
+        deadline_s = math.inf if timeout_s is None else time.monotonic() + timeout_s
         while True:
             if (value := self._reading.next(awaited=False)) is not None:
                 return value
             if subscription.closed:
                 raise StopIteration
-            left_s = self._reading.left_s()
-            subscription.wait(_POLL_S if left_s is None else min(left_s, _POLL_S))
+            left_s = deadline_s - time.monotonic()
+            if left_s <= 0:
+                raise TimeoutError(f"{subscription.key_expr}: no message within {timeout_s:g} s")
+            silent_s = self._reading.left_s()
+            subscription.wait(min(left_s, _POLL_S, math.inf if silent_s is None else silent_s))
 
     def __enter__(self) -> Self:
         return self

@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -223,6 +224,44 @@ def test_a_recording_of_a_site_is_the_same_over_the_mesh_and_as_a_file(mesh, sit
     assert (tool.unit, len(tool) > 3) == ("m", True)
     with pytest.raises(robomesh.RecordingError, match="there are test/notes"):
         mesh.open_recording("other/notes")
+
+
+def test_the_last_joint_state_is_a_joint_state(robot):
+    state = robot.last("joints")
+    assert len(state.positions_deg) == 5
+    assert repr(state).startswith(f"<state of test/arm at {state.time:%H:%M:%S.%f}: waist ")
+
+
+def test_a_wait_for_an_event_ends_in_time(robot):
+    with robot.events(history=False) as events:
+        with pytest.raises(TimeoutError, match=r"robomesh/test/arm/events/\*\*: no message within 0\.1 s"):
+            events.next(timeout_s=0.1)
+        assert repr(events) == "<stream of robomesh/test/arm/events/**>"
+
+
+def test_errors_of_values_have_their_code_and_a_program_needs_no_text(robot):
+    with robot.control("ops") as arm:
+        with pytest.raises(robomesh.MessageError) as wrong:
+            arm.move_joints_deg([1, 2, 3])
+        assert (wrong.value.code, wrong.value.reason.values["joints"]) == ("joints.count", "5")
+        with pytest.raises(robomesh.MessageError, match=r"write Path\('square\.program'\)"):
+            arm.run("square.program")
+        assert arm.home().text == "done"
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        robomesh.RobotNotFoundError("arm", ["a/arm", "b/arm"], ["a/arm"]),
+        robomesh.StaleError("a/arm/joints", 1.0, 2.0, None),
+        robomesh.QuotaError("too much", again_s=2.0),
+        robomesh.RecordingError("damaged"),
+        robomesh.MotionError("stopped", text="it was stopped"),
+    ],
+)
+def test_errors_keep_their_text_and_fields_between_processes(error):
+    again = pickle.loads(pickle.dumps(error))
+    assert (type(again), str(again), vars(again)) == (type(error), str(error), vars(error))
 
 
 def test_the_document_names_everything_public():

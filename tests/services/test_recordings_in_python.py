@@ -136,10 +136,10 @@ def test_messages_longer_than_one_answer_are_read_one_after_the_other(mesh, fold
 
 def test_refusals_of_the_recorder_have_their_code(mesh, folder):
     async def use(recording):
-        with pytest.raises(robomesh.RefusedError) as refused:
+        with pytest.raises(robomesh.RecordingError) as refused:
             await recording.joints(start_s=100.0)
         (folder / "arm" / "trial.mcap").unlink()
-        with pytest.raises(robomesh.RefusedError) as gone:
+        with pytest.raises(robomesh.RecordingError) as gone:
             await recording.joints()
         return refused.value.code, gone.value.code
 
@@ -154,7 +154,7 @@ def test_a_damaged_chunk_is_an_error_not_a_shorter_result(mesh, folder):
     path.write_bytes(data)
 
     async def use(recording):
-        with pytest.raises(robomesh.RefusedError) as refused:
+        with pytest.raises(robomesh.RecordingError) as refused:
             await recording.joints()
         return refused.value.code
 

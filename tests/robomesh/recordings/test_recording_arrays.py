@@ -118,7 +118,7 @@ def test_an_unknown_value_is_refused_with_the_names_there_are(path, name):
 def test_messages_and_events_are_decoded(tmp_path):
     path = write_recording(tmp_path / "trial.mcap")
     recording = robomesh.open_recording(path)
-    assert recording.topics == ("controller", "description", "events", "frames", "joints", "video/front")
+    assert recording.topic_names == ("controller", "description", "events", "frames", "joints", "video/front")
     assert [event.code for event in recording.events(start_s=1.0)] == ["second.1", "second.2", "second.3"]
     first, *others = recording.messages("controller")
     assert (first.site, first.robot, first.topic) == ("site", "arm", "controller")
