@@ -436,4 +436,4 @@ def blocking_stream(loop: EventLoopThread, begin: Any) -> Stream[Any]:
         await stream.prepare()
         return stream
 
-    return loop.run(begun()).blocking()
+    return loop.run(begun()).blocking(loop)

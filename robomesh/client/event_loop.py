@@ -4,6 +4,7 @@ import asyncio
 import atexit
 import contextlib
 import threading
+import weakref
 from collections.abc import Callable, Coroutine
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, TypeVar
@@ -37,24 +38,19 @@ class _ThreadForEach(ThreadPoolExecutor):
 
 
 class EventLoopThread:
-    """An event loop that runs in its own thread until `close`, or until the main thread ends.
+    """An event loop that runs in its own thread.
 
-    The thread is not a daemon: Python ends daemon threads inside Zenoh's code, which aborts the process.
+    It runs until `close`, until the main thread ends, or until this object is no longer used: all objects of
+    a connection share it.
     """
 
     def __init__(self) -> None:
-        self._loop = asyncio.new_event_loop()
-        self._loop.set_default_executor(_ThreadForEach())
-        self._closing: Callable[[], Coroutine[Any, Any, None]] | None = None
-        self._ended = False
-        self._thread = threading.Thread(target=self._run, name="robomesh")
-        self._thread.start()
-        # An interrupted exit does not wait for threads, and ends Python inside Zenoh's code.
-        atexit.register(self._close_at_exit)
+        self._running = _Running()
+        weakref.finalize(self, self._running.stop).atexit = False
 
     def at_end(self, close: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Set what runs before the loop ends."""
-        self._closing = close
+        self._running.closing = close
 
     def run(self, coroutine: Coroutine[Any, Any, T], *, waiting: Callable[[], None] = lambda: None) -> T:
         """Run a coroutine to its end and return its result; for any thread but the loop's own.
@@ -68,6 +64,31 @@ class EventLoopThread:
         Raises:
             SessionError: If the loop has been closed, or is closed before the coroutine ends.
         """
+        return self._running.run(coroutine, waiting)
+
+    def close(self) -> None:
+        """Run what was set by `at_end`, and end the thread."""
+        self._running.close()
+
+
+class _Running:
+    """The loop and its thread, which refers to this object until it ends.
+
+    The thread is not a daemon: Python ends daemon threads inside Zenoh's code, which aborts the process.
+    """
+
+    def __init__(self) -> None:
+        self._loop = asyncio.new_event_loop()
+        self._loop.set_default_executor(_ThreadForEach())
+        self.closing: Callable[[], Coroutine[Any, Any, None]] | None = None
+        self._ended = False
+        self._thread = threading.Thread(target=self._run, name="robomesh")
+        self._thread.start()
+        # An interrupted exit does not wait for threads, and ends Python inside Zenoh's code.
+        atexit.register(self._close_at_exit)
+
+    def run(self, coroutine: Coroutine[Any, Any, T], waiting: Callable[[], None]) -> T:
+        """See `EventLoopThread.run`."""
         if self._has_ended():
             coroutine.close()
             raise _closed()
@@ -103,13 +124,16 @@ class EventLoopThread:
                 raise _closed() from None
             raise
 
+    def stop(self) -> None:
+        """Let the thread end soon."""
+        with contextlib.suppress(RuntimeError):  # the loop has just ended
+            self._loop.call_soon_threadsafe(self._loop.stop)
+
     def close(self) -> None:
-        """Run what was set by `at_end`, and end the thread."""
+        """Stop, and wait for the thread's end."""
         if self._thread.is_alive():
-            with contextlib.suppress(RuntimeError):  # the loop has just ended
-                self._loop.call_soon_threadsafe(self._loop.stop)
+            self.stop()
             self._thread.join()
-        atexit.unregister(self._close_at_exit)
 
     def _has_ended(self) -> bool:
         return self._ended or not self._thread.is_alive()
@@ -129,14 +153,15 @@ class EventLoopThread:
             end_with_main.cancel()
             self._loop.run_until_complete(self._end())
             self._loop.close()
+            atexit.unregister(self._close_at_exit)
 
     async def _end(self) -> None:
         others = asyncio.all_tasks() - {asyncio.current_task()}
         for task in others:
             task.cancel()
         await asyncio.gather(*others, return_exceptions=True)
-        if self._closing is not None:
-            await self._closing()
+        if self.closing is not None:
+            await self.closing()
 
     async def _end_with_main_thread(self) -> None:
         while threading.main_thread().is_alive():

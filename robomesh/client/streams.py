@@ -212,10 +212,14 @@ class AsyncStream(_Counted[T]):
         """Unsubscribe; the iterator ends."""
         self._reading.subscription.close()
 
-    def blocking(self) -> "Stream[T]":
-        """Return this stream for a thread, instead of this one."""
+    def blocking(self, connection: object) -> "Stream[T]":
+        """Return this stream for a thread, instead of this one.
+
+        Args:
+            connection: Ends when no object refers to it.
+        """
         self._unsubscribe.detach()
-        return Stream(self._reading)
+        return Stream(self._reading, connection)
 
 
 class Stream(_Counted[T]):
@@ -223,6 +227,10 @@ class Stream(_Counted[T]):
 
     A program that is slower than the topic gets the newest message, and skips the ones before it.
     """
+
+    def __init__(self, reading: Reading[T], connection: object) -> None:
+        super().__init__(reading)
+        self._connection = connection
 
     def __iter__(self) -> Self:
         return self

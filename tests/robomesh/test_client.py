@@ -1,6 +1,7 @@
 """`import robomesh`: states, requests and control, from a real site."""
 
 import asyncio
+import gc
 import os
 import pickle
 import signal
@@ -247,6 +248,23 @@ def test_errors_of_values_have_their_code_and_a_program_needs_no_text(robot):
         with pytest.raises(robomesh.MessageError, match=r"write Path\('square\.program'\)"):
             arm.run("square.program")
         assert arm.home().text == "done"
+
+
+def test_a_connection_that_is_no_longer_used_ends(site):
+    def threads():
+        return sum(thread.name == "robomesh" for thread in threading.enumerate())
+
+    before = threads()
+    states = [robomesh.connect(site.router, timeout_s=20.0).robot("arm").joints() for _ in range(3)]
+    gc.collect()
+    assert next(states[0]).positions  # the stream keeps its connection
+    assert threads() == before + 3
+    states.clear()
+    gc.collect()
+    deadline = time.monotonic() + WAIT_S
+    while threads() > before:
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
 
 
 @pytest.mark.parametrize(
