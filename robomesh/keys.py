@@ -7,6 +7,7 @@ robomesh/<site>/<robot>/alive/<service>/<id>    presence: a liveliness token
 """
 
 import re
+from functools import lru_cache
 from typing import NamedTuple
 
 from robomesh import reason_codes as codes
@@ -86,6 +87,7 @@ def every_robot(topic: str) -> str:
     return f"{ROOT}/*/*/{topic}"
 
 
+@lru_cache(4096)  # each sample's key
 def parse_key(key: str) -> Key:
     """Return site, robot and topic of a key; rejects key expressions with wildcards.
 
