@@ -11,6 +11,7 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from google.protobuf.message import Message
 
 from robomesh import reason_codes as codes
 from robomesh.errors import KeyNameError, UnknownTopicError
@@ -22,6 +23,7 @@ __all__ = [
     "EVERYONE",
     "PEOPLE",
     "REQUESTS",
+    "SCHEMAS",
     "SERVICES",
     "TOPICS",
     "History",
@@ -393,6 +395,10 @@ _REQUESTS = (
 )
 
 TOPICS: Mapping[str, Topic] = MappingProxyType({row.name: row for row in _TOPICS})
+# By the full name of the schema: "foxglove.JointStates".
+SCHEMAS: Mapping[str, type[Message]] = MappingProxyType(
+    {row.schema.DESCRIPTOR.full_name: row.schema for row in _TOPICS}
+)
 REQUESTS: Mapping[str, Request] = MappingProxyType({row.name: row for row in _REQUESTS})
 
 

@@ -30,8 +30,9 @@ def describe_file(path: Path) -> schema.Recording:
     """
     try:
         found = path.stat()
-    except OSError as error:
-        raise RecordingError(codes.RECORDING_FILE(file=path, detail=error.strerror)) from None
+    except (OSError, ValueError) as error:  # a path with a null byte is a ValueError
+        detail = getattr(error, "strerror", None) or error
+        raise RecordingError(codes.RECORDING_FILE(file=path, detail=detail)) from None
     recording = schema.Recording()
     recording.CopyFrom(_described(path, found.st_ino, found.st_size, found.st_mtime_ns))
     return recording

@@ -26,6 +26,7 @@ from robomesh.recordings.records import (
     MESSAGE,
     MOST_RECORD_BYTES,
     RECORD,
+    check_unpacked,
     stream_of,
     unpack_chunk,
     walk_chunk,
@@ -48,6 +49,7 @@ class Block(NamedTuple):
     Attributes:
         channels: Channels with messages in the block; None: unknown.
         chunk: The block is a chunk, which must be unpacked.
+        unpacked: Its size when it is unpacked, at most [bytes].
     """
 
     start_ns: int
@@ -56,6 +58,7 @@ class Block(NamedTuple):
     length: int
     channels: frozenset[int] | None
     chunk: bool
+    unpacked: int = 0
 
 
 class Attached(NamedTuple):
@@ -109,14 +112,32 @@ def _layout_of(path: Path, inode: int, size: int, mtime_ns: int) -> Layout:
             reader = make_reader(stream)
             summary = reader.get_summary()
             if summary is not None and summary.statistics is not None and summary.chunk_indexes:
-                metadata = {record.name: dict(record.metadata) for record in reader.iter_metadata()}
-                return _indexed(summary, metadata, size)
+                return _indexed(summary, _metadata_of(stream, summary, size), size)
         except DAMAGE:
             pass  # the end is missing or damaged, but the rest may be readable
         try:
             return _scans.layout(path, inode, stream, whole=_ends_whole(path, size))
         except DAMAGE as error:
             raise RecordingError(f"{path.name}: not a readable recording: {error}") from None
+
+
+def _metadata_of(stream: IO[bytes], summary: Summary, size: int) -> dict[str, dict[str, str]]:
+    """Return the metadata records that a file's summary lists; each once, however often it is listed.
+
+    Raises:
+        DAMAGE: One of these, if a record cannot be read.
+    """
+    found: dict[str, dict[str, str]] = {}
+    offsets = dict.fromkeys(each.offset for each in summary.metadata_indexes)
+    for offset in offsets:
+        stream.seek(offset)
+        opcode, length = RECORD.unpack(stream.read(RECORD.size))
+        size -= length
+        if opcode != Opcode.METADATA or size < 0:
+            raise ValueError("the summary lists invalid metadata")
+        record = Metadata.read(stream_of(stream.read(length)))
+        found[record.name] = dict(record.metadata)
+    return found
 
 
 def _indexed(summary: Summary, metadata: dict[str, dict[str, str]], size: int) -> Layout:
@@ -127,6 +148,14 @@ def _indexed(summary: Summary, metadata: dict[str, dict[str, str]], size: int) -
     """
     assert summary.statistics is not None
     blocks = [_block_of(chunk, size) for chunk in summary.chunk_indexes]
+    end = 0
+    for block in sorted(blocks, key=lambda block: block.offset):
+        if block.offset < end:
+            raise ValueError("the summary lists a chunk twice")
+        end = block.offset + block.length
+    check_unpacked(sum(block.unpacked for block in blocks), size)
+    # Only the times of chunks decide what is read: other programs' statistics may be incomplete.
+    filled = [block for block in blocks if block.end_ns]
     attachments = {}
     for each in summary.attachment_indexes:
         begin = each.offset + each.length - 4 - each.data_size
@@ -140,8 +169,8 @@ def _indexed(summary: Summary, metadata: dict[str, dict[str, str]], size: int) -
         blocks=tuple(sorted(blocks)),
         attachments=attachments,
         metadata=metadata,
-        start_ns=summary.statistics.message_start_time,
-        end_ns=summary.statistics.message_end_time,
+        start_ns=min((block.start_ns for block in filled), default=0),
+        end_ns=max((block.end_ns for block in filled), default=0),
         whole=True,
     )
 
@@ -159,6 +188,7 @@ def _block_of(chunk: ChunkIndex, size: int) -> Block:
         chunk.chunk_length,
         frozenset(chunk.message_index_offsets) or None,
         chunk=True,
+        unpacked=chunk.uncompressed_size,
     )
 
 
@@ -180,6 +210,7 @@ class _Scan:
         self.metadata: dict[str, dict[str, str]] = {}
         # The current block of unchunked messages.
         self.begin = self.end = 0
+        self.unpacked = 0
         self.start_ns, self.end_ns = 0, 0
         self.seen: set[int] = set()
         # Position up to which the file is scanned, and the bytes before it.
@@ -314,8 +345,11 @@ def _note(scan: _Scan, opcode: int, offset: int, content: bytes) -> None:
     elif opcode == Opcode.CHUNK:
         # A chunk is one block, so end the block of unchunked messages before it.
         scan.close_block()
-        start_ns, end_ns, *_ = _CHUNK.unpack_from(content)
-        scan.blocks.append(Block(start_ns, end_ns, offset, RECORD.size + len(content), None, chunk=True))
+        start_ns, end_ns, unpacked, _ = _CHUNK.unpack_from(content)
+        length = RECORD.size + len(content)
+        scan.unpacked += unpacked
+        check_unpacked(scan.unpacked, offset + length)
+        scan.blocks.append(Block(start_ns, end_ns, offset, length, None, chunk=True, unpacked=unpacked))
         with contextlib.suppress(*DAMAGE):  # reading this chunk fails later; other chunks stay readable
             for inner, body in walk_chunk(unpack_chunk(content)):
                 if inner == Opcode.MESSAGE:

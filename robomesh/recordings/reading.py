@@ -10,14 +10,16 @@ from typing import IO, Any, NamedTuple, Self
 
 from google.protobuf.timestamp_pb2 import Timestamp
 from mcap.opcode import Opcode
+from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
 from robomesh import reason_codes as codes
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.layout import Attached, Block, layout_of
 from robomesh.recordings.records import DAMAGE, MESSAGE, RECORD, unpack_chunk
+from robomesh.topics import SCHEMAS
 
-FOREVER_NS = (1 << 64) - 1
+FOREVER_NS = 1 << 64
 # Messages that wait for sorting because their chunk overlaps the next one; above this limit the file's order
 # counts.
 _MOST_WAITING_BYTES = 64 << 20
@@ -79,22 +81,27 @@ class RecordingFile:
         return found
 
     def schema_name(self, topic: str) -> str:
-        """Return the full name of a topic's schema: "foxglove.JointStates"; empty: no schema.
+        """Return the full name of a topic's schema: "foxglove.JointStates"; empty: none, or several.
 
         Raises:
             RecordingError: If the topic is missing.
         """
-        schema = self.layout.schemas.get(self.layout.channels[min(self._channels(topic))].schema_id)
+        schema = self._schema(topic)[1]
         return schema.name if schema is not None else ""
 
     def decoder(self, topic: str) -> Callable[[bytes], Any] | None:
-        """Return the function that decodes a topic's messages; None: they are not protobuf."""
-        channel = self.layout.channels[min(self._channels(topic))]
-        schema = self.layout.schemas.get(channel.schema_id)
+        """Return the function that decodes a topic's messages; None: they are not protobuf.
+
+        Our schemas are decoded as ours: a file's schema of the same name may have other fields.
+        """
+        encoding, schema = self._schema(topic)
         if schema is None:
             return None
+        known = SCHEMAS.get(schema.name)
+        if known is not None and encoding == schema.encoding == "protobuf":
+            return known.FromString
         try:
-            return DecoderFactory().decoder_for(channel.message_encoding, schema)
+            return DecoderFactory().decoder_for(encoding, schema)
         except (*DAMAGE, TypeError):
             return None
 
@@ -240,6 +247,15 @@ class RecordingFile:
         found = self.attached(name)
         return self._bytes(found.offset, found.length)
 
+    def _schema(self, topic: str) -> tuple[str, Schema | None]:
+        """Return the encoding and the schema of a topic's messages; None: it has none, or several."""
+        channels = [self.layout.channels[number] for number in sorted(self._channels(topic))]
+        found = [(each.message_encoding, self.layout.schemas.get(each.schema_id)) for each in channels]
+        encoding, schema = found[0]
+        if schema is None or any(each != encoding or not _equal(other, schema) for each, other in found):
+            return encoding, None
+        return encoding, schema
+
     def _channels(self, topic: str) -> frozenset[int]:
         try:
             return self.topics[topic]
@@ -295,7 +311,7 @@ class RecordingFile:
         data = self._bytes(block.offset, block.length)
         if block.chunk:
             try:
-                data = unpack_chunk(data[RECORD.size :])
+                data = unpack_chunk(data[RECORD.size :], block.unpacked)
             except DAMAGE as error:
                 raise RecordingError(f"{self.path.name}: damaged near byte {block.offset}: {error}") from None
         self._unpacked = block, data
@@ -304,6 +320,10 @@ class RecordingFile:
 
 def _has(block: Block, wanted: frozenset[int] | None) -> bool:
     return wanted is None or block.channels is None or not wanted.isdisjoint(block.channels)
+
+
+def _equal(one: Schema | None, other: Schema) -> bool:
+    return one is not None and (one.name, one.encoding, one.data) == (other.name, other.encoding, other.data)
 
 
 def _text(time_ns: int) -> str:

@@ -42,6 +42,8 @@ _WHOLE_MESSAGE = struct.Struct("<BQHIQQ")
 _FOOTER = struct.Struct("<BQQQ")
 # A longer record is damaged: attachments and our chunks are smaller.
 MOST_RECORD_BYTES = 256 << 20
+# What all chunks of a file may unpack to: this, or a multiple of the file. States compress to a tenth.
+_MOST_UNPACKED_BYTES, _MOST_TIMES_THE_FILE = 1 << 30, 200
 _READ_BYTES = 1 << 20
 # Exceptions of the library for a truncated or modified file.
 DAMAGE = (McapError, EOFError, struct.error, ValueError, KeyError, IndexError, OverflowError, MemoryError)
@@ -114,16 +116,29 @@ def walk(stream: IO[bytes]) -> Iterator[tuple[int, bytes, int]]:
             return
 
 
-def unpack_chunk(body: bytes) -> bytes:
+def check_unpacked(unpacked: int, size: int) -> None:
+    """Check the unpacked size of all chunks of a file [bytes]: a small file must not cost minutes.
+
+    Raises:
+        ValueError: If it is too large.
+    """
+    if unpacked > _MOST_UNPACKED_BYTES + _MOST_TIMES_THE_FILE * size:
+        raise ValueError(f"its {size >> 10} KiB unpack to {unpacked >> 20} MiB, and are no recording")
+
+
+def unpack_chunk(body: bytes, most: int = MOST_RECORD_BYTES) -> bytes:
     """Return the unpacked records of a chunk's body; uses no more memory than its declared, limited size.
+
+    Args:
+        most: Limit of that size [bytes].
 
     Raises:
         DAMAGE: One of these, if it cannot be unpacked, or its size or checksum is wrong.
     """
     chunk = Chunk.read(stream_of(body))
     size = chunk.uncompressed_size
-    if size > MOST_RECORD_BYTES:
-        raise ValueError(f"a chunk has {size >> 20} MiB: the limit is {MOST_RECORD_BYTES >> 20} MiB")
+    if size > most:
+        raise ValueError(f"a chunk has {size >> 20} MiB: the limit is {most >> 20} MiB")
     try:
         data = _unpacked(chunk.compression, chunk.data, size + 1)
     except (zstandard.ZstdError, RuntimeError) as error:

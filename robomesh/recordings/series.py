@@ -164,9 +164,11 @@ def known_values(file: RecordingFile) -> list[str]:
         last = file.newest(key, file.layout.end_ns)
         looked = itertools.islice(file.messages([key]), _LOOKED_AT)
         values = _Values(file, key)
-        for message in (*looked, *([] if last is None else [last])):
+        for message in itertools.chain(looked, () if last is None else (last,)):
             known.update((f"{topic}/{name}", None) for name, _ in values.of(message.data))
-    return list(known)[:_MOST_NAMES]
+            if len(known) >= _MOST_NAMES:
+                return list(known)[:_MOST_NAMES]
+    return list(known)
 
 
 def _sliding(file: RecordingFile, names: Sequence[str]) -> frozenset[str]:

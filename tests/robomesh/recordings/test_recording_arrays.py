@@ -11,7 +11,9 @@ from foxglove.channels import JointStatesChannel
 from foxglove.mcap import MCAPCompression, MCAPWriteOptions
 from foxglove.messages import JointState, JointStates
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates as JointStatesMessage
+from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
 from mcap.reader import make_reader
+from mcap.records import Metadata
 from mcap.writer import CompressionType, Writer
 from mcap_protobuf.decoder import DecoderFactory
 from mcap_protobuf.schema import register_schema
@@ -212,7 +214,11 @@ def test_a_truncated_file_is_read_up_to_its_end(path, tmp_path):
 
 
 def test_what_is_no_recording_is_refused(tmp_path):
-    for path, code in ((tmp_path / "gone.mcap", "recording.file"), (tmp_path, "recording.file")):
+    for path, code in (
+        (tmp_path / "gone.mcap", "recording.file"),
+        (tmp_path, "recording.file"),
+        (tmp_path / "a\0b", "recording.file"),
+    ):
         with pytest.raises(robomesh.RecordingError) as refused:
             robomesh.open_recording(path)
         assert refused.value.code == code
@@ -267,3 +273,62 @@ def test_a_time_out_of_range_is_refused(tmp_path):
         writer.finish()
     with pytest.raises(robomesh.RecordingError, match="a time out of range"):
         robomesh.open_recording(tmp_path / "late.mcap").joints()
+
+
+def _file(path, fill):
+    """Write a file with one channel of joints, as `fill(writer, channel)` does."""
+    with path.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.ZSTD)
+        writer.start()
+        schema_id = register_schema(writer, JointStatesMessage)
+        fill(writer, writer.register_channel("robomesh/site/arm/joints", "protobuf", schema_id))
+        writer.finish()
+    return path
+
+
+def _put(writer, channel, messages):
+    for number, message in enumerate(messages):
+        data = message if isinstance(message, bytes) else message.SerializeToString()
+        writer.add_message(channel, START_NS + number, data, START_NS + number)
+
+
+@pytest.mark.parametrize("name", ["foxglove.JointStates", "robomesh.KinematicState", "robomesh.Event"])
+def test_a_schema_with_the_name_of_ours_and_other_fields_has_no_values(tmp_path, name):
+    package, _, own = name.rpartition(".")
+    file = FileDescriptorProto(name="other.proto", package=package, syntax="proto3")
+    file.message_type.add(name=own)
+
+    def fill(writer, channel):
+        other = writer.register_schema(name, "protobuf", FileDescriptorSet(file=[file]).SerializeToString())
+        _put(writer, writer.register_channel("robomesh/site/arm/raw", "protobuf", other), [b""])
+
+    recording = robomesh.open_recording(_file(tmp_path / "other.mcap", fill))
+    assert recording.value_names() == (["raw/severity"] if own == "Event" else [])
+
+
+def test_what_a_summary_lists_many_times_is_read_once(tmp_path, monkeypatch):
+    reads = []
+    read = Metadata.read
+    monkeypatch.setattr(Metadata, "read", lambda stream: reads.append(1) or read(stream))
+
+    def fill(writer, channel):
+        writer.add_metadata("robomesh", {"name": "many"})
+        writer._Writer__metadata_indexes *= 1000
+        _put(writer, channel, [joints(waist=1)])
+        writer._Writer__finalize_chunk()
+        writer._Writer__chunk_indices *= 1000
+
+    recording = robomesh.open_recording(_file(tmp_path / "many.mcap", fill))
+    assert recording.info.name == "many"
+    assert len(recording.joints()) == 1
+    assert len(reads) < 10
+
+
+def test_a_small_file_whose_chunks_unpack_to_much_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("robomesh.recordings.records._MOST_UNPACKED_BYTES", 1 << 20)
+    monkeypatch.setattr("robomesh.recordings.records._MOST_TIMES_THE_FILE", 0)
+    path = _file(tmp_path / "bomb.mcap", lambda writer, channel: _put(writer, channel, [bytes(1 << 20)] * 2))
+    for keep in (None, -100):  # with and without a summary
+        (tmp_path / "cut.mcap").write_bytes(path.read_bytes()[:keep])
+        with pytest.raises(robomesh.RecordingError, match="unpack to"):
+            robomesh.open_recording(tmp_path / "cut.mcap")
