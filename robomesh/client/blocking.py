@@ -13,8 +13,9 @@ from robomesh.client.control import AsyncArm
 from robomesh.client.event_loop import EventLoopThread
 from robomesh.client.mesh import AsyncMesh, Service
 from robomesh.client.recorded_values import RecordedJoints, RecordedValues
-from robomesh.client.recording import AsyncRecording, DiskSource, RecordedSample
+from robomesh.client.recording import AsyncRecording, RecordedSample
 from robomesh.client.recording_list import RecordingInfo
+from robomesh.client.recording_source import DiskSource
 from robomesh.client.robot import AsyncRobot, CheckResult, InverseResult, Matrix
 from robomesh.client.samples import Alarm, Event, JointState, Sample
 from robomesh.client.streams import AsyncStream, OnStale, Stream

@@ -8,8 +8,9 @@ from typing import Any, Self
 
 from robomesh.client.connection import connected, connection_settings
 from robomesh.client.recorder import RecorderFile
-from robomesh.client.recording import AsyncRecording, MeshSource
+from robomesh.client.recording import AsyncRecording
 from robomesh.client.recording_list import RecordingInfo, find_recording, list_recordings, recording_info
+from robomesh.client.recording_source import MeshSource
 from robomesh.client.robot import AsyncRobot, events_of
 from robomesh.client.samples import Alarm, Event, alarm_of
 from robomesh.client.streams import AsyncStream

@@ -1,6 +1,7 @@
 """Joint states and values of a recording as NumPy arrays, collected message by message."""
 
 from array import array
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import nan
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     IntArray = NDArray[np.int64]
 
 _UNITS = {ROTARY: "rad", PRISMATIC: "m"}
-# Positions that no message contains: other programs' states may name some joints only.
+# Positions in the table that no message contains.
 _MOST_ABSENT = 1_000_000
 
 
@@ -58,7 +59,7 @@ class RecordedJoints(_Recorded):
     `time_ns`, `time`, `received_ns` and `time_s` are its times, (n,); `sequence` has the publisher's numbers.
 
     Attributes:
-        names: Names of the joints, in the order of the first state.
+        names: Names of the joints, in the order in which the states first name them.
         units: Units of their positions: "rad", or "m" if prismatic; "": the recording does not describe it.
         positions: (n, k) [rad or m]; NaN: absent.
         velocities: (n, k) [rad/s or m/s]; NaN: absent.
@@ -119,6 +120,9 @@ class _Times:
         self._sources, self._received, self._sequence = array("q"), array("q"), array("q")
         self._since_start = array("d")
 
+    def __len__(self) -> int:
+        return len(self._sources)
+
     def since_start_s(self, message: Recorded) -> float:
         """Return the publisher's time since the recording's start [s]."""
         return (self._publisher_times.of(message) - self._start_ns) * 1e-9
@@ -143,7 +147,7 @@ class _Times:
 
 
 class JointsCollector:
-    """Joint states, as they are read.
+    """Joint states, as they are read. States may name some joints only, in any order.
 
     Args:
         types: Type of each described joint: "rotary" or "prismatic".
@@ -153,50 +157,64 @@ class JointsCollector:
     def __init__(self, types: Mapping[str, str], *, start_ns: int) -> None:
         self._types = types
         self._times = _Times(start_ns)
-        self._names: tuple[str, ...] = ()
+        # Column of each joint: its name, and how many joints of its state before it have the same name.
+        self._columns: dict[tuple[str, int], int] = {}
+        # Columns of the states from a row on: consecutive states mostly have the same joints.
+        self._layouts: list[tuple[int, array[int]]] = []
+        self._names: tuple[str, ...] | None = None
         self._positions, self._velocities = array("d"), array("d")
-        self._present = 0
 
     def add(self, message: Recorded, state: Message) -> None:
         """Add a state.
 
         Raises:
-            RecordingError: If the states have too few joints of the first one.
+            RecordingError: If the states have too few joints in common.
         """
         assert isinstance(state, JointStates)
-        self._times.add(message, self._times.since_start_s(message))
-        joints: list[Any] = list(state.joints)
+        joints = state.joints
         names = tuple([joint.name for joint in joints])
-        if not self._names:
-            self._names = names
         if names != self._names:
-            by_name = dict(zip(names, joints, strict=True))
-            joints = [by_name.get(name) for name in self._names]
-            self._present += sum(joint is not None for joint in joints)
-        else:
-            self._present += len(joints)
-        self._positions.extend(
-            [joint.position if joint and joint.HasField("position") else nan for joint in joints]
-        )
-        self._velocities.extend(
-            [joint.velocity if joint and joint.HasField("velocity") else nan for joint in joints]
-        )
-        if len(self._positions) - self._present > max(_MOST_ABSENT, self._present):
-            raise RecordingError("its joint states contain too few of the first state's joints for a table")
+            self._names = names
+            self._layouts.append((len(self._times), self._columns_of(names)))
+        self._times.add(message, self._times.since_start_s(message))
+        self._positions.extend([joint.position if joint.HasField("position") else nan for joint in joints])
+        self._velocities.extend([joint.velocity if joint.HasField("velocity") else nan for joint in joints])
+        present = len(self._positions)
+        if len(self._times) * len(self._columns) - present > max(_MOST_ABSENT, present):
+            raise RecordingError("its joint states have too few joints in common for a table")
 
     def collected(self) -> RecordedJoints:
         """Return the states."""
         import numpy as np
 
         times = self._times.arrays()
-        shape = len(times["time_ns"]), len(self._names)
+        count = len(times["time_ns"])
+        positions = np.full((count, len(self._columns)), nan)
+        velocities = positions.copy()
+        ends = [*(row for row, _ in self._layouts), count][1:]
+        at = 0
+        for (row, columns), end in zip(self._layouts, ends, strict=True):
+            shape = end - row, len(columns)
+            size = shape[0] * shape[1]
+            for table, values in ((positions, self._positions), (velocities, self._velocities)):
+                table[row:end, np.asarray(columns)] = np.asarray(values[at : at + size]).reshape(shape)
+            at += size
+        names = tuple(name for name, _ in self._columns)
         return RecordedJoints(
             **times,
-            names=self._names,
-            units=tuple(_UNITS.get(self._types.get(name, ""), "") for name in self._names),
-            positions=np.asarray(self._positions).reshape(shape),
-            velocities=np.asarray(self._velocities).reshape(shape),
+            names=names,
+            units=tuple(_UNITS.get(self._types.get(name, ""), "") for name in names),
+            positions=positions,
+            velocities=velocities,
         )
+
+    def _columns_of(self, names: tuple[str, ...]) -> "array[int]":
+        """Return the columns of a state's joints; add columns for new joints."""
+        found, seen = array("q"), Counter[str]()
+        for name in names:
+            found.append(self._columns.setdefault((name, seen[name]), len(self._columns)))
+            seen[name] += 1
+        return found
 
 
 class ValuesCollector:

@@ -119,7 +119,7 @@ class RecorderFile:
                 if error.code == codes.RECORDING_NO_BYTE.name:  # the new version is shorter
                     raise RecordingError(codes.RECORDING_CHANGED(file=self.name)) from None
                 raise
-            if piece.version != version or not piece.data:
+            if piece.version != version or not 0 < len(piece.data) <= end - begin:
                 raise RecordingError(codes.RECORDING_CHANGED(file=self.name))
             begin += len(piece.data)
             yield piece.data
@@ -155,6 +155,9 @@ class RecorderFile:
             if messages[:repeated] != [last] * repeated or (answer.more and not messages):
                 raise RecordingError(codes.RECORDING_CHANGED(file=self.name))
             new = messages[repeated:]
+            times = [each.received_ns for each in messages]
+            if times != sorted(times) or (last is not None and times and times[0] < last.received_ns):
+                raise RecordingError(f"{self.name}: its recorder sends messages in a wrong order")
             yield RangePage(answer.schema, new)
             if not answer.more:
                 return
@@ -191,7 +194,7 @@ class RecorderFile:
             OSError: If the copy cannot be written.
         """
         # The name comes from another machine: accept no path.
-        if self.name in ("", ".", "..") or Path(self.name).name != self.name:
+        if self.name in ("", ".", "..") or Path(self.name).name != self.name or not self.name.isprintable():
             raise RecordingError(
                 f"the recorder of {self._site} names the file {self.name!r}, which is not a plain file name"
             )

@@ -3,144 +3,36 @@
 It is a file of this machine, or one in the folder of a site's recorder, which is read through the mesh.
 """
 
-import contextlib
 import logging
-from collections.abc import AsyncGenerator, AsyncIterator, Callable, Iterator, Sequence
+from collections.abc import AsyncGenerator, AsyncIterator, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from itertools import islice
-from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
 from google.protobuf.message import DecodeError, Message
 
 from robomesh import reason_codes as codes
 from robomesh.client.recorded_values import JointsCollector, RecordedJoints, RecordedValues, ValuesCollector
-from robomesh.client.recorder import RecorderFile
-from robomesh.client.recording_list import RecordingInfo, describe_recording
+from robomesh.client.recording_source import Page, Source
 from robomesh.client.samples import Event, event_of, joint_types
-from robomesh.errors import KeyNameError, RefusedError
+from robomesh.errors import KeyNameError, MessageError
 from robomesh.keys import parse_key
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.publisher_time import Recorded
 from robomesh.recordings.values import topic_of
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.topics import TOPICS
 
 log = logging.getLogger(__name__)
 
-Decoder = Callable[[bytes], Message]
-
-_SCHEMAS = {row.schema.DESCRIPTOR.full_name: row.schema for row in TOPICS.values()}
-_PAGE = 2000
 # What one call reads into memory: a small file must not fill it. States compress to a tenth.
 _MOST_BYTES, _MOST_TIMES_THE_FILE = 256 << 20, 200
+# Memory of a message beside its bytes: times, and the object.
+_MESSAGE_BYTES = 64
 _MOST_NAMED = 10
 _MOST_S = 1e9
 # What an array of integers can represent.
 _LAST_NS = (1 << 63) - 1
 _JOINTS, _EVENT, _DESCRIPTION = "foxglove.JointStates", "robomesh.Event", "robomesh.Description"
-
-
-class RecordedBytes(Recorded, Protocol):
-    """A recorded message."""
-
-    @property
-    def data(self) -> bytes:
-        """Its bytes."""
-        ...
-
-
-class Page(NamedTuple):
-    """Some messages of a topic.
-
-    Attributes:
-        schema: Full name of their schema: "foxglove.JointStates"; empty: none.
-        decode: Decodes their bytes; None: unknown schema.
-    """
-
-    schema: str
-    decode: Decoder | None
-    messages: Sequence[RecordedBytes]
-
-
-class Source(Protocol):
-    """Place from which a recording is read."""
-
-    @property
-    def info(self) -> RecordingInfo:
-        """Description of the recording."""
-        ...
-
-    def pages(self, key: str, start_ns: int | None, end_ns: int | None) -> AsyncGenerator[Page]:
-        """Yield a channel's messages between two receive times (both included), in their order.
-
-        Raises:
-            RecordingError: If it cannot be read.
-            RobomeshError: If its recorder refuses or does not answer.
-        """
-        ...
-
-    async def value_names(self) -> list[str]:
-        """Return the names of the recorded values.
-
-        Raises:
-            RecordingError: If it cannot be read.
-            RobomeshError: If its recorder refuses or does not answer.
-        """
-        ...
-
-
-class DiskSource:
-    """A file of this machine. Its functions never wait, so that a caller needs no event loop.
-
-    Raises:
-        RecordingError: If no part of it can be read.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.info = describe_recording(path)
-        self._path = path
-
-    async def pages(self, key: str, start_ns: int | None, end_ns: int | None) -> AsyncGenerator[Page]:
-        """See `Source`."""
-        from robomesh.recordings.reading import RecordingFile
-
-        with RecordingFile(self._path) as file:
-            first_ns, last_ns = file.clip(start_ns, end_ns)
-            name = file.schema_name(key)
-            decode = file.decoder(key)
-            if decode is not None:
-                decode = _decoder(name) or decode
-            messages = file.messages([key], start_ns=first_ns, end_ns=last_ns + 1)
-            while page := list(islice(messages, _PAGE)):
-                yield Page(name, decode, page)
-
-    async def value_names(self) -> list[str]:
-        """See `Source`."""
-        from robomesh.recordings.reading import RecordingFile
-        from robomesh.recordings.series import known_values
-
-        with RecordingFile(self._path) as file:
-            return known_values(file)
-
-
-class MeshSource:
-    """A file in the folder of a site's recorder."""
-
-    def __init__(self, file: RecorderFile, info: RecordingInfo) -> None:
-        self._file, self.info = file, info
-
-    async def pages(self, key: str, start_ns: int | None, end_ns: int | None) -> AsyncGenerator[Page]:
-        """See `Source`."""
-        with _as_recording_errors():
-            async for page in self._file.pages(key, start_ns=start_ns, end_ns=end_ns):
-                yield Page(page.schema, _decoder(page.schema), page.messages)
-
-    async def value_names(self) -> list[str]:
-        """See `Source`."""
-        with _as_recording_errors():
-            return await self._file.value_names()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -212,7 +104,7 @@ class AsyncRecording:
     ) -> RecordedJoints:
         """Return the joint states of a topic, with the schema foxglove.JointStates."""
         found = JointsCollector(await self._joint_types(), start_ns=self.info.start_ns)
-        async for recorded, message in self._decoded(self._key(topic), start_s, end_s, _JOINTS):
+        async for recorded, message in self._decoded([self._key(topic)], start_s, end_s, _JOINTS):
             found.add(recorded, message)
         return found.collected()
 
@@ -230,7 +122,7 @@ class AsyncRecording:
         found: dict[str, RecordedValues] = {}
         for topic, own in wanted.items():
             collector = ValuesCollector(topic, own, start_ns=self.info.start_ns)
-            async for recorded, message in self._decoded(self._key(topic), start_s, end_s):
+            async for recorded, message in self._decoded([self._key(topic)], start_s, end_s):
                 collector.add(recorded, message)
             found |= collector.collected(types)
         if missing := [name for name in names if not len(found[name])]:
@@ -241,13 +133,18 @@ class AsyncRecording:
 
     async def events(self, *, start_s: float | None = None, end_s: float | None = None) -> list[Event]:
         """Return the events of all services, in the order of their times."""
+        topics = [each for each in self.info.topics if each.messages]
+        keys = [each.key for each in topics if each.name == "events" or each.name.startswith("events/")]
         found: list[Event] = []
-        for topic in self.info.topics:
-            if topic.messages and (topic.name == "events" or topic.name.startswith("events/")):
-                site, robot, _ = _parts(topic.key)
-                async for _, event in self._decoded(topic.key, start_s, end_s, _EVENT):
-                    assert isinstance(event, schema.Event)
-                    found.append(event_of(site, robot, event))
+        left_out = 0
+        async for recorded, event in self._decoded(keys, start_s, end_s, _EVENT):
+            assert isinstance(event, schema.Event)
+            site, robot, _ = _parts(recorded.topic)
+            try:
+                found.append(event_of(site, robot, event))
+            except MessageError:
+                left_out += 1
+        self._warn(left_out, "events have a time out of range: left out")
         return sorted(found, key=lambda event: event.time)
 
     async def messages(
@@ -264,7 +161,7 @@ class AsyncRecording:
         """Yield the messages of a topic as `messages`, in lists of up to some thousand."""
         key = self._key(topic)
         site, robot, name = _parts(key)
-        async for page in self._pages(key, start_s, end_s):
+        async for page in self._source.pages([key], self._time_ns(start_s), self._time_ns(end_s)):
             yield [
                 RecordedSample(
                     site=site,
@@ -303,13 +200,10 @@ class AsyncRecording:
         if self._types is None:
             self._types = {}
             if "description" in self.topic_names:
-                async for _, message in self._decoded(self._key("description"), None, None, _DESCRIPTION):
+                async for _, message in self._decoded([self._key("description")], None, None, _DESCRIPTION):
                     assert isinstance(message, schema.Description)
                     self._types = joint_types(message)
         return self._types
-
-    def _pages(self, key: str, start_s: float | None, end_s: float | None) -> AsyncGenerator[Page]:
-        return self._source.pages(key, self._time_ns(start_s), self._time_ns(end_s))
 
     def _time_ns(self, since_start_s: float | None) -> int | None:
         if since_start_s is None:
@@ -319,48 +213,40 @@ class AsyncRecording:
         return self.info.start_ns + round(since_start_s * 1e9)
 
     async def _decoded(
-        self, key: str, start_s: float | None, end_s: float | None, wanted: str = ""
+        self, keys: Sequence[str], start_s: float | None, end_s: float | None, wanted: str = ""
     ) -> AsyncIterator[tuple[Recorded, Message]]:
-        """Yield a channel's messages of the wanted schema; empty: of any schema.
+        """Yield channels' messages of the wanted schema; empty: of any schema.
 
         Raises:
             RecordingError: If they are too many for one result, or a time is out of range.
         """
-        left_out = total = 0
+        left_out = count = total = 0
         most = _MOST_BYTES + _MOST_TIMES_THE_FILE * self.info.bytes
-        async for page in self._pages(key, start_s, end_s):
+        names = ", ".join(keys[:_MOST_NAMED])
+        async for page in self._source.pages(keys, self._time_ns(start_s), self._time_ns(end_s)):
             for each in page.messages:
+                count += 1
+                total += len(each.data) + _MESSAGE_BYTES
+                if total > most:
+                    raise RecordingError(
+                        f"{self.info.file}: its messages of {names} have more than {most >> 20} MiB: read "
+                        "them one after the other, with `messages`"
+                    )
                 message = _decoded(page, each.data) if wanted in ("", page.schema) else None
                 if message is None:
                     left_out += 1
                     continue
-                total += len(each.data)
-                if max(each.source_ns, each.received_ns) > _LAST_NS:
-                    raise RecordingError(f"{self.info.file}: a message of {key} has a time out of range")
+                if max(abs(each.source_ns), abs(each.received_ns)) > _LAST_NS:
+                    raise RecordingError(f"{self.info.file}: a message of {names} has a time out of range")
                 yield each, message
-            if total > most:
-                raise RecordingError(
-                    f"{self.info.file}: its messages of {key} have more than {most >> 20} MiB: read them one "
-                    "after the other, with `messages`"
-                )
-        if left_out:
-            log.warning("%s: %d messages of %s cannot be read: left out", self.info.file, left_out, key)
+        self._warn(left_out, f"messages of {names} cannot be read: left out")
+        if start_s is None and end_s is None and not self.info.open:
+            expected = sum(each.messages for each in self.info.topics if each.key in keys)
+            self._warn(expected - count, f"of {expected} messages of {names} are missing")
 
-
-@contextlib.contextmanager
-def _as_recording_errors() -> Iterator[None]:
-    """Raise a recorder's refusal of a file as the error that a file on this machine raises."""
-    try:
-        yield
-    except RefusedError as error:
-        if not error.code.startswith("recording."):
-            raise
-        raise RecordingError(error.reason) from None
-
-
-def _decoder(name: str) -> Decoder | None:
-    known = _SCHEMAS.get(name)
-    return None if known is None else known.FromString
+    def _warn(self, count: int, what: str) -> None:
+        if count > 0:
+            log.warning("%s: %d %s", self.info.file, count, what)
 
 
 def _decoded(page: Page, data: bytes) -> Message | None:

@@ -1,14 +1,20 @@
 """`import robomesh` reading recordings from a recorder: the same arrays as from the file itself."""
 
+import itertools
+
 import pytest
+import zenoh
 
 import robomesh
 from robomesh import reason_codes as codes
 from robomesh.client.recorder import RecorderFile
-from robomesh.client.recording import MeshSource
 from robomesh.client.recording_list import recording_info
+from robomesh.client.recording_source import MeshSource
+from robomesh.endpoints import client_config
 from robomesh.errors import QuotaError
 from robomesh.recordings.layout import layout_of
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import open_session
 from tests.conftest import run
 from tests.recordings import Written, joints, write_recording
 from tests.services.test_recordings_served import served
@@ -162,3 +168,36 @@ def test_a_damaged_chunk_is_an_error_not_a_shorter_result(mesh, folder):
     with pytest.raises(robomesh.RecordingError) as own:
         robomesh.open_recording(path).joints()
     assert own.value.code == "recording.unreadable"
+
+
+def test_nonsense_of_a_recorder_is_an_error(mesh, tmp_path):
+    """A recorder sends messages backwards, more bytes than requested, and names that are no file names."""
+    range_key, piece_key = (f"robomesh/site/-/recordings/{name}/li" for name in ("range", "piece"))
+    pages = itertools.count(1000, -1)
+
+    def answer(query):
+        with query:
+            message = schema.RecordedMessages(schema="foxglove.JointStates", more=True)
+            message.messages.add().received.FromSeconds(next(pages))
+            piece = schema.Piece(data=bytes(1000), total=10, version="1")
+            key = str(query.key_expr)
+            query.reply(key, (message if key == range_key else piece).SerializeToString())
+
+    async def main():
+        async with open_session(mesh) as session:
+            with zenoh.open(client_config(mesh.connect)) as plain:
+                declared = [plain.declare_queryable(key, answer) for key in (range_key, piece_key)]
+                file = RecorderFile(session, "site", "trial.mcap", asker="li")
+                with pytest.raises(robomesh.RecordingError):
+                    async for _ in file.pages("robomesh/site/arm/joints"):
+                        pass
+                with pytest.raises(robomesh.RecordingError):
+                    await file.fetch(tmp_path)
+                for name in ("../trial.mcap", "a\0b", "a\x1b[2J", ""):
+                    with pytest.raises(robomesh.RecordingError, match="not a plain file name"):
+                        await RecorderFile(session, "site", name, asker="li").fetch(tmp_path)
+                for each in declared:
+                    each.undeclare()
+
+    run(main())
+    assert list(tmp_path.iterdir()) == []

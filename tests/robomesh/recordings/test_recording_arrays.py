@@ -247,7 +247,7 @@ def test_a_small_file_whose_states_lack_most_joints_does_not_fill_the_memory(tmp
     path = _write(tmp_path / "wide.mcap", [first, *[joints()] * 50_000])
     tracemalloc.start()
     try:
-        with pytest.raises(robomesh.RecordingError, match="too few of the first state's joints"):
+        with pytest.raises(robomesh.RecordingError, match="too few joints in common"):
             robomesh.open_recording(path).joints()
         assert tracemalloc.get_traced_memory()[1] < 200 << 20
     finally:
@@ -292,6 +292,32 @@ def _put(writer, channel, messages):
         writer.add_message(channel, START_NS + number, data, START_NS + number)
 
 
+def test_states_may_name_no_joints_further_joints_and_one_name_twice(tmp_path):
+    twice = JointStatesMessage()
+    for position in (7, 8):
+        twice.joints.add(name="waist", position=position)
+    states = [JointStatesMessage(), joints(waist=1, lift=2), joints(lift=20, waist=10), joints(tool=3), twice]
+    path = _file(tmp_path / "mixed.mcap", lambda writer, channel: _put(writer, channel, states))
+    found = robomesh.open_recording(path).joints()
+    assert found.names == ("waist", "lift", "tool", "waist")
+    nan = float("nan")
+    expected = [[nan] * 4, [1, 2, nan, nan], [10, 20, nan, nan], [nan, nan, 3, nan], [7, nan, nan, 8]]
+    assert np.array_equal(found.positions, expected, equal_nan=True)
+
+
+def test_a_topic_with_two_schemas_has_no_wrong_values(tmp_path, caplog):
+    def fill(writer, channel):
+        _put(writer, channel, [joints(waist=1)])
+        other = register_schema(writer, schema.ControllerState)
+        other = writer.register_channel("robomesh/site/arm/joints", "protobuf", other)
+        _put(writer, other, [schema.ControllerState(rate_hz=5)])
+
+    recording = robomesh.open_recording(_file(tmp_path / "two.mcap", fill))
+    assert [sample.message for sample in recording.messages("joints")] == [None, None]
+    assert len(recording.joints()) == 0
+    assert "2 messages of robomesh/site/arm/joints cannot be read" in caplog.text
+
+
 @pytest.mark.parametrize("name", ["foxglove.JointStates", "robomesh.KinematicState", "robomesh.Event"])
 def test_a_schema_with_the_name_of_ours_and_other_fields_has_no_values(tmp_path, name):
     package, _, own = name.rpartition(".")
@@ -304,6 +330,19 @@ def test_a_schema_with_the_name_of_ours_and_other_fields_has_no_values(tmp_path,
 
     recording = robomesh.open_recording(_file(tmp_path / "other.mcap", fill))
     assert recording.value_names() == (["raw/severity"] if own == "Event" else [])
+
+
+def test_false_statistics_make_no_result_shorter(tmp_path, caplog):
+    def fill(writer, channel):
+        _put(writer, channel, [joints(waist=number) for number in range(10)])
+        statistics = writer._Writer__statistics
+        statistics.message_start_time, statistics.message_end_time = 0, START_NS + 2
+        statistics.channel_message_counts[channel] = 12
+
+    recording = robomesh.open_recording(_file(tmp_path / "false.mcap", fill))
+    assert recording.info.start_ns == START_NS
+    assert len(recording.joints()) == len(recording.joints(end_s=1.0)) == 10
+    assert "2 of 12 messages of robomesh/site/arm/joints are missing" in caplog.text
 
 
 def test_what_a_summary_lists_many_times_is_read_once(tmp_path, monkeypatch):
@@ -332,3 +371,45 @@ def test_a_small_file_whose_chunks_unpack_to_much_is_refused(tmp_path, monkeypat
         (tmp_path / "cut.mcap").write_bytes(path.read_bytes()[:keep])
         with pytest.raises(robomesh.RecordingError, match="unpack to"):
             robomesh.open_recording(tmp_path / "cut.mcap")
+
+
+def test_messages_without_bytes_count_too(tmp_path, monkeypatch):
+    monkeypatch.setattr("robomesh.client.recording._MOST_BYTES", 10_000)
+    monkeypatch.setattr("robomesh.client.recording._MOST_TIMES_THE_FILE", 0)
+    path = _file(tmp_path / "empty.mcap", lambda writer, channel: _put(writer, channel, [b""] * 1000))
+    with pytest.raises(robomesh.RecordingError, match="one after the other"):
+        robomesh.open_recording(path).joints()
+
+
+def test_long_messages_are_not_all_in_memory(tmp_path):
+    state = joints(**{"n" * (1 << 20): 1.0})
+    path = _file(tmp_path / "long.mcap", lambda writer, channel: _put(writer, channel, [state] * 200))
+    recording = robomesh.open_recording(path)
+    tracemalloc.start()
+    try:
+        assert sum(1 for _ in recording.messages("joints")) == 200
+        assert tracemalloc.get_traced_memory()[1] < 100 << 20
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_file_that_another_recording_replaced_is_refused(path, tmp_path):
+    recording = robomesh.open_recording(path)
+    write_recording(tmp_path / "other.mcap").replace(path)
+    with Written(tmp_path / "other.mcap") as file:
+        file.put("joints", joints(waist=1), 100.0)
+    (tmp_path / "other.mcap").replace(path)
+    with pytest.raises(robomesh.RecordingError, match="it was replaced"):
+        recording.joints()
+
+
+def test_invalid_events_of_a_recording_are_left_out_with_a_warning(tmp_path, caplog):
+    odd, newer = schema.Event(code="odd"), schema.Event(code="newer", severity=99)
+    odd.timestamp.seconds = 1 << 62
+    with Written(tmp_path / "events.mcap") as file:
+        for number in range(50):
+            file.put(f"events/s{number}", newer, 0.01 * number)
+        file.put("events/s0", odd, 1.0)
+    events = robomesh.open_recording(tmp_path / "events.mcap").events()
+    assert [(event.code, event.severity) for event in events] == [("newer", "99")] * 50
+    assert "1 events have a time out of range" in caplog.text
