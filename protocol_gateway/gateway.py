@@ -3,6 +3,7 @@
 import asyncio
 import gc
 import logging
+from collections.abc import Mapping
 from contextlib import AsyncExitStack
 
 from protocol_gateway.checking.cell_occupancy import CellOccupancy
@@ -51,9 +52,9 @@ async def serve(session: Session, settings: Settings) -> None:
             robots.append(robot)
             await robot.listen()
             log.info("%s: controller at %s:%d", each.name, each.host, each.port)
-        measure_links(
-            session, {robot.name: each.link for robot, each in zip(settings.robots, robots, strict=True)}
-        )
+        by_name = {robot.name: each for robot, each in zip(settings.robots, robots, strict=True)}
+        measure_links(session, {name: each.link for name, each in by_name.items()})
+        _measure_robots(session, by_name)
         # A collection over all permanent objects would pause every robot for 20 ms.
         gc.collect()
         gc.freeze()
@@ -63,3 +64,17 @@ async def serve(session: Session, settings: Settings) -> None:
                 tasks.create_task(checker.run())
             for robot in robots:
                 tasks.create_task(robot.run())
+
+
+def _measure_robots(session: Session, robots: Mapping[str, Robot]) -> None:
+    """Register the metrics of each robot."""
+    session.measure(
+        "stopped",
+        "Whether a stop is latched",
+        lambda: {name: float(each.stopped) for name, each in robots.items()},
+    )
+    session.measure(
+        "joints_stale",
+        "Whether the joint positions are missing or stale",
+        lambda: {name: float(not each.has_current_joints) for name, each in robots.items()},
+    )

@@ -199,6 +199,16 @@ class Robot:
         """Link to the robot's controller."""
         return self._link
 
+    @property
+    def stopped(self) -> bool:
+        """True while a stop is latched."""
+        return self._control.authority.stop is not None
+
+    @property
+    def has_current_joints(self) -> bool:
+        """True if joint positions were received that are not stale."""
+        return self._telemetry.positions(time.monotonic()) is not None
+
     async def listen(self) -> None:
         """Listen for old client programs, if the site file allows them.
 

@@ -52,7 +52,7 @@ class Clock:
     @property
     def best(self) -> Reading | None:
         """The reading with the shortest round trip, which is the most exact; None: no reading."""
-        return min(self.readings, key=lambda reading: reading.round_trip_s, default=None)
+        return min(tuple(self.readings), key=lambda reading: reading.round_trip_s, default=None)
 
 
 def answer_clock(session: Session, site: str, *, wall_ns: Callable[[], int] = time.time_ns) -> Answerer:

@@ -21,12 +21,14 @@ class Measure:
     Attributes:
         name: Prometheus name without `robomesh_`: "browsers"; a counter's name ends in "_total".
         text: Help text for people.
-        read: Returns the current value, or one for each robot; called on any thread.
+        read: Returns the current value, or one for each label's value; called on any thread.
+        label: Name of the label of several values.
     """
 
     name: str
     text: str
     read: Callable[[], float | Mapping[str, float]]
+    label: str = "robot"
 
 
 @dataclass

@@ -3,7 +3,9 @@
 List of metrics: docs/monitoring.md.
 """
 
-from collections.abc import Iterator, Mapping
+import asyncio
+import time
+from collections.abc import Callable, Iterator, Mapping
 
 from prometheus_client import CollectorRegistry, start_http_server
 from prometheus_client.core import (
@@ -18,7 +20,7 @@ from prometheus_client.registry import Collector
 
 from robomesh.counters import Measure
 from robomesh.errors import SessionError
-from robomesh.keys import WHOLE_SITE, parse_key
+from robomesh.keys import parse_key
 from robomesh.latencies import STEPS_S, Latencies
 from robomesh.session import Session
 
@@ -31,13 +33,22 @@ _COUNTS = {
 }
 # An age above this is not reported: the publisher, for example an ended replay, has gone.
 _LONGEST_AGE_S = 3600.0
+_HEARTBEAT_S = 1.0
 
 
 class SessionMetrics(Collector):
-    """The counters of a session and the measures of its service."""
+    """The counters of a session and the measures of its service.
 
-    def __init__(self, session: Session, about: Mapping[str, str]) -> None:
-        self._session, self._about = session, dict(about)
+    Args:
+        about: Labels that identify the process.
+        heartbeat_s: Returns the monotonic time at which its event loop last ran. Another thread answers
+            Prometheus, so an answer alone does not prove that the service works.
+    """
+
+    def __init__(
+        self, session: Session, about: Mapping[str, str], heartbeat_s: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._session, self._about, self._heartbeat_s = session, dict(about), heartbeat_s
 
     def collect(self) -> Iterator[Metric]:
         """Yield all metrics with their current values."""
@@ -46,6 +57,11 @@ class SessionMetrics(Collector):
         yield info
         yield GaugeMetricFamily(
             "robomesh_connected", "Whether a router is there", value=float(self._session.connected)
+        )
+        yield GaugeMetricFamily(
+            "robomesh_heartbeat_age_seconds",
+            "Since the event loop last ran",
+            value=max(time.monotonic() - self._heartbeat_s(), 0.0),
         )
         counters = self._session.counters()
         for name, text in _COUNTS.items():
@@ -103,30 +119,46 @@ class SessionMetrics(Collector):
 def serve_metrics(session: Session, host: str, port: int, about: Mapping[str, str]) -> str:
     """Serve the metrics until the process ends; return the address with the actual port.
 
+    Call it in the event loop whose heartbeat the metrics report.
+
     Raises:
         SessionError: If it cannot listen at that address.
     """
     registry = CollectorRegistry()
-    registry.register(SessionMetrics(session, about))
+    registry.register(SessionMetrics(session, about, _heartbeat(asyncio.get_running_loop())))
     ProcessCollector(registry=registry)
     try:
         server, _ = start_http_server(port, addr=host, registry=registry)
     except OSError as error:
         raise SessionError(
-            f"--metrics {host}:{port}: cannot listen there: {error.strerror or error}; "
-            "name another port, or 0"
+            f"metrics {host}:{port}: cannot listen there: {error.strerror or error}; "
+            "choose another port, or 0"
         ) from None
     shown = f"[{host}]" if ":" in host else host
     return f"http://{shown}:{server.server_port}/metrics"
 
 
+def _heartbeat(loop: asyncio.AbstractEventLoop) -> Callable[[], float]:
+    """Return a function that returns the monotonic time at which the event loop last ran."""
+    last_s = time.monotonic()
+
+    def beat() -> None:
+        nonlocal last_s
+        last_s = time.monotonic()
+        loop.call_later(_HEARTBEAT_S, beat)
+
+    beat()
+    return lambda: last_s
+
+
 def _own(measure: Measure) -> Metric:
     value = measure.read()
-    by_robot = isinstance(value, Mapping)
     family = CounterMetricFamily if measure.name.endswith("_total") else GaugeMetricFamily
-    metric = family(f"robomesh_{measure.name}", measure.text, labels=["robot"] if by_robot else [])
-    for robot, number in sorted(value.items()) if isinstance(value, Mapping) else [(WHOLE_SITE, value)]:
-        metric.add_metric([robot] if by_robot else [], number)
+    if not isinstance(value, Mapping):
+        return family(f"robomesh_{measure.name}", measure.text, value=value)
+    metric = family(f"robomesh_{measure.name}", measure.text, labels=[measure.label])
+    for label, number in sorted(value.items()):
+        metric.add_metric([label], number)
     return metric
 
 

@@ -236,9 +236,16 @@ class Session:
         if who is not None and not access_rights.may(who, who.site, act, key):
             raise NoRightError(codes.NO_RIGHT(access_rights.refusal(who, act, key)))
 
-    def measure(self, name: str, text: str, read: Callable[[], float | Mapping[str, float]]) -> None:
+    def measure(
+        self,
+        name: str,
+        text: str,
+        read: Callable[[], float | Mapping[str, float]],
+        *,
+        label: str = "robot",
+    ) -> None:
         """Add a number to the health and the metrics of this process; see `Measure`."""
-        self.measures.append(Measure(name, text, read))
+        self.measures.append(Measure(name, text, read, label))
 
     def counters(self) -> Counters:
         """Return the counters of everything sent, received and answered so far; on any thread."""

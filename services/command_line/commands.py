@@ -32,6 +32,7 @@ COMMANDS = {
     "renderer": Row("site.app", "Draw the robots off screen and publish video."),
     "console": Row("site.app", "Serve the page."),
     "watch": Row("site.app", "Hold the site's alarms, and check presence, clocks, versions and names."),
+    "metrics": Row("site.app", "Print a Prometheus configuration that scrapes every service of a site."),
     "simulate": Row("site.app", "Run a simulated controller with the old text protocol."),
     "foxglove": Row("bridges", "Serve Foxglove and Lichtblick on a Foxglove WebSocket, ws://127.0.0.1:8765."),
     "ros2": Row("bridges", "Publish the robots to ROS 2 nodes with rmw_zenoh."),

@@ -218,6 +218,7 @@ class _Recorder:
         measure, disk = self.session.measure, self.disk
         measure("captures", "Recordings that are open", lambda: len(recorded()))
         measure("disk_free_bytes", "Free on the disk of the recordings", lambda: disk.free_bytes)
+        measure("disk_low", "Whether less is free than the site file's warning mark", lambda: disk.is_low)
         measure("disk_behind_seconds", "Age of the data that waits for the disk", lambda: disk.behind_s)
         measure("recording_level", "0: all; 1: no video; 2: states only; 3: nothing", lambda: disk.level)
 

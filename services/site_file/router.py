@@ -12,9 +12,10 @@ from robomesh.endpoints import Link, Tls
 from robomesh.errors import KeyNameError
 from robomesh.keys import check_name
 from robots.bounded_toml import read_toml
+from services.errors import ListenError
 from services.pki import Folder
 from services.pki.errors import KeysError
-from services.site_file.listen_address import reachable
+from services.site_file.listen_address import reachable, split_address
 from services.site_file.part import PART_CONFIG
 
 # A robot's page is #/<site>/<robot>: a site with one of these names would collide with a page of the console.
@@ -80,6 +81,28 @@ class Router(BaseModel):
         return connect
 
 
+class Metrics(BaseModel):
+    """The metrics of the site's services for Prometheus.
+
+    Attributes:
+        listen: HOST:PORT of the router's metrics; absent: none. The other services use the next ports, in the
+            order gateway, kinematics, console, recorder, player, watch, renderer.
+    """
+
+    model_config = PART_CONFIG
+    listen: str | None = None
+
+    @field_validator("listen")
+    @classmethod
+    def _listen(cls, listen: str | None) -> str | None:
+        if listen is not None:
+            try:
+                split_address(listen)
+            except ListenError as error:
+                raise ValueError(str(error)) from None
+        return listen
+
+
 class Keys(BaseModel):
     """The site's own certificates, made by `robomesh keys`; with them every connection uses TLS.
 
@@ -98,12 +121,14 @@ class RoutedSite(BaseModel):
         site: Name of the site in keys: lower-case letters, digits, `-` and `_`, at most 64 characters.
         router: The router.
         keys: The site's certificates.
+        metrics: Metrics for Prometheus.
     """
 
     model_config = PART_CONFIG
     site: str
     router: Router = Router()
     keys: Keys = Keys()
+    metrics: Metrics = Metrics()
 
     @field_validator("site")
     @classmethod

@@ -105,6 +105,15 @@ class Alarms:
     _annunciations: list[float] = field(default_factory=list)
     flooding: bool = False
 
+    def active_by_priority(self) -> dict[str, float]:
+        """Return the number of active alarms that are not shelved, by priority; on any thread."""
+        shown = [each for each in tuple(self.by_id.values()) if each.active and each.shelved_until is None]
+        return {
+            name.lower(): float(sum(each.priority == priority for each in shown))
+            for name, priority in AlarmMessage.Priority.items()
+            if priority
+        }
+
     def activate(self, alarm: Alarm, now: float) -> None:
         """Activate an alarm, or count another activation of it."""
         before = self.by_id.get(alarm.id)

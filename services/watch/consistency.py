@@ -158,13 +158,7 @@ def _clocks(mesh: Mesh, here: str, begun: frozenset[str]) -> Iterator[Condition]
     own = mesh.processes.get(here)
     if own is None:
         return  # the text must name both clocks
-    hosts: dict[str, list[tuple[float, float]]] = defaultdict(list)
-    for process in mesh.processes.values():
-        best = process.clock.best
-        if best is not None and process.health.id != here:
-            hosts[process.health.host].append((best.round_trip_s, best.offset_s))
-    for host, readings in hosts.items():
-        round_trip_s, offset_s = min(readings)
+    for host, (round_trip_s, offset_s) in _clock_readings(mesh, here).items():
         limit = _CLOCK_OVER_S if f"{WHOLE_SITE}:clock.off:{host}" in begun else _CLOCK_S
         if abs(offset_s) - round_trip_s / 2 > limit:
             code = codes.CLOCK_AHEAD if offset_s > 0 else codes.CLOCK_BEHIND
@@ -177,6 +171,22 @@ def _clocks(mesh: Mesh, here: str, begun: frozenset[str]) -> Iterator[Condition]
                 values=(("offset_s", f"{offset_s:.3f}"), ("uncertainty_s", f"{round_trip_s / 2:.3f}")),
                 gist=code.name,
             )
+
+
+def largest_clock_offset_s(mesh: Mesh, here: str) -> float:
+    """Return by how much at least the farthest host's clock differs from this watch's; on any thread."""
+    readings = _clock_readings(mesh, here).values()
+    return max((0.0, *(abs(offset_s) - round_trip_s / 2 for round_trip_s, offset_s in readings)))
+
+
+def _clock_readings(mesh: Mesh, here: str) -> dict[str, tuple[float, float]]:
+    """Return the best reading, round trip and offset, of each host's clock."""
+    hosts: dict[str, list[tuple[float, float]]] = defaultdict(list)
+    for process in tuple(mesh.processes.values()):
+        best = process.clock.best
+        if best is not None and process.health.id != here:
+            hosts[process.health.host].append((best.round_trip_s, best.offset_s))
+    return {host: min(readings) for host, readings in hosts.items()}
 
 
 def _versions(mesh: Mesh) -> Iterator[Condition]:

@@ -21,7 +21,7 @@ from robomesh.topics import check_operator
 from services.watch.alarm_registry import AlarmRegistry
 from services.watch.alarms import AlarmError
 from services.watch.conditions import Condition, ConditionTracker, robot_conditions
-from services.watch.consistency import SETTLED_S, Expected, mesh_conditions
+from services.watch.consistency import SETTLED_S, Expected, largest_clock_offset_s, mesh_conditions
 from services.watch.mesh import Mesh
 
 log = logging.getLogger(__name__)
@@ -80,6 +80,17 @@ class _Watch:
         self._zenoh_id = str(session.zenoh_session.info.zid())
         session.measure(
             "alarms", "Alarms that are not over and seen", lambda: len(self._registry.alarms.by_id)
+        )
+        session.measure(
+            "alarms_active",
+            "Alarms that are active and not shelved",
+            self._registry.alarms.active_by_priority,
+            label="priority",
+        )
+        session.measure(
+            "clock_off_seconds",
+            "Certain difference between the watch's clock and the farthest host's",
+            lambda: largest_clock_offset_s(self._mesh, session.identity),
         )
         session.measure("processes", "Processes of the mesh", lambda: len(self._mesh.processes))
 

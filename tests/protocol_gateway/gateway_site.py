@@ -182,6 +182,12 @@ async def gateway(mesh, folder, *ports, up=True, each=(), **robot):
             await asyncio.gather(*watching, return_exceptions=True)
 
 
+def measured(site, name):
+    """Return a metric of the gateway, by robot."""
+    (value,) = (each.read() for each in site.own.measures if each.name == name)
+    return value
+
+
 async def watch(session, site, topic):
     seen = site.seen.setdefault(topic, [])
     async for sample in session.subscribe(site.key(topic), newest=2000):

@@ -1,7 +1,7 @@
 """Controllers that report little, or only unknown records, or have no proven stop."""
 
 from tests.conftest import run
-from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, simulator, until
+from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, measured, refusal, simulator, until
 from tests.protocol_gateway.scripted_controller import repeated, scripted_controller
 
 
@@ -90,8 +90,10 @@ def test_stale_positions_are_not_used(mesh, tmp_path):
             gateway(mesh, tmp_path, port) as site,
         ):
             await site.lease(A.ACQUIRE, ttl_s=5)
+            await until(lambda: measured(site, "joints_stale") == {"arm": 0.0})
             positions = ""
             await until(lambda: site.events("joints.gone"))
+            assert measured(site, "joints_stale") == {"arm": 1.0}
             await until(lambda: "no joint positions for 1 s" in site.controller.link_text)
             assert site.controller.link == STATE.UP
             text = await refusal(site.command(C.MOVE_RELATIVE, joint_positions=[0.1] * 5))

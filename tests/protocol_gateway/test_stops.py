@@ -14,7 +14,7 @@ from robomesh.errors import NoAnswerError
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
 from tests.protocol_gateway.control_bench import control_bench
-from tests.protocol_gateway.gateway_site import gateway, simulator
+from tests.protocol_gateway.gateway_site import gateway, measured, simulator
 from tests.refusals import refused
 
 C = schema.CommandRequest.Command
@@ -198,7 +198,9 @@ def test_stops_have_a_separate_connection(mesh, tmp_path):
                 ask = schema.LeaseRequest(action=A.ACQUIRE)
                 with pytest.raises(NoAnswerError):
                     await site.session.ask(site.key("lease/request/li"), ask, timeout_s=0.5)
+                assert measured(site, "stopped") == {"arm": 0.0}
                 assert (await site.stop()).sent
+                assert measured(site, "stopped") == {"arm": 1.0}
             finally:
                 go_on.set()
             for subscriber in subscribers:

@@ -339,3 +339,15 @@ def test_an_event_dated_in_the_future_hides_and_repeats_none():
     events.handle(key, ahead, now + 30.0)
     events.handle_history(key, [event("later", 1040)], now + 50.0)
     assert "arm:later" in events.alarms.by_id
+
+
+def test_active_alarms_are_counted_by_priority_without_shelved_and_ended_ones():
+    alarms = Alarms()
+    assert alarms.active_by_priority() == {"low": 0, "medium": 0, "high": 0, "critical": 0}
+    for name in ("a", "b", "shelved", "ended"):
+        alarms.activate(alarm(name), 1.0)
+    alarms.activate(alarm("c", priority=Message.CRITICAL), 1.0)
+    alarms.acknowledge(["b"], "li", 2.0)
+    alarms.shelve(["shelved"], "li", 2.0, for_s=60.0, reason="tested")
+    alarms.clear("ended", 2.0)
+    assert alarms.active_by_priority() == {"low": 0, "medium": 0, "high": 2, "critical": 1}

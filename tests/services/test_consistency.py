@@ -8,7 +8,7 @@ from robomesh.schemas.robomesh_pb2 import ControllerState, ServiceHealth
 from services.errors import SiteFileError
 from services.site_file import site as site_file
 from services.watch.conditions import Condition, ConditionTracker, robot_conditions
-from services.watch.consistency import Expected, mesh_conditions
+from services.watch.consistency import Expected, largest_clock_offset_s, mesh_conditions
 from services.watch.mesh import Mesh
 
 # 2026-11-22 12:00 UTC.
@@ -77,6 +77,16 @@ def test_a_router_with_a_missing_link_is_reported():
     texts = found(mesh_of(health("router", values={"links": 1.0, "links_wanted": 2.0})))
     assert "reaches 1 of the 2 routers" in texts["-:router.unlinked:a1"]
     assert found(mesh_of(health("router", values={"links": float("nan"), "links_wanted": 2.0}))) == {}
+
+
+def test_the_metric_of_clocks_is_the_certain_part_of_the_largest_offset():
+    mesh = mesh_of(health())
+    assert largest_clock_offset_s(mesh, "me") == 0.0
+    mesh.record_clock("a1", Reading(offset_s=0.01, round_trip_s=0.1))
+    assert largest_clock_offset_s(mesh, "me") == 0.0
+    mesh.record_clock("a1", Reading(offset_s=-2.0, round_trip_s=0.01))
+    assert largest_clock_offset_s(mesh, "me") == pytest.approx(1.995)
+    assert largest_clock_offset_s(mesh, "a1") == 0.0
 
 
 def test_an_alarm_keeps_its_words_while_only_a_number_in_them_counts_on():

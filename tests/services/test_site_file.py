@@ -298,12 +298,17 @@ def test_a_router_reads_the_same_values_as_other_services(tmp_path):
     path = tmp_path / "site.toml"
     path.write_text(
         'site = "plant"\n[router]\nlisten = ["tcp/127.0.0.1:7450"]\naccess = "rules.json5"\n'
-        'connect = ["tcp/127.0.0.2:7447"]\n[keys]\nfolder = "keys"\n'
+        'connect = ["tcp/127.0.0.2:7447"]\n[keys]\nfolder = "keys"\n[metrics]\nlisten = "127.0.0.1:9101"\n'
         '[[robot]]\nname = "arm"\nmodel = "pt600"\n'
     )
     read, whole = read_routed(path), site.load(path)
     assert read is not None
-    assert (read.site, read.router, read.keys) == (whole.site, whole.router, whole.keys)
+    assert (read.site, read.router, read.keys, read.metrics) == (
+        whole.site,
+        whole.router,
+        whole.keys,
+        whole.metrics,
+    )
     assert set(site.Site.model_fields) == set(RoutedSite.model_fields) | OTHER_PARTS
 
 

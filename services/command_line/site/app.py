@@ -19,8 +19,8 @@ def up(
         str,
         typer.Option(
             metavar="HOST:PORT",
-            help="Serve Prometheus: the first service on this port, the others on the following ones; "
-            "port 0: free ports. The log lists them.",
+            help="Serve Prometheus: the router on this port, the others on the following ones, instead of at "
+            "the site file's [metrics]; port 0: free ports. The log lists them.",
         ),
     ] = "",
 ) -> None:
@@ -28,6 +28,22 @@ def up(
     from services.command_line.site import up as command
 
     command.run(site, metrics)
+
+
+@app.command()
+def metrics(
+    site: Annotated[Path | None, typer.Argument(metavar="[SITE.toml]", help="The site file.")] = None,
+    listen: Annotated[
+        str,
+        typer.Option(
+            "--metrics", metavar="HOST:PORT", help="As of robomesh up; else the site file's [metrics]."
+        ),
+    ] = "",
+) -> None:
+    """Print a Prometheus configuration that scrapes every service of a site."""
+    from services.command_line.site.metrics_ports import print_scrape_config
+
+    print_scrape_config(site, listen)
 
 
 @app.command()

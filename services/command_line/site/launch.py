@@ -10,7 +10,7 @@ from robomesh.keys import WHOLE_SITE, check_name
 from robomesh.session import SessionSettings
 from services.command_line.connection_options import with_keys
 from services.command_line.site.controllers import ControllerError
-from services.command_line.site.router import metrics_address
+from services.command_line.site.metrics_ports import own_address
 from services.command_line.site.services import SERVICES, Options
 from services.site_file import site as site_file
 from services.site_file.listen_address import reachable
@@ -43,7 +43,7 @@ def launch(name: str, options: Options, connect: str, metrics: str = "") -> None
             (site.site, robot)
             for robot in ([each.name for each in site.robot] if row.of_robots else [WHOLE_SITE])
         ],
-        metrics=metrics_address(site, metrics),
+        metrics=own_address(site, metrics, name, started=bool(options.started)),
         **ends,
     )
 

@@ -1,16 +1,13 @@
 """`robomesh router`: reads only a part of the site file, because its restart has to be quick."""
 
-import logging
 from pathlib import Path
 
 from robomesh import service
 from services import router
+from services.command_line.site.metrics_ports import own_address
 from services.pki import Folder
-from services.site_file.listen_address import check_reach, split_address
 from services.site_file.router import RoutedSite, read_routed
 from services.supervisor import wait_as_standby
-
-logger = logging.getLogger(__name__)
 
 
 def run(path: Path | None, config_out: Path | None = None, metrics: str = "") -> None:
@@ -19,7 +16,7 @@ def run(path: Path | None, config_out: Path | None = None, metrics: str = "") ->
     wait_as_standby()
     # zenohd may run in another folder.
     site = _read(path if path is None or config_out is None else path.absolute())
-    settings = _settings(site, metrics_address(site, metrics))
+    settings = _settings(site, own_address(site, metrics, "router"))
     if config_out is not None:
         print(router.write_config(settings, config_out))
         return
@@ -51,17 +48,3 @@ def _settings(site: RoutedSite, metrics: tuple[str, int] | None) -> router.Setti
         metrics=metrics,
         line_bps=None if site.router.line_mbit is None else site.router.line_mbit * 1e6,
     )
-
-
-def metrics_address(site: RoutedSite, text: str) -> tuple[str, int] | None:
-    """Parse the address of the Prometheus endpoint; None: no endpoint.
-
-    Raises:
-        ListenError: If the address is invalid, or beyond loopback without the site's `insecure = true`.
-    """
-    if not text:
-        return None
-    host, port = split_address(text)
-    if warning := check_reach(f"--metrics {text}", host, secured=False, insecure=site.router.insecure):
-        logger.warning("%s", warning)
-    return host, port

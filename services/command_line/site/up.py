@@ -14,8 +14,7 @@ from pathlib import Path
 from robomesh import service
 from robomesh.keys import robot_key
 from robomesh.session import SessionSettings, open_session
-from services.command_line.site.metrics_ports import extra_with_metrics, with_metrics
-from services.command_line.site.router import metrics_address
+from services.command_line.site.metrics_ports import extra_with_metrics, first_address, with_metrics
 from services.command_line.site.services import SERVICES
 from services.errors import SiteFileError
 from services.pki import Folder
@@ -38,14 +37,14 @@ def run(path: Path | None, metrics: str = "") -> None:
     """Run the site until Ctrl-C.
 
     Args:
-        metrics: HOST:PORT of the first service's Prometheus endpoint; empty: none.
+        metrics: HOST:PORT of the first service's Prometheus endpoint; empty: the site file decides.
     """
     _log_plain_lines()
     # The services log that they wait for their router.
     logging.getLogger("robomesh").setLevel(logging.ERROR)
     site = site_file.load(path)
     endpoint = reachable(site.listened[0])
-    metered = metrics_address(site, metrics)
+    metered = first_address(site, metrics)
     _check_ports_free(site)
 
     async def ready() -> None:
