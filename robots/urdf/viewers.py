@@ -7,6 +7,7 @@ import math
 import xml.etree.ElementTree as Xml
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 MeshUri = Callable[[str], str | None]
 
@@ -85,13 +86,25 @@ def prefixed(urdf: str, prefix: str, mesh_uri: MeshUri, *, joints: bool = False)
     return root
 
 
-def together(robots: Iterable[Viewed], *, plain_joints: bool) -> str:
+def without_joints(robot: Xml.Element) -> Xml.Element:
+    """Return a robot with its links that have a shape, for a viewer that gets their placements as frames.
+
+    Foxglove and Lichtblick place links by the URDF's joints too, at zero, until the next frames arrive: in a
+    paused recording, never. Without joints they cannot show a pose that the robot does not have.
+    """
+    for element in list(robot):
+        if element.tag == "joint" or (element.tag == "link" and element.find("visual") is None):
+            robot.remove(element)
+    return robot
+
+
+def together(robots: Iterable[Viewed], *, joints: Literal["prefixed", "plain", "none"]) -> str:
     """Return one URDF of all robots at their places in their sites; invalid URDFs are left out.
 
     The root is the site's frame, or `WORLD` for several sites: their relative placement is unknown.
 
     Args:
-        plain_joints: Joints keep their names without a prefix; only for a single robot.
+        joints: "plain": they keep their names, for a single robot; "none": see `without_joints`.
     """
     whole = Xml.Element("robot", name=WORLD)
     known = list(robots)
@@ -110,8 +123,11 @@ def together(robots: Iterable[Viewed], *, plain_joints: bool) -> str:
     for robot in known:
         prefix = f"{robot.site}/{robot.robot}/"
         try:
-            root = prefixed(robot.urdf, prefix, robot.mesh_uri, joints=not plain_joints)
+            root = prefixed(robot.urdf, prefix, robot.mesh_uri, joints=joints == "prefixed")
         except ValueError:
+            continue
+        if joints == "none":
+            whole.extend(without_joints(root).findall("link"))
             continue
         children = {end.get("link") for end in root.iter("child")}
         whole.extend(element for element in root if element.tag in ("link", "joint"))

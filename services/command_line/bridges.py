@@ -39,10 +39,16 @@ def foxglove(
     ] = None,
     private_key: Annotated[Path | None, typer.Option(metavar="PEM", help="The certificate's key.")] = None,
     insecure: Annotated[bool, typer.Option(help="Listen beyond loopback without protection.")] = False,
+    layout: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Only write a layout for one --robot, to import.")
+    ] = None,
     connect: Connect = DEFAULT_ROUTER,
     metrics: Metrics = "",
 ) -> None:
     """Serve Foxglove and Lichtblick on a Foxglove WebSocket, ws://127.0.0.1:8765."""
+    if layout is not None:
+        _write_layout(layout, robot or [], connect)
+        return
     from robomesh import service
     from services import foxglove as bridge
 
@@ -65,6 +71,32 @@ def foxglove(
         session_settings=attachment(connect),
         present_for=(),
     )
+
+
+def _write_layout(path: Path, robots: list[str], router: str) -> None:
+    import json
+
+    from robomesh.client.robot import AsyncRobot
+    from services.command_line import discovery
+    from services.viewer_layout import viewer_layout
+
+    if len(robots) != 1:
+        raise typer.BadParameter("a layout shows one robot: add --robot ROBOT", param_hint="--layout")
+
+    async def made() -> str:
+        async with discovery.attached(router) as session:
+            found = await discovery.find(session, robots[0])
+            description = await AsyncRobot(session, *found).description()
+            return json.dumps(viewer_layout(*found, description), indent=1)
+
+    text = discovery.run(made())
+    try:
+        path.write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise typer.BadParameter(
+            f"{path}: cannot be written: {error.strerror}", param_hint="--layout"
+        ) from None
+    print(f"{path}: in Foxglove or Lichtblick, Layouts, Import from file")
 
 
 @app.command()

@@ -37,6 +37,7 @@ from services.console.errors import PageNotBuiltError, RefusedRequest
 from services.console.http import png
 from services.console.http.error_responses import as_json, as_text
 from services.console.http.guard import Guard
+from services.console.http.layouts import layout_response
 from services.console.http.listener import listening
 from services.console.http.meshes import MeshCache, mesh_response
 from services.console.http.pictures import MJPEG, Pictures
@@ -280,7 +281,7 @@ async def _serve_signed_in(browser: Browser, user: SignedIn, websocket: WebSocke
 def application(hub: Hub) -> ASGIApp:
     """Return the app with all its routes; with accounts, every request passes the authentication middleware.
 
-    `/mesh` (WebSocket), `/mesh/<site>/<robot>/<name>`, pictures, recordings,
+    `/mesh` (WebSocket), `/mesh/<site>/<robot>/<name>`, layouts of other viewers, pictures, recordings,
     Define, `/account`, `/health`, the page.
     """
     settings, secure = hub.settings, hub.settings.certificate is not None
@@ -290,6 +291,9 @@ def application(hub: Hub) -> ASGIApp:
     async def mesh(request: Request) -> Response:
         return await mesh_response(request, hub.session, hub.meshes)
 
+    async def layout(request: Request) -> Response:
+        return await layout_response(request, hub.session)
+
     async def health(_: Request) -> Response:
         return JSONResponse({"mesh": hub.session.connected}, headers={"Cache-Control": "no-store"})
 
@@ -298,6 +302,7 @@ def application(hub: Hub) -> ASGIApp:
         *account.routes(),
         WebSocketRoute("/mesh", hub.browse),
         Route("/mesh/{site}/{robot}/{name}", mesh, methods=["GET"]),
+        Route("/layout/{site}/{robot}.json", layout, methods=["GET"]),
         *hub.pictures.routes(),
         *Recordings(hub.session, hub.asker).routes(),
         *([] if hub.define is None else [hub.define.routes()]),

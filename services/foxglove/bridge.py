@@ -29,7 +29,7 @@ class Bridge:
     def __init__(self, session: Session, settings: Settings) -> None:
         self.session, self.settings = session, settings
         self.context = foxglove.Context()
-        self.channels = Channels(session, self.context, one_robot=len(settings.robots) == 1)
+        self.channels = Channels(session, self.context)
         self._loop = asyncio.get_running_loop()
         self._alive: dict[tuple[str, str], set[PresenceKey]] = {}
         self._removals: dict[tuple[str, str], asyncio.TimerHandle] = {}

@@ -47,10 +47,9 @@ class Channels:
         topic_channels: The channels by topic.
     """
 
-    def __init__(self, session: Session, context: foxglove.Context, *, one_robot: bool) -> None:
+    def __init__(self, session: Session, context: foxglove.Context) -> None:
         self.topic_channels: dict[str, TopicChannel | LatchedChannel] = {}
         self._session, self._context = session, context
-        self._one_robot = one_robot
         # Kept when a robot goes offline: its description is not published again when it returns.
         self._described: dict[tuple[str, str], Description] = {}
         self._present: set[tuple[str, str]] = set()
@@ -144,7 +143,7 @@ class Channels:
             for (site, robot), description in sorted(self._described.items())
             if description.urdf and (site, robot) in self._present
         ]
-        text = together(robots, plain_joints=self._one_robot)
+        text = together(robots, joints="none")
         self._all_robots.publish(text_message(text), time.time_ns())
 
 

@@ -13,7 +13,7 @@ from robomesh.header import Header
 from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
-from robots.urdf.viewers import prefixed
+from robots.urdf.viewers import prefixed, without_joints
 
 _MESH_WITHIN_S = 10.0
 _PICTURE_WITHIN_S = 5.0
@@ -132,9 +132,9 @@ async def picture(session: Session, site: str, robot: str) -> Attachment | None:
 
 
 def self_contained_urdf(robot: KnownRobot) -> str:
-    """Return a robot's URDF with links named as the frames and with embedded GLB meshes.
+    """Return a robot's links, named as the frames, as URDF with embedded GLB meshes.
 
-    A viewer that opens the file has no other source of meshes.
+    A viewer that opens the file has no other source of meshes. The whole URDF is an attachment.
     """
     description = robot.description
     mesh_of = {link.name: robot.meshes.get(link.mesh) for link in description.links}
@@ -144,6 +144,7 @@ def self_contained_urdf(robot: KnownRobot) -> str:
         return f"data:model/gltf-binary;base64,{base64.b64encode(data).decode()}" if data else None
 
     try:
-        return ET.tostring(prefixed(description.urdf, robot.prefix, uri), encoding="unicode")
+        shown = without_joints(prefixed(description.urdf, robot.prefix, uri))
+        return ET.tostring(shown, encoding="unicode")
     except ValueError:
         return description.urdf

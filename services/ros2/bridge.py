@@ -122,7 +122,7 @@ class Bridge:
     def _publish_description(self) -> None:
         """Publish all robots in one description, and the transforms between the sites' frames."""
         robots = sorted(self._described.values(), key=lambda each: (each.site, each.robot))
-        text = together(robots, plain_joints=self._plain)
+        text = together(robots, joints="plain" if self._plain else "prefixed")
         if text == self._published_text:
             return
         self._published_text = text

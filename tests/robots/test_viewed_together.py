@@ -27,7 +27,7 @@ def viewed(site, robot, pose):
 @pytest.mark.parametrize("pose", POSES.values(), ids=POSES)
 def test_every_link_of_every_robot_has_its_placement_in_the_site(pose):
     robots = [viewed("hall", "pt600", pose), viewed("hall", "puma560", pinocchio.SE3.Identity())]
-    whole = pinocchio.buildModelFromXML(together(robots, plain_joints=False))
+    whole = pinocchio.buildModelFromXML(together(robots, joints="prefixed"))
     generator = np.random.default_rng(5)
     for robot, base_to_site in (("pt600", pose), ("puma560", pinocchio.SE3.Identity())):
         model = build_model(load(robot))
@@ -51,9 +51,9 @@ def test_several_sites_share_a_root_and_a_single_site_is_the_root():
         children = {each.get("link") for each in urdf.iter("child")}
         return [link.get("name") for link in urdf.findall("link") if link.get("name") not in children]
 
-    assert roots(together([first], plain_joints=True)) == ["here"]
-    assert roots(together([first, second], plain_joints=False)) == [WORLD]
-    assert pinocchio.buildModelFromXML(together([first, second], plain_joints=False)).nq == 10
+    assert roots(together([first], joints="plain")) == ["here"]
+    assert roots(together([first, second], joints="prefixed")) == [WORLD]
+    assert pinocchio.buildModelFromXML(together([first, second], joints="prefixed")).nq == 10
 
 
 def test_upper_side_of_the_floors_plate_is_at_the_floors_height():
@@ -62,7 +62,7 @@ def test_upper_side_of_the_floors_plate_is_at_the_floors_height():
         replace(viewed("hall", robot, pose), floor_m=floor_m)
         for robot, pose, floor_m in (("pt600", high, -0.25), ("puma560", low, -0.25), ("pt500", low, None))
     ]
-    text = together(robots, plain_joints=False)
+    text = together(robots, joints="prefixed")
     (box,) = Xml.fromstring(text).findall("link[@name='hall/floor.0']/visual/geometry/box")
     size = [float(each) for each in box.get("size").split()]
     whole = pinocchio.buildModelFromXML(text)
@@ -76,11 +76,23 @@ def test_upper_side_of_the_floors_plate_is_at_the_floors_height():
 
 
 def test_plain_joints_keep_their_names_and_the_meshes_are_those_of_the_mesh():
-    urdf = Xml.fromstring(together([viewed("here", "pt600", pinocchio.SE3.Identity())], plain_joints=True))
+    urdf = Xml.fromstring(together([viewed("here", "pt600", pinocchio.SE3.Identity())], joints="plain"))
     names = {joint.get("name") for joint in urdf.findall("joint")}
     assert {"waist", "elbow"} <= names
     assert {mesh.get("filename") for mesh in urdf.iter("mesh")} >= {"file:///base.glb"}
     assert not list(urdf.iter("collision"))
+
+
+def test_without_joints_a_viewer_has_the_links_with_shapes_and_no_pose_of_its_own():
+    arm = replace(
+        viewed("here", "pt600", POSES["upright"]),
+        mesh_uri=lambda link: None if link.endswith("_axis") else f"{link}.glb",
+    )
+    urdf = Xml.fromstring(together([arm], joints="none"))
+    links = {link.get("name") for link in urdf.findall("link")}
+    assert {"here", "here/pt600/base", "here/pt600/flange"} <= links
+    assert not [name for name in links if name.endswith("_axis")]
+    assert not urdf.findall("joint")
 
 
 def test_mimic_joint_follows_the_renamed_joint():
@@ -92,7 +104,7 @@ def test_mimic_joint_follows_the_renamed_joint():
 
 def test_invalid_urdf_is_left_out_and_the_others_stay():
     bad = Viewed("here", "bad", "<robot", (), lambda link: None)
-    text = together([bad, viewed("here", "pt600", pinocchio.SE3.Identity())], plain_joints=False)
+    text = together([bad, viewed("here", "pt600", pinocchio.SE3.Identity())], joints="prefixed")
     assert "here/pt600/base" in text
     with pytest.raises(ValueError, match="is not a URDF"):
         prefixed("<robot", "", lambda link: None)

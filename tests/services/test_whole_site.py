@@ -7,6 +7,8 @@ import signal
 import socket
 import subprocess
 import sys
+import urllib.error
+import urllib.request
 from concurrent.futures import ThreadPoolExecutor
 from math import degrees, radians
 
@@ -14,8 +16,10 @@ import pytest
 from mcap.reader import make_reader
 
 from robomesh import reason_codes as codes
+from robomesh.keys import parse_key
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
+from robomesh.topics import topic
 from tests.conftest import free_port, last_value, run
 from tests.refusals import refused
 from tests.site import ONE_ARM, alive, kill, robomesh, running_site, site_file, wait_until
@@ -249,6 +253,37 @@ def test_snapshot_saves_a_picture(site, tmp_path):
     result = site.command("snapshot", "arm", "top", str(out))
     assert result.returncode == 0, result.stderr
     assert out.read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_layout_for_other_viewers_names_topics_and_services_that_there_are(site, tmp_path):
+    path = tmp_path / "layout.json"
+    written = site.command("foxglove", "--robot", "arm", "--layout", str(path))
+    assert (written.returncode, written.stderr) == (0, "")
+    layout = json.loads(path.read_text())
+    with urllib.request.urlopen(f"{site.console}/layout/test/arm.json", timeout=20) as answer:
+        assert json.load(answer) == layout
+    panels = layout["configById"]
+    keys = [
+        panels["Image!video"]["imageMode"]["imageTopic"],
+        panels["RawMessages!controller"]["topicPath"],
+        *(
+            each["value"].partition(".")[0]
+            for name in ("joints", "tool")
+            for each in panels[f"Plot!{name}"]["paths"]
+        ),
+    ]
+    assert {parse_key(key).topic for key in keys} == {"video/front", "controller", "joints", "kinematics"}
+    assert all(topic(parse_key(key).topic) for key in keys)
+    assert len(panels["Plot!joints"]["paths"]) == 5
+    commands = {each["serviceName"] for name, each in panels.items() if name.startswith("CallService")}
+    assert commands == {f"robomesh/test/arm/{name}" for name in ("stop", "home", "hold", "resume", "reset")}
+    assert "add --robot" in site.command("foxglove", "--layout", str(path)).stderr
+    nowhere = site.command("foxglove", "--robot", "arm", "--layout", str(tmp_path / "no" / "layout.json"))
+    assert nowhere.returncode == 2
+    with pytest.raises(urllib.error.HTTPError) as unknown:
+        urllib.request.urlopen(f"{site.console}/layout/test/nobody.json", timeout=20)
+    assert unknown.value.code == 504
+    unknown.value.close()
 
 
 def test_monitor_prints_a_line_a_state(site):
