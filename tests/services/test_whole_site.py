@@ -260,7 +260,7 @@ def test_the_layout_for_other_viewers_names_topics_and_services_that_there_are(s
     written = site.command("foxglove", "--robot", "arm", "--layout", str(path))
     assert (written.returncode, written.stderr) == (0, "")
     layout = json.loads(path.read_text())
-    with urllib.request.urlopen(f"{site.console}/layout/test/arm.json", timeout=20) as answer:
+    with urllib.request.urlopen(f"{site.console.rstrip('/')}/layout/test/arm.json", timeout=20) as answer:
         assert json.load(answer) == layout
     panels = layout["configById"]
     keys = [
@@ -281,7 +281,7 @@ def test_the_layout_for_other_viewers_names_topics_and_services_that_there_are(s
     nowhere = site.command("foxglove", "--robot", "arm", "--layout", str(tmp_path / "no" / "layout.json"))
     assert nowhere.returncode == 2
     with pytest.raises(urllib.error.HTTPError) as unknown:
-        urllib.request.urlopen(f"{site.console}/layout/test/nobody.json", timeout=20)
+        urllib.request.urlopen(f"{site.console.rstrip('/')}/layout/test/nobody.json", timeout=20)
     assert unknown.value.code == 504
     unknown.value.close()
 
