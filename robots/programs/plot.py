@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robomesh.extras import missing
 from robots.errors import SaveError
 from robots.joints import FloatArray, Joints, JointType
 from robots.programs.steps import CheckResult, Violation, ViolationKind
@@ -38,7 +39,7 @@ def plot_check(result: CheckResult, joints: Joints, target: Path, *, title: str)
         import matplotlib as mpl
         from matplotlib.figure import Figure
     except ModuleNotFoundError:
-        raise SaveError(target, "pictures need matplotlib, which comes with robomesh[plots]") from None
+        raise SaveError(target, missing("matplotlib")) from None
 
     with mpl.rc_context(
         {"font.size": 8.5, "svg.hashsalt": "robomesh", "axes.edgecolor": _LINE, "text.color": _TEXT}

@@ -10,6 +10,7 @@ from typing import Any
 
 import typer
 
+from robomesh.extras import EXTRAS, missing
 from services.command_line.commands import root
 from services.command_line.output import discard, print_or_discard, show_directions
 from services.command_line.reading_limits import limit
@@ -44,6 +45,12 @@ def run(arguments: list[str]) -> int:
         # Typer and rich exit this way when the reader of the output is gone.
         discard(sys.stdout)
         return 0
+    except ModuleNotFoundError as error:
+        # `cv2.typing` comes with `cv2`.
+        module = (error.name or "").partition(".")[0]
+        if module in EXTRAS:
+            return _failed(missing(module))
+        return _failed_ourselves(error)
     except Exception as error:
         # Services run their robots in task groups.
         while isinstance(error, ExceptionGroup):
@@ -53,9 +60,7 @@ def run(arguments: list[str]) -> int:
             return 0
         if isinstance(error, _known_errors()):
             return _failed(str(error))
-        if os.environ.get("ROBOMESH_DEBUG"):
-            raise
-        return _failed(f"a fault of robomesh itself: {error!r} (ROBOMESH_DEBUG=1 shows where)")
+        return _failed_ourselves(error)
 
 
 def _reader_is_gone() -> bool:
@@ -63,6 +68,12 @@ def _reader_is_gone() -> bool:
     output = select.poll()
     output.register(1, 0)
     return any(event & select.POLLERR for _, event in output.poll(0))
+
+
+def _failed_ourselves(error: Exception) -> int:
+    if os.environ.get("ROBOMESH_DEBUG"):
+        raise error
+    return _failed(f"a fault of robomesh itself: {error!r} (ROBOMESH_DEBUG=1 shows where)")
 
 
 def _failed(text: str) -> int:

@@ -7,6 +7,7 @@ a server, so no other certificate passes for a router's, whatever its address.
 from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
+from robomesh.extras import missing
 from services.pki.errors import KeysError
 
 try:
@@ -16,9 +17,7 @@ try:
     from cryptography.hazmat.primitives.asymmetric import ec
     from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 except ImportError:
-    raise KeysError(
-        "making certificates needs the package cryptography: pip install 'robomesh[keys]'"
-    ) from None
+    raise KeysError(missing("cryptography")) from None
 
 # The clock of a machine that has just started may be behind.
 _CLOCKS_BEHIND = timedelta(minutes=10)

@@ -2,7 +2,6 @@
 
 import asyncio
 import http.client
-import importlib.util
 import json
 import os
 import shutil
@@ -14,15 +13,18 @@ from dataclasses import dataclass
 
 import typer
 
+from robomesh.extras import ADDED_IN_CHECKOUT, install_command, is_missing
 from services.command_line.site.services import SERVICES
 
 # Extra -> packages that it installs.
 _EXTRAS = {
     **{name: row.packages for name, row in SERVICES.items() if name != "router"},
     "simulator": ("ruckig",),
+    "keys": ("cryptography",),
     "foxglove": ("foxglove",),
     "ros2": ("rosbags",),
-    "keys": ("cryptography",),
+    "plots": ("matplotlib",),
+    "step": ("cascadio",),
 }
 _FREE_BYTES = 1 << 30
 # Timeout for a site that runs on this machine.
@@ -63,15 +65,12 @@ def _python() -> list[Finding]:
 def _extras() -> list[Finding]:
     findings = []
     for extra, packages in _EXTRAS.items():
-        missing = [package for package in packages if importlib.util.find_spec(package) is None]
-        findings.append(
-            Finding(
-                f"role {extra}",
-                not missing,
-                "its packages are installed" if not missing else f"no {', '.join(missing)}",
-                f"pip install 'robomesh[{extra}]', or ./dev up, which installs all extras",
-            )
-        )
+        missing = [package for package in packages if is_missing(package)]
+        fix, rare = install_command(extra), extra in ADDED_IN_CHECKOUT
+        text = "its packages are installed" if not missing else f"no {', '.join(missing)}"
+        if missing and rare:
+            text = f"not installed; {fix} installs it"
+        findings.append(Finding(f"{'part' if rare else 'role'} {extra}", rare or not missing, text, fix))
     return findings
 
 

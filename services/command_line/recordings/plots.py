@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from robomesh.extras import missing
 from robomesh.recordings.channel_names import ABOUT
 from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordingFile
@@ -52,7 +53,7 @@ def write_plots(file: RecordingFile, span: Span, target: Path) -> int:
         import matplotlib as mpl
         from matplotlib.figure import Figure
     except ModuleNotFoundError:
-        raise ExportError("plots need matplotlib, which comes with robomesh[plots]") from None
+        raise ExportError(missing("matplotlib")) from None
 
     panels = _panels(known_values(file))
     if not panels:

@@ -1,0 +1,48 @@
+"""The extras of this distribution, which an installation may lack, and how to install them."""
+
+from importlib.util import find_spec
+from pathlib import Path
+
+# Module -> extra that brings it.
+EXTRAS = {
+    "argon2": "keys",
+    "av": "renderer",
+    "cascadio": "step",
+    "coal": "robots",
+    "collada": "meshes",
+    "cryptography": "keys",
+    "cv2": "renderer",
+    "ezdxf": "meshes",
+    "fast_simplification": "meshes",
+    "foxglove": "foxglove",
+    "matplotlib": "plots",
+    "moderngl": "renderer",
+    "pinocchio": "robots",
+    "rosbags": "ros2",
+    "ruckig": "robots",
+    "starlette": "console",
+    "tomlkit": "console",
+    "trimesh": "robots",
+    "uvicorn": "console",
+    "websockets": "console",
+}
+# What `./dev add` brings in a checkout; it has the other extras.
+ADDED_IN_CHECKOUT = {"foxglove", "plots", "ros2", "step"}
+_CHECKOUT = (Path(__file__).resolve().parents[1] / "dev").is_file()
+
+
+def is_missing(module: str) -> bool:
+    """Return whether a module is not installed."""
+    return find_spec(module) is None
+
+
+def missing(module: str) -> str:
+    """Return a sentence on a missing module, with the command that installs it."""
+    return f"this needs the package {module}, which is not installed: {install_command(EXTRAS[module])}"
+
+
+def install_command(extra: str) -> str:
+    """Return the command that installs an extra."""
+    if _CHECKOUT and extra in ADDED_IN_CHECKOUT:
+        return f"./dev add {extra}"
+    return f"pip install 'robomesh[{extra}]'"

@@ -1,0 +1,69 @@
+"""Extras that an installation lacks: one line names the package and the command that installs it."""
+
+import ast
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from robomesh import extras
+from robots.errors import MeshError, SaveError
+from robots.meshes.step import read_step
+from robots.programs.plot import plot_check
+from services.command_line import main
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_every_extra_of_the_table_exists():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert {*extras.EXTRAS.values(), *extras.ADDED_IN_CHECKOUT} <= project["optional-dependencies"].keys()
+
+
+def test_what_a_checkout_adds_is_what_dev_adds():
+    (parts,) = (
+        node.value
+        for node in ast.parse((ROOT / "dev").read_text()).body
+        if isinstance(node, ast.Assign) and node.targets[0].id == "PARTS"
+    )
+    assert ast.literal_eval(parts).keys() == extras.ADDED_IN_CHECKOUT
+
+
+@pytest.mark.parametrize(
+    ("checkout", "extra", "command"),
+    [
+        (True, "step", "./dev add step"),
+        (True, "renderer", "pip install 'robomesh[renderer]'"),
+        (False, "step", "pip install 'robomesh[step]'"),
+    ],
+)
+def test_a_checkout_adds_what_it_left_out(monkeypatch, checkout, extra, command):
+    monkeypatch.setattr(extras, "_CHECKOUT", checkout)
+    assert extras.install_command(extra) == command
+
+
+def test_a_step_file_without_its_reader_is_rejected_with_the_command(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "cascadio", None)
+    path = tmp_path / "box.step"
+    path.write_text("ISO-10303-21;")
+    with pytest.raises(MeshError, match=r"needs the package cascadio, .* add step"):
+        read_step(path)
+
+
+def test_a_plot_without_matplotlib_is_rejected_with_the_command(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(SaveError, match=r"needs the package matplotlib, .* add plots"):
+        plot_check(None, None, tmp_path / "check.svg", title="")
+
+
+@pytest.mark.parametrize(("command", "extra"), [("foxglove", "foxglove"), ("ros2", "ros2")])
+def test_a_bridge_without_its_package_ends_with_the_command(monkeypatch, capsys, command, extra):
+    package = {"foxglove": "foxglove", "ros2": "rosbags"}[command]
+    for name in [each for each in sys.modules if each.startswith((f"{package}.", f"services.{command}"))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, package, None)
+    assert main.run([command]) == 2
+    assert capsys.readouterr().err == (
+        f"robomesh: this needs the package {package}, which is not installed: ./dev add {extra}\n"
+    )
