@@ -72,6 +72,7 @@ class Settings:
             name if the console has a certificate.
         certificate: With `key`: serve over TLS (PEM).
         hosts: Host names of the console, in addition to `localhost` and IP addresses.
+        embed: Origins whose pages may show pictures and video.
         page: Folder of the built page.
         define: Settings of the page's Define; None: robots cannot be defined here.
     """
@@ -80,6 +81,7 @@ class Settings:
     listen: str = "127.0.0.1:8080"
     insecure: bool = False
     hosts: tuple[str, ...] = ()
+    embed: tuple[str, ...] = ()
     accounts: Path | None = None
     certificate: Path | None = None
     key: Path | None = None
@@ -111,7 +113,7 @@ async def serve(
         tls = tls_context(settings.certificate, settings.key)
     with listening(host, port) as listener:
         hub = Hub(session, settings, exposed=warning is not None, tls=tls)
-        guarded = Guard(application(hub), settings.hosts, secure=tls is not None)
+        guarded = Guard(application(hub), settings.hosts, secure=tls is not None, embed=settings.embed)
         bound_port = listener.getsockname()[1]
         address = f"http{'s' if tls else ''}://{f'[{host}]' if ':' in host else host}:{bound_port}"
         async with hub:

@@ -1,10 +1,13 @@
 """The site file's `[console]`."""
 
+import re
 from pathlib import Path
 
-from pydantic import BaseModel, StrictBool
+from pydantic import BaseModel, StrictBool, field_validator
 
 from services.site_file.part import PART_CONFIG
+
+_ORIGIN = re.compile(r"https?://(?:[a-z0-9.-]+|\[[0-9a-f:]+\])(?::\d{1,5})?")
 
 
 class ConsoleTls(BaseModel):
@@ -29,6 +32,8 @@ class Console(BaseModel):
         accounts: File of accounts (`robomesh accounts`); absent: the page needs no sign-in.
         tls: The page's certificate; absent: HTTP.
         insecure: Accept an address that other machines reach without accounts or TLS.
+        embed: Origins ("https://intranet.example") whose pages may show pictures and video of the robots;
+            never the page itself. Not with `accounts`: other pages' requests carry no sign-in.
     """
 
     model_config = PART_CONFIG
@@ -37,6 +42,17 @@ class Console(BaseModel):
     accounts: Path | None = None
     tls: ConsoleTls | None = None
     insecure: StrictBool = False
+    embed: tuple[str, ...] = ()
+
+    @field_validator("embed")
+    @classmethod
+    def _are_origins(cls, origins: tuple[str, ...]) -> tuple[str, ...]:
+        for origin in origins:
+            if not _ORIGIN.fullmatch(origin):
+                raise ValueError(
+                    f"{origin!r} is not an origin: https://HOST or https://HOST:PORT, in lower case"
+                )
+        return origins
 
     @property
     def scheme(self) -> str:

@@ -1,12 +1,16 @@
 """Hosts and origins that the console accepts."""
 
 import pytest
+from pydantic import ValidationError
+from starlette.datastructures import Headers
 
 from robomesh.errors import RefusedError
 from services.console.accounts.rights import parse_request
 from services.console.errors import WatchError
-from services.console.http.guard import refused_host, refused_origin
+from services.console.http.guard import Guard, refused_host, refused_origin
 from services.console.websocket.shared_subscriptions import check_expression
+from services.site_file.console import Console
+from tests.conftest import run
 
 
 @pytest.mark.parametrize(
@@ -96,3 +100,54 @@ def test_requests_of_the_table_can_be_asked(key):
 def test_a_page_asks_one_robot_one_request_of_the_table(key):
     with pytest.raises(RefusedError):
         parse_request(key)
+
+
+LISTED = "https://intranet.plant"
+
+
+@pytest.mark.parametrize(
+    ("path", "headers", "shown"),
+    [
+        ("/video/s/r/front.mjpeg", {"Origin": LISTED}, True),
+        ("/video/s/r/front.mjpeg", {"Referer": f"{LISTED}/wall?of=pt600"}, True),
+        ("/image/s/r/front.jpg", {"Referer": f"{LISTED}:444/"}, False),
+        ("/image/s/r/front.jpg", {"Origin": "http://intranet.plant"}, False),
+        ("/image/s/r/front.jpg", {"Origin": "https://evil.example", "Referer": f"{LISTED}/"}, False),
+        ("/image/s/r/front.jpg", {"Referer": "https://[evil"}, False),
+        ("/image/s/r/front.jpg", {"Origin": "null"}, False),
+        ("/image/s/r/front.jpg", {}, False),
+        ("/", {"Origin": LISTED}, False),
+        ("/mesh/s/r/base", {"Origin": LISTED}, False),
+    ],
+)
+def test_only_media_are_shown_on_pages_of_listed_origins(path, headers, shown):
+    async def app(scope, receive, send):
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+
+    async def answer(embed):
+        given = [(name.lower().encode(), value.encode()) for name, value in headers.items()]
+        scope = {"type": "http", "method": "GET", "path": path}
+        scope["headers"] = [(b"host", b"localhost:8080"), *given]
+        sent = []
+
+        async def send(message):
+            sent.append(message)
+
+        await Guard(app, embed=embed)(scope, None, send)
+        return Headers(raw=sent[0]["headers"])
+
+    found = run(answer((LISTED,)))
+    assert found["Cross-Origin-Resource-Policy"] == ("cross-origin" if shown else "same-origin")
+    assert found.get("Access-Control-Allow-Origin") == (LISTED if shown else None)
+    assert found["X-Frame-Options"] == "DENY"
+    assert "frame-ancestors 'none'" in found["Content-Security-Policy"]
+    assert run(answer(()))["Cross-Origin-Resource-Policy"] == "same-origin"
+
+
+@pytest.mark.parametrize(
+    "origin", ["intranet.plant", "https://a/b", "https://*", "*", "https://A.example", "null"]
+)
+def test_an_origin_to_embed_in_is_checked(origin):
+    with pytest.raises(ValidationError, match="is not an origin"):
+        Console(embed=(origin,))
+    assert Console(embed=(LISTED, "http://10.0.0.7:3000", "https://[::1]:443")).embed

@@ -51,9 +51,9 @@ class Video:
 
 
 @asynccontextmanager
-async def rendered(mesh, page):  # noqa: F811
+async def rendered(mesh, page, **settings):  # noqa: F811
     """Yield a console and a simulated renderer: its views, and 20 pictures a second while watched."""
-    async with console(mesh, page) as (address, other):
+    async with console(mesh, page, **settings) as (address, other):
 
         async def views(request):
             if request.message.of != "front":

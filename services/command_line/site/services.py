@@ -115,6 +115,7 @@ def _console(site: "Site", options: Options) -> Any:
         listen=site.console.listen,
         insecure=site.console.insecure,
         hosts=site.console.hosts,
+        embed=site.console.embed,
         accounts=site.console.accounts,
         certificate=None if tls is None else tls.certificate,
         key=None if tls is None else tls.key,

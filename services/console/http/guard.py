@@ -38,6 +38,9 @@ SECURITY_HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
 }
+# Pictures and video, which pages of other origins may show, and which a browser shows by themselves.
+_MEDIA = ("/video/", "/image/")
+_MEDIA_POLICY = "default-src 'none'; img-src 'self'; media-src 'self'; base-uri 'none'; form-action 'none'; "
 
 
 def refused_host(host: str, names: Collection[str]) -> Reason | None:
@@ -74,6 +77,15 @@ def refused_origin(origin: str, host: str, *, secure: bool = False) -> Reason | 
     return codes.HTTP_ORIGIN(origin=origin, host=host)
 
 
+def _origin_of(address: str) -> str:
+    """Return the origin of an address; empty: it has none."""
+    with contextlib.suppress(ValueError):
+        parts = urlsplit(address)
+        if parts.scheme and parts.netloc:
+            return f"{parts.scheme}://{parts.netloc}".lower()
+    return ""
+
+
 def refused_body(scope: Scope, headers: Headers) -> RefusedRequest | None:
     """Return the refusal if a body is declared too large, or is not allowed; otherwise None.
 
@@ -98,11 +110,19 @@ class Guard:
 
     Args:
         secure: The console is served over TLS.
+        embed: Origins whose pages may show pictures and video.
     """
 
-    def __init__(self, app: ASGIApp, names: Collection[str] = (), *, secure: bool = False) -> None:
+    def __init__(
+        self,
+        app: ASGIApp,
+        names: Collection[str] = (),
+        *,
+        secure: bool = False,
+        embed: Collection[str] = (),
+    ) -> None:
         self._app = app
-        self._names = names
+        self._names, self._embed = names, embed
         self._secure = secure
         self._headers = SECURITY_HEADERS | ({"Strict-Transport-Security": _HSTS} if secure else {})
 
@@ -111,11 +131,15 @@ class Guard:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        refused = self._refused(scope, Headers(scope=scope))
+        headers = Headers(scope=scope)
+        refused = self._refused(scope, headers)
+        added = self._headers
+        if scope["type"] == "http" and scope["path"].startswith(_MEDIA):
+            added = added | self._media_headers(headers)
 
         async def send_guarded(message: Message) -> None:
             if message["type"].endswith("http.response.start"):  # also of a refused WebSocket
-                MutableHeaders(scope=message).update(self._headers)
+                MutableHeaders(scope=message).update(added)
             await send(message)
 
         if refused is None:
@@ -127,6 +151,18 @@ class Guard:
             # Further bytes of this connection may be the rest of the rejected request.
             answer.headers["Connection"] = "close"
             await answer(scope, receive, send_guarded)
+
+    def _media_headers(self, headers: Headers) -> dict[str, str]:
+        """Return the headers of pictures and video: a page of a listed origin may show them."""
+        origin = headers.get("origin") or _origin_of(headers.get("referer", ""))
+        added = {
+            "Content-Security-Policy": f"{_MEDIA_POLICY}frame-ancestors 'none'",
+            "Vary": "Origin, Referer",
+        }
+        if origin in self._embed:
+            added["Cross-Origin-Resource-Policy"] = "cross-origin"
+            added["Access-Control-Allow-Origin"] = origin
+        return added
 
     def _refused(self, scope: Scope, headers: Headers) -> RefusedRequest | None:
         host = headers.get("host", "")

@@ -1,0 +1,81 @@
+"""Pictures and video of a console in pages of other origins, and opened by themselves, in Chromium."""
+
+import asyncio
+import http.server
+import threading
+
+import pytest
+from playwright.async_api import async_playwright
+
+from tests.browser.conftest import ARGUMENTS, CHROMIUM, LAUNCH_MS, PATIENCE_MS
+from tests.conftest import run
+from tests.services.test_console import page  # noqa: F401
+from tests.services.test_console_pictures import rendered
+
+pytestmark = pytest.mark.browser
+
+EMBEDDING = """<!doctype html><img id="moving" src="http://{0}/video/s/r/front.mjpeg">
+<img id="still" src="http://{0}/image/s/r/front.jpg"><img id="shared" crossorigin src="http://{0}/image/s/r/front.png">
+<video id="video" muted autoplay src="http://{0}/video/s/r/front.mp4"></video>"""
+SHOWN = """() => ["moving", "still", "shared"].every((id) => document.getElementById(id).naturalWidth > 0)
+  && document.getElementById("video").currentTime > 0.2"""
+FAILED = """() => new Promise((resolve) => {
+  const image = new Image();
+  image.onload = () => resolve("shown");
+  image.onerror = () => resolve("refused");
+  image.src = ADDRESS;
+})"""
+
+
+@pytest.fixture
+def intranet():
+    """Yield the ports of two servers of the same pages, and the pages by path."""
+    pages = {}
+
+    class Pages(http.server.BaseHTTPRequestHandler):
+        def do_GET(self):
+            body = pages.get(self.path, "<!doctype html>").encode()
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html")
+            self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body)
+
+        def log_message(self, *_):
+            pass
+
+    servers = [http.server.ThreadingHTTPServer(("127.0.0.1", 0), Pages) for _ in range(2)]
+    threads = [threading.Thread(target=server.serve_forever) for server in servers]
+    for thread in threads:
+        thread.start()
+    yield [f"http://127.0.0.1:{server.server_port}" for server in servers], pages
+    for server, thread in zip(servers, threads, strict=True):
+        server.shutdown()
+        thread.join()
+        server.server_close()
+
+
+def test_pages_of_listed_origins_show_pictures_and_video_and_others_do_not(mesh, page, intranet):  # noqa: F811
+    (listed, other), pages = intranet
+
+    async def main():
+        async with rendered(mesh, page, embed=(listed,)) as (address, *_), async_playwright() as playwright:
+            pages["/wall"] = EMBEDDING.format(address)
+            browser = await playwright.chromium.launch(
+                executable_path=str(CHROMIUM), args=ARGUMENTS, timeout=LAUNCH_MS
+            )
+            tab = await browser.new_page()
+            await tab.goto(f"{listed}/wall", wait_until="commit")
+            await tab.wait_for_function(SHOWN, timeout=PATIENCE_MS)
+            for origin, result in ((listed, "shown"), (other, "refused")):
+                await tab.goto(f"{origin}/", timeout=PATIENCE_MS)
+                script = FAILED.replace("ADDRESS", f"'http://{address}/image/s/r/front.jpg'")
+                assert await tab.evaluate(script) == result
+            # By itself, without any page.
+            await tab.goto(f"http://{address}/video/s/r/front.mp4", wait_until="commit")
+            playing = "() => document.querySelector('video')?.currentTime > 0.2"
+            await tab.wait_for_function(playing, timeout=PATIENCE_MS)
+            await browser.close()
+            await asyncio.sleep(0)
+
+    run(main(), timeout_s=180.0)
