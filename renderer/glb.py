@@ -59,6 +59,15 @@ def read_glb(data: bytes) -> tuple[Surface, ...]:
         raise GlbError(f"the GLB's content is inconsistent: {error!r}") from None
 
 
+def glb_to_z_up(data: bytes) -> NDArray[np.float64]:
+    """Return the (4, 4) rotation from a GLB's own axes, after its nodes' placements, to z up.
+
+    Raises:
+        GlbError: If it is not GLB, or is truncated.
+    """
+    return _file_to_z_up(_chunks(data)[0])
+
+
 def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
     if len(data) < 20 or struct.unpack_from("<I", data)[0] != _MAGIC:
         raise GlbError(f"{len(data)} bytes are not GLB, which begins with 'glTF'")

@@ -18,6 +18,7 @@ EXTRAS = {
     "matplotlib": "plots",
     "moderngl": "renderer",
     "pinocchio": "robots",
+    "rerun": "rerun",
     "rosbags": "ros2",
     "ruckig": "robots",
     "starlette": "console",
@@ -27,7 +28,7 @@ EXTRAS = {
     "websockets": "console",
 }
 # What `./dev add` brings in a checkout; it has the other extras.
-ADDED_IN_CHECKOUT = {"foxglove", "plots", "ros2", "step"}
+ADDED_IN_CHECKOUT = {"foxglove", "plots", "rerun", "ros2", "step"}
 _CHECKOUT = (Path(__file__).resolve().parents[1] / "dev").is_file()
 
 

@@ -1,8 +1,10 @@
 """Recordings for tests, written by the plain `mcap` writer, with known content."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
@@ -11,6 +13,10 @@ from mcap.writer import Writer
 from mcap_protobuf.schema import register_schema
 
 from robomesh.schemas import robomesh_pb2 as schema
+from robots.description import load
+from robots.glb import link_meshes
+from robots.urdf.write import to_urdf
+from services.kinematics.descriptions import describe
 
 START_NS = 1_700_000_000_000_000_000
 KEY_PICTURE = b"\x00\x00\x00\x01\x67sps\x00\x00\x00\x01\x68pps\x00\x00\x01\x65"
@@ -39,15 +45,23 @@ class Written:
         self._writer.finish()
         self._stream.close()
 
-    def put(self, topic: str, message: Message, at_s: float) -> None:
-        """Put a message of the robot, received so long after the start."""
+    def put(self, topic: str, message: Message, at_s: float, *, repeated: bool = False) -> None:
+        """Put a message of the robot, received so long after the start.
+
+        Args:
+            repeated: It is published again with the time of the start.
+        """
         key = f"robomesh/{self.site}/{self.robot}/{topic}"
         if key not in self._channels:
             number = register_schema(self._writer, type(message))
             self._channels[key] = self._writer.register_channel(key, "protobuf", number)
         time_ns = START_NS + round(at_s * 1e9)
         self._writer.add_message(
-            self._channels[key], time_ns, message.SerializeToString(), time_ns - 1000, int(at_s * 1e3)
+            self._channels[key],
+            time_ns,
+            message.SerializeToString(),
+            (START_NS if repeated else time_ns) - 1000,
+            int(at_s * 1e3),
         )
 
     def attach(self, name: str, data: bytes, media_type: str = "application/octet-stream") -> None:
@@ -87,4 +101,24 @@ def write_recording(
                     format="h264", frame_id="site/arm/camera/front", data=data + b"%d" % number
                 )
                 file.put("video/front", picture, at_s)
+    return path
+
+
+def write_swinging_arm(path: Path) -> Path:
+    """Write a Pt600 that swings its waist for 2 s, as its gateway and kinematics would publish it."""
+    description = load("pt600")
+    glbs = link_meshes(description)
+    message = describe(
+        description, urdf=to_urdf(description), meshes=glbs, base_to_site=np.eye(4), cell="", simulated=True
+    )
+    with Written(path) as file:
+        file.put("description", message, 0.0)
+        for name, glb in glbs.items():
+            file.attach(f"mesh/{name}", glb)
+        for number in range(201):
+            at_s = number / 100
+            home = {joint.name: joint.home for joint in message.joints}
+            file.put("joints", joints(**home | {"waist": math.sin(at_s)}), at_s)
+            file.put("controller", schema.ControllerState(link=schema.ControllerState.UP), at_s)
+        file.put("events", schema.Event(severity=schema.Event.WARNING, code="odd"), 1.0)
     return path

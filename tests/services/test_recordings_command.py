@@ -15,40 +15,18 @@ from robomesh.errors import QuotaError
 from robomesh.recordings.capture import Capture
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
-from robots.description import load
-from robots.glb import link_meshes
-from robots.urdf.write import to_urdf
 from services.command_line.main import run
 from services.command_line.recordings.output import atomic_file
-from services.kinematics.descriptions import describe
 from services.recorder.serving import RecordingServer
 from tests.conftest import run as run_async
-from tests.recordings import START_NS, Written, joints, write_recording
+from tests.recordings import START_NS, Written, joints, write_recording, write_swinging_arm
 
 SIZE, FPS = (160, 120), 10
 
 
 @pytest.fixture(scope="module")
 def moving(tmp_path_factory):
-    """Record a Pt600 that swings its waist for 2 s, as its gateway and kinematics would publish it."""
-    description = load("pt600")
-    glbs = link_meshes(description)
-    message = describe(
-        description, urdf=to_urdf(description), meshes=glbs, base_to_site=np.eye(4), cell="", simulated=True
-    )
-    path = tmp_path_factory.mktemp("moving") / "moving.mcap"
-    with Written(path) as file:
-        file.put("description", message, 0.0)
-        for name, glb in glbs.items():
-            file.attach(f"mesh/{name}", glb)
-        for number in range(201):
-            at_s = number / 100
-            home = {joint.name: joint.home for joint in message.joints}
-            state = joints(**home | {"waist": math.sin(at_s)})
-            file.put("joints", state, at_s)
-            file.put("controller", schema.ControllerState(link=schema.ControllerState.UP), at_s)
-        file.put("events", schema.Event(severity=schema.Event.WARNING, code="odd"), 1.0)
-    return path
+    return write_swinging_arm(tmp_path_factory.mktemp("moving") / "moving.mcap")
 
 
 def test_a_table_holds_the_files_numbers(moving, tmp_path, capsys):

@@ -60,7 +60,10 @@ def play(
 def export(
     what: _Recording,
     out: Annotated[
-        Path, typer.Argument(metavar="OUT", help=".csv: joints and tool; .mp4: video; .png .pdf .svg: plots")
+        Path,
+        typer.Argument(
+            metavar="OUT", help=".csv: joints and tool; .mp4: video; .png .pdf .svg: plots; .rrd: Rerun"
+        ),
     ],
     begin: Annotated[float, typer.Option("--from", metavar="SECONDS", help="Since its start.")] = 0.0,
     end: Annotated[float | None, typer.Option("--to", metavar="SECONDS", help="Else to its end.")] = None,
@@ -74,7 +77,7 @@ def export(
     connect: Connect = DEFAULT_ROUTER,
     as_json: Json = False,
 ) -> None:
-    """Export a recording as a table, a video or plots."""
+    """Export a recording as a table, a video, plots, or for the Rerun viewer."""
     from services.command_line.recordings import export
 
     width, _, height = size.partition("x")

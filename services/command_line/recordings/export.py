@@ -1,5 +1,6 @@
-"""`robomesh recordings export`: a recording as a table, video or plots, by the file's ending."""
+"""`robomesh recordings export`: a recording as a table, video, plots or for Rerun, by the file's ending."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,9 +44,10 @@ def run(source: str, out: Path, wanted: Wanted, router: str, as_json: bool) -> N
         RecordingError: If the recording cannot be read.
     """
     kind = out.suffix.lower()
-    if kind not in (".csv", ".mp4", *_PLOTS):
+    if kind not in (".csv", ".mp4", ".rrd", *_PLOTS):
         raise ExportError(
-            f"{out}: the name must end in .csv (joints and tool), .mp4 (video), {', '.join(_PLOTS)} (plots)"
+            f"{out}: the name must end in .csv (joints and tool), .mp4 (video), .rrd (Rerun), "
+            f"{', '.join(_PLOTS)} (plots)"
         )
     with local_file(source, router) as path, RecordingFile(path) as file:
         span = span_of(file, wanted.begin_s, wanted.end_s)
@@ -59,7 +61,7 @@ def run(source: str, out: Path, wanted: Wanted, router: str, as_json: bool) -> N
 
 def _write(
     file: RecordingFile, span: Span, target: Path, kind: str, wanted: Wanted
-) -> tuple[str, dict[str, float]]:
+) -> tuple[str, Mapping[str, float]]:
     if kind == ".csv":
         from services.command_line.recordings.tables import write_table
 
@@ -70,6 +72,11 @@ def _write(
 
         panels = write_plots(file, span, target)
         return f"{panels} plots", {"plots": panels}
+    if kind == ".rrd":
+        from services.command_line.recordings.rerun_file import write_rerun
+
+        counts = write_rerun(file, span, target)
+        return ", ".join(f"{number} {what}" for what, number in counts.items()), dict(counts)
     if wanted.recorded:
         from services.command_line.recordings.recorded_video import write_recorded
 

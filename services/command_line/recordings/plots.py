@@ -16,7 +16,7 @@ from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.output import progress
 from services.command_line.recordings.span import Span, decoded, topics_of
 
-_CURVES = ("#1462a8", "#8a6a1f", "#2b7a4b", "#93456f", "#5a51a8", "#5b6369", "#9a5426")
+COLORS = ("#1462a8", "#8a6a1f", "#2b7a4b", "#93456f", "#5a51a8", "#5b6369", "#9a5426")
 _TEXT, _LINE = "#1d2124", "#cbd0d3"
 _MARKS = {
     schema.Event.INFO: "#8b9398",
@@ -31,7 +31,9 @@ _MOST_EVENTS, _MOST_NAMED, _MOST_LABELS = 60, 12, 10
 _LEAST_CLEARANCE_MM = 50.0
 
 
-class _Panel(NamedTuple):
+class Panel(NamedTuple):
+    """A plot: its title and the names of its values."""
+
     title: str
     values: tuple[str, ...]
 
@@ -55,7 +57,7 @@ def write_plots(file: RecordingFile, span: Span, target: Path) -> int:
     except ModuleNotFoundError:
         raise ExportError(missing("matplotlib")) from None
 
-    panels = _panels(known_values(file))
+    panels = panels_of(known_values(file))
     if not panels:
         raise ExportError(f"{file.path.name}: it holds no joints, tool or clearance to plot")
     reader, events = SeriesReader(), _events(file, span)
@@ -86,7 +88,9 @@ def write_plots(file: RecordingFile, span: Span, target: Path) -> int:
     return len(panels)
 
 
-def _panels(known: list[str]) -> list[_Panel]:
+def panels_of(known: list[str]) -> list[Panel]:
+    """Return the plots of a recording with these values; none is empty."""
+
     def ending(first: str, last: str) -> tuple[str, ...]:
         return tuple(name for name in known if name.startswith(first) and name.endswith(last))
 
@@ -95,11 +99,11 @@ def _panels(known: list[str]) -> list[_Panel]:
     )
     near = tuple(name for name in ("kinematics/clearance", "kinematics/own_clearance") if name in known)
     panels = (
-        _Panel("joints", ending("joints/", "/position")),
-        _Panel("joint speeds", ending("joints/", "/velocity")),
-        _Panel("tool, base frame", tool),
-        _Panel("tool speed", tuple(name for name in ("kinematics/tool/speed",) if name in known)),
-        _Panel(_CLEARANCE, near),
+        Panel("joints", ending("joints/", "/position")),
+        Panel("joint speeds", ending("joints/", "/velocity")),
+        Panel("tool, base frame", tool),
+        Panel("tool speed", tuple(name for name in ("kinematics/tool/speed",) if name in known)),
+        Panel(_CLEARANCE, near),
     )
     return [panel for panel in panels if panel.values]
 
@@ -107,7 +111,7 @@ def _panels(known: list[str]) -> list[_Panel]:
 def _draw(axes: Any, title: str, found: list[Series]) -> None:
     unit, factor = _shown(found[0].unit)
     for number, each in enumerate(found):
-        color = _CURVES[number % len(_CURVES)]
+        color = COLORS[number % len(COLORS)]
         low, high = each.lowest * factor, each.highest * factor
         axes.plot(each.times_s, (low + high) / 2, color=color, linewidth=1.0, label=_label(each.name))
         # Fill from the lowest to the highest value of each point, so that no peak is lost.

@@ -8,7 +8,7 @@ from pathlib import Path
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from renderer.appearance import appearance_of, mesh_name, placements_at
-from renderer.cache import cache_folder, stored_glb
+from renderer.cache import cache_folder
 from renderer.clearance_line import draw_clearance_line
 from renderer.composition import RobotSnapshot, compose
 from renderer.encoder import open_encoder
@@ -17,11 +17,11 @@ from renderer.overlay import write_over
 from renderer.requested_views import ViewSpec
 from renderer.robot_state import Ages, RobotState
 from renderer.studio import Studio
-from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.recordings.errors import ExportError
+from services.command_line.recordings.meshes import recorded_mesh
 from services.command_line.recordings.output import progress
 from services.command_line.recordings.span import Span, decoded, needed, topics_of
 from services.command_line.recordings.tables import description_of
@@ -110,17 +110,8 @@ def _take_meshes(file: RecordingFile, description: schema.Description, studio: S
         *description.fixtures,
     ]
     for body in bodies:
-        if not body.mesh:
-            continue
-        try:
-            glb: bytes | None = file.attachment(f"mesh/{body.mesh}")
-        except RecordingError:
-            glb = stored_glb(body.mesh_sha256, cache_folder())
-        if glb is None:
-            raise ExportError(
-                f"{file.path.name}: it holds no mesh of {body.name}, and none is in the cache of this machine"
-            )
-        studio.add_mesh(mesh_name(body), glb, body.color)
+        if body.mesh:
+            studio.add_mesh(mesh_name(body), recorded_mesh(file, body), body.color)
 
 
 def _pictures(file: RecordingFile, span: Span, state: RobotState, fps: float) -> Iterator[tuple[int, Ages]]:
