@@ -168,7 +168,7 @@ def _renderer(site: "Site", _: Options) -> Any:
     )
 
 
-# In the order in which `robomesh up` starts them.
+# In the order in which `robomesh up` starts them, and of the ports of their metrics: append a new service.
 SERVICES = {
     "router": Service(module="services.router", settings=None, standby=True, last=True),
     "gateway": Service(
