@@ -84,3 +84,22 @@ def test_every_example_stands_in_the_readme():
     # `tests/robomesh/test_client.py` runs it.
     first = (ROOT / "docs" / "python.md").read_text(encoding="utf-8").partition("```\n")[0]
     assert first.partition("```python\n")[2] in readme
+
+
+def test_the_chinese_readme_has_the_content_of_the_english_one():
+    english, chinese = ((ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "README.zh.md"))
+    assert len(english.splitlines()) <= 150
+    assert len(english.splitlines()) == len(chinese.splitlines())
+    for pattern in (
+        r"^#+ ",
+        r"^\| ",
+        r"\]\(([^)]+)\)",
+        r"^robomesh (?!puts|works|has)([a-z]+)",
+        r"\d+(?:[.,]\d+)*",
+    ):
+        of_each = [re.findall(pattern, text, re.MULTILINE) for text in (english, chinese)]
+        if pattern.startswith(r"\]"):
+            of_each = [sorted(set(found) - {"README.md", "README.zh.md"}) for found in of_each]
+        elif pattern.startswith(r"\d"):
+            of_each = [sorted(set(found)) for found in of_each]
+        assert of_each[0] == of_each[1], pattern
