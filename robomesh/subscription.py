@@ -119,6 +119,7 @@ class Subscription:
         if history and self.topic.history in (History.LAST_100, History.KEY_FRAME):
             self._waiting = deque(maxlen=_ZENOH_RING)
         self._subscriber: Any = _declare(session, key_expr, self.topic)
+        self._finished = threading.Event()
         # Not a daemon: Python would end a daemon thread inside Zenoh's code, which aborts the process.
         self._thread = threading.Thread(target=self._read, name=f"read {key_expr}")
         self._thread.start()
@@ -238,7 +239,7 @@ class Subscription:
 
     def join(self) -> None:
         """Wait until a closed subscription's thread has ended."""
-        self._thread.join()
+        self._finished.wait()
 
     def close_soon(self) -> None:
         """Unsubscribe; on any thread."""
@@ -307,6 +308,8 @@ class Subscription:
         except zenoh.ZError:
             if not self._closed:  # `close` before the first read raises too
                 raise
+        finally:
+            self._finished.set()
 
     def _receive(self, sample: zenoh.Sample) -> None:
         with self._lock:

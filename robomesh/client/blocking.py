@@ -3,6 +3,7 @@
 All calls may be used from several threads; each stream and each arm from one thread at a time.
 """
 
+import contextlib
 import time
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -20,6 +21,7 @@ from robomesh.client.robot import AsyncRobot, CheckResult, InverseResult, Matrix
 from robomesh.client.samples import Alarm, Event, JointState, Sample
 from robomesh.client.streams import AsyncStream, OnStale, Stream
 from robomesh.endpoints import DEFAULT_ROUTER
+from robomesh.errors import SessionError
 from robomesh.schemas import robomesh_pb2 as schema
 
 T = TypeVar("T")
@@ -313,7 +315,8 @@ class Recording:
             while (samples := self._run(_next_of(pages))) is not None:
                 yield from samples
         finally:
-            self._run(pages.aclose())
+            with contextlib.suppress(SessionError):  # a closed connection has ended them
+                self._run(pages.aclose())
 
 
 def open_recording(path: str | Path) -> Recording:

@@ -3,6 +3,7 @@
 import asyncio
 import atexit
 import contextlib
+import signal
 import threading
 import weakref
 from collections.abc import Callable, Coroutine
@@ -81,7 +82,10 @@ class _Running:
         self._loop = asyncio.new_event_loop()
         self._loop.set_default_executor(_ThreadForEach())
         self.closing: Callable[[], Coroutine[Any, Any, None]] | None = None
+        self._stopping = asyncio.Event()
         self._ended = False
+        # Not `Thread.join`: a Ctrl-C at Python's exit may leave a thread's lock locked.
+        self._finished = threading.Event()
         self._thread = threading.Thread(target=self._run, name="robomesh")
         self._thread.start()
         # An interrupted exit does not wait for threads, and ends Python inside Zenoh's code.
@@ -96,6 +100,10 @@ class _Running:
         tasks: list[asyncio.Task[T]] = []
 
         def start() -> None:
+            if self._ended:
+                coroutine.close()
+                result.set_exception(_closed())
+                return
             tasks.append(self._loop.create_task(coroutine))
             tasks[0].add_done_callback(lambda task: _transfer(task, result))
 
@@ -127,46 +135,45 @@ class _Running:
     def stop(self) -> None:
         """Let the thread end soon."""
         with contextlib.suppress(RuntimeError):  # the loop has just ended
-            self._loop.call_soon_threadsafe(self._loop.stop)
+            self._loop.call_soon_threadsafe(self._stopping.set)
 
     def close(self) -> None:
         """Stop, and wait for the thread's end."""
         if self._thread.is_alive():
             self.stop()
-            self._thread.join()
+            self._finished.wait()
 
     def _has_ended(self) -> bool:
         return self._ended or not self._thread.is_alive()
 
     def _close_at_exit(self) -> None:
-        while self._thread.is_alive():
-            with contextlib.suppress(KeyboardInterrupt):
-                self.close()
+        handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+        try:
+            self.close()
+        finally:
+            signal.signal(signal.SIGINT, handler)
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
-        end_with_main = self._loop.create_task(self._end_with_main_thread())
         try:
-            self._loop.run_forever()
+            self._loop.run_until_complete(self._run_until_stopped())
         finally:
-            self._ended = True
-            end_with_main.cancel()
-            self._loop.run_until_complete(self._end())
             self._loop.close()
             atexit.unregister(self._close_at_exit)
+            self._finished.set()
 
-    async def _end(self) -> None:
+    async def _run_until_stopped(self) -> None:
+        while threading.main_thread().is_alive() and not self._stopping.is_set():
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(_POLL_S):
+                    await self._stopping.wait()
+        self._ended = True
         others = asyncio.all_tasks() - {asyncio.current_task()}
         for task in others:
             task.cancel()
         await asyncio.gather(*others, return_exceptions=True)
         if self.closing is not None:
             await self.closing()
-
-    async def _end_with_main_thread(self) -> None:
-        while threading.main_thread().is_alive():
-            await asyncio.sleep(_POLL_S)
-        self._loop.stop()
 
 
 def _transfer(task: asyncio.Task[T], result: "Future[T]") -> None:

@@ -199,6 +199,8 @@ class RecorderFile:
                 f"the recorder of {self._site} names the file {self.name!r}, which is not a plain file name"
             )
         out = out / self.name if await asyncio.to_thread(out.is_dir) else out
+        if out.exists() and not out.is_file():  # the copy would replace it
+            raise RecordingError(f"{out} is not a file: choose another path for the copy")
         for _ in range(_VERSIONS - 1):
             with contextlib.suppress(RecordingError):
                 return await self._fetch_version(out, on_progress)

@@ -162,6 +162,18 @@ def test_calls_of_other_threads_end_with_a_clear_error_when_the_mesh_is_closed(r
         same.last("controller")
 
 
+def test_a_mesh_that_several_threads_close_is_closed(router):
+    for _ in range(5):
+        mesh = robomesh.connect(router, timeout_s=20.0)
+        streams = [mesh.events() for _ in range(5)]
+        closers = [threading.Thread(target=mesh.close) for _ in range(8)]
+        for closer in closers:
+            closer.start()
+        for closer in closers:
+            closer.join(WAIT_S)
+        assert [list(stream) for stream in streams] == [[]] * 5
+
+
 def test_an_interrupted_call_of_a_function_that_blocks_leaves_no_traceback(monkeypatch):
     loop, begun, release = EventLoopThread(), threading.Event(), threading.Event()
     threads, faults = [], []
@@ -187,9 +199,10 @@ def test_an_interrupted_call_of_a_function_that_blocks_leaves_no_traceback(monke
 
 
 SCRIPT = """
-import os, signal, sys, threading, time
+import faulthandler, os, signal, sys, threading, time
 import robomesh
 
+faulthandler.dump_traceback_later(40.0, exit=True)
 signal.signal(signal.SIGINT, signal.default_int_handler)
 mesh = robomesh.connect(sys.argv[1], timeout_s=20.0)
 streams = [mesh.events(history=False) for _ in range(20)]

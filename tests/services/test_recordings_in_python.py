@@ -1,6 +1,7 @@
 """`import robomesh` reading recordings from a recorder: the same arrays as from the file itself."""
 
 import itertools
+import os
 
 import pytest
 import zenoh
@@ -196,8 +197,11 @@ def test_nonsense_of_a_recorder_is_an_error(mesh, tmp_path):
                 for name in ("../trial.mcap", "a\0b", "a\x1b[2J", ""):
                     with pytest.raises(robomesh.RecordingError, match="not a plain file name"):
                         await RecorderFile(session, "site", name, asker="li").fetch(tmp_path)
+                os.mkfifo(tmp_path / "pipe")
+                with pytest.raises(robomesh.RecordingError, match="is not a file"):
+                    await file.fetch(tmp_path / "pipe")
                 for each in declared:
                     each.undeclare()
 
     run(main())
-    assert list(tmp_path.iterdir()) == []
+    assert [each.name for each in tmp_path.iterdir()] == ["pipe"]
