@@ -3,9 +3,11 @@
 `robomesh --help` answers from the table, without importing any command.
 """
 
+import importlib.metadata
 from importlib import import_module
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
+import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
@@ -45,6 +47,7 @@ COMMANDS = {
     "record": Row("live.app", "Record a robot until Ctrl-C."),
     "alive": Row("live.app", "Check that a service answers: exit status 0 or 1, for health checks."),
     "doctor": Row("doctor.app", "Check this machine, and say how to fix what is missing."),
+    "version": Row("version", "Print the version of robomesh; --all: all that a report of a fault needs."),
     "fk": Row(
         "robot.kinematics", 'Forward kinematics: {"joints": [..]} a line in, {"tool", "links"} a line out.'
     ),
@@ -96,6 +99,7 @@ def root() -> TyperGroup:
     return _LazyGroup(
         name="robomesh",
         help="A service mesh that puts industrial robot arms on the network.",
+        params=_options(),
         commands={
             # Only a `short_help` wraps; typer cuts a `help` to one line.
             name: TyperCommand(name=name, help=row.help, short_help=row.help, rich_markup_mode=None)
@@ -104,3 +108,34 @@ def root() -> TyperGroup:
         no_args_is_help=True,
         rich_markup_mode=None,
     )
+
+
+def _options() -> list[Any]:
+    """Return the options of `robomesh` itself, taken from a command that Typer makes with them alone."""
+    app = typer.Typer()
+
+    @app.command()
+    def only(
+        version: Annotated[
+            bool,
+            typer.Option(
+                "--version",
+                is_eager=True,
+                expose_value=False,
+                callback=_print_version,
+                help="Print the version and exit.",
+            ),
+        ] = False,
+    ) -> None: ...
+
+    options = [each for each in get_command(app).params if each.name != "help"]
+    for option in options:
+        # As in `get_help_option`.
+        option.default = False
+    return options
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        print(f"robomesh {importlib.metadata.version('robomesh')}")
+        raise typer.Exit

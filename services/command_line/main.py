@@ -32,11 +32,13 @@ def main() -> None:
 
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit status."""
+    if arguments[:1] == ["help"]:
+        arguments = [*arguments[1:], "--help"]
     try:
         outcome: Any = root().main(arguments, prog_name="robomesh", standalone_mode=False)
         return outcome if isinstance(outcome, int) else 0
     except typer.TyperException as error:
-        return _failed(f"{error.format_message()} (see {' '.join(['robomesh', *arguments[:1]])} --help)")
+        return _wrong_usage(error)
     except (KeyboardInterrupt, typer.Abort):
         return 130
     except MemoryError:
@@ -68,6 +70,16 @@ def _reader_is_gone() -> bool:
     output = select.poll()
     output.register(1, 0)
     return any(event & select.POLLERR for _, event in output.poll(0))
+
+
+def _wrong_usage(error: typer.TyperException) -> int:
+    text = error.format_message()
+    if text.startswith("Usage: "):  # a group without a command
+        print_or_discard(text, sys.stderr)
+        return 2
+    context = getattr(error, "ctx", None)
+    command = "robomesh" if context is None else context.command_path
+    return _failed(f"{text} (see {command} --help)")
 
 
 def _failed_ourselves(error: Exception) -> int:

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from services.command_line.completion import robot_names
+
 SiteFile = Annotated[Path | None, typer.Option("--site", metavar="SITE.toml", help="The site file.")]
 Connect = Annotated[
     str,
@@ -20,7 +22,9 @@ Metrics = Annotated[
     typer.Option(metavar="HOST:PORT", help="Serve Prometheus there; port 0: a free port, see the log."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")]
-Robot = Annotated[str, typer.Argument(metavar="ROBOT", help="robot, or site/robot")]
+Robot = Annotated[
+    str, typer.Argument(metavar="ROBOT", help="robot, or site/robot", autocompletion=robot_names)
+]
 Width = Annotated[int, typer.Option(metavar="PX", min=0, help="Picture width; 0: the renderer's own.")]
 Height = Annotated[int, typer.Option(metavar="PX", min=0, help="Picture height; 0: the renderer's own.")]
 
