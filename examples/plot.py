@@ -9,6 +9,8 @@ import matplotlib.pyplot as plt
 
 import robomesh
 
+if len(sys.argv) != 3:
+    sys.exit(__doc__)
 recording = robomesh.open_recording(sys.argv[1])
 joints = recording.joints()
 tool = recording.values("kinematics/tool/x", "kinematics/tool/y", "kinematics/tool/z")
