@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import GlbError
+from robots.meshes.mesh import Y_UP_TO_Z_UP
 
 _MAGIC = 0x46546C67
 _JSON_CHUNK = 0x4E4F534A
@@ -21,7 +22,6 @@ _BINARY_CHUNK = 0x004E4942
 _TRIANGLES = 4
 
 _COMPONENTS: dict[int, str] = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_Y_UP_TO_Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
@@ -55,7 +55,7 @@ def read_glb(data: bytes) -> tuple[Surface, ...]:
     document, binary = _chunks(data)
     try:
         return tuple(_surfaces(document, binary))
-    except (KeyError, IndexError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, IndexError, TypeError, ValueError) as error:
         raise GlbError(f"the GLB's content is inconsistent: {error!r}") from None
 
 
@@ -91,8 +91,8 @@ def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
         elif kind == _BINARY_CHUNK:
             binary = body
         at += 8 + size
-    if document is None:
-        raise GlbError("the GLB has no JSON chunk")
+    if not isinstance(document, dict):
+        raise GlbError("the GLB has no JSON chunk with an object")
     return document, binary
 
 
@@ -125,10 +125,11 @@ def _meshes(document: dict[str, Any]) -> Iterator[tuple[int, NDArray[np.float64]
 
 
 def _file_to_z_up(document: dict[str, Any]) -> NDArray[np.float64]:
-    extras = document.get("asset", {}).get("extras", {})
+    asset = document.get("asset")
+    extras = asset.get("extras") if isinstance(asset, dict) else None
     if isinstance(extras, dict) and extras.get("robomesh") == {"up": "z"}:
         return np.eye(4)  # from before 2026-11, for example in a recording
-    return _Y_UP_TO_Z_UP
+    return Y_UP_TO_Z_UP
 
 
 def _placement(node: dict[str, Any]) -> NDArray[np.float64]:

@@ -1,5 +1,7 @@
 """Meshes: reading from GLB, preparation, cache."""
 
+import contextlib
+import json
 import math
 import struct
 
@@ -8,7 +10,7 @@ import pytest
 
 from renderer import cache
 from renderer.errors import GlbError
-from renderer.glb import read_glb
+from renderer.glb import glb_to_z_up, read_glb
 from renderer.mesh import prepared
 from tests.renderer.bodies import ball, cube
 
@@ -93,6 +95,25 @@ def test_an_empty_mesh_is_empty():
 def test_invalid_glb_is_rejected(data, says):
     with pytest.raises(GlbError, match=says):
         prepared(data)
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        [],
+        {"asset": 5},
+        {"asset": {"extras": []}, "nodes": [7]},
+        {"nodes": {"a": 1}, "scenes": [3]},
+        {"asset": {}, "nodes": [{"mesh": 0}], "meshes": [{"primitives": 4}], "scenes": [{"nodes": [0]}]},
+    ],
+)
+def test_json_of_another_shape_is_rejected_or_has_no_surface(document):
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    data = struct.pack("<4sIIII", b"glTF", 2, 20 + len(text), len(text), 0x4E4F534A) + text
+    for read in (read_glb, glb_to_z_up):
+        with contextlib.suppress(GlbError):
+            read(data)
 
 
 def test_positions_that_are_not_finite_are_rejected():
