@@ -6,7 +6,7 @@ It is a file of this machine, or one in the folder of a site's recorder, which i
 import logging
 from collections.abc import AsyncGenerator, AsyncIterator, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
 from google.protobuf.message import DecodeError, Message
@@ -14,7 +14,7 @@ from google.protobuf.message import DecodeError, Message
 from robomesh import reason_codes as codes
 from robomesh.client.recorded_values import JointsCollector, RecordedJoints, RecordedValues, ValuesCollector
 from robomesh.client.recording_source import Page, Source
-from robomesh.client.samples import Event, event_of, joint_types
+from robomesh.client.samples import Event, event_of, joint_types, utc
 from robomesh.errors import KeyNameError, MessageError
 from robomesh.keys import parse_key
 from robomesh.recordings.errors import RecordingError
@@ -62,8 +62,7 @@ class RecordedSample:
     @property
     def time(self) -> datetime:
         """Publisher's time in UTC, to the microsecond."""
-        second, rest_ns = divmod(self.time_ns, 1_000_000_000)
-        return datetime.fromtimestamp(second, tz=UTC).replace(microsecond=rest_ns // 1000)
+        return utc(self.time_ns)
 
 
 class AsyncRecording:
@@ -198,11 +197,12 @@ class AsyncRecording:
     async def _joint_types(self) -> dict[str, str]:
         """Return the type of each joint, from the last description."""
         if self._types is None:
-            self._types = {}
+            types: dict[str, str] = {}
             if "description" in self.topic_names:
                 async for _, message in self._decoded([self._key("description")], None, None, _DESCRIPTION):
                     assert isinstance(message, schema.Description)
-                    self._types = joint_types(message)
+                    types = joint_types(message)
+            self._types = types  # only a complete one: a read that failed is repeated
         return self._types
 
     def _time_ns(self, since_start_s: float | None) -> int | None:

@@ -4,10 +4,11 @@ import asyncio
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 
 from robomesh import reason_codes as codes
+from robomesh.client.samples import utc
 from robomesh.errors import RobomeshError
 from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.recordings.channel_names import topic_name
@@ -82,8 +83,7 @@ class RecordingInfo:
     @property
     def start(self) -> datetime:
         """Start in UTC, to the microsecond."""
-        second, rest_ns = divmod(self.start_ns, 1_000_000_000)
-        return datetime.fromtimestamp(second, tz=UTC).replace(microsecond=rest_ns // 1000)
+        return utc(self.start_ns)
 
 
 def recording_info(message: schema.Recording, recorder_site: str = "") -> RecordingInfo:

@@ -51,8 +51,7 @@ class Sample:
     @property
     def time(self) -> datetime:
         """Publisher's time in UTC, to the microsecond."""
-        second, rest_ns = divmod(self.time_ns, 1_000_000_000)
-        return datetime.fromtimestamp(second, tz=UTC).replace(microsecond=rest_ns // 1000)
+        return utc(self.time_ns)
 
     @property
     def age_s(self) -> float | None:
@@ -162,6 +161,12 @@ class Alarm:
     text: str
     advice: str
     by: str
+
+
+def utc(time_ns: int) -> datetime:
+    """Return a time, ns since the Unix epoch, in UTC, to the microsecond."""
+    second, rest_ns = divmod(time_ns, 1_000_000_000)
+    return datetime.fromtimestamp(second, tz=UTC).replace(microsecond=rest_ns // 1000)
 
 
 def in_degrees(

@@ -81,6 +81,16 @@ def test_joints_have_the_rows_and_times_of_the_csv_table(path, tmp_path):
     assert [repr(each) for each in states.positions[:, 1].tolist()] == column["lift [m]"]
 
 
+def test_units_are_read_again_after_a_read_of_the_description_that_failed(path, monkeypatch):
+    recording = robomesh.open_recording(path)
+    with monkeypatch.context() as broken:
+        broken.setattr("robomesh.client.recording._MOST_BYTES", -1)
+        broken.setattr("robomesh.client.recording._MOST_TIMES_THE_FILE", 0)
+        with pytest.raises(robomesh.RecordingError, match="one after the other"):
+            recording.joints()
+    assert recording.joints().units == ("rad", "m")
+
+
 def test_a_range_counts_from_the_recordings_start_and_includes_both_ends(path):
     recording = robomesh.open_recording(path)
     states = recording.joints(start_s=1.0, end_s=1.5)
