@@ -31,7 +31,6 @@ __all__ = [
     "glb_of",
     "link_mesh",
     "link_meshes",
-    "main_color_of",
     "main_colors",
     "shapes_glb",
 ]
@@ -80,11 +79,11 @@ def shapes_glb(shapes: tuple[Shape, ...], *, cache: Path | None = None) -> bytes
 
 def main_colors(meshes: Mapping[str, bytes]) -> dict[str, Color]:
     """Return the colour that covers most of each GLB of ours."""
-    found = {name: main_color_of(glb) for name, glb in meshes.items()}
+    found = {name: _main_color_of(glb) for name, glb in meshes.items()}
     return {name: color for name, color in found.items() if color is not None}
 
 
-def main_color_of(glb: bytes) -> Color | None:
+def _main_color_of(glb: bytes) -> Color | None:
     """Return the colour that covers most of a mesh of ours; None: it has none, or is of another program."""
     try:
         (size,) = struct.unpack_from("<I", glb, 12)

@@ -59,10 +59,10 @@ def glb_of(mesh: Mesh) -> bytes:
     for wire in mesh.wires:
         if len(wire.vertices):
             _add(document, wire, wire.segments, _LINES if len(wire.segments) else _POINTS, False)
-    return _packed(document, main_color(mesh))
+    return _packed(document, _main_color(mesh))
 
 
-def main_color(mesh: Mesh) -> Color | None:
+def _main_color(mesh: Mesh) -> Color | None:
     """Return the colour that covers most of a mesh; None: it has no triangles."""
     areas: dict[Color, float] = {}
     for part in mesh.parts:

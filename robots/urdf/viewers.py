@@ -55,12 +55,12 @@ class Viewed:
     floor_m: float | None = None
 
 
-def prefixed(urdf: str, prefix: str, mesh_uri: MeshUri, *, joints: bool = False) -> Xml.Element:
+def prefixed(urdf: str, prefix: str, mesh_uri: MeshUri, *, prefix_joints: bool = False) -> Xml.Element:
     """Return a URDF with prefixed link names, in which each link shows its mesh only, in its colour.
 
     Args:
         prefix: Prefix of the links, `<site>/<robot>/`.
-        joints: Also prefix the joints.
+        prefix_joints: Also prefix the joints.
 
     Raises:
         ValueError: If it is not XML.
@@ -78,7 +78,7 @@ def prefixed(urdf: str, prefix: str, mesh_uri: MeshUri, *, joints: bool = False)
         _show(link, mesh_uri(name), "" if color is None else color.get("rgba", ""))
     for end in (*root.iter("parent"), *root.iter("child")):
         end.set("link", prefix + end.get("link", ""))
-    if joints:
+    if prefix_joints:
         for joint in root.findall("joint"):
             joint.set("name", prefix + joint.get("name", ""))
             for mimic in joint.findall("mimic"):
@@ -123,7 +123,7 @@ def together(robots: Iterable[Viewed], *, joints: Literal["prefixed", "plain", "
     for robot in known:
         prefix = f"{robot.site}/{robot.robot}/"
         try:
-            root = prefixed(robot.urdf, prefix, robot.mesh_uri, joints=joints == "prefixed")
+            root = prefixed(robot.urdf, prefix, robot.mesh_uri, prefix_joints=joints == "prefixed")
         except ValueError:
             continue
         if joints == "none":

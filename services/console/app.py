@@ -7,7 +7,6 @@ import ssl
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from starlette.applications import Starlette
@@ -23,6 +22,7 @@ from starlette.websockets import WebSocket
 
 from robomesh import keys, topics
 from robomesh import reason_codes as codes
+from robomesh.health import own_version
 from robomesh.keys import PresenceKey
 from robomesh.schemas.robomesh_pb2 import Event, ToPage
 from robomesh.session import Session
@@ -238,7 +238,7 @@ class Hub:
 
     def _hello(self, browser: Browser) -> ToPage:
         hello = ToPage.Hello(
-            version=_version(),
+            version=own_version(),
             site=self.settings.site,
             insecure=self.exposed,
             connected=self.session.connected,
@@ -351,11 +351,3 @@ class PageFiles(StaticFiles):
 def _presence(token: PresenceKey, *, alive: bool) -> ToPage:
     key = keys.presence_key(token.site, token.robot, token.service, token.id)
     return ToPage(presence=ToPage.Presence(key=key, alive=alive))
-
-
-@functools.cache  # reads the package's metadata; each page needs it
-def _version() -> str:
-    try:
-        return version("robomesh")
-    except PackageNotFoundError:
-        return "unknown"

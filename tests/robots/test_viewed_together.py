@@ -98,7 +98,7 @@ def test_without_joints_a_viewer_has_the_links_with_shapes_and_no_pose_of_its_ow
 def test_mimic_joint_follows_the_renamed_joint():
     text = """<robot name="g"><link name="a"/><link name="b"/><joint name="two" type="revolute">
     <parent link="a"/><child link="b"/><mimic joint="one"/></joint></robot>"""
-    joint = prefixed(text, "s/g/", lambda link: None, joints=True).find("joint")
+    joint = prefixed(text, "s/g/", lambda link: None, prefix_joints=True).find("joint")
     assert (joint.get("name"), joint.find("mimic").get("joint")) == ("s/g/two", "s/g/one")
 
 
