@@ -25,6 +25,9 @@ log = logging.getLogger(__name__)
 
 # Rate of a picture in which nothing moves: subscribers see that the stream is alive, and its age.
 _IDLE_HZ = 2.0
+# After a requested key frame as many pictures follow at the full rate: ffmpeg, and what is built on it, shows
+# nothing before it has measured the rate on 20 pictures, at rest 10 s.
+_MEASURED_PICTURES = 22
 _TRY_AGAIN_S = 5.0
 _MOST_ASKERS = 64
 
@@ -75,6 +78,7 @@ class Stream:
         self._key_frames = KeyFrameClock()
         self._video_watched = self._image_watched = False
         self._drawn_version: tuple[int, ...] = ()
+        self._at_full_rate = 0  # pictures left of `_MEASURED_PICTURES`
         self._next_frame_at = self._drawn_at = self._image_at = self._not_before = -math.inf
         self._last_image: CompressedImage | None = None
         self._still: asyncio.Task[None] | None = None
@@ -91,14 +95,14 @@ class Stream:
         """Time at which the next picture is due [s]."""
         if self._video_watched and self._key_frames.asked:
             return self._not_before
-        if self._changed():
+        if self._moves():
             return max(self._next_frame_at, self._not_before)
         return max(self._drawn_at + 1.0 / _IDLE_HZ, self._not_before)
 
     @property
     def wanted_hz(self) -> float:
         """Current rate of pictures to draw [1/s]."""
-        return self._rate_hz if self._changed() else _IDLE_HZ
+        return self._rate_hz if self._moves() else _IDLE_HZ
 
     def update_watchers(self) -> None:
         """Check for subscribers; called when their number changes."""
@@ -150,8 +154,9 @@ class Stream:
     def _rate_hz(self) -> float:
         return self.spec.fps if self._video_watched else self.spec.image_hz
 
-    def _changed(self) -> bool:
-        return self._version() != self._drawn_version
+    def _moves(self) -> bool:
+        measured = self._video_watched and self._at_full_rate > 0
+        return measured or self._version() != self._drawn_version
 
     def _version(self) -> tuple[int, ...]:
         return (self.state.version, *(other.version for other in self._host.neighbours(self.state)))
@@ -170,7 +175,10 @@ class Stream:
             self._failed(now, error)
             return _nothing()
         key_frame = video and self._key_frames.due(now)
+        self._at_full_rate = max(self._at_full_rate - 1, 0)
         if key_frame:
+            if self._key_frames.asked:
+                self._at_full_rate = _MEASURED_PICTURES
             self._key_frames.made(now)
         job = PictureJob(
             stream=self.name,

@@ -145,7 +145,7 @@ class Hub:
         self.meshes = MeshCache()
         self.subscriptions = SharedSubscriptions(session)
         self.views = Views(session)
-        self.pictures = Pictures(self.subscriptions, self.views, self.asker)
+        self.pictures = Pictures(self.subscriptions, self.views, session, self.asker)
         self._alive: set[PresenceKey] = set()
         self._browsers: set[Browser] = set()
         self._closed_browsers = Counter[str]()  # samples of closed browsers

@@ -59,7 +59,7 @@ def test_pages_of_listed_origins_show_pictures_and_video_and_others_do_not(mesh,
     (listed, other), pages = intranet
 
     async def main():
-        async with rendered(mesh, page, embed=(listed,)) as (address, *_), async_playwright() as playwright:
+        async with rendered(mesh, page, embed=(listed,)) as (address, _), async_playwright() as playwright:
             pages["/wall"] = EMBEDDING.format(address)
             browser = await playwright.chromium.launch(
                 executable_path=str(CHROMIUM), args=ARGUMENTS, timeout=LAUNCH_MS

@@ -151,10 +151,29 @@ def test_a_robot_at_rest_is_drawn_about_twice_a_second(mesh, tmp_path):
 
             task = asyncio.create_task(publish_home())
             video = monitor.subscribe("robomesh/hall/arm/video/front", newest=100, history=False)
-            messages = await frames(video, 6)
+            # The first ones follow a requested key frame.
+            messages = await frames(video, stream._MEASURED_PICTURES + 6)
             task.cancel()
-            took = messages[-1][0].received - messages[2][0].received
+            took = messages[-1][0].received - messages[-4][0].received
             assert took > 1.2  # four pictures; a moving arm would have fifty
+
+    run(main())
+
+
+def test_pictures_of_a_robot_at_rest_follow_a_requested_key_frame_at_the_full_rate(mesh, tmp_path):
+    """ffmpeg shows nothing before it has 21 pictures, which would take 10 s at two a second."""
+
+    async def main():
+        async with renderer_site(mesh, tmp_path) as (_, monitor):
+            await picture(monitor)
+            video = monitor.subscribe("robomesh/hall/arm/video/front", newest=100, history=False)
+            await frames(video, stream._MEASURED_PICTURES + 4)  # those of the first key frame, and at rest
+            key = "robomesh/hall/arm/video/front/keyframe/li"
+            async with asyncio.timeout(40):
+                while not (await monitor.ask(key, KeyFrameRequest())).forced:
+                    await asyncio.sleep(0.1)
+            messages = await frames(video, stream._MEASURED_PICTURES)
+            assert messages[-1][0].received - messages[0][0].received < 8.0
 
     run(main())
 

@@ -3,6 +3,7 @@
 import asyncio
 import io
 from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass
 from fractions import Fraction
 
 import av
@@ -14,7 +15,7 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from robomesh import reason_codes as codes
 from robomesh.errors import QuotaError, RefusedError
 from robomesh.header import Header
-from robomesh.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
+from robomesh.schemas.robomesh_pb2 import KeyFrameAnswer, ViewAnswer, ViewRequest
 from robomesh.subscription import Sample
 from services.console.http import pictures
 from services.console.http.streaming import Streamed
@@ -50,47 +51,69 @@ class Video:
         return CompressedVideo(data=bytes(packet), format="h264"), packet.is_keyframe
 
 
+@dataclass
+class Rendering:
+    """A simulated renderer's publishers, its task, and the key frames that were asked of it."""
+
+    images: list
+    videos: list
+    playing: asyncio.Task
+    key_frames: list
+
+
+@asynccontextmanager
+async def rendering(other):
+    """Run a simulated renderer in a session: its views, and 20 pictures a second while watched."""
+    key_frames = []
+
+    async def views(request):
+        if request.message.of != "front":
+            raise RefusedError(codes.VIEW_UNKNOWN(view=request.message.of, views="front"))
+        if request.message.width == 640:
+            raise QuotaError("li has had its views", again_s=30.5)
+        if request.message.width > 1920:
+            raise RefusedError(
+                codes.VIEW_INVALID(codes.VIEW_SIZE(width=2000, height=90, least=64, most=1920))
+            )
+        if request.message == ViewRequest(of="front"):
+            return ViewAnswer(topic="video/front", image="image/front", width=160, height=90, fps=20)
+        if request.message.width == 1920:
+            raise RefusedError(codes.VIEW_NO_ROOM(codes.VIEWS_TOO_MANY(count=1, most=1)))
+        return ViewAnswer(topic="video/free-1", image="image/free-1", width=160, height=90, fps=20)
+
+    async def key_frame(request):
+        key_frames.append(request.chunk)
+        return KeyFrameAnswer()
+
+    other.answer("s", "r", "views/*", views)
+    other.answer("s", "r", "video/*/keyframe/*", key_frame)
+    images = [other.declare_publisher("s", "r", f"image/{name}") for name in ("front", "free-1")]
+    videos = [other.declare_publisher("s", "r", f"video/{name}") for name in ("front", "free-1")]
+
+    async def play():
+        video, shade = Video(), 0
+        while True:
+            shade = (shade + 5) % 250
+            message, key = video.packet(shade)
+            for publisher in videos:
+                publisher.put(message, key_frame=key)
+            for publisher in images:
+                publisher.put(CompressedImage(data=jpeg(shade), format="jpeg"))
+            await asyncio.sleep(0.05)
+
+    playing = asyncio.create_task(play())
+    try:
+        yield Rendering(images, videos, playing, key_frames)
+    finally:
+        playing.cancel()
+        await asyncio.gather(playing, return_exceptions=True)
+
+
 @asynccontextmanager
 async def rendered(mesh, page, **settings):  # noqa: F811
-    """Yield a console and a simulated renderer: its views, and 20 pictures a second while watched."""
-    async with console(mesh, page, **settings) as (address, other):
-
-        async def views(request):
-            if request.message.of != "front":
-                raise RefusedError(codes.VIEW_UNKNOWN(view=request.message.of, views="front"))
-            if request.message.width == 640:
-                raise QuotaError("li has had its views", again_s=30.5)
-            if request.message.width > 1920:
-                raise RefusedError(
-                    codes.VIEW_INVALID(codes.VIEW_SIZE(width=2000, height=90, least=64, most=1920))
-                )
-            if request.message == ViewRequest(of="front"):
-                return ViewAnswer(topic="video/front", image="image/front", width=160, height=90, fps=20)
-            if request.message.width == 1920:
-                raise RefusedError(codes.VIEW_NO_ROOM(codes.VIEWS_TOO_MANY(count=1, most=1)))
-            return ViewAnswer(topic="video/free-1", image="image/free-1", width=160, height=90, fps=20)
-
-        other.answer("s", "r", "views/*", views)
-        images = [other.declare_publisher("s", "r", f"image/{name}") for name in ("front", "free-1")]
-        videos = [other.declare_publisher("s", "r", f"video/{name}") for name in ("front", "free-1")]
-
-        async def play():
-            video, shade = Video(), 0
-            while True:
-                shade = (shade + 5) % 250
-                message, key = video.packet(shade)
-                for publisher in videos:
-                    publisher.put(message, key_frame=key)
-                for publisher in images:
-                    publisher.put(CompressedImage(data=jpeg(shade), format="jpeg"))
-                await asyncio.sleep(0.05)
-
-        playing = asyncio.create_task(play())
-        try:
-            yield address, images, videos, playing
-        finally:
-            playing.cancel()
-            await asyncio.gather(playing, return_exceptions=True)
+    """Yield a console's address and a simulated renderer."""
+    async with console(mesh, page, **settings) as (address, other), rendering(other) as renderer:
+        yield address, renderer
 
 
 async def stream(address, path, *, until_bytes, method="GET", timeout_s=15.0):
@@ -121,7 +144,7 @@ async def unwatched(publishers, timeout_s=10.0):
 
 def test_mjpeg_is_one_picture_after_another_until_its_reader_goes(mesh, page):  # noqa: F811
     async def main():
-        async with rendered(mesh, page) as (address, images, _, __):
+        async with rendered(mesh, page) as (address, renderer):
             head, body, (_, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=12_000)
             assert "200 ok" in head
             assert "multipart/x-mixed-replace; boundary=picture" in head
@@ -132,9 +155,9 @@ def test_mjpeg_is_one_picture_after_another_until_its_reader_goes(mesh, page):  
                     shades += [frame.to_ndarray(format="gray").mean() for frame in container.decode(video=0)]
             assert len({round(shade) for shade in shades}) > 2
             # The shared view: nothing is rendered for this reader only.
-            assert [publisher.watched for publisher in images] == [True, False]
+            assert [publisher.watched for publisher in renderer.images] == [True, False]
             writer.close()
-            await unwatched(images)
+            await unwatched(renderer.images)
 
     run(main())
 
@@ -144,10 +167,10 @@ def test_an_mjpeg_whose_pictures_end_says_that_it_is_stale_and_then_ends(mesh, p
     monkeypatch.setattr(pictures, "_SILENT_S", 0.75)
 
     async def main():
-        async with rendered(mesh, page) as (address, _, __, playing):
+        async with rendered(mesh, page) as (address, renderer):
             _, body, (reader, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=1_000)
             assert body.count(b"--picture\r\n") > body.count(pictures._STALE)
-            playing.cancel()
+            renderer.playing.cancel()
             async with asyncio.timeout(40):
                 body = await pieces_of(reader, 1_000_000)
             assert body.count(pictures._STALE) >= 2
@@ -159,7 +182,7 @@ def test_an_mjpeg_whose_pictures_end_says_that_it_is_stale_and_then_ends(mesh, p
 
 def test_a_head_of_a_stream_ends_with_its_headers(mesh, page):  # noqa: F811
     async def main():
-        async with rendered(mesh, page) as (address, *_):
+        async with rendered(mesh, page) as (address, _):
             for ending, kind in (("mjpeg", "multipart/x-mixed-replace"), ("mp4", "video/mp4")):
                 head, _, (reader, writer) = await stream(
                     address, f"/video/s/r/front.{ending}", until_bytes=0, method="HEAD"
@@ -195,7 +218,7 @@ def test_a_reader_that_takes_nothing_loses_its_stream():
 
 def test_mp4_plays_while_it_happens_until_its_reader_goes(mesh, page):  # noqa: F811
     async def main():
-        async with rendered(mesh, page) as (address, _, videos, __):
+        async with rendered(mesh, page) as (address, renderer):
             head, body, (_, writer) = await stream(address, "/video/s/r/front.mp4", until_bytes=6_000)
             assert "200 ok" in head
             assert "video/mp4" in head
@@ -204,21 +227,38 @@ def test_mp4_plays_while_it_happens_until_its_reader_goes(mesh, page):  # noqa: 
                 shades += [frame.to_ndarray(format="gray").mean() for frame in container.decode(video=0)]
             assert len({round(shade) for shade in shades}) > 5
             writer.close()
-            await unwatched(videos)
+            await unwatched(renderer.videos)
+
+    run(main())
+
+
+def test_every_mp4_asks_for_a_key_frame_also_one_that_joins_another(mesh, page):  # noqa: F811
+    async def main():
+        async with rendered(mesh, page) as (address, renderer):
+            writers = []
+            for readers in (1, 2):
+                _, _, (_, writer) = await stream(address, "/video/s/r/front.mp4", until_bytes=1_000)
+                writers.append(writer)
+                async with asyncio.timeout(40):
+                    while len(renderer.key_frames) < readers:
+                        await asyncio.sleep(0.02)
+            for writer in writers:
+                writer.close()
+            await unwatched(renderer.videos)
 
     run(main())
 
 
 def test_a_still_is_the_newest_picture_as_jpeg_or_png(mesh, page):  # noqa: F811
     async def main():
-        async with rendered(mesh, page) as (address, images, *_):
+        async with rendered(mesh, page) as (address, renderer):
             for ending, kind in (("jpg", "image/jpeg"), ("png", "image/png")):
                 status, headers, body = await get(address, f"/image/s/r/front.{ending}")
                 assert (status, headers["content-type"]) == (200, kind)
                 with av.open(io.BytesIO(body)) as container:
                     frame = next(container.decode(video=0))
                 assert (frame.width, frame.height) == (WIDTH, HEIGHT)
-            await unwatched(images)
+            await unwatched(renderer.images)
 
     run(main())
 
@@ -240,7 +280,7 @@ def test_a_still_is_the_newest_picture_as_jpeg_or_png(mesh, page):  # noqa: F811
 )
 def test_a_missing_picture_is_refused_with_code_and_sentence(mesh, page, path, status, code, words):  # noqa: F811
     async def main():
-        async with rendered(mesh, page) as (address, *_):
+        async with rendered(mesh, page) as (address, _):
             answered, headers, body = await get(address, f"/{path}")
             assert answered == status
             assert headers.get("retry-after") == ("31" if status == 429 else None)
@@ -269,18 +309,18 @@ def test_more_streams_than_there_is_room_for_are_refused_and_room_comes_back(mes
     monkeypatch.setattr(pictures, most, 1)
 
     async def main():
-        async with rendered(mesh, page) as (address, images, *_):
+        async with rendered(mesh, page) as (address, renderer):
             _, _, (_, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=100)
             status, headers, body = await get(address, "/video/s/r/front.mjpeg")
             assert status == 503
             suffix = "_of" if most == "_MOST_OF_ONE" else ""
             assert read_refusal(headers, body).code == f"view.too_many_streams{suffix}"
             writer.close()
-            await unwatched(images)
+            await unwatched(renderer.images)
             head, _, (_, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=100)
             assert "200 ok" in head
             writer.close()
-            await unwatched(images)
+            await unwatched(renderer.images)
 
     run(main())
 

@@ -14,8 +14,9 @@ import contextlib
 import logging
 import time
 from collections import Counter
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import AsyncGenerator, Callable, Coroutine
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -33,7 +34,8 @@ from renderer.mp4 import FragmentedMp4
 from robomesh import keys
 from robomesh import reason_codes as codes
 from robomesh.errors import BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError, RobomeshError
-from robomesh.schemas.robomesh_pb2 import VideoFrames, ViewRequest
+from robomesh.schemas.robomesh_pb2 import KeyFrameRequest, VideoFrames, ViewRequest
+from robomesh.session import Session
 from robomesh.subscription import Sample
 from services.console.errors import RefusedRequest
 from services.console.http.error_responses import (
@@ -92,6 +94,7 @@ class Pictures:
 
     subscriptions: SharedSubscriptions
     views: Views
+    session: Session
     asker: Callable[[Scope], str]
     streams: Counter[str] = field(default_factory=Counter)  # by address
     stills: int = 0
@@ -115,8 +118,13 @@ class Pictures:
     async def mp4(self, request: Request) -> Response:
         """Send fragmented MP4, from the newest key frame on."""
         view = await self._view(request)
-        pieces = _fragments(self.subscriptions, view.video)
+        pieces = _fragments(self.subscriptions, view, partial(self._want_key_frame, request, view.video))
         return await self._stream(request, pieces, view.video, "video/mp4")
+
+    async def _want_key_frame(self, request: Request, key: str) -> None:
+        """Ask for a key frame, with which the renderer sends pictures at the full rate for a moment."""
+        with contextlib.suppress(RobomeshError):  # the next key frame comes within 2 s anyway
+            await self.session.ask(f"{key}/keyframe/{self.asker(request.scope)}", KeyFrameRequest())
 
     async def still(self, request: Request) -> Response:
         """Send the newest picture as JPEG."""
@@ -260,18 +268,25 @@ async def _mjpeg_parts(
             silent_s = silent_s + stale_after_s if sample is None else 0.0
 
 
-async def _fragments(subscriptions: SharedSubscriptions, key: str) -> AsyncGenerator[bytes]:
+async def _fragments(
+    subscriptions: SharedSubscriptions, view: _View, want_key_frame: Callable[[], Coroutine[None, None, None]]
+) -> AsyncGenerator[bytes]:
     """Yield MP4 fragments. Earlier frames are shown at the start: the times are those of arrival."""
     mp4 = FragmentedMp4()
-    with contextlib.closing(_Watch(subscriptions, key, VideoQueue())) as watch:
-        while (sample := await watch.next(_SILENT_S)) is not None:
-            try:
-                piece = b"".join(mp4.add(data, at) for data, at in _packets(sample))
-            except (DecodeError, Mp4Error) as error:
-                log.info("an MP4 stream ended: %s", error)
-                return
-            if piece:
-                yield piece
+    with contextlib.closing(_Watch(subscriptions, view.video, VideoQueue())) as watch:
+        asking = asyncio.create_task(want_key_frame())
+        try:
+            while (sample := await watch.next(_SILENT_S)) is not None:
+                try:
+                    packets = _packets(sample)
+                    piece = b"".join(mp4.add(data, at, usual_s=1.0 / view.fps) for data, at in packets)
+                except (DecodeError, Mp4Error) as error:
+                    log.info("an MP4 stream ended: %s", error)
+                    return
+                if piece:
+                    yield piece
+        finally:
+            asking.cancel()
 
 
 def _packets(sample: Sample) -> list[tuple[bytes, int]]:
