@@ -36,6 +36,10 @@ RUN --mount=type=cache,target=/root/.cache/uv \
     /opt/uv/bin/uv venv --quiet /opt/robomesh \
  && UV_LINK_MODE=copy /opt/uv/bin/uv pip install --quiet --python /opt/robomesh/bin/python \
       --constraint /dist/requirements.lock "$(echo /dist/robomesh-*.whl)[$ROLE]" \
+ && case "$ROLE" in gateway|kinematics) \
+      /opt/uv/bin/uv pip install --quiet --python /opt/robomesh/bin/python --no-deps \
+        --constraint /dist/requirements.lock eaik;; \
+    esac \
  && /opt/robomesh/bin/python -m compileall -q /opt/robomesh
 # What a role keeps is below /data, each part a volume of its own; everything else may be read-only.
 RUN useradd --uid 10001 --create-home robomesh \

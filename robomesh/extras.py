@@ -20,7 +20,7 @@ EXTRAS = {
     "pinocchio": "robots",
     "rerun": "rerun",
     "rosbags": "ros2",
-    "ruckig": "robots",
+    "ruckig": "simulator",
     "starlette": "console",
     "tomlkit": "console",
     "trimesh": "robots",

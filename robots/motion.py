@@ -1,4 +1,4 @@
-"""Jerk-limited motion of all joints, as a function of time.
+"""Jerk-limited motion of all joints, as a function of time, for the simulated controller.
 
 A motion is planned once and then sampled, so a late tick causes no error. From rest to rest it is a straight
 line in joint space. It stays on this line, which may have been collision-checked, when its speed changes,
@@ -14,12 +14,9 @@ import numpy as np
 import ruckig
 
 from robots.joints import FloatArray, Joints
+from robots.straight_motion import Limits, StraightMotion, line_limits, straight_motion
 
-# Homing is slow because the positions are not yet known. The rest is for the search of the joints' marks.
-HOMING_SPEED = 0.5
-HOMING_REST_S = 0.5
-
-# State on a line (position, velocity, acceleration) or limits (velocity, acceleration, jerk).
+# State on a line: position, velocity, acceleration.
 _Values: TypeAlias = tuple[float, float, float]
 
 
@@ -41,69 +38,6 @@ class _Trajectory(Protocol):
     def at_time(self, time_s: float) -> Any: ...
 
 
-@dataclass(frozen=True, eq=False)
-class StraightMotion:
-    """Motion on a straight line in joint space, to its target or until it has braked.
-
-    One profile moves all joints; the joint that reaches its limit first determines the speed. Ruckig's
-    phase-synchronized motion is not used: it silently leaves the straight line if the slowest joint's profile
-    exceeds another joint's limits, and the driven line must be the checked line.
-
-    Attributes:
-        start, target: (n,) the line's ends [rad] or [m].
-        end: (n,) where the motion ends: at the target unless it brakes.
-        duration: [s]
-    """
-
-    start: FloatArray
-    target: FloatArray
-    end: FloatArray
-    duration: float
-    _joints: Joints
-    # Ruckig's phases: start times [s], and (phases, 4) share of the way with its rate, acceleration and jerk.
-    _times: FloatArray
-    _shares: FloatArray
-
-    def progress(self, times_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the completed share of the way at times (m,), 0 to 1, and its rate [1/s]."""
-        share, rate, _ = self._at(times_s)
-        return np.clip(share, 0.0, 1.0), rate
-
-    def at_time(self, time_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the (n,) positions, velocities and accelerations at a time since the start."""
-        share, rate, curvature = self._at(np.float64(time_s))
-        way = self.target - self.start
-        return self.start + share * way, rate * way, curvature * way
-
-    def at_speed(self, time_s: float, speed: float) -> "StraightMotion":
-        """Return the motion from its state at a time to the target, at another speed."""
-        return _plan_on_line(self._joints, self.start, self.target, self._at(np.float64(time_s)), speed=speed)
-
-    def braked(self, time_s: float) -> "StraightMotion":
-        """Return the motion from its state at a time to rest, as fast as the limits allow."""
-        return _plan_on_line(self._joints, self.start, self.target, self._at(np.float64(time_s)), speed=None)
-
-    def _at(self, times_s: Any) -> tuple[Any, Any, Any]:
-        phase = np.clip(np.searchsorted(self._times, times_s, side="right") - 1, 0, len(self._times) - 1)
-        t = np.clip(times_s, 0.0, self.duration) - self._times[phase]
-        s, v, a, j = self._shares[phase].T
-        return s + t * (v + t * (a / 2 + t * j / 6)), v + t * (a + t * j / 2), a + t * j
-
-
-def straight_motion(
-    joints: Joints, start: FloatArray, target: FloatArray, *, speed: float
-) -> StraightMotion | None:
-    """Plan a straight motion from rest to rest; None if start and target are equal.
-
-    Args:
-        start, target: (n,) [rad] or [m].
-        speed: Fraction of the joints' maximum speeds, in (0, 1].
-    """
-    if np.array_equal(start, target):
-        return None
-    return _plan_on_line(joints, start, target, (0.0, 0.0, 0.0), speed=speed)
-
-
 def _plan_on_line(
     joints: Joints,
     start: FloatArray,
@@ -118,15 +52,8 @@ def _plan_on_line(
         begin: Completed share of the way, its rate [1/s] and its acceleration [1/s²].
         speed: Fraction of the joints' maximum speeds; None to brake.
     """
-    way = np.abs(target - start)
-    moving = way > 0
-    # Scale by the way of the joint that moves farthest, so that ruckig sees values of a joint's magnitude.
-    length = float(way.max())
-    fastest, quickest, sharpest = (
-        float((limit[moving] * (length / way[moving])).min())
-        for limit in (joints.max_speed * (speed or 1.0), joints.max_acceleration, joints.max_jerk)
-    )
-    at, limits = (begin[0] * length, begin[1] * length, begin[2] * length), (fastest, quickest, sharpest)
+    length, limits = line_limits(joints, start, target, speed or 1.0)
+    at = begin[0] * length, begin[1] * length, begin[2] * length
     parts = [_plan_to_speed(at, 0.0, limits)] if speed is None else _plan_to_position(at, length, limits)
     end = (
         target
@@ -136,10 +63,10 @@ def _plan_on_line(
     phases = np.concatenate([_phases(part) for part in parts])
     begins = np.concatenate([[0.0], np.cumsum(phases[:-1, 0])])
     duration = sum(part.duration for part in parts)
-    return StraightMotion(start, target, end, duration, joints, begins, phases[:, 1:] / length)
+    return StraightMotion(start, target, end, duration, begins, phases[:, 1:] / length)
 
 
-def _plan_to_position(at: _Values, place: float, limits: _Values) -> list[Any]:
+def _plan_to_position(at: _Values, place: float, limits: Limits) -> list[Any]:
     """Return consecutive trajectories of one value, to rest at a position ahead."""
     _, velocity, acceleration = at
     fastest, quickest, sharpest = limits
@@ -158,7 +85,7 @@ def _plan_to_position(at: _Values, place: float, limits: _Values) -> list[Any]:
     return [*first, _calculate(ruckig.Ruckig(1), request)]
 
 
-def _plan_to_speed(at: _Values, speed: float, limits: _Values) -> Any:
+def _plan_to_speed(at: _Values, speed: float, limits: Limits) -> Any:
     """Return a trajectory of one value to a speed."""
     request = _request_from(at, limits)
     request.control_interface = ruckig.ControlInterface.Velocity
@@ -166,7 +93,7 @@ def _plan_to_speed(at: _Values, speed: float, limits: _Values) -> Any:
     return _calculate(ruckig.Ruckig(1), request)
 
 
-def _request_from(at: _Values, limits: _Values) -> ruckig.InputParameter:
+def _request_from(at: _Values, limits: Limits) -> ruckig.InputParameter:
     request = ruckig.InputParameter(1)
     request.current_position, request.current_velocity, request.current_acceleration = ([x] for x in at)
     request.max_velocity, request.max_acceleration, request.max_jerk = ([x] for x in limits)
@@ -238,7 +165,7 @@ class Motion:
             )
             return
         if isinstance(line, StraightMotion) and np.array_equal(line.target, target):
-            self._follow(line.at_speed(now_s - self._begin_s, speed), now_s, target)
+            self._follow(self._replanned(line, now_s, speed), now_s, target)
             return
         request = self._request(now_s, speed)
         request.target_position = target.tolist()
@@ -249,7 +176,7 @@ class Motion:
         """Brake as fast as acceleration and jerk limits allow; a straight motion stays on its line."""
         line = self._trajectory
         if isinstance(line, StraightMotion) and self.moving(now_s):
-            braked = line.braked(now_s - self._begin_s)
+            braked = self._replanned(line, now_s, None)
             self._follow(braked, now_s, braked.end)
             return
         request = self._request(now_s, 1.0)
@@ -257,6 +184,11 @@ class Motion:
         trajectory = _calculate(self._planner, request)
         end = trajectory.at_time(trajectory.duration)[0]
         self._follow(trajectory, now_s, np.array(end, dtype=np.float64))
+
+    def _replanned(self, line: StraightMotion, now_s: float, speed: float | None) -> StraightMotion:
+        """Return the motion from now to the line's target, at another speed; None: to rest, on the line."""
+        at = line.share_at(np.float64(now_s - self._begin_s))
+        return _plan_on_line(self._joints, line.start, line.target, at, speed=speed)
 
     def _request(self, now_s: float, speed: float) -> ruckig.InputParameter:
         state = self.state(now_s)

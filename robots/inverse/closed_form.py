@@ -4,6 +4,8 @@ Source: Ostermeier, Kuelz, Althoff 2025, "Automatic geometric decomposition for 
 kinematics".
 """
 
+import functools
+import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, pi
@@ -11,11 +13,12 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from eaik.pybindings import EAIK
 
 from robots.inverse.chain import Chain, placement_misses
 from robots.inverse.tasks import Task
 from robots.joints import FloatArray
+
+log = logging.getLogger(__name__)
 
 _TURN = 2 * pi
 # Tolerance of limits for rounding [rad].
@@ -47,11 +50,14 @@ class ClosedForm:
 
 
 def closed_form(chain: Chain) -> ClosedForm | None:
-    """Return the closed form of a chain; None if the arm is unsupported or verification fails."""
+    """Return the closed form of a chain; None if the arm or Python is unsupported, or verification fails."""
     if not (chain.serial and chain.rotary and len(chain.moving) in (5, 6)):
         return None
+    eaik = _eaik()
+    if eaik is None:
+        return None
     joints_and_tool = np.vstack([np.zeros(3), chain.origins, chain.tool_to_base[:3, 3]])
-    arm = EAIK.Robot(chain.axes.T, np.diff(joints_and_tool, axis=0).T, chain.tool_to_base[:3, :3], [], True)
+    arm = eaik.Robot(chain.axes.T, np.diff(joints_and_tool, axis=0).T, chain.tool_to_base[:3, :3], [], True)
     if not arm.has_known_decomposition():
         return None
     axis, away = chain.tool_to_base[:3, 2], chain.tool_to_base[:3, 3] - chain.origins[-1]
@@ -63,6 +69,20 @@ def closed_form(chain: Chain) -> ClosedForm | None:
         if all(_recovers(form, random.uniform(-np.pi, np.pi, len(chain.moving))) for _ in range(_TRIALS))
         else None
     )
+
+
+@functools.cache
+def _eaik() -> Any:
+    """Return EAIK's module; None, with one line of log, if it is not installed."""
+    try:
+        from eaik.pybindings import EAIK
+    except ModuleNotFoundError:
+        log.warning(
+            "eaik is not installed, so inverse kinematics searches: slower, and it may miss a solution of "
+            "several. To install it (Python 3.11 to 3.13): pip install --no-deps eaik"
+        )
+        return None
+    return EAIK
 
 
 def _recovers(form: ClosedForm, x: FloatArray) -> bool:

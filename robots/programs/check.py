@@ -13,7 +13,6 @@ from robots.collision.floor import floor_advice
 from robots.errors import ProgramError
 from robots.inverse import InverseSolver, build_solver
 from robots.joints import FloatArray, Joints, as_positions, violations
-from robots.motion import HOMING_REST_S, HOMING_SPEED, straight_motion
 from robots.programs.path import PathSamples
 from robots.programs.plan import plan_program
 from robots.programs.segments import Segment, SegmentChecker
@@ -28,6 +27,7 @@ from robots.programs.steps import (
 )
 from robots.programs.text import parse_program
 from robots.programs.violations import Runs
+from robots.straight_motion import HOMING_REST_S, HOMING_SPEED, straight_motion
 
 # Size of the cache of motions' timings.
 _MOST_KEPT = 1_000

@@ -30,7 +30,8 @@ from protocol_gateway.core.records import (
 )
 from protocol_gateway.core.scales import si_scales
 from robots.joints import FloatArray, Joints
-from robots.motion import HOMING_REST_S, HOMING_SPEED, Motion
+from robots.motion import Motion
+from robots.straight_motion import HOMING_REST_S, HOMING_SPEED
 from services.simulator.unit_execution import Move, Order, SetSpeed, Situation, Word, asks_to_stop, orders_of
 
 _DEMO_SPEED = 0.6

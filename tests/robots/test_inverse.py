@@ -1,6 +1,7 @@
 """Inverse kinematics: every solution is verified by forward kinematics."""
 
 import pickle
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,16 @@ from robomesh.reasons import Reason
 from robots.description import load, parse
 from robots.errors import JointCountError, PoseError
 from robots.example_robots import example_folder
-from robots.inverse import InverseSolver, Task, build_solver, follow, natural_task, solve, tool_pose
+from robots.inverse import (
+    InverseSolver,
+    Task,
+    build_solver,
+    closed_form,
+    follow,
+    natural_task,
+    solve,
+    tool_pose,
+)
 from robots.joints import violations
 from robots.model import build_model, tool_placement
 from tests.robots.arms import allowed_positions, arm, dh_arm, reached, telescope
@@ -49,6 +59,25 @@ def test_closed_form_is_used_if_the_arms_family_has_one(name: str, analytic: boo
     _, model, solver = arm(name)
     for positions in allowed_positions(model, 10):
         assert solve(solver, tool_placement(model, positions), task=Task.POSE_6D).analytic is analytic
+
+
+def test_without_eaik_poses_are_solved_by_search_and_one_line_says_so(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    description, model, _ = arm("puma560")
+    monkeypatch.setitem(sys.modules, "eaik.pybindings", None)
+    closed_form._eaik.cache_clear()
+    try:
+        solvers = [build_solver(description) for _ in range(2)]
+    finally:
+        closed_form._eaik.cache_clear()
+    (line,) = [each.message for each in caplog.records]
+    assert line.startswith("eaik is not installed, so inverse kinematics searches")
+    for positions in allowed_positions(model, 10):
+        target = tool_placement(model, positions)
+        result = solve(solvers[0], target, task=Task.POSE_6D)
+        assert not result.analytic
+        assert reached(model, result.solutions[0], target, roll=True) < 1e-8
 
 
 def test_all_postures_of_a_puma_are_found_once_each() -> None:

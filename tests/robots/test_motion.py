@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from robots.description import load
 from robots.joints import joints_of
-from robots.motion import Motion, straight_motion
+from robots.motion import Motion, _plan_on_line
+from robots.straight_motion import straight_motion
 
 JOINTS = joints_of(load("pt600"))
 # The ratios differ between joints, so ruckig's phase synchronization would leave the straight line.
@@ -115,5 +116,22 @@ def test_duration_follows_from_way_speed_acceleration_and_jerk():
     assert rate == pytest.approx([0.0, 1.0, 0.0], abs=1e-9)
 
 
+@settings(max_examples=300)
+@given(
+    st.floats(-9.0, 1.5).map(lambda exponent: 10.0**exponent),
+    st.floats(0.01, 1.0),
+    st.sampled_from([JOINTS, UNEVEN]),
+)
+def test_motion_from_rest_is_the_one_that_ruckig_plans(way, speed, joints):
+    target = joints.home + way * np.array([1.0, -0.3, 0.0, 0.7, 0.2])
+    motion = straight_motion(joints, joints.home, target, speed=speed)
+    ruckigs = _plan_on_line(joints, joints.home, target, (0.0, 0.0, 0.0), speed=speed)
+    assert motion.duration == pytest.approx(ruckigs.duration, rel=1e-6, abs=1e-9)
+    for time_s in np.linspace(0.0, motion.duration, 20):
+        for own, other in zip(motion.at_time(time_s), ruckigs.at_time(time_s), strict=True):
+            assert own == pytest.approx(other, rel=1e-5, abs=1e-6)
+
+
 def test_motion_of_length_zero_takes_no_time():
-    assert straight_motion(JOINTS, JOINTS.home, JOINTS.home.copy(), speed=1.0) is None
+    for way in (0.0, 1e-320, 1e-200, 1e-16):
+        assert straight_motion(JOINTS, 0 * JOINTS.home, way + 0 * JOINTS.home, speed=1.0) is None

@@ -11,12 +11,13 @@ from robots.cells import CellDescription, CellRobot
 from robots.collision import Cell, build_cell
 from robots.collision.path import SAMPLE_M, placements_along, travelled
 from robots.model import tool_jacobian, tool_placement
-from robots.motion import HOMING_REST_S, Motion
+from robots.motion import Motion
 from robots.programs.check import check_plan, check_program
 from robots.programs.steps import CheckResult, Step, StepKind, ViolationKind
 from robots.programs.tool_chain import samples_between, tool_chain, tools_and_jacobians
 from robots.programs.violations import MOST_VIOLATIONS, Runs
 from robots.singularity import reach_of, singularity_margin, singularity_margins
+from robots.straight_motion import HOMING_REST_S
 from tests.robots.boxes import bar_arm, block, cell_of, placed
 
 STRETCHED = np.zeros(2)

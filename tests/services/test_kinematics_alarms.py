@@ -8,8 +8,8 @@ from robots.collision import Nearest
 from robots.description import load
 from robots.joints import joints_of
 from robots.model import build_model
-from robots.motion import straight_motion
 from robots.singularity import reach_of, singularity_margin
+from robots.straight_motion import straight_motion
 from services.kinematics.alarms import Alarms
 from services.kinematics.conditions import (
     limit_conditions,
