@@ -22,7 +22,7 @@ from robots import description
 from robots.bounded_toml import read_toml
 from robots.errors import DescriptionError
 from robots.kinematic_tree import BASE, bare_links, tree_of
-from robots.schema import UrdfDescription
+from robots.schema import Pose, UrdfDescription
 from services.errors import ListenError, SiteFileError
 from services.site_file.console import Console
 from services.site_file.console import resolve_paths as resolve_console_paths
@@ -294,9 +294,19 @@ def _tcp_address(endpoint: str) -> str:
     return re.split("[?#]", rest)[0] if protocol in ("tcp", "tls") else ""
 
 
-# The site without a file. In a checkout the folder robots/ is the program's own, hence my-robots/.
+# The site without a file: an arm at a workbench. In a checkout the folder robots/ is the program's own, hence
+# my-robots/.
 DEMO = Site(
     site="demo",
-    robot=(Robot(name="pt600", model="pt600", demo=True),),
+    robot=(Robot(name="pt600", model="pt600", demo=True, cell="demo", check="require"),),
+    fixture=(
+        Fixture(
+            cell="demo",
+            name="workbench",  # low enough for the demo's tour: tests/services/test_simulated_motion.py
+            box=(400.0, 1200.0, 100.0),
+            pose=Pose(xyz=(600.0, 0.0, 50.0)),
+            color="#8a8f94",
+        ),
+    ),
     define=Define(folder=Path("my-robots")),
 )

@@ -10,10 +10,14 @@ from hypothesis import strategies as st
 from protocol_gateway.core.records import AbsolutePositions, Command
 from robots.description import load
 from robots.joints import joints_of, violations
+from robots.collision.cell import build_cell
+from robots.collision.distance import outside_clearance
 from robots.model import build_model, tool_placement
 from robots.motion import Motion
 from services.simulator.controller import Controller
 from services.simulator.demo import demo_tour
+from services.site_file.cells import cells_of
+from services.site_file.site import DEMO
 
 PT600 = load("pt600")
 JOINTS = joints_of(PT600)
@@ -59,6 +63,16 @@ def test_the_demo_tours_several_poses_within_limits_and_above_the_floor(robot):
             assert not violations(joints, positions)
             assert tool_placement(model, positions)[2, 3] > 0.1
         now_s = motion.end_s
+
+
+def test_the_built_in_site_moves_clear_of_its_workbench():
+    cell = build_cell(cells_of(DEMO)["pt600"])
+    tour = [JOINTS.home, *itertools.islice(demo_tour(PT600), 10)]
+    warning_m = cell.arms["pt600"].warning_m
+    for begin, end in itertools.pairwise(tour):
+        for positions in np.linspace(begin, end, 25):
+            found = outside_clearance(cell, "pt600", positions, {})
+            assert found is not None and found.distance_m > warning_m, found
 
 
 def test_speed_hold_resume_and_stop_stay_on_the_checked_line():

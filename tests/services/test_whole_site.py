@@ -399,6 +399,7 @@ def test_ctrl_c_waits_until_what_moves_is_stopped_and_what_is_recorded_is_closed
     entries = [json.loads(line) for line in log.read_text().splitlines()]
     # The program that moved the arm may have asked for more, which is refused and in the log too.
     own = [each for each in entries if each["operator"] == "gateway"]
+    assert len(own) >= 2, entries
     stopped, ended = own[-2:]
     assert stopped["request"] == "STOP"
     # On a busy machine the program may not have renewed its lease in time.
