@@ -5,9 +5,12 @@ import os
 import signal
 from contextlib import asynccontextmanager
 
+import pytest
+
+from robomesh.errors import RefusedError
 from services.command_line.discovery import Robot
 from services.command_line.live.send import joined
-from services.command_line.recordings.record import _record
+from services.command_line.recordings.record import _interrupted, _record, _stop
 from tests.conftest import run
 from tests.services.recording import put_states, recording_site, trace_off
 from tests.services.test_recorder import fill_disk_under
@@ -43,6 +46,31 @@ def test_ctrl_c_ends_a_recording_and_prints_a_summary(mesh, router, tmp_path, ca
     done = run(main())
     assert (done.recording.name, done.problem) == ("trial", "")
     assert (tmp_path / "arm" / done.recording.file).is_file()
+
+
+def test_a_recording_of_another_client_is_ended_from_the_command_line(mesh, router, tmp_path, capsys):
+    async def main():
+        async with arm_recorded(mesh, tmp_path):
+            recording = asyncio.create_task(_record("arm", "trial", ["-"], router))
+            await until_printed(capsys, "Ctrl-C ends it")
+            ended = await _stop("arm", router)
+            assert (ended.name, ended.open) == ("trial", False)
+            with pytest.raises(RefusedError, match="is not being recorded"):
+                await _stop("arm", router)
+            return await recording
+
+    assert run(main()).problem == "recording trial was ended by another"
+
+
+def test_a_second_ctrl_c_does_not_end_the_program_before_the_recording():
+    async def main():
+        async with _interrupted() as pressed:
+            os.kill(os.getpid(), signal.SIGINT)
+            await pressed.wait()
+            os.kill(os.getpid(), signal.SIGINT)  # `timeout --signal INT` sends both
+            await asyncio.sleep(0.05)
+
+    run(main())
 
 
 def test_a_recording_ended_by_another_client_is_reported(mesh, router, tmp_path, capsys):

@@ -126,13 +126,19 @@ def record(
         list[str] | None,
         typer.Option(metavar="VIEW", help="Record this view's video too; repeatable; -: no video."),
     ] = None,
+    stop: Annotated[bool, typer.Option("--stop", help="End its recording, whoever started it.")] = False,
     connect: Connect = DEFAULT_ROUTER,
     as_json: Json = False,
 ) -> None:
     """Record a robot until Ctrl-C."""
     from services.command_line.recordings import record as command
 
-    command.record(robot, name, view or (), connect, as_json)
+    if not stop:
+        command.record(robot, name, view or (), connect, as_json)
+    elif name or view:
+        raise typer.BadParameter("--stop ends a recording: give it without --name and --view")
+    else:
+        command.stop(robot, connect, as_json)
 
 
 @app.command()

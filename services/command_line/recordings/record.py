@@ -49,6 +49,27 @@ def record(robot: str, name: str, views: Sequence[str], router: str, as_json: bo
         raise typer.Exit(1)
 
 
+def stop(robot: str, router: str, as_json: bool) -> None:
+    """End the recording of a robot, also one that another client started, and print its content."""
+    ended = discovery.run(_stop(robot, router))
+    if as_json:
+        show(ended, as_json)
+    else:
+        print(summary(ended), flush=True)
+
+
+async def _stop(text: str, router: str) -> schema.Recording:
+    async with discovery.attached(router) as session:
+        return await _trace_off(session, await discovery.find(session, text))
+
+
+async def _trace_off(session: Session, robot: discovery.Robot) -> schema.Recording:
+    key = robot_key(*robot, "recorder/request")
+    ended = await session.ask(key, _Request(action=_Request.TRACE_OFF), timeout_s=10.0)
+    assert isinstance(ended, schema.Recording)
+    return ended
+
+
 async def _record(text: str, name: str, views: Sequence[str], router: str) -> _Done:
     async with discovery.attached(router) as session, _interrupted() as interrupted:
         robot = await discovery.find(session, text)
@@ -66,8 +87,7 @@ async def _record(text: str, name: str, views: Sequence[str], router: str) -> _D
         pressed.cancel()
         if not ending.done():
             with contextlib.suppress(RefusedError):  # it has just ended; its state has the reason
-                done = await session.ask(key, _Request(action=_Request.TRACE_OFF), timeout_s=10.0)
-                assert isinstance(done, schema.Recording)
+                done = await _trace_off(session, robot)
                 ending.cancel()
                 return _Done(done, f"recording {done.name} {done.problem}" if done.problem else "")
         return await ending
@@ -115,21 +135,18 @@ def _gone(newest: schema.Recording) -> str:
 
 @asynccontextmanager
 async def _interrupted() -> AsyncIterator[asyncio.Event]:
-    """Yield an event that Ctrl-C sets; a second Ctrl-C ends the program."""
+    """Yield an event that Ctrl-C sets.
+
+    A second Ctrl-C has no effect: it would leave the recording open. `timeout --signal INT` sends two.
+    """
     pressed = asyncio.Event()
     loop = asyncio.get_running_loop()
 
-    def restore() -> None:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            loop.remove_signal_handler(number)
-
-    def press() -> None:
-        pressed.set()
-        restore()
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, press)
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    for number in numbers:
+        loop.add_signal_handler(number, pressed.set)
     try:
         yield pressed
     finally:
-        restore()
+        for number in numbers:
+            loop.remove_signal_handler(number)
