@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from protocol_gateway.core.records import AbsolutePositions, Command
-from robots.description import load
-from robots.joints import joints_of, violations
 from robots.collision.cell import build_cell
 from robots.collision.distance import outside_clearance
+from robots.description import load
+from robots.joints import joints_of, violations
 from robots.model import build_model, tool_placement
 from robots.motion import Motion
 from services.simulator.controller import Controller
@@ -72,7 +72,8 @@ def test_the_built_in_site_moves_clear_of_its_workbench():
     for begin, end in itertools.pairwise(tour):
         for positions in np.linspace(begin, end, 25):
             found = outside_clearance(cell, "pt600", positions, {})
-            assert found is not None and found.distance_m > warning_m, found
+            assert found
+            assert found.distance_m > warning_m, found
 
 
 def test_speed_hold_resume_and_stop_stay_on_the_checked_line():
