@@ -397,8 +397,8 @@ def test_ctrl_c_waits_until_what_moves_is_stopped_and_what_is_recorded_is_closed
     log = tmp_path / "audit" / "test" / "arm.jsonl"
     assert robomesh("audit", "verify", str(log)).returncode == 0
     entries = [json.loads(line) for line in log.read_text().splitlines()]
-    # The program that moved the arm may have asked for more, which is refused and in the log too. On a busy machine
-    # it may also have requested the stop itself, because its renewals had no answer; the gateway sends none then.
+    # The program that moved the arm may have asked for more, which is refused and in the log too. On a busy
+    # machine its renewals may have had no answer: then it requests the stop itself, and the gateway none.
     ended = [each for each in entries if each["operator"] == "gateway"][-1]
     requests = [each["request"] for each in entries]
     assert requests.index("MOVE_ABSOLUTE") < requests.index("STOP") < entries.index(ended), requests
