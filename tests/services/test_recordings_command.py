@@ -10,12 +10,15 @@ from datetime import datetime
 import av
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from robomesh.errors import QuotaError
 from robomesh.recordings.capture import Capture
+from robomesh.recordings.series import Series
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
 from services.command_line.main import run
+from services.command_line.recordings import plots
 from services.command_line.recordings.output import atomic_file
 from services.recorder.serving import RecordingServer
 from tests.conftest import run as run_async
@@ -107,6 +110,18 @@ def test_plots_mark_events(moving, tmp_path):
     assert "#b37400" in text  # the warning's mark
     assert "<!-- odd -->" in text  # its code
     assert f"<!-- site/arm   moving   {datetime.fromtimestamp(START_NS * 1e-9).astimezone():%Y-%m-%d}" in text
+
+
+def test_a_plot_has_no_line_where_nothing_was_recorded():
+    times_s = np.concatenate([np.arange(0, 2, 0.1), np.arange(10, 12, 0.1)])
+    series = Series("joints/waist/position", "rad", times_s, times_s, times_s)
+    axes = Figure().subplots()
+    plots._draw(axes, "joints", [series], between_s=0.15)
+    drawn = axes.lines[0].get_xdata()
+    assert np.flatnonzero(np.isnan(drawn)).tolist() == [20]
+    axes = Figure().subplots()
+    plots._draw(axes, "joints", [series], between_s=9.0)  # points of a long recording are far apart
+    assert not np.isnan(axes.lines[0].get_xdata()).any()
 
 
 def test_a_plot_of_too_many_values_shows_the_first_64(tmp_path):

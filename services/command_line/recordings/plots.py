@@ -12,6 +12,7 @@ from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.series import MOST_VALUES, Series, SeriesReader, known_values
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.topics import topic
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.output import progress
 from services.command_line.recordings.span import Span, decoded, topics_of
@@ -74,7 +75,7 @@ def write_plots(file: RecordingFile, span: Span, target: Path) -> int:
         for number, (panel, axes) in enumerate(zip(panels, all_axes, strict=True)):
             drawn = panel.values[:MOST_VALUES]
             found = reader.read(file, drawn, start_ns=span.start_ns, end_ns=span.end_ns, points=_POINTS)
-            _draw(axes, panel.title, found)
+            _draw(axes, panel.title, found, between_s=1.5e-9 * (span.end_ns - span.start_ns) / _POINTS)
             if len(drawn) < len(panel.values):
                 words = f"the first {len(drawn)} of {len(panel.values)}"
                 axes.set_title(words, loc="right", fontsize=8, color=_MARKS[schema.Event.WARNING])
@@ -108,14 +109,21 @@ def panels_of(known: list[str]) -> list[Panel]:
     return [panel for panel in panels if panel.values]
 
 
-def _draw(axes: Any, title: str, found: list[Series]) -> None:
+def _draw(axes: Any, title: str, found: list[Series], *, between_s: float) -> None:
+    """Draw the series of a panel; `between_s`: more than the time between two of their points."""
     unit, factor = _shown(found[0].unit)
     for number, each in enumerate(found):
         color = COLORS[number % len(COLORS)]
-        low, high = each.lowest * factor, each.highest * factor
-        axes.plot(each.times_s, (low + high) / 2, color=color, linewidth=1.0, label=_label(each.name))
+        # A line across a time without data would show values that nothing measured.
+        longest_s = max(topic(each.name.split("/")[0]).stale_after_s or 0.0, between_s)
+        gaps = np.flatnonzero(np.diff(each.times_s) > longest_s) + 1
+        times_s, low, high = (
+            np.insert(values, gaps, np.nan) for values in (each.times_s, each.lowest, each.highest)
+        )
+        low, high = low * factor, high * factor
+        axes.plot(times_s, (low + high) / 2, color=color, linewidth=1.0, label=_label(each.name))
         # Fill from the lowest to the highest value of each point, so that no peak is lost.
-        axes.fill_between(each.times_s, low, high, color=color, alpha=0.35, linewidth=0)
+        axes.fill_between(times_s, low, high, color=color, alpha=0.35, linewidth=0)
     if all(not len(each.times_s) or np.ptp(each.highest) == 0 for each in found):
         axes.margins(y=0.2)
     if title == _CLEARANCE:
