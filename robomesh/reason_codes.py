@@ -743,6 +743,11 @@ RECORDING_TIMES = Code("recording.times", "the range ends before it begins")
 RECORDING_OUTSIDE = Code(
     "recording.outside", "{file}: nothing from {start} to {end}: it goes from {first} to {last}"
 )
+RECORDING_SEVERAL_ROBOTS = Code(
+    "recording.several_robots",
+    "{file} is merged from recordings of several robots: {robots}",
+    "use the recording of one of them",
+)
 RECORDING_NO_JOINTS = Code("recording.no_joints", "{file} contains no joint states")
 RECORDING_RANGE = Code("recording.range", "{range}: {file} has {bytes} bytes")
 RECORDING_TOO_MANY = Code(

@@ -2,17 +2,24 @@
 
 import math
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.message import Message
+from mcap.reader import make_reader
 from mcap.writer import Writer
 from mcap_protobuf.schema import register_schema
 
+from robomesh.header import Header
+from robomesh.recordings.capture import Capture
+from robomesh.recordings.reindex import index
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.topics import topic
 from robots.description import load
 from robots.glb import link_meshes
 from robots.urdf.write import to_urdf
@@ -122,3 +129,58 @@ def write_swinging_arm(path: Path) -> Path:
             file.put("controller", schema.ControllerState(link=schema.ControllerState.UP), at_s)
         file.put("events", schema.Event(severity=schema.Event.WARNING, code="odd"), 1.0)
     return path
+
+
+def write_capture(
+    path: Path, numbers: range, *, robot: str = "arm", closed: bool = True, missed: int = 0
+) -> Path:
+    """Write a recording of joint states with these numbers, 0.01 s apart, as the recorder does."""
+    key = f"robomesh/site/{robot}/joints"
+    about = {"site": "site", "robot": robot, "name": "trial", "started_by": "request"}
+    capture = Capture(path, about, start_ns=START_NS + numbers[0] * 10_000_000)
+    capture.attach("robot.toml", "application/toml", path.stem.encode(), time_ns=START_NS)
+    for number in numbers:
+        at_ns = START_NS + number * 10_000_000
+        data = joints(waist=number).SerializeToString()
+        capture.add(key, topic("joints"), Header(7, number, at_ns), data, received_ns=at_ns)
+    if closed:
+        capture.finish({key: missed})
+        index(path)
+    else:
+        capture.hand_over()
+        capture.write_out()
+        capture.give_up()
+    return path
+
+
+def merge(paths: list[Path], out: Path) -> Path:
+    """Merge files as the `mcap` tools do: by receive time, and only if no two metadata records share a name.
+
+    Raises:
+        ValueError: If two share one.
+    """
+    with out.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(library="merge")
+        names: set[str] = set()
+        channels: dict[tuple[str, str], int] = {}
+        messages: list[tuple[Any, int]] = []
+        for path in paths:
+            reader = make_reader(BytesIO(path.read_bytes()))
+            for metadata in reader.iter_metadata():
+                if metadata.name in names:
+                    raise ValueError(f"metadata name '{metadata.name}' was previously encountered")
+                names.add(metadata.name)
+                writer.add_metadata(metadata.name, metadata.metadata)
+            for each in reader.iter_attachments():
+                writer.add_attachment(0, 0, each.name, each.media_type, each.data)
+            for found, channel, message in reader.iter_messages():
+                key = channel.topic, found.name
+                if key not in channels:
+                    number = writer.register_schema(found.name, found.encoding, found.data)
+                    channels[key] = writer.register_channel(channel.topic, channel.message_encoding, number)
+                messages.append((message, channels[key]))
+        for message, number in sorted(messages, key=lambda each: each[0].log_time):
+            writer.add_message(number, message.log_time, message.data, message.publish_time, message.sequence)
+        writer.finish()
+    return out

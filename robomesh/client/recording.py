@@ -17,6 +17,7 @@ from robomesh.client.recording_source import Page, Source
 from robomesh.client.samples import Event, event_of, joint_types, utc
 from robomesh.errors import KeyNameError, MessageError
 from robomesh.keys import parse_key
+from robomesh.recordings.channel_names import robot_channels
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.publisher_time import Recorded
 from robomesh.recordings.values import topic_of
@@ -73,7 +74,8 @@ class AsyncRecording:
     warning in the log.
 
     Raises:
-        RecordingError: Of every function: the file is damaged, changed, or lacks what was requested.
+        RecordingError: It contains several robots. Of every function: the file is damaged, changed, or lacks
+            what was requested.
         RobomeshError: Of every function, over the mesh: the recorder refuses or does not answer.
 
     Attributes:
@@ -83,6 +85,7 @@ class AsyncRecording:
     def __init__(self, source: Source) -> None:
         self._source = source
         self.info = source.info
+        robot_channels({topic.key: topic.messages for topic in self.info.topics}, self.info.file)
         self._types: dict[str, str] | None = None
 
     def __repr__(self) -> str:
@@ -240,7 +243,8 @@ class AsyncRecording:
                     raise RecordingError(f"{self.info.file}: a message of {names} has a time out of range")
                 yield each, message
         self._warn(left_out, f"messages of {names} cannot be read: left out")
-        if start_s is None and end_s is None and not self.info.open:
+        # Merged recordings may count a message twice, which is read once.
+        if start_s is None and end_s is None and not self.info.open and not self.info.merged_from:
             expected = sum(each.messages for each in self.info.topics if each.key in keys)
             self._warn(expected - count, f"of {expected} messages of {names} are missing")
 

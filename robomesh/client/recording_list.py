@@ -58,6 +58,7 @@ class RecordingInfo:
         recovered: Its recorder was killed, and the file was completed afterwards.
         part: Part of a split recording, from 1; 0: it was not split.
         topics: Recorded topics by their channels' names.
+        merged_from: The recordings of a file that was merged; empty: it is one recording.
         message: The description as the recorder sends it.
     """
 
@@ -74,6 +75,7 @@ class RecordingInfo:
     recovered: bool
     part: int
     topics: tuple[RecordedTopic, ...]
+    merged_from: "tuple[RecordingInfo, ...]"
     message: schema.Recording = field(repr=False, compare=False)
 
     def __repr__(self) -> str:
@@ -106,6 +108,7 @@ def recording_info(message: schema.Recording, recorder_site: str = "") -> Record
         recovered=message.recovered,
         part=message.part,
         topics=tuple(topics),
+        merged_from=tuple(map(recording_info, message.merged_from)),
         message=message,
     )
 

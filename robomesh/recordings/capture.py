@@ -16,17 +16,15 @@ from typing import Any
 
 from google.protobuf.message import Message
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Metadata, Schema
+from mcap.records import Attachment, Channel, Schema
 from mcap_protobuf.schema import build_file_descriptor_set
 
 from robomesh import reason_codes as codes
 from robomesh.header import Header
 from robomesh.recordings import records
-from robomesh.recordings.channel_names import ABOUT, INDEXING, LOST
 from robomesh.recordings.errors import CaptureError
+from robomesh.recordings.metadata import about_name, about_record, end_record
 from robomesh.topics import Topic
-
-__all__ = ["ABOUT", "INDEXING", "LOST", "Capture", "is_being_written"]
 
 
 def is_being_written(path: Path) -> bool:
@@ -54,7 +52,7 @@ class Capture:
     disk from any thread. The file is locked (flock) while it is open: `is_being_written`.
 
     Args:
-        about: Metadata `robomesh`: site, robot, name, started_by, cause, part.
+        about: What the recording says of itself: site, robot, name, started_by, cause, part.
 
     Raises:
         CaptureError: If it cannot be created.
@@ -91,7 +89,8 @@ class Capture:
         with contextlib.suppress(OSError):  # a disk without locks
             fcntl.flock(self._file, fcntl.LOCK_EX)
         self._put(records.start())
-        self._put_record(records.record_bytes(Metadata(ABOUT, self.about)))
+        self._name = about_name(self.about.get("site", ""), self.about.get("robot", ""), path.stem)
+        self._put_record(records.record_bytes(about_record(self._name, self.about, start_ns)))
 
     @property
     def size(self) -> int:
@@ -178,9 +177,9 @@ class Capture:
         """
         self._open_file()
         self.hand_over()
-        lost = {key: str(number) for key, number in missed.items() if number}
         with self._lock:
-            self._put_record(records.record_bytes(Metadata(LOST, lost)))
+            end = end_record(self._name, self._contents.end_ns, missed)
+            self._put_record(records.record_bytes(end))
             self._put(self._contents.end(self._end))
             self._finished = True
         with self._writing:

@@ -1,14 +1,17 @@
-"""Names in recordings, and endings of their files."""
+"""Names of channels, and endings of the files of recordings."""
 
+from collections.abc import Mapping
+
+from robomesh import reason_codes as codes
 from robomesh.errors import KeyNameError
-from robomesh.keys import parse_key
+from robomesh.keys import WHOLE_SITE, Key, parse_key
+from robomesh.recordings.errors import RecordingError
 
-# Metadata records: description of the recording; numbers of missing publications by topic.
-ABOUT = "robomesh"
-LOST = "robomesh.lost"
 # Endings: of a recording, and of one that is being rewritten.
 SUFFIX = ".mcap"
 INDEXING = ".indexing"
+# Channel with the robot's URDF for viewers; all other channels of our recorder are keys of the mesh.
+ROBOT_DESCRIPTION = "/robot_description"
 
 
 def topic_name(channel: str) -> str:
@@ -17,3 +20,36 @@ def topic_name(channel: str) -> str:
         return parse_key(channel).topic
     except KeyNameError:
         return channel.strip("/")
+
+
+def is_recorders(channel: str) -> bool:
+    """Return whether our recorder writes a channel of this name."""
+    try:
+        return channel == ROBOT_DESCRIPTION or bool(parse_key(channel))
+    except KeyNameError:
+        return False
+
+
+def robot_channels(messages: Mapping[str, int], file: str) -> dict[str, str]:
+    """Return the channels of the robot in a file, by topic below it: "joints".
+
+    Args:
+        messages: Number of messages by channel.
+
+    Raises:
+        RecordingError: If several robots have messages.
+    """
+    keys: dict[str, Key] = {}
+    for channel in sorted(messages):
+        try:
+            key = parse_key(channel)
+        except KeyNameError:
+            continue
+        if key.robot != WHOLE_SITE:
+            keys[channel] = key
+    robots = sorted({key[:2] for channel, key in keys.items() if messages[channel]})
+    if len(robots) > 1:
+        names = ", ".join(f"{site}/{robot}" for site, robot in robots)
+        raise RecordingError(codes.RECORDING_SEVERAL_ROBOTS(file=file, robots=names))
+    robots = robots or [key[:2] for key in keys.values()][:1]
+    return {key.topic: channel for channel, key in keys.items() if key[:2] in robots}

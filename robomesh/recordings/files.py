@@ -1,6 +1,7 @@
 """Description of a recording from its file."""
 
 import contextlib
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
@@ -10,16 +11,16 @@ from google.protobuf.message import DecodeError
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from robomesh import reason_codes as codes
+from robomesh.keys import parse_key
 from robomesh.messages import reason_message
 from robomesh.reasons import Reason
-from robomesh.recordings.channel_names import ABOUT, LOST
+from robomesh.recordings.channel_names import is_recorders, robot_channels
 from robomesh.recordings.errors import RecordingError
-from robomesh.recordings.layout import Layout, layout_of
+from robomesh.recordings.layout import layout_of
+from robomesh.recordings.metadata import OneRecording, lost_in
 from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.records import number_in
 from robomesh.schemas import robomesh_pb2 as schema
-
-_CONTROLLER = "/controller"
 
 
 def describe_file(path: Path) -> schema.Recording:
@@ -58,56 +59,69 @@ def _described(path: Path, inode: int, size: int, mtime_ns: int) -> schema.Recor
     if not size:
         raise RecordingError(codes.RECORDING_EMPTY(file=path.name))
     layout = layout_of(path)
-    about, lost = layout.metadata.get(ABOUT, {}), _lost(layout.metadata.get(LOST, {}))
-    if not layout.whole and not about and not layout.counts:
+    if not layout.whole and not layout.recordings and not layout.counts:
         raise RecordingError(codes.RECORDING_CUT(file=path))
-    recording = schema.Recording(
+    recording = _told(layout.about)
+    recording.file, recording.bytes = path.name, size
+    recording.name = recording.name or path.stem
+    recording.start.CopyFrom(_timestamp(layout.start_ns or _begun_ns(path)))
+    recording.duration.CopyFrom(_duration(layout.end_ns - layout.start_ns))
+    recording.attachments.extend(sorted(layout.attachments))
+    counts = {channel: number for channel, number in layout.messages.items() if number}
+    if len(layout.recordings) > 1 or not all(map(is_recorders, counts)):
+        recording.merged_from.extend(map(_merged, layout.recordings))
+    if not layout.whole:
+        set_problem(recording, codes.RECORDING_KILLED())
+    with contextlib.suppress(RecordingError, DecodeError):
+        _describe_robot(recording, path)
+    lost = lost_in(layout.metadata)
+    for topic in sorted({*counts, *lost}):
+        recording.topics.add(topic=topic, messages=counts.get(topic, 0), lost=lost[topic])
+    return recording
+
+
+def _told(about: Mapping[str, str]) -> schema.Recording:
+    """Return what a recording says of itself, which another program may have written."""
+    return schema.Recording(
         site=about.get("site", ""),
         robot=about.get("robot", ""),
-        name=about.get("name", path.stem),
+        name=about.get("name", ""),
         started_by=about.get("started_by", ""),
         cause=about.get("cause", ""),
         part=number_in(about.get("part", "")),
         recovered=about.get("recovered", "") not in ("", "false"),
-        file=path.name,
-        start=_timestamp(layout.start_ns or _begun_ns(path)),
-        duration=_duration(layout.end_ns - layout.start_ns),
-        bytes=size,
-        attachments=sorted(layout.attachments),
     )
-    if not layout.whole:
-        set_problem(recording, codes.RECORDING_KILLED())
-    state = _newest_state(path)
-    if state.HasField("audit_head"):
-        recording.audit_head.CopyFrom(state.audit_head)
-    counts = _counts(layout)
-    for topic in sorted({*counts, *lost}):
-        recording.topics.add(topic=topic, messages=counts.get(topic, 0), lost=lost.get(topic, 0))
+
+
+def _merged(one: OneRecording) -> schema.Recording:
+    """Return the description of a recording in a merged file."""
+    recording = _told(one.about)
+    if one.start_ns:
+        recording.start.CopyFrom(_timestamp(one.start_ns))
+    if one.start_ns and one.end_ns:
+        recording.duration.CopyFrom(_duration(one.end_ns - one.start_ns))
+    for topic, number in sorted(one.lost.items()):
+        recording.topics.add(topic=topic, lost=number)
     return recording
 
 
-def _counts(layout: Layout) -> dict[str, int]:
-    counts: dict[str, int] = {}
-    for number, channel in layout.channels.items():
-        if number in layout.counts:
-            counts[channel.topic] = counts.get(channel.topic, 0) + layout.counts[number]
-    return counts
+def _describe_robot(recording: schema.Recording, path: Path) -> None:
+    """Add the robot's name if the file does not tell it, and the newest head of its audit log.
 
-
-def _newest_state(path: Path) -> schema.ControllerState:
-    """Return the newest state of the controller, which contains the head of the audit log."""
+    Raises:
+        RecordingError: If several robots have messages, or the file is damaged.
+        DecodeError: If the controller's newest state is invalid.
+    """
     with RecordingFile(path) as file:
-        topics = [topic for topic in file.topics if topic.endswith(_CONTROLLER)]
-        try:
-            newest = [file.newest(topic, file.layout.end_ns) for topic in topics]
-            data = [each.data for each in newest if each is not None]
-            return schema.ControllerState.FromString(data[0] if data else b"")
-        except (RecordingError, DecodeError):
-            return schema.ControllerState()
-
-
-def _lost(record: dict[str, str]) -> dict[str, int]:
-    return {key: number_in(text) for key, text in record.items()}
+        channels = robot_channels(file.layout.messages, path.name)
+        if channels and not recording.robot:
+            recording.site, recording.robot, _ = parse_key(next(iter(channels.values())))
+        if "controller" not in channels:
+            return
+        newest = file.newest(channels["controller"], file.layout.end_ns)
+        state = schema.ControllerState.FromString(newest.data if newest else b"")
+        if state.HasField("audit_head"):
+            recording.audit_head.CopyFrom(state.audit_head)
 
 
 def _begun_ns(path: Path) -> int:

@@ -11,7 +11,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, ChunkIndex, MessageIndex, Metadata, Schema
 
 from robomesh.recordings import records
-from robomesh.recordings.channel_names import ABOUT, LOST
+from robomesh.recordings.metadata import about_name, end_record, is_about, is_end, lost_in
 
 _CHUNK_BYTES = 1 << 20
 
@@ -21,32 +21,46 @@ class Copied:
     """Counts and checksums of the copied data, to verify the new file.
 
     Attributes:
+        attachments: Their names and checksums.
         cut: Number of sources that end in the middle of a record.
         damaged: Number of omitted chunks, which could not be unpacked.
     """
 
     messages: Counter[int] = field(default_factory=Counter)
     crc: int = 0
-    attachments: dict[str, int] = field(default_factory=dict)
+    attachments: set[tuple[str, int]] = field(default_factory=set)
     cut: int = 0
     damaged: int = 0
 
 
 class IndexedWriter:
-    """The new file: its chunks and its summary."""
+    """The new file: its chunks and its summary.
 
-    def __init__(self, stream: IO[bytes], about: Mapping[str, str]) -> None:
+    Args:
+        about: Additions and changes to what its recordings say of themselves.
+        file: Name for a recording that has none, without ending.
+        joined: The sources are consecutive pieces of one recording, which has the first one's name.
+    """
+
+    def __init__(
+        self, stream: IO[bytes], about: Mapping[str, str], *, file: str, joined: bool = False
+    ) -> None:
         self.copied = Copied()
-        self.about: dict[str, str] = {}
+        # Names of the metadata at the beginning of each recording; the metadata at their ends.
+        self.recordings: list[str] = []
+        self._ends: list[Metadata] = []
+        # Lost publications that no metadata counts, by topic.
         self.lost: Counter[str] = Counter()
-        self._more = about
+        self._more, self._file, self._joined = about, file, joined
         self._stream = stream
         self._contents = records.Contents()
         self._pack = zstandard.ZstdCompressor(level=3)
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._channels: dict[tuple[str, str, int], int] = {}
         self._chunk = bytearray()
+        # Channels and schemas whose records are written; 0: a channel has no schema.
         self._begun: set[int] = set()
+        self._begun_schemas = {0}
         self._places: dict[int, list[tuple[int, int]]] = {}
         self._end = 0
         # Number and time of each channel's last message.
@@ -86,7 +100,8 @@ class IndexedWriter:
             # A stream reader needs the channel and its schema before their first message.
             self._begun.add(channel)
             found = self._contents.channels[channel]
-            if found.schema_id:
+            if found.schema_id not in self._begun_schemas:
+                self._begun_schemas.add(found.schema_id)
                 self._chunk += records.record_bytes(self._contents.schemas[found.schema_id])
             self._chunk += records.record_bytes(found)
         self._places.setdefault(channel, []).append((log_time, len(self._chunk)))
@@ -99,29 +114,37 @@ class IndexedWriter:
             self._end_chunk()
 
     def attachment(self, found: Attachment) -> None:
-        """Add an attachment; ignores a second one with the same name."""
-        if found.name not in self.copied.attachments:
-            self.copied.attachments[found.name] = zlib.crc32(found.data)
+        """Add an attachment; ignores one that is already there."""
+        attachment = found.name, zlib.crc32(found.data)
+        if attachment not in self.copied.attachments:
+            self.copied.attachments.add(attachment)
             self._end_chunk()
             self._record(records.record_bytes(found))
 
     def metadata(self, found: Metadata) -> None:
-        """Add a metadata record; our own records are merged and written at the end."""
-        if found.name == ABOUT:
-            self.about = self.about or dict(found.metadata)
-        elif found.name == LOST:
-            self.lost.update({key: records.number_in(text) for key, text in found.metadata.items()})
-        else:
-            self._end_chunk()
-            self._record(records.record_bytes(found))
+        """Add a metadata record; those at a recording's end are written at the end of the file."""
+        if is_end(found.name):
+            self._ends.append(found)
+            return
+        if is_about(found.name):
+            if self.recordings and self._joined:
+                return
+            self.recordings.append(found.name)
+            found = Metadata(found.name, {**found.metadata, **self._more})
+        self._end_chunk()
+        self._record(records.record_bytes(found))
 
     def finish(self) -> None:
         """Write the end of the file."""
         self._end_chunk()
-        if self.about or self._more:
-            self._record(records.record_bytes(Metadata(ABOUT, {**self.about, **self._more})))
-            lost = {key: str(number) for key, number in self.lost.items() if number}
-            self._record(records.record_bytes(Metadata(LOST, lost)))
+        if not self.recordings and self._more:
+            self.metadata(Metadata(about_name("", "", self._file), {}))
+        ends = self._ends
+        if len(self.recordings) == 1:
+            lost = self.lost + lost_in(ends)
+            ends = [end_record(self.recordings[0], self._contents.end_ns, lost)]
+        for each in ends:
+            self._record(records.record_bytes(each))
         self._put(self._contents.end(self._end))
 
     def _end_chunk(self) -> None:

@@ -9,7 +9,7 @@ import struct
 import threading
 from collections import Counter, OrderedDict
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import IO, NamedTuple
 
@@ -20,6 +20,7 @@ from mcap.summary import Summary
 
 from robomesh import reason_codes as codes
 from robomesh.recordings.errors import RecordingError
+from robomesh.recordings.metadata import OneRecording, recordings_in, shared_entries
 from robomesh.recordings.records import (
     DAMAGE,
     MAGIC,
@@ -83,10 +84,28 @@ class Layout:
     schemas: dict[int, Schema]
     blocks: tuple[Block, ...]
     attachments: dict[str, Attached]
-    metadata: dict[str, dict[str, str]]
+    metadata: tuple[Metadata, ...]
     start_ns: int
     end_ns: int
     whole: bool
+
+    @cached_property
+    def messages(self) -> dict[str, int]:
+        """Number of messages by channel name; a name may have several channels."""
+        found: dict[str, int] = {}
+        for number, channel in self.channels.items():
+            found[channel.topic] = found.get(channel.topic, 0) + self.counts.get(number, 0)
+        return found
+
+    @cached_property
+    def recordings(self) -> tuple[OneRecording, ...]:
+        """The recordings in the file: several, if it was merged; none, if another program wrote it."""
+        return recordings_in(self.metadata)
+
+    @cached_property
+    def about(self) -> dict[str, str]:
+        """What its recordings say of themselves, if they agree: site, robot, name, ..."""
+        return shared_entries(self.recordings)
 
 
 def layout_of(path: Path) -> Layout:
@@ -121,13 +140,13 @@ def _layout_of(path: Path, inode: int, size: int, mtime_ns: int) -> Layout:
             raise RecordingError(f"{path.name}: not a readable recording: {error}") from None
 
 
-def _metadata_of(stream: IO[bytes], summary: Summary, size: int) -> dict[str, dict[str, str]]:
+def _metadata_of(stream: IO[bytes], summary: Summary, size: int) -> tuple[Metadata, ...]:
     """Return the metadata records that a file's summary lists; each once, however often it is listed.
 
     Raises:
         DAMAGE: One of these, if a record cannot be read.
     """
-    found: dict[str, dict[str, str]] = {}
+    found: list[Metadata] = []
     offsets = dict.fromkeys(each.offset for each in summary.metadata_indexes)
     for offset in offsets:
         stream.seek(offset)
@@ -135,12 +154,11 @@ def _metadata_of(stream: IO[bytes], summary: Summary, size: int) -> dict[str, di
         size -= length
         if opcode != Opcode.METADATA or size < 0:
             raise ValueError("the summary lists invalid metadata")
-        record = Metadata.read(stream_of(stream.read(length)))
-        found[record.name] = dict(record.metadata)
-    return found
+        found.append(Metadata.read(stream_of(stream.read(length))))
+    return tuple(found)
 
 
-def _indexed(summary: Summary, metadata: dict[str, dict[str, str]], size: int) -> Layout:
+def _indexed(summary: Summary, metadata: tuple[Metadata, ...], size: int) -> Layout:
     """Return the layout in a file's summary, which another program may have written.
 
     Raises:
@@ -207,7 +225,7 @@ class _Scan:
         self.schemas: dict[int, Schema] = {}
         self.blocks: list[Block] = []
         self.attachments: dict[str, Attached] = {}
-        self.metadata: dict[str, dict[str, str]] = {}
+        self.metadata: list[Metadata] = []
         # The current block of unchunked messages.
         self.begin = self.end = 0
         self.unpacked = 0
@@ -257,7 +275,7 @@ class _Scan:
             schemas=dict(self.schemas),
             blocks=blocks,
             attachments=dict(self.attachments),
-            metadata=dict(self.metadata),
+            metadata=tuple(self.metadata),
             start_ns=min((block.start_ns for block in blocks), default=0),
             end_ns=max((block.end_ns for block in blocks), default=0),
             whole=whole,
@@ -340,8 +358,7 @@ def _note(scan: _Scan, opcode: int, offset: int, content: bytes) -> None:
         channel = Channel.read(stream)
         scan.channels[channel.id] = channel
     elif opcode == Opcode.METADATA:
-        metadata = Metadata.read(stream)
-        scan.metadata[metadata.name] = dict(metadata.metadata)
+        scan.metadata.append(Metadata.read(stream))
     elif opcode == Opcode.CHUNK:
         # A chunk is one block, so end the block of unchunked messages before it.
         scan.close_block()

@@ -3,7 +3,8 @@
 import heapq
 import os
 import struct
-from collections.abc import Callable, Collection, Iterator
+from collections import deque
+from collections.abc import Callable, Collection, Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import IO, Any, NamedTuple, Self
@@ -14,6 +15,7 @@ from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
 from robomesh import reason_codes as codes
+from robomesh.keys import ROOT
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.layout import Attached, Block, layout_of
 from robomesh.recordings.records import DAMAGE, MESSAGE, RECORD, unpack_chunk
@@ -23,6 +25,8 @@ FOREVER_NS = 1 << 64
 # Messages that wait for sorting because their chunk overlaps the next one; above this limit the file's order
 # counts.
 _MOST_WAITING_BYTES = 64 << 20
+# Messages of a topic between the two records of one publication.
+_MOST_BETWEEN = 2000
 
 
 class RecordedMessage(NamedTuple):
@@ -140,10 +144,33 @@ class RecordingFile:
     ) -> Iterator[RecordedMessage]:
         """Yield messages by their receive time, from `start_ns` up to but excluding `end_ns`.
 
+        Yields a publication once, even if the file is merged from recordings that both contain it.
+
         Raises:
             RecordingError: If the topic is missing, or the file is damaged there.
         """
         wanted = None if topics is None else frozenset().union(*map(self._channels, topics))
+        return self._once(self._sorted(wanted, start_ns, end_ns))
+
+    def _once(self, messages: Iterable[RecordedMessage]) -> Iterator[RecordedMessage]:
+        """Yield each publication once: recordings that were merged may overlap."""
+        if len(self.layout.recordings) < 2:
+            yield from messages
+            return
+        known: dict[str, tuple[set[tuple[int, ...]], deque[tuple[int, ...]]]] = {}
+        for message in messages:
+            if message.topic.startswith(f"{ROOT}/"):  # other programs may number all messages 0
+                seen, order = known.setdefault(message.topic, (set(), deque()))
+                publication = message.source_ns, message.sequence, hash(message.data)
+                if publication in seen:
+                    continue
+                seen.add(publication)
+                order.append(publication)
+                if len(order) > _MOST_BETWEEN:
+                    seen.discard(order.popleft())
+            yield message
+
+    def _sorted(self, wanted: frozenset[int] | None, start_ns: int, end_ns: int) -> Iterator[RecordedMessage]:
         waiting: list[RecordedMessage] = []
         waiting_bytes = 0
         for block in self.layout.blocks:
@@ -198,7 +225,7 @@ class RecordingFile:
             if len(found) >= count and block.end_ns < found[0].received_ns:
                 break
             if block.start_ns <= at_ns and _has(block, wanted):
-                found = sorted([*found, *self._read(block, wanted, 0, at_ns + 1)])[-count:]
+                found = [*self._once(sorted([*found, *self._read(block, wanted, 0, at_ns + 1)]))][-count:]
         return found
 
     def state_at(self, topics: Collection[str], at_ns: int) -> dict[str, RecordedMessage]:

@@ -15,8 +15,8 @@ from mcap.records import Metadata
 
 from robomesh.recordings import records
 from robomesh.recordings.capture import is_being_written
-from robomesh.recordings.channel_names import ABOUT, LOST
 from robomesh.recordings.errors import CaptureError
+from robomesh.recordings.metadata import about_name, end_record, is_about
 from robomesh.recordings.reindex import rewrite
 
 
@@ -76,7 +76,7 @@ def is_ours(path: Path) -> bool:
     """
     with path.open("rb") as stream, contextlib.suppress(*records.DAMAGE):
         for opcode, body, _ in itertools.islice(records.walk(stream), 2):
-            if opcode == Opcode.METADATA and Metadata.read(records.stream_of(body)).name == ABOUT:
+            if opcode == Opcode.METADATA and is_about(Metadata.read(records.stream_of(body)).name):
                 return True
     return False
 
@@ -115,8 +115,9 @@ def close_in_place(path: Path, missed: Mapping[str, int] = MappingProxyType({}))
     with path.open("r+b") as stream:
         stream.truncate(end)
         stream.seek(end)
-        lost = {key: str(number) for key, number in missed.items() if number}
-        data = records.record_bytes(Metadata(LOST, lost))
+        names = [each.name for each in contents.metadata if is_about(each.name)]
+        name = names[0] if names else about_name("", "", path.stem)
+        data = records.record_bytes(end_record(name, contents.end_ns, missed))
         contents.note(data[0], data[records.RECORD.size :], end)
         stream.write(data + contents.end(end + len(data)))
         stream.flush()

@@ -18,9 +18,10 @@ from mcap.records import Attachment, Channel, Metadata, Schema, Statistics
 
 from robomesh.recordings import records
 from robomesh.recordings.capture import is_being_written
-from robomesh.recordings.channel_names import INDEXING, LOST
+from robomesh.recordings.channel_names import INDEXING
 from robomesh.recordings.errors import CaptureError
 from robomesh.recordings.indexed_writer import Copied, IndexedWriter
+from robomesh.recordings.metadata import is_about, is_end
 from robomesh.worker import answer_all, report
 
 _STEP_BYTES = 8 << 20
@@ -50,10 +51,11 @@ def rewrite(
 ) -> Copied:
     """Copy the sources into one new file, verify it, and then rename it to the target.
 
-    The target may be one of the sources; it stays unchanged until the rename.
+    The target may be one of the sources; it stays unchanged until the rename. Several sources become one
+    recording.
 
     Args:
-        about: Additions and changes to the first source's metadata `robomesh`.
+        about: Additions and changes to what the recording says of itself.
 
     Raises:
         CaptureError: If the new file differs from the sources, no source is a recording, or one is still
@@ -74,10 +76,10 @@ def rewrite(
 
     try:
         with new.open("wb") as stream:
-            writer = IndexedWriter(stream, about or {})
+            writer = IndexedWriter(stream, about or {}, file=target.stem, joined=len(sources) > 1)
             for source in sources:
                 _copy(source, writer, report)
-            if not writer.copied.messages and not writer.about:
+            if not writer.copied.messages and not writer.recordings:
                 raise CaptureError(f"{sources[0].name}: not a readable recording")
             writer.finish()
             stream.flush()
@@ -104,7 +106,8 @@ class _Source:
         self._schemas: dict[int, tuple[int, Schema]] = {}
         self._channels: dict[int, int] = {}
         self._gaps = _Gaps()
-        self._has_lost = False
+        # Numbers of metadata records at the beginnings and ends of recordings.
+        self._begun = self._ended = 0
         # Messages by this file's channels, including omitted ones.
         self.counts: Counter[int] = Counter()
 
@@ -124,7 +127,8 @@ class _Source:
                 self._writer.attachment(Attachment.read(records.stream_of(body)))
             case Opcode.METADATA:
                 metadata = Metadata.read(records.stream_of(body))
-                self._has_lost = self._has_lost or metadata.name == LOST
+                self._begun += is_about(metadata.name)
+                self._ended += is_end(metadata.name)
                 self._writer.metadata(metadata)
             case Opcode.CHUNK:
                 try:
@@ -136,8 +140,11 @@ class _Source:
                     self.take(*each)
 
     def end(self) -> None:
-        """Count the missing publications by their numbers if the writer was killed before it wrote them."""
-        if not self._has_lost and self._writer.about:
+        """Count the missing publications by their numbers if the writer was killed before it wrote them.
+
+        Between the recordings of a merged file nothing was lost.
+        """
+        if self._begun == 1 and not self._ended:
             self._writer.lost.update(self._gaps.by_topic(self._writer.topic))
 
     def _message(self, body: bytes) -> None:
@@ -253,7 +260,7 @@ def _check(path: Path, writer: IndexedWriter) -> None:
                             found.crc = zlib.crc32(each, found.crc)
                 elif opcode == Opcode.ATTACHMENT:
                     attachment = Attachment.read(records.stream_of(body))
-                    found.attachments[attachment.name] = zlib.crc32(attachment.data)
+                    found.attachments.add((attachment.name, zlib.crc32(attachment.data)))
             stream.seek(0)
             summary = make_reader(stream).get_summary()
         except records.DAMAGE as error:

@@ -12,7 +12,7 @@ from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 
 from robomesh import reason_codes as codes
-from robomesh.recordings.channel_names import topic_name
+from robomesh.recordings.channel_names import robot_channels, topic_name
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordingFile
@@ -145,11 +145,17 @@ class SeriesReader:
 
 
 def topics_of_values(file: RecordingFile) -> dict[str, str]:
-    """Return the topics with numbers as in the names of values, and their channels' names in the file."""
+    """Return the topics with numbers as in the names of values, and their channels' names in the file.
+
+    Raises:
+        RecordingError: If several robots have messages.
+    """
+    own = robot_channels(file.layout.messages, file.path.name)
     found: dict[str, str] = {}
     for key in sorted(file.topics):
-        if has_values(file.schema_name(key)) and file.decoder(key) is not None:
-            found.setdefault(topic_name(key), key)
+        topic = topic_name(key)
+        if own.get(topic, key) == key and has_values(file.schema_name(key)) and file.decoder(key) is not None:
+            found.setdefault(topic, key)
     return found
 
 
@@ -173,10 +179,10 @@ def known_values(file: RecordingFile) -> list[str]:
 
 def _sliding(file: RecordingFile, names: Sequence[str]) -> frozenset[str]:
     """Return the prismatic joints (unit: metre)."""
-    topics = [topic for topic in file.topics if topic.endswith("/description")]
-    if not any(name.startswith(_JOINTS) for name in names) or not topics:
+    description = robot_channels(file.layout.messages, file.path.name).get("description")
+    if not any(name.startswith(_JOINTS) for name in names) or description is None:
         return frozenset()
-    told = file.newest(topics[0], file.layout.end_ns)
+    told = file.newest(description, file.layout.end_ns)
     try:
         return prismatic_joints(Description.FromString(b"" if told is None else told.data))
     except DecodeError:

@@ -992,7 +992,7 @@ class RecorderRequest(_message.Message):
     def __init__(self, action: _Optional[_Union[RecorderRequest.Action, str]] = ..., name: _Optional[str] = ..., views: _Optional[_Iterable[str]] = ...) -> None: ...
 
 class Recording(_message.Message):
-    __slots__ = ("site", "robot", "name", "file", "start", "duration", "bytes", "open", "topics", "started_by", "problem", "audit_head", "cause", "part", "attachments", "recovered", "indexing", "problem_reason")
+    __slots__ = ("site", "robot", "name", "file", "start", "duration", "bytes", "open", "topics", "started_by", "problem", "audit_head", "cause", "part", "attachments", "recovered", "indexing", "problem_reason", "merged_from")
     class TopicCount(_message.Message):
         __slots__ = ("topic", "messages", "lost")
         TOPIC_FIELD_NUMBER: _ClassVar[int]
@@ -1020,6 +1020,7 @@ class Recording(_message.Message):
     RECOVERED_FIELD_NUMBER: _ClassVar[int]
     INDEXING_FIELD_NUMBER: _ClassVar[int]
     PROBLEM_REASON_FIELD_NUMBER: _ClassVar[int]
+    MERGED_FROM_FIELD_NUMBER: _ClassVar[int]
     site: str
     robot: str
     name: str
@@ -1038,7 +1039,8 @@ class Recording(_message.Message):
     recovered: bool
     indexing: float
     problem_reason: Reason
-    def __init__(self, site: _Optional[str] = ..., robot: _Optional[str] = ..., name: _Optional[str] = ..., file: _Optional[str] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., duration: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., bytes: _Optional[int] = ..., open: _Optional[bool] = ..., topics: _Optional[_Iterable[_Union[Recording.TopicCount, _Mapping]]] = ..., started_by: _Optional[str] = ..., problem: _Optional[str] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., cause: _Optional[str] = ..., part: _Optional[int] = ..., attachments: _Optional[_Iterable[str]] = ..., recovered: _Optional[bool] = ..., indexing: _Optional[float] = ..., problem_reason: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
+    merged_from: _containers.RepeatedCompositeFieldContainer[Recording]
+    def __init__(self, site: _Optional[str] = ..., robot: _Optional[str] = ..., name: _Optional[str] = ..., file: _Optional[str] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., duration: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., bytes: _Optional[int] = ..., open: _Optional[bool] = ..., topics: _Optional[_Iterable[_Union[Recording.TopicCount, _Mapping]]] = ..., started_by: _Optional[str] = ..., problem: _Optional[str] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., cause: _Optional[str] = ..., part: _Optional[int] = ..., attachments: _Optional[_Iterable[str]] = ..., recovered: _Optional[bool] = ..., indexing: _Optional[float] = ..., problem_reason: _Optional[_Union[Reason, _Mapping]] = ..., merged_from: _Optional[_Iterable[_Union[Recording, _Mapping]]] = ...) -> None: ...
 
 class RecordingList(_message.Message):
     __slots__ = ("recordings", "free_bytes", "flight")

@@ -10,8 +10,10 @@ from google.protobuf.message import DecodeError
 from robomesh import reason_codes as codes
 from robomesh import topics
 from robomesh.errors import RobomeshError
-from robomesh.keys import Key, parse_key
+from robomesh.keys import parse_key
 from robomesh.publisher import LIST_LENGTH
+from robomesh.recordings.channel_names import robot_channels
+from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.video import holds_key_frame
@@ -55,7 +57,7 @@ class RecordingSource:
     """A recording that is being played. Methods may block on the disk; not thread-safe.
 
     Raises:
-        RecordingError: If the file cannot be read.
+        RecordingError: If the file cannot be read, or contains several robots.
         ReplayError: If it contains no robot.
     """
 
@@ -63,13 +65,12 @@ class RecordingSource:
         self.file = RecordingFile(path)
         layout = self.file.layout
         self.start_ns, self.end_ns = layout.start_ns, layout.end_ns
-        found = _topics_of_robot(self.file)
-        if not found:
+        try:
+            self._keys = _topics_of_robot(self.file)
+        except (RecordingError, ReplayError):
             self.file.close()
-            raise ReplayError(codes.REPLAY_NO_ROBOT(file=path.name))
-        first = next(iter(found.values()))
-        self.of_site, self.of_robot = first.site, first.robot
-        self._keys = {name: key.topic for name, key in found.items()}
+            raise
+        self.of_site, self.of_robot, _ = parse_key(next(iter(self._keys)))
         self._upcoming: Iterator[RecordedMessage] = iter(())
         self._taken: dict[str, int] = {}
         self._pending: RecordedMessage | None = None
@@ -183,22 +184,21 @@ class RecordingSource:
             )
 
 
-def _topics_of_robot(file: RecordingFile) -> dict[str, Key]:
-    """Return the channels of recorded topics of the first robot in the file."""
-    found: dict[str, Key] = {}
-    for name in sorted(file.topics):
+def _topics_of_robot(file: RecordingFile) -> dict[str, str]:
+    """Return the robot's channels that the recorder records, with their topics.
+
+    Raises:
+        RecordingError: If several robots have messages.
+        ReplayError: If there is none.
+    """
+    found: dict[str, str] = {}
+    for topic, channel in robot_channels(file.layout.messages, file.path.name).items():
         try:
-            key = parse_key(name)
-            row = topics.topic(key.topic)
+            row = topics.topic(topic)
         except RobomeshError:
             continue
-        first = next(iter(found.values()), key)
-        same = (key.site, key.robot) == (first.site, first.robot)
-        if (
-            same
-            and key.robot != "-"
-            and row.recorded
-            and file.schema_name(name) == row.schema.DESCRIPTOR.full_name
-        ):
-            found[name] = key
+        if row.recorded and file.schema_name(channel) == row.schema.DESCRIPTOR.full_name:
+            found[channel] = topic
+    if not found:
+        raise ReplayError(codes.REPLAY_NO_ROBOT(file=file.path.name))
     return found

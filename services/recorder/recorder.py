@@ -13,7 +13,7 @@ from robomesh import reason_codes as codes
 from robomesh.errors import MessageError, RefusedError
 from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.recordings.capture import Capture
-from robomesh.recordings.channel_names import INDEXING, SUFFIX
+from robomesh.recordings.channel_names import INDEXING, ROBOT_DESCRIPTION, SUFFIX
 from robomesh.recordings.errors import RecordingsError
 from robomesh.recordings.recover import State
 from robomesh.schemas import robomesh_pb2 as schema
@@ -175,7 +175,7 @@ class _Robot:
             text = self_contained_urdf(known)
             with self.recorder.subscriptions.lock:
                 log_time_ns = part.log_time_ns(time.monotonic_ns())
-                part.capture.add_text("/robot_description", text, known.header, received_ns=log_time_ns)
+                part.capture.add_text(ROBOT_DESCRIPTION, text, known.header, received_ns=log_time_ns)
                 part.capture.hand_over()
 
     async def _picture(self, part: Part) -> None:

@@ -142,7 +142,7 @@ def test_a_file_is_self_contained(recorded):
     assert b'site = "site"' in attached["site.toml"]
     assert b"geheim" not in attached["site.toml"]
     assert b"site.key" not in attached["site.toml"]
-    assert metadata["robomesh"]["robot"] == "arm"
+    assert metadata[f"robomesh:site/arm/{path.stem}"]["robot"] == "arm"
     assert schemas["/robot_description"].name == "std_msgs/msg/String"
     urdf = ET.fromstring(text[8:-1].decode())
     # Links with a shape; the frames place them.

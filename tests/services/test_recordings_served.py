@@ -25,7 +25,7 @@ from services.console.http.recordings import Recordings
 from services.recorder.answers import Answers
 from services.recorder.serving import RecordingServer
 from tests.conftest import run
-from tests.recordings import START_NS, Written, joints, write_recording
+from tests.recordings import START_NS, Written, joints, merge, write_capture, write_recording
 from tests.refusals import refused
 from tests.services.http_refusals import read_refusal
 
@@ -242,6 +242,19 @@ def test_a_file_can_be_fetched_whole_in_ranges_and_resumed(http, folder):
     assert (beyond.status_code, beyond.headers["content-range"]) == (416, f"bytes */{len(whole)}")
     reason = read_refusal(beyond.headers, beyond.content)
     assert (reason.code, reason.values["bytes"]) == ("recording.range", str(len(whole)))
+
+
+def test_values_of_several_robots_are_not_one_table(http, folder):
+    merge(
+        [
+            write_recording(folder / "arm" / "one.mcap"),
+            write_capture(folder / "arm" / "other.mcap", range(10), robot="other"),
+        ],
+        folder / "arm" / "merged.mcap",
+    )
+    answer = http.get("/recordings/site/merged.mcap/values.csv")
+    assert answer.status_code == 409
+    assert read_refusal(answer.headers, answer.content).code == "recording.several_robots"
 
 
 def test_a_missing_file_or_attachment_is_404_with_a_sentence(http):

@@ -49,7 +49,7 @@ def _print_table(recordings: list[schema.Recording]) -> None:
                 f"{_start(each):%Y-%m-%d %H:%M:%S}" if each.HasField("start") else "-",
                 f"{each.duration.ToNanoseconds() * 1e-9:.1f} s",
                 f"{each.bytes / 1e6:.1f} MB",
-                f"{each.site}/{each.robot}",
+                _robot(each),
                 (each.name or each.file) + (f" part {each.part}" if each.part else ""),
                 _state(each),
             )
@@ -125,13 +125,15 @@ def show(recording: schema.Recording, as_json: bool) -> None:
     state = _state(recording)
     part = f" part {recording.part}" if recording.part else ""
     print(
-        f"{recording.name or recording.file}{part}  {recording.site}/{recording.robot}  "
+        f"{recording.name or recording.file}{part}  {_robot(recording)}  "
         f"{_start(recording):%Y-%m-%d %H:%M:%S}, {values['duration_s']:.1f} s, {recording.bytes / 1e6:.2f} MB"
         + (f"  ({state})" if state else "")
     )
     print(f"    file: {recording.file}")
     if recording.HasField("audit_head"):
         print(f"    audit log: entry {values['audit_head']['number']}, {values['audit_head']['hash']}")
+    for each in recording.merged_from:
+        print(f"    from {_source(each)}")
     if recording.cause:
         print(f"    saved because of: {recording.cause}")
     if recording.attachments:
@@ -144,7 +146,31 @@ def show(recording: schema.Recording, as_json: bool) -> None:
 def _state(recording: schema.Recording) -> str:
     if recording.open:
         return "recording now"
+    if recording.merged_from:
+        count = len(recording.merged_from)
+        merged = "a recording merged with other topics" if count == 1 else f"merged from {count} recordings"
+        return f"{merged}; {recording.problem}" if recording.problem else merged
     return recording.problem or ("recovered" if recording.recovered else "")
+
+
+def _robot(recording: schema.Recording) -> str:
+    if recording.robot:
+        return f"{recording.site}/{recording.robot}"
+    return "several robots" if recording.merged_from else "no robot"
+
+
+def _source(recording: schema.Recording) -> str:
+    """Return one line about a recording in a merged file; files of earlier versions have no times."""
+    words = f"{_robot(recording)} {recording.name}"
+    if recording.part:
+        words += f" part {recording.part}"
+    if recording.HasField("start"):
+        words += f", {_start(recording):%Y-%m-%d %H:%M:%S}"
+    if recording.HasField("duration"):
+        words += f", {recording.duration.ToNanoseconds() * 1e-9:.1f} s"
+    if lost := sum(topic.lost for topic in recording.topics):
+        words += f", {lost} lost"
+    return words + (", recovered" if recording.recovered else "")
 
 
 def _rate(topic: schema.Recording.TopicCount, duration_s: float) -> str:
@@ -169,6 +195,21 @@ def summary(recording: schema.Recording) -> str:
     )
 
 
+def _source_values(recording: schema.Recording) -> dict[str, Any]:
+    start = _start(recording) if recording.HasField("start") else None
+    length_s = recording.duration.ToNanoseconds() * 1e-9 if recording.HasField("duration") else None
+    return {
+        "name": recording.name,
+        "site": recording.site,
+        "robot": recording.robot,
+        "part": recording.part,
+        "start": start.isoformat(timespec="milliseconds") if start else None,
+        "duration_s": length_s,
+        "recovered": recording.recovered,
+        "lost": sum(topic.lost for topic in recording.topics),
+    }
+
+
 def _values(recording: schema.Recording) -> dict[str, Any]:
     return {
         "name": recording.name,
@@ -183,6 +224,7 @@ def _values(recording: schema.Recording) -> dict[str, Any]:
         "cause": recording.cause,
         "part": recording.part,
         "recovered": recording.recovered,
+        "merged_from": [_source_values(each) for each in recording.merged_from],
         "attachments": list(recording.attachments),
         "audit_head": {"number": recording.audit_head.number, "hash": recording.audit_head.hash.hex()}
         if recording.HasField("audit_head")

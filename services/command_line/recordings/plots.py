@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robomesh.extras import missing
-from robomesh.recordings.channel_names import ABOUT
 from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.series import MOST_VALUES, Series, SeriesReader, known_values
@@ -162,7 +161,7 @@ def _shown(unit: str) -> tuple[str, float]:
 
 def _title(file: RecordingFile) -> str:
     """Return the title: robot, name and start of the recording."""
-    about = file.layout.metadata.get(ABOUT, {})
+    about = file.layout.about
     begin = datetime.fromtimestamp(file.layout.start_ns * 1e-9).astimezone()
     robot = "/".join(about[name] for name in ("site", "robot") if about.get(name))
     return "   ".join(

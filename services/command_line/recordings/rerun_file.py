@@ -22,7 +22,6 @@ from renderer.views import FREE, camera_of
 from robomesh.extras import missing
 from robomesh.h264 import is_key_frame
 from robomesh.keys import parse_key
-from robomesh.recordings.channel_names import ABOUT
 from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.series import known_values
@@ -134,7 +133,7 @@ class _Export:
         self._counts: Counter[str] = Counter()
 
     def write(self) -> Counter[str]:
-        rr, about = self._rr, self._file.layout.metadata.get(ABOUT, {})
+        rr, about = self._rr, self._file.layout.about
         appearance = None
         if self._description is not None and self._description.urdf:
             appearance = appearance_of(self._description)

@@ -4,8 +4,7 @@ from typing import NamedTuple, TypeVar
 
 from google.protobuf.message import DecodeError, Message
 
-from robomesh.errors import KeyNameError
-from robomesh.keys import parse_key
+from robomesh.recordings.channel_names import robot_channels
 from robomesh.recordings.reading import RecordingFile
 from services.command_line.recordings.errors import ExportError
 
@@ -39,14 +38,12 @@ def span_of(file: RecordingFile, begin_s: float, end_s: float | None) -> Span:
 
 
 def topics_of(file: RecordingFile) -> dict[str, str]:
-    """Return the robot's topics by their name below the robot, with their keys in the file."""
-    found: dict[str, str] = {}
-    for topic in sorted(file.topics):
-        try:
-            found.setdefault(parse_key(topic).topic, topic)
-        except KeyNameError:
-            continue
-    return found
+    """Return the robot's topics by their name below the robot, with their keys in the file.
+
+    Raises:
+        RecordingError: If several robots have messages.
+    """
+    return robot_channels(file.layout.messages, file.path.name)
 
 
 def needed(file: RecordingFile, topic: str) -> str:

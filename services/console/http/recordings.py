@@ -25,7 +25,8 @@ from starlette.types import Scope
 from robomesh import reason_codes as codes
 from robomesh.client.recorder import RangeMessage, RecorderFile
 from robomesh.errors import RobomeshError
-from robomesh.recordings.channel_names import topic_name
+from robomesh.recordings.channel_names import robot_channels
+from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.table import Table, is_due, table_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
@@ -114,7 +115,11 @@ class Recordings:
         """Send joints and tool as CSV, one row for each state."""
         file = self._file(request)
         info = await file.describe()
-        topics = {topic_name(each.topic): each.topic for each in info.topics if each.messages}
+        messages = {each.topic: each.messages for each in info.topics if each.messages}
+        try:
+            topics = robot_channels(messages, file.name)
+        except RecordingError as error:
+            raise RefusedRequest(409, error.reason) from None
         if "joints" not in topics:
             raise RefusedRequest(404, codes.RECORDING_NO_JOINTS(file=file.name))
         saved = quote(file.name.removesuffix(".mcap") + ".csv")

@@ -1180,6 +1180,13 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "{file}：{start} 至 {end} 没有数据：录制从 {first} 到 {last}",
     ],
   ],
+  [
+    "recording.several_robots",
+    [
+      "{file} is merged from recordings of several robots: {robots}: use the recording of one of them",
+      "{file} 由多台机器人的录制合并而成：{robots}：请使用其中一台的录制",
+    ],
+  ],
   ["recording.no_joints", ["{file} contains no joint states", "{file}：其中没有关节记录"]],
   ["recording.range", ["{range}: {file} has {bytes} bytes", "{range}：{file} 有 {bytes} 字节"]],
   [

@@ -48,6 +48,11 @@ export function topicOf(channel: string): string {
   return chunks[0] === "robomesh" && chunks.length > 3 ? chunks.slice(3).join("/") : channel;
 }
 
+/** Return the recorded robot; of a merged file, possibly several. */
+export function robotsOf({ robot, mergedFrom }: Recording): string[] {
+  return robot ? [robot] : [...new Set(mergedFrom.map((each) => each.robot))];
+}
+
 export function messagesOf({ topics }: Recording): bigint {
   return topics.reduce((sum, { messages }) => sum + messages, 0n);
 }

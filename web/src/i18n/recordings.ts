@@ -47,6 +47,7 @@ const TEXTS = {
   recovered: ["recovered", "已恢复"],
   recovered_hint: ["Its writer was killed; the file was made whole afterwards.", "写入进程曾被终止，文件随后已修复。"],
   part: ["part {part}", "第 {part} 部分"],
+  merged: ["merged", "已合并"],
   by_trace: ["by the controller's trace", "由控制器跟踪启动"],
   by_flight: ["by the flight recorder", "由循环录制保存"],
   by_request: ["on request", "按请求"],

@@ -13,6 +13,7 @@ import {
   lostText,
   messagesOf,
   momentText,
+  robotsOf,
   sizeText,
   startedText,
   startMs,
@@ -34,6 +35,7 @@ export function RecordingCard(props: {
   const empty = isEmpty(recording);
   const mine = { site, file };
   const lost = lostText(recording);
+  const robots = robotsOf(recording).join(", ");
   const first = props.first.value;
   const isFirst = first?.site === site && first.file === file;
   const compare = () => (props.first.value = isFirst ? null : { ...mine, name });
@@ -50,6 +52,7 @@ export function RecordingCard(props: {
             </span>
           )}
           {recording.part > 0 && <span class="tag">{r("part", { part: recording.part })}</span>}
+          {recording.mergedFrom.length > 0 && <span class="tag">{r("merged")}</span>}
           {recording.recovered && (
             <span class="tag" title={r("recovered_hint")}>
               {r("recovered")}
@@ -57,7 +60,7 @@ export function RecordingCard(props: {
           )}
         </div>
         <p class="recording-facts dim">
-          <span>{props.sited ? `${site} / ${recording.robot}` : recording.robot}</span>
+          <span>{props.sited ? `${site} / ${robots}` : robots}</span>
           <time title={fullTime(startMs(recording))}>{dateText(startMs(recording))}</time>
           <span class="figure">{momentText(durationS(recording), 0)}</span>
           <span class="figure">{sizeText(recording.bytes)}</span>

@@ -2,7 +2,7 @@
 
 import { signal } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
-import { sizeText, startMs } from "../../i18n/recording-format";
+import { robotsOf, sizeText, startMs } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
 import type { Notice } from "../../mesh/control";
 import { reasonOf } from "../../mesh/control";
@@ -30,7 +30,7 @@ const first = signal<(RecordingName & { name: string }) | null>(null);
 
 export function RecordingList() {
   const { rows, sites, waiting } = useRecordings();
-  const robots = [...new Set(rows.map(({ recording }) => recording.robot))].sort();
+  const robots = [...new Set(rows.flatMap(({ recording }) => robotsOf(recording)))].sort();
   const shown = rows.filter(isWanted);
   useEffect(() => () => void (first.value = null), []);
   return (
@@ -96,9 +96,9 @@ export function RecordingList() {
 
 function isWanted({ recording }: Row): boolean {
   const searchText = search.value.trim().toLowerCase();
-  const words = [recording.robot, recording.name, recording.file, recording.cause].join(" ").toLowerCase();
+  const words = [...robotsOf(recording), recording.name, recording.file, recording.cause].join(" ").toLowerCase();
   return (
-    (robot.value === EVERY || recording.robot === robot.value) &&
+    (robot.value === EVERY || robotsOf(recording).includes(robot.value)) &&
     Date.now() - startMs(recording) <= SPANS[span.value] &&
     words.includes(searchText)
   );
