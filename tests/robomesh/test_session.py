@@ -64,6 +64,8 @@ def test_value_published_during_its_query_is_live(mesh):
             subscription = monitor.subscribe("robomesh/site/arm/joints", newest=10)
             answer = await anext(subscription)
             assert (answer.live, answer.message()) == (False, joints(2.0))
+            # The query may overtake the subscription's declaration: they use different connections.
+            await until(lambda: publisher.watched)
             for _ in range(2):
                 publisher._publisher.put(answer.payload, attachment=pack(answer.header))
             publisher.put(joints(3.0))
