@@ -35,8 +35,9 @@ def sources() -> Iterator[Path]:
     """Yield every file that the built page depends on."""
     yield Path(__file__)
     yield from _SCHEMAS
-    for name in ("index.html", "package.json", "package-lock.json", "tsconfig.json", "vite.config.ts"):
+    for name in ("package.json", "package-lock.json", "tsconfig.json", "vite.config.ts"):
         yield PAGE / name
+    yield from PAGE.glob("*.html")
     for folder in ("src", "public"):
         for path in (PAGE / folder).rglob("*"):
             if path.is_file() and GENERATED not in path.parents:

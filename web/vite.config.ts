@@ -10,5 +10,6 @@ export default defineConfig({
     assetsInlineLimit: 0, // data: addresses would need a wider security policy
     chunkSizeWarningLimit: 900,
     modulePreload: { polyfill: false },
+    rollupOptions: { input: ["index.html", "view.html"] },
   },
 });

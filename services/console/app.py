@@ -48,6 +48,7 @@ from services.console.http.uvicorn_server import (
     server_of,
     tls_context,
 )
+from services.console.http.view_page import ViewPage
 from services.console.requested_views import Views
 from services.console.websocket.page_connection import Browser
 from services.console.websocket.shared_subscriptions import SharedSubscriptions
@@ -283,8 +284,8 @@ async def _serve_signed_in(browser: Browser, user: SignedIn, websocket: WebSocke
 def application(hub: Hub) -> ASGIApp:
     """Return the app with all its routes; with accounts, every request passes the authentication middleware.
 
-    `/mesh` (WebSocket), `/mesh/<site>/<robot>/<name>`, layouts of other viewers, pictures, recordings,
-    Define, `/account`, `/health`, the page.
+    `/mesh` (WebSocket), `/mesh/<site>/<robot>/<name>`, layouts of other viewers, pictures, pages of single
+    views, recordings, Define, `/account`, `/health`, the page.
     """
     settings, secure = hub.settings, hub.settings.certificate is not None
     cookie = cookie_name(settings.site, secure=secure)
@@ -306,6 +307,7 @@ def application(hub: Hub) -> ASGIApp:
         Route("/mesh/{site}/{robot}/{name}", mesh, methods=["GET"]),
         Route("/layout/{site}/{robot}.json", layout, methods=["GET"]),
         *hub.pictures.routes(),
+        *ViewPage(hub.session, hub.pictures, settings.page).routes(),
         *Recordings(hub.session, hub.asker).routes(),
         *([] if hub.define is None else [hub.define.routes()]),
         Mount("/", PageFiles(directory=hub.settings.page, html=True)),

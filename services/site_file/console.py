@@ -32,8 +32,9 @@ class Console(BaseModel):
         accounts: File of accounts (`robomesh accounts`); absent: the page needs no sign-in.
         tls: The page's certificate; absent: HTTP.
         insecure: Accept an address that other machines reach without accounts or TLS.
-        embed: Origins ("https://intranet.example") whose pages may show pictures and video of the robots;
-            never the page itself. Not with `accounts`: other pages' requests carry no sign-in.
+        embed: Origins ("https://intranet.example") whose pages may show pictures, video, and pages of single
+            views, which have no controls; never the page itself. Not with `accounts`: other pages' requests
+            carry no sign-in.
     """
 
     model_config = PART_CONFIG

@@ -11,6 +11,7 @@ from tests.browser.conftest import ARGUMENTS, CHROMIUM, LAUNCH_MS, PATIENCE_MS
 from tests.conftest import run
 from tests.services.test_console import page  # noqa: F401
 from tests.services.test_console_pictures import rendered
+from web import build_page
 
 pytestmark = pytest.mark.browser
 
@@ -19,6 +20,10 @@ EMBEDDING = """<!doctype html><img id="moving" src="http://{0}/video/s/r/front.m
 <video id="video" muted autoplay src="http://{0}/video/s/r/front.mp4"></video>"""
 SHOWN = """() => ["moving", "still", "shared"].every((id) => document.getElementById(id).naturalWidth > 0)
   && document.getElementById("video").currentTime > 0.2"""
+FRAMES = """<!doctype html><iframe id="view" src="http://{0}/view/s/r/front?theme=light&language=en"></iframe>
+<iframe id="page" src="http://{0}/"></iframe><iframe id="trick" src="http://{0}/view/..%2Findex.html"></iframe>"""
+VIEW_SHOWN = """() => document.querySelector(".frame:not(.stale) img")?.naturalWidth > 0"""
+NAMES = ("view", "page", "trick")
 FAILED = """() => new Promise((resolve) => {
   const image = new Image();
   image.onload = () => resolve("shown");
@@ -77,5 +82,37 @@ def test_pages_of_listed_origins_show_pictures_and_video_and_others_do_not(mesh,
             await tab.wait_for_function(playing, timeout=PATIENCE_MS)
             await browser.close()
             await asyncio.sleep(0)
+
+    run(main(), timeout_s=180.0)
+
+
+def test_a_listed_page_frames_one_view_without_controls_and_nothing_else(mesh, intranet):
+    (listed, other), pages = intranet
+    build_page.build()
+
+    async def main():
+        async with (
+            rendered(mesh, build_page.DIST, embed=(listed,)) as (address, renderer),
+            async_playwright() as playwright,
+        ):
+            pages["/frames"] = FRAMES.format(address)
+            browser = await playwright.chromium.launch(
+                executable_path=str(CHROMIUM), args=ARGUMENTS, timeout=LAUNCH_MS
+            )
+            tab = await browser.new_page()
+            await tab.goto(f"{listed}/frames", timeout=PATIENCE_MS)
+            frames = {name: await (await tab.query_selector(f"#{name}")).content_frame() for name in NAMES}
+            await frames["view"].wait_for_function(VIEW_SHOWN, timeout=PATIENCE_MS)
+            assert await frames["view"].locator("a, button, input, form, [onclick], [tabindex]").count() == 0
+            assert (await frames["view"].locator(".frame-name").inner_text()).endswith("r")
+            for name in ("page", "trick"):
+                assert frames[name].url.startswith("chrome-error:")
+            renderer.playing.cancel()
+            await frames["view"].locator(".frame-notice .age").wait_for(timeout=PATIENCE_MS)
+            await tab.goto(f"{other}/frames", timeout=PATIENCE_MS)
+            for name in NAMES:
+                frame = await (await tab.query_selector(f"#{name}")).content_frame()
+                assert frame.url.startswith("chrome-error:")
+            await browser.close()
 
     run(main(), timeout_s=180.0)

@@ -31,6 +31,7 @@ DELTA = b"\0\0\0\1\x41\x9a\x01"
 def page(tmp_path):
     (tmp_path / "assets").mkdir()
     (tmp_path / "index.html").write_text("<!doctype html><title>page</title>")
+    (tmp_path / "view.html").write_text("<!doctype html><title>view</title>")
     (tmp_path / "assets" / "index-1234.js").write_text("export {}")
     return tmp_path
 

@@ -71,7 +71,8 @@ def test_a_current_page_is_not_built_again():
 @pytest.mark.slow
 def test_the_built_page_asks_nothing_of_anybody_else():
     build_page.build()
-    html = (build_page.DIST / "index.html").read_text()
-    assert "://" not in html
-    assert "<style" not in html
-    assert re.search(r"<script(?![^>]*src=)", html) is None
+    for name in ("index.html", "view.html"):
+        html = (build_page.DIST / name).read_text()
+        assert "://" not in html
+        assert "<style" not in html
+        assert re.search(r"<script(?![^>]*src=)", html) is None

@@ -332,7 +332,7 @@ def test_a_slow_reader_gets_the_newest_picture_next():
 
     async def main():
         feeds = SharedSubscriptions()
-        watch = pictures._Watch(feeds, "robomesh/s/r/image/front", NewestQueue())
+        watch = pictures.Watch(feeds, "robomesh/s/r/image/front", NewestQueue())
         for number in range(100):
             sample = Sample("robomesh/s/r/image/front", b"", Header(1, number, 0), True, 0.0)
             feeds.sink(SampleBatch([sample]))

@@ -7,6 +7,7 @@ Origin of a WebSocket and of every changing request must be the page's own.
 
 import contextlib
 import ipaddress
+import re
 from collections.abc import Collection
 from urllib.parse import urlsplit
 
@@ -26,11 +27,12 @@ _READING = ("GET", "HEAD", "OPTIONS")
 _MOST_BODY = (("/account/", 16 * 1024), ("/define/", 200 * 1000**2))
 _HSTS = "max-age=31536000"
 
+_PAGE_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; "
+    "connect-src 'self' blob:; base-uri 'none'; form-action 'none'; "
+)
 SECURITY_HEADERS = {
-    "Content-Security-Policy": (
-        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; "
-        "connect-src 'self' blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-    ),
+    "Content-Security-Policy": f"{_PAGE_POLICY}frame-ancestors 'none'",
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
@@ -41,6 +43,9 @@ SECURITY_HEADERS = {
 # Pictures and video, which pages of other origins may show, and which a browser shows by themselves.
 _MEDIA = ("/video/", "/image/")
 _MEDIA_POLICY = "default-src 'none'; img-src 'self'; media-src 'self'; base-uri 'none'; form-action 'none'; "
+# Exactly what the route of a view's page matches: below another path, as "/view/../index.html", the page with
+# controls could be found.
+_VIEW_PAGE = re.compile("/view/[^/]+/[^/]+/[^/]+")
 
 
 def refused_host(host: str, names: Collection[str]) -> Reason | None:
@@ -110,7 +115,7 @@ class Guard:
 
     Args:
         secure: The console is served over TLS.
-        embed: Origins whose pages may show pictures and video.
+        embed: Origins whose pages may show pictures, video, and the pages of single views in frames.
     """
 
     def __init__(
@@ -125,6 +130,10 @@ class Guard:
         self._names, self._embed = names, embed
         self._secure = secure
         self._headers = SECURITY_HEADERS | ({"Strict-Transport-Security": _HSTS} if secure else {})
+        policy = f"{_PAGE_POLICY}frame-ancestors {' '.join(embed)}"
+        self._framed_headers = self._headers | {"Content-Security-Policy": policy}
+        # It knows no origins. Browsers ignore it beside `frame-ancestors`, other programs need not.
+        del self._framed_headers["X-Frame-Options"]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request that passes the checks; reject others."""
@@ -136,6 +145,8 @@ class Guard:
         added = self._headers
         if scope["type"] == "http" and scope["path"].startswith(_MEDIA):
             added = added | self._media_headers(headers)
+        elif scope["type"] == "http" and self._embed and _VIEW_PAGE.fullmatch(scope["path"]):
+            added = self._framed_headers
 
         async def send_guarded(message: Message) -> None:
             if message["type"].endswith("http.response.start"):  # also of a refused WebSocket

@@ -68,7 +68,7 @@ _NO_STORE = {"Cache-Control": "no-store"}
 _STALE = (Path(__file__).parent / "stale.jpg").read_bytes()
 
 
-class _View(NamedTuple):
+class View(NamedTuple):
     """The keys of a view's video and pictures, and its highest rate [1/s]."""
 
     video: str
@@ -110,16 +110,16 @@ class Pictures:
 
     async def mjpeg(self, request: Request) -> Response:
         """Send one JPEG after another; each replaces the one before."""
-        view = await self._view(request)
+        view = await self.view(request)
         stale_after_s = max(_STALE_AFTER_S, _STALE_AFTER / view.fps)
         pieces = _mjpeg_parts(self.subscriptions, view.image, stale_after_s)
-        return await self._stream(request, pieces, view.image, f"{MJPEG}; boundary={_BOUNDARY}")
+        return await self.stream(request, pieces, view.image, f"{MJPEG}; boundary={_BOUNDARY}")
 
     async def mp4(self, request: Request) -> Response:
         """Send fragmented MP4, from the newest key frame on."""
-        view = await self._view(request)
+        view = await self.view(request)
         pieces = _fragments(self.subscriptions, view, partial(self._want_key_frame, request, view.video))
-        return await self._stream(request, pieces, view.video, "video/mp4")
+        return await self.stream(request, pieces, view.video, "video/mp4")
 
     async def _want_key_frame(self, request: Request, key: str) -> None:
         """Ask for a key frame, with which the renderer sends pictures at the full rate for a moment."""
@@ -140,8 +140,8 @@ class Pictures:
             raise RefusedRequest(503, codes.VIEW_TOO_MANY_STILLS(count=_MOST_STILLS))
         self.stills += 1
         try:
-            key = (await self._view(request)).image
-            with contextlib.closing(_Watch(self.subscriptions, key, NewestQueue())) as watch:
+            key = (await self.view(request)).image
+            with contextlib.closing(Watch(self.subscriptions, key, NewestQueue())) as watch:
                 sample = await watch.next(_STILL_WITHIN_S)
             if sample is None:
                 raise RefusedRequest(504, codes.VIEW_NO_PICTURE(view=key, seconds=_STILL_WITHIN_S))
@@ -149,7 +149,7 @@ class Pictures:
         finally:
             self.stills -= 1
 
-    async def _view(self, request: Request) -> _View:
+    async def view(self, request: Request) -> View:
         """Return the keys of the view that a request names."""
         path, size = request.path_params, _size(request.query_params)
         try:
@@ -174,11 +174,16 @@ class Pictures:
                     await self.views.ask(robot, ViewRequest(of=view), self.asker(request.scope))
                     status = 400
             raise RefusedRequest(status, error.reason) from None
-        return _View(f"{robot}/{answer.topic}", f"{robot}/{answer.image}", max(answer.fps, 1.0))
+        return View(f"{robot}/{answer.topic}", f"{robot}/{answer.image}", max(answer.fps, 1.0))
 
-    async def _stream(
+    async def stream(
         self, request: Request, pieces: AsyncGenerator[bytes], key: str, media_type: str
     ) -> Response:
+        """Return a response that sends the pieces, if there is room for another stream.
+
+        Args:
+            key: Key of the pictures, for a refusal.
+        """
         if request.method == "HEAD":
             await pieces.aclose()
             return _endless(media_type)
@@ -216,17 +221,31 @@ class Pictures:
         await pieces.aclose()
 
 
-class _Watch:
-    """One reader's subscription to a key; reads the newest sample."""
+class Watch:
+    """One reader's subscription to a key; reads the newest sample.
 
-    def __init__(self, subscriptions: SharedSubscriptions, key: str, queue: SendQueue) -> None:
+    Args:
+        ready: Set when a sample arrives; for a reader of several keys.
+    """
+
+    def __init__(
+        self,
+        subscriptions: SharedSubscriptions,
+        key: str,
+        queue: SendQueue,
+        ready: asyncio.Event | None = None,
+    ) -> None:
         self._subscriptions, self._key, self._queue = subscriptions, key, queue
-        self._ready = asyncio.Event()
+        self._ready = ready or asyncio.Event()
         subscriptions.join(key, self._push)
 
     def close(self) -> None:
         """Unsubscribe."""
         self._subscriptions.leave(self._key, self._push)
+
+    def pop(self) -> Sample | None:
+        """Return the next sample; None if none has arrived."""
+        return self._queue.pop()
 
     async def next(self, within_s: float) -> Sample | None:
         """Return the next sample; None if none arrives in time."""
@@ -255,7 +274,7 @@ async def _prepend(first: bytes, pieces: AsyncGenerator[bytes]) -> AsyncGenerato
 async def _mjpeg_parts(
     subscriptions: SharedSubscriptions, key: str, stale_after_s: float
 ) -> AsyncGenerator[bytes]:
-    with contextlib.closing(_Watch(subscriptions, key, NewestQueue())) as watch:
+    with contextlib.closing(Watch(subscriptions, key, NewestQueue())) as watch:
         sample = await watch.next(_FIRST_WITHIN_S)
         if sample is None:
             return
@@ -269,11 +288,11 @@ async def _mjpeg_parts(
 
 
 async def _fragments(
-    subscriptions: SharedSubscriptions, view: _View, want_key_frame: Callable[[], Coroutine[None, None, None]]
+    subscriptions: SharedSubscriptions, view: View, want_key_frame: Callable[[], Coroutine[None, None, None]]
 ) -> AsyncGenerator[bytes]:
     """Yield MP4 fragments. Earlier frames are shown at the start: the times are those of arrival."""
     mp4 = FragmentedMp4()
-    with contextlib.closing(_Watch(subscriptions, view.video, VideoQueue())) as watch:
+    with contextlib.closing(Watch(subscriptions, view.video, VideoQueue())) as watch:
         asking = asyncio.create_task(want_key_frame())
         try:
             while (sample := await watch.next(_SILENT_S)) is not None:

@@ -2,6 +2,7 @@
 
 import { signal } from "@preact/signals";
 import { isolated } from "./foreign-text";
+import { readStored } from "./stored";
 
 const TEXTS = {
   fleet: ["Fleet", "机群"],
@@ -410,7 +411,7 @@ export type Language = "en" | "zh";
 const STORAGE_KEY = "robomesh.language";
 
 function initialLanguage(): Language {
-  const stored = localStorage.getItem(STORAGE_KEY);
+  const stored = readStored(STORAGE_KEY);
   if (stored === "en" || stored === "zh") return stored;
   return navigator.language.toLowerCase().startsWith("zh") ? "zh" : "en";
 }

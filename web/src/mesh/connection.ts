@@ -209,7 +209,8 @@ function send(message: NonNullable<MessageInitShape<typeof FromPageSchema>["mess
   return true;
 }
 
-function receive(bytes: Uint8Array): void {
+/** Take one message of the console. */
+export function receive(bytes: Uint8Array): void {
   const { message } = fromBinary(ToPageSchema, bytes);
   switch (message.case) {
     case "hello":

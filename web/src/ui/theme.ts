@@ -1,12 +1,13 @@
 // The theme: dark unless the person or the system chooses light.
 
 import { signal } from "@preact/signals";
+import { readStored } from "../i18n/stored";
 
 export type Theme = "dark" | "light";
 const STORAGE_KEY = "robomesh.theme";
 
 function initial(): Theme {
-  const stored = localStorage.getItem(STORAGE_KEY);
+  const stored = readStored(STORAGE_KEY);
   if (stored === "dark" || stored === "light") return stored;
   return matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark";
 }

@@ -1,0 +1,28 @@
+// Entry of the page of one view: `/view/<site>/<robot>/<view>`, `?theme=dark|light`, `?language=en|zh`.
+
+import "@preact/signals";
+import { render } from "preact";
+import { ViewPage } from "../features/view/view-page";
+import { isolateForeignTexts } from "../i18n/foreign-text";
+import { language } from "../i18n/texts";
+import { followView } from "../mesh/view-stream";
+import { applyTheme, theme } from "../ui/theme";
+import "../ui/tokens.css";
+import "./base.css";
+import "../ui/state.css";
+import "../ui/replay.css";
+import "../features/view/view-page.css";
+
+const query = new URLSearchParams(location.search);
+const [, , site = "", robot = "", view = ""] = location.pathname.split("/");
+const wantedTheme = query.get("theme");
+const wantedLanguage = query.get("language");
+if (wantedTheme === "dark" || wantedTheme === "light") theme.value = wantedTheme;
+if (wantedLanguage === "en" || wantedLanguage === "zh") language.value = wantedLanguage;
+isolateForeignTexts();
+applyTheme();
+document.documentElement.lang = language.value === "zh" ? "zh-Hans" : "en";
+const token = query.get("token");
+followView(`${location.pathname}/live${token ? `?${new URLSearchParams({ token })}` : ""}`);
+const root = document.getElementById("view");
+if (root) render(<ViewPage site={site} robot={robot} view={view} />, root);
