@@ -17,8 +17,11 @@ PROGRAM = Path(sys.argv[1])
 ROBOT = sys.argv[2] if len(sys.argv) > 2 else "demo/pt600"
 ROUTER = sys.argv[3] if len(sys.argv) > 3 else "tcp/127.0.0.1:7447"
 
-with robomesh.connect(ROUTER) as mesh:
-    result = mesh.robot(ROBOT).check(PROGRAM)
+try:
+    with robomesh.connect(ROUTER) as mesh:
+        result = mesh.robot(ROBOT).check(PROGRAM)
+except robomesh.RobomeshError as error:
+    sys.exit(f"not done: {error}")
 signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # from here on `| head` may end it
 for each in result.violations:
     print(f"line {each.line}, {each.time_s:.2f} s: {each.kind}: {each.text}")

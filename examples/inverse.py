@@ -20,11 +20,14 @@ ROUTER = sys.argv[5] if len(sys.argv) > 5 else "tcp/127.0.0.1:7447"
 # Tool to base, row by row, in metres: the tool's z points against the base's.
 POSE = [[1, 0, 0, X], [0, -1, 0, Y], [0, 0, -1, Z], [0, 0, 0, 1]]
 
-with robomesh.connect(ROUTER) as mesh:
-    robot = mesh.robot(ROBOT)
-    result = robot.inverse(POSE, all_solutions=True)
-    joints = robot.description().joints
-    solutions = [robot.degrees(each) for each in result.solutions]
+try:
+    with robomesh.connect(ROUTER) as mesh:
+        robot = mesh.robot(ROBOT)
+        result = robot.inverse(POSE, all_solutions=True)
+        joints = robot.description().joints
+        solutions = [robot.degrees(each) for each in result.solutions]
+except robomesh.RobomeshError as error:
+    sys.exit(f"not done: {error}")
 signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # from here on `| head` may end it
 units = ["mm" if joint.type == joint.PRISMATIC else "" for joint in joints]
 for solution in solutions:

@@ -16,9 +16,13 @@ config = zenoh.Config()
 config.insert_json5("mode", '"client"')
 config.insert_json5("connect/endpoints", f'["{ROUTER}"]')
 
+try:
+    session = zenoh.open(config)
+except zenoh.ZError:
+    sys.exit(f"not done: no router at {ROUTER}")
 with (
     suppress(BrokenPipeError, KeyboardInterrupt),  # `| head`, Ctrl-C
-    zenoh.open(config) as session,
+    session,
     session.declare_subscriber("robomesh/*/*/joints/slow") as states,
 ):
     for sample in states:

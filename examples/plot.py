@@ -11,9 +11,12 @@ import robomesh
 
 if len(sys.argv) != 3:
     sys.exit(__doc__)
-recording = robomesh.open_recording(sys.argv[1])
-joints = recording.joints()
-tool = recording.values("kinematics/tool/x", "kinematics/tool/y", "kinematics/tool/z")
+try:
+    recording = robomesh.open_recording(sys.argv[1])
+    joints = recording.joints()
+    tool = recording.values("kinematics/tool/x", "kinematics/tool/y", "kinematics/tool/z")
+except robomesh.RobomeshError as error:
+    sys.exit(f"not done: {error}")
 
 figure, (above, below) = plt.subplots(2, sharex=True, layout="constrained", figsize=(9, 6))
 above.plot(joints.time_s, joints.positions_deg, label=joints.names)

@@ -101,6 +101,30 @@ def test_inverse_says_where_the_joints_must_be_or_why_they_cannot(site, place, s
     assert bool(solutions) is (status == 0)
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("home.py", "demo/pt600", "tcp/127.0.0.1:1"),
+        ("check.py", "examples/square.program", "demo/pt600", "tcp/127.0.0.1:1"),
+        ("inverse.py", "400", "0", "300", "demo/pt600", "tcp/127.0.0.1:1"),
+        ("joints.py", "tcp/127.0.0.1:1"),
+        ("plot.py", "absent.mcap", "picture.png"),
+    ],
+)
+def test_an_example_reports_what_it_cannot_do_in_one_line(arguments):
+    name, *words = arguments
+    result = subprocess.run(
+        [sys.executable, f"examples/{name}", *words],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        cwd=EXAMPLES.parent,
+    )
+    assert result.returncode == 1, result.stdout + result.stderr
+    assert result.stderr.startswith("not done: ")
+    assert len(result.stderr.splitlines()) == 1
+
+
 def test_plot_draws_a_recording(tmp_path):
     path, picture = tmp_path / "trial.mcap", tmp_path / "trial.png"
     with Written(path) as file:
