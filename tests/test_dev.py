@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
+from deploy.locked_parts import plain, roots
 from tests.run_parts import run_parts
 
 pytestmark = pytest.mark.slow
@@ -132,7 +133,7 @@ def test_the_bench_is_the_whole_lock_file_without_what_robomesh_does_not_call(de
     assert bench > names(dev.requirements({"site"}))
     assert everything - bench >= dev.UNUSED
     # These are what the unused packages bring.
-    assert not (everything - bench) & dev.roots({"bench"})
+    assert not (everything - bench) & roots({"bench"})
 
 
 def test_every_line_keeps_its_version_marker_and_hashes(dev):
@@ -144,16 +145,14 @@ def test_every_line_keeps_its_version_marker_and_hashes(dev):
 
 @pytest.mark.parametrize("parts", [{"site"}, {"site", "bench"}])
 def test_what_a_package_asks_for_is_installed_with_it(dev, parts):
-    wanted = {dev.plain(name) for name in names(dev.requirements(parts))}
+    wanted = {plain(name) for name in names(dev.requirements(parts))}
     for name in wanted:
         try:
             asked = [Requirement(each) for each in requires(name) or ()]
         except PackageNotFoundError:  # for other systems
             continue
         needed = {
-            dev.plain(each.name)
-            for each in asked
-            if each.marker is None or each.marker.evaluate({"extra": ""})
+            plain(each.name) for each in asked if each.marker is None or each.marker.evaluate({"extra": ""})
         }
         assert needed <= wanted | dev.UNUSED, name
 

@@ -1,6 +1,5 @@
 """Extras that an installation lacks: one line names the package and the command that installs it."""
 
-import ast
 import subprocess
 import sys
 import tomllib
@@ -8,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from deploy.locked_parts import PARTS
 from robomesh import extras
 from robots.errors import MeshError, SaveError
 from robots.meshes.step import read_step
@@ -22,12 +22,7 @@ def test_every_extra_of_the_table_exists():
 
 
 def test_what_a_checkout_adds_is_what_dev_adds():
-    (parts,) = (
-        node.value
-        for node in ast.parse((ROOT / "dev").read_text()).body
-        if isinstance(node, ast.Assign) and node.targets[0].id == "PARTS"
-    )
-    assert ast.literal_eval(parts).keys() == extras.ADDED_IN_CHECKOUT
+    assert PARTS.keys() == extras.ADDED_IN_CHECKOUT
 
 
 @pytest.mark.parametrize(
