@@ -64,17 +64,17 @@ class _Sequence:
 
 
 class _Preamble:
-    """First messages of a file that is opened now: the last value, or the frames since a key frame."""
+    """What a file that is opened now lacks: the last value, or the frames since a key frame."""
 
     def __init__(self) -> None:
-        self.entries: list[tuple[Header, bytes, int]] = []
+        self.entries: list[tuple[Header, bytes]] = []
         self._bytes = 0
         self._full = False
 
     def begin(self) -> None:
         self.entries, self._bytes, self._full = [], 0, False
 
-    def add(self, entry: tuple[Header, bytes, int]) -> None:
+    def add(self, entry: tuple[Header, bytes]) -> None:
         self._bytes += len(entry[1])
         self._full = self._full or self._bytes > _MAX_PREAMBLE_BYTES
         if self._full:
@@ -90,9 +90,12 @@ class _TopicSubscription:
         self.key_expr = key_expr
         self._ignored = ignored
         self.row = topic(key_expr.split("/", 3)[3])
-        # Lost publications, and the first messages of a new file, by key.
+        self._is_video = self.row.history is History.KEY_FRAME
+        # Lost publications, and what a new file lacks, by key.
         self.lost: Counter[str] = Counter()
         self.preamble: dict[str, _Preamble] = {}
+        # Sinks that received the newest picture.
+        self._begun: frozenset[Sink] = frozenset()
         self.begun_ns = time.time_ns()
         self._session = session
         self._sequences: dict[str, _Sequence] = {}
@@ -100,12 +103,12 @@ class _TopicSubscription:
         # The ring is not drained before the reply with earlier messages has come, or its timeout.
         self._blocked_until = 0.0
         self._subscriber = _subscribe(session, key_expr, self.row)
-        if self.row.history in (History.LAST_100, History.KEY_FRAME) or self._is_static:
+        if self.row.history in (History.LAST_100, History.KEY_FRAME) or self.is_static:
             self._blocked_until = time.monotonic() + _REPLY_TIMEOUT_S
             self.query()
 
     @property
-    def _is_static(self) -> bool:
+    def is_static(self) -> bool:
         """True if the topic describes the robot and is published only once, before the recording."""
         return self.row.history is History.LAST and self.row.stale_after_s is None
 
@@ -134,7 +137,7 @@ class _TopicSubscription:
 
     def refresh(self) -> None:
         """Query a service that came online for what it published while the link was down."""
-        if self.row.history is History.LAST_100 or self._is_static:
+        if self.row.history is History.LAST_100 or self.is_static:
             self.query()
 
     def drain(self, sinks: Iterable[Sink]) -> int:
@@ -143,8 +146,8 @@ class _TopicSubscription:
         while self._replies:
             reply = self._replies.popleft()
             try:
-                for key, header, payload, received_ns in self._read_reply(reply):
-                    self._deliver(key, header, payload, received_ns, sinks)
+                for key, header, payload in self._read_reply(reply):
+                    self._deliver(key, header, payload, time.monotonic_ns(), sinks)
             except (MessageError, ValueError) as error:  # ValueError: an invalid timestamp
                 log.warning("%s: a message is not recorded: %s", self.key_expr, error)
         if blocked:
@@ -177,16 +180,27 @@ class _TopicSubscription:
     def _deliver(
         self, key: str, header: Header, payload: bytes, received_ns: int, sinks: Iterable[Sink]
     ) -> None:
-        if self._is_static or self.row.history is History.KEY_FRAME:
-            self._keep(key, header, payload, received_ns)
+        if self._is_video:
+            # Without a new picture, a viewer would show the last one as live, however old it is.
+            if not holds_key_frame(payload) and key in self.preamble:
+                for sink in frozenset(sinks) - self._begun:
+                    self.deliver_preamble(key, sink, received_ns)
+            self._begun = frozenset(sinks)
         for sink in sinks:
             sink.take(key, self.row, header, payload, received_ns)
+        if self._is_video or self.is_static:
+            self._keep(key, header, payload)
 
-    def _keep(self, key: str, header: Header, payload: bytes, received_ns: int) -> None:
+    def deliver_preamble(self, key: str, sink: Sink, received_ns: int) -> None:
+        """Give a sink the messages that a new file lacks."""
+        for header, payload in self.preamble[key].entries:
+            sink.take(key, self.row, header, payload, received_ns)
+
+    def _keep(self, key: str, header: Header, payload: bytes) -> None:
         preamble = self.preamble.setdefault(key, _Preamble())
-        if self._is_static or holds_key_frame(payload):
+        if self.is_static or holds_key_frame(payload):
             preamble.begin()
-        preamble.add((header, payload, received_ns))
+        preamble.add((header, payload))
 
     def _accepts(self, kind: str, key: str) -> bool:
         return key in self._sequences or self._ignored.key(kind, key) is not None
@@ -223,27 +237,26 @@ class _TopicSubscription:
             return True
         return False
 
-    def _read_reply(self, sample: zenoh.Sample) -> list[tuple[str, Header, bytes, int]]:
-        """Return the new messages of a reply, oldest first.
+    def _read_reply(self, sample: zenoh.Sample) -> list[tuple[str, Header, bytes]]:
+        """Return the new messages of a reply, oldest first; keep pictures, which may be old, for `_deliver`.
 
         Raises:
             MessageError: If it cannot be decoded.
         """
-        key, now_ns = str(sample.key_expr), time.monotonic_ns()
+        key = str(sample.key_expr)
         if sample.attachment is None or not self._accepts(REPLY, key):
             return []
         header = unpack(sample.attachment.to_bytes())
         payload = sample.payload.to_bytes()
-        found: list[tuple[str, Header, bytes, int]] = []
-        if self.row.history is History.KEY_FRAME:
+        found: list[tuple[str, Header, bytes]] = []
+        if self._is_video:
             if key in self._sequences:
                 return []  # live frames have arrived; the next key frame is near
             frames = decode(schema.VideoFrames, payload)
-            newest_ns = max((frame.source_time_ns for frame in frames.frames), default=0)
             for frame in frames.frames:
                 each = Header(frames.publisher, frame.sequence, frame.source_time_ns)
                 if self._is_new(key, each):
-                    found.append((key, each, frame.data, now_ns - (newest_ns - frame.source_time_ns)))
+                    self._keep(key, each, frame.data)
         elif self.row.history is History.LAST_100:
             assert self.row.history_schema is not None
             history: Any = decode(self.row.history_schema, payload)
@@ -253,12 +266,12 @@ class _TopicSubscription:
                 each = Header(header.publisher, number, time_ns)
                 # Older entries belong to earlier recordings.
                 if time_ns >= self.begun_ns and self._is_new(key, each):
-                    found.append((key, each, entry.SerializeToString(), now_ns))
+                    found.append((key, each, entry.SerializeToString()))
             if not found and key not in self._sequences:
                 seen = self._sequences[key] = _Sequence(header)
                 seen.skipped.update(range(header.sequence - len(entries) + 1, header.sequence + 1))
         elif self._is_new(key, header):
-            found.append((key, header, payload, now_ns))
+            found.append((key, header, payload))
         return found
 
 
@@ -282,15 +295,14 @@ class RobotSubscriptions:
                 sink.drained()
 
     def attach(self, sink: Sink, names: frozenset[str]) -> None:
-        """Give a sink the first messages of these topics, and every publication from now on."""
+        """Give a sink the last values of static topics, and every publication of these from now on."""
         for name in sorted(names - self._topics.keys()):
             key_expr = robot_key(self._site, self._robot, name)
             self._topics[name] = _TopicSubscription(self._session, key_expr, self._ignored)
         for name in names:
             each = self._topics[name]
-            for key, preamble in each.preamble.items():
-                for header, payload, received_ns in preamble.entries:
-                    sink.take(key, each.row, header, payload, received_ns)
+            for key in each.preamble if each.is_static else ():
+                each.deliver_preamble(key, sink, received_ns=0)  # before the file's start
         self._sinks[sink] = (names, self._lost_of(names))
         self._update_sinks()
 

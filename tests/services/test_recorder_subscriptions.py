@@ -18,7 +18,16 @@ from services.recorder.file_writer import Part
 from services.recorder.settings import Flight
 from tests.conftest import run
 from tests.recordings import KEY_PICTURE, PICTURE, START_NS
-from tests.services.recording import WITHIN_S, put_states, recording_site, trace_on, until
+from tests.services.recording import (
+    WITHIN_S,
+    put_states,
+    recording_site,
+    trace_off,
+    trace_on,
+    until,
+    until_indexed,
+)
+from tests.services.test_recordings_elsewhere import counted
 
 ARM = "robomesh/site/arm"
 JOINTS, VIDEO, EVENTS = f"{ARM}/joints", f"{ARM}/video/front", f"{ARM}/events"
@@ -170,15 +179,52 @@ def test_the_rings_of_a_hundred_robots_fit_into_memory():
 def test_frames_since_a_key_frame_are_kept_whole_or_not_at_all(monkeypatch):
     preamble = subscriptions._Preamble()
     for number in range(1000):
-        preamble.add((Header(7, number, 0), PICTURE, 0))
+        preamble.add((Header(7, number, 0), PICTURE))
     assert len(preamble.entries) == 1000
     monkeypatch.setattr(subscriptions, "_MAX_PREAMBLE_BYTES", 1000)
-    preamble.add((Header(7, 1000, 0), PICTURE, 0))
-    preamble.add((Header(7, 1001, 0), PICTURE, 0))
+    preamble.add((Header(7, 1000, 0), PICTURE))
+    preamble.add((Header(7, 1001, 0), PICTURE))
     assert preamble.entries == [], "frames without their key frame cannot be decoded"
     preamble.begin()
-    preamble.add((Header(7, 1002, 0), KEY_PICTURE, 0))
+    preamble.add((Header(7, 1002, 0), KEY_PICTURE))
     assert len(preamble.entries) == 1
+
+
+def test_a_recording_begins_with_a_new_picture_and_with_an_old_one_only_to_decode_it(
+    mesh, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(subscriptions, "_REPLY_TIMEOUT_S", WITHIN_S)
+
+    async def main():
+        async with recording_site(mesh, tmp_path, views=("front", "top")) as session:
+            front, top = (
+                session.declare_publisher("site", "arm", f"video/{view}") for view in ("front", "top")
+            )
+            joints = session.declare_publisher("site", "arm", "joints")
+            for publisher in (front, top):
+                publisher.put(CompressedVideo(format="h264", data=KEY_PICTURE + b"old"), key_frame=True)
+            await trace_on(session)
+            await until(lambda: front.watched and top.watched and joints.watched)
+            await put_states(joints, range(5))
+            await counted(session, {"joints": 5})
+            front.put(CompressedVideo(format="h264", data=KEY_PICTURE + b"new"), key_frame=True)
+            top.put(CompressedVideo(format="h264", data=PICTURE + b"new"))
+            await counted(session, {"video/front": 1, "video/top": 1})
+            done = await trace_off(session)
+            await until_indexed(tmp_path / "arm" / done.file)
+            return tmp_path / "arm" / done.file
+
+    with RecordingFile(run(main(), timeout_s=60.0)) as file:
+        (last,) = [message.received_ns for message in file.last(JOINTS, file.layout.end_ns, 1)]
+        front, top = (
+            [
+                (CompressedVideo.FromString(each.data).data, each.received_ns >= last)
+                for each in file.messages([f"{ARM}/video/{view}"])
+            ]
+            for view in ("front", "top")
+        )
+    assert front == [(KEY_PICTURE + b"new", True)]
+    assert top == [(KEY_PICTURE + b"old", True), (PICTURE + b"new", True)]
 
 
 def test_setting_the_clock_during_a_recording_shifts_no_message(tmp_path):
@@ -255,8 +301,9 @@ def test_a_history_with_events_before_the_first_live_one_is_recorded_whole(mesh)
                     other.zenoh_session.put(EVENTS, b"", attachment=pack(Header(7, 7, 0)))
                     await asyncio.sleep(0.02)
                 queryable = other.zenoh_session.declare_queryable(EVENTS, reply)
-                await asyncio.to_thread(robot.refresh)
-                await until(lambda: len(sink.taken) >= 6)
+                while len(sink.taken) < 6:  # until the router knows the queryable
+                    await asyncio.to_thread(robot.refresh)
+                    await asyncio.sleep(0.1)
                 queryable.undeclare()
                 with subscribed.lock:
                     return sink.taken, robot.lost(sink)
