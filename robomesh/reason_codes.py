@@ -192,6 +192,16 @@ ACCOUNT_LAST_ADMIN = Code(
 ACCOUNT_ROLE = Code("account.role", "role '{role}' is unknown", "there are {roles}")
 ACCOUNT_ACTION = Code("account.action", "action '{action}' is unknown", "there are {actions}")
 ACCOUNT_FAILED = Code("account.failed", "{detail}")
+TOKEN_UNKNOWN = Code(
+    "token.unknown", "the token in this address is unknown", "ask an administrator for a new address"
+)
+TOKEN_REVOKED = Code(
+    "token.revoked", "token {token} of this address is revoked", "ask an administrator for a new address"
+)
+TOKEN_EXPIRED = Code(
+    "token.expired", "token {token} of this address has expired", "ask an administrator for a new address"
+)
+TOKEN_OTHER_VIEW = Code("token.other_view", "token {token} opens only the view {view} of {robot}")
 PASSWORD_SHORT = Code(
     "account.short",
     "the password is too short",

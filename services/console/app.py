@@ -300,14 +300,14 @@ def application(hub: Hub) -> ASGIApp:
     async def health(_: Request) -> Response:
         return JSONResponse({"mesh": hub.session.connected}, headers={"Cache-Control": "no-store"})
 
+    viewing = [*hub.pictures.routes(), *ViewPage(hub.session, hub.pictures, settings.page).routes()]
     routes: list[BaseRoute] = [
         Route("/health", health, methods=["GET"]),
         *account.routes(),
         WebSocketRoute("/mesh", hub.browse),
         Route("/mesh/{site}/{robot}/{name}", mesh, methods=["GET"]),
         Route("/layout/{site}/{robot}.json", layout, methods=["GET"]),
-        *hub.pictures.routes(),
-        *ViewPage(hub.session, hub.pictures, settings.page).routes(),
+        *viewing,
         *Recordings(hub.session, hub.asker).routes(),
         *([] if hub.define is None else [hub.define.routes()]),
         Mount("/", PageFiles(directory=hub.settings.page, html=True)),
@@ -320,7 +320,7 @@ def application(hub: Hub) -> ASGIApp:
     )
     refusals = {HTTPException: _refused_by_routing, Exception: _failed}
     app = Starlette(routes=routes, middleware=[packed], exception_handlers=refusals)
-    return app if hub.auth is None else AuthMiddleware(app, hub.auth.sessions, cookie)
+    return app if hub.auth is None else AuthMiddleware(app, hub.auth, cookie, viewing)
 
 
 async def _refused_by_routing(request: Request, error: Exception) -> Response:

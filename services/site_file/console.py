@@ -33,8 +33,8 @@ class Console(BaseModel):
         tls: The page's certificate; absent: HTTP.
         insecure: Accept an address that other machines reach without accounts or TLS.
         embed: Origins ("https://intranet.example") whose pages may show pictures, video, and pages of single
-            views, which have no controls; never the page itself. Not with `accounts`: other pages' requests
-            carry no sign-in.
+            views, which have no controls; never the page itself. With `accounts` they need a token
+            (`robomesh accounts tokens`): other pages' requests carry no sign-in.
     """
 
     model_config = PART_CONFIG

@@ -140,6 +140,12 @@ RULES: Mapping[str, Rule] = MappingProxyType(
             (),
             5 * _MINUTE_S,
         ),
+        "token.refused": Rule(
+            LOW,
+            "A screen or program there has an old address, or tries tokens: find out which.",
+            (),
+            5 * _MINUTE_S,
+        ),
         "accounts.unreadable": Rule(
             MEDIUM, "Repair the accounts file; until then the last valid one applies."
         ),

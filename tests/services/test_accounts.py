@@ -40,14 +40,14 @@ def test_a_file_is_read_as_it_was_written_and_is_its_owners_alone(tmp_path):
     change_account(path, "add", "li", role=AccountRole.OPERATOR, hashed=hashed())
     change_account(path, "add", "zhao", hashed=hashed())
     change_account(path, "disable", "zhao")
-    accounts = read_accounts(path)
+    accounts = read_accounts(path).accounts
     assert [(a.name, a.role.value, a.disabled) for a in accounts.values()] == [
         ("li", "operator", False),
         ("zhao", "monitor", True),
     ]
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     change_account(path, "remove", "li")
-    assert list(read_accounts(path)) == ["zhao"]
+    assert list(read_accounts(path).accounts) == ["zhao"]
 
 
 ROW = 'name = "li"\nrole = "operator"\nhash = "$argon2id$x"\ncreated = 2026-11-21T08:00:00Z\n'
@@ -57,8 +57,8 @@ ROW = 'name = "li"\nrole = "operator"\nhash = "$argon2id$x"\ncreated = 2026-11-2
     ("text", "says"),
     [
         ("[[account", "not TOML"),
-        ("[account]\n" + ROW, r"\[\[account\]\] tables"),
-        ('site = "s"\n', r"\[\[account\]\] tables"),
+        ("[account]\n" + ROW, r"\[\[account\]\] and \[\[token\]\] tables"),
+        ('site = "s"\n', r"\[\[account\]\] and \[\[token\]\] tables"),
         (f"[[account]]\n{ROW}[[account]]\n{ROW}", "two accounts are named 'li'"),
         ("[[account]]\n" + ROW.replace('"li"', '"li.shanghai"'), "account name 'li.shanghai' is invalid"),
         ("[[account]]\n" + ROW.replace('"li"', '"' + "x" * 33 + '"'), "use at most 32 "),
@@ -318,14 +318,14 @@ def test_accounts_are_kept_from_the_command_line_with_passwords_from_standard_in
         return commanded(capsys, monkeypatch, *arguments, line=line)
 
     assert do("add", site, "li", "--role", "operator", line=PASSWORD + "\n")[0] == 0
-    kept = read_accounts(tmp_path / "who.toml")["li"]
+    kept = read_accounts(tmp_path / "who.toml").accounts["li"]
     assert verify(kept.hash, PASSWORD)
     assert do("role", site, "li", "admin")[0] == 0
     status, text = do("list", site, "--json")
     assert (status, '"role": "admin"' in text, "argon2" in text) == (0, True, False)
     assert do("passwd", site, "li", line="another few words\n")[0] == 0
     assert do("disable", tmp_path / "who.toml", "li")[0] == 0
-    assert read_accounts(tmp_path / "who.toml")["li"].disabled
+    assert read_accounts(tmp_path / "who.toml").accounts["li"].disabled
     assert do("remove", site, "li")[0] == 0
     for arguments, line, says in (
         (("add", site, "wang"), "short\n", "too short"),

@@ -5,7 +5,6 @@ import contextlib
 import logging
 import math
 import time
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,15 +14,17 @@ from robomesh.schemas.robomesh_pb2 import Event
 from services.console.accounts.file import (
     Account,
     AccountRole,
-    Accounts,
+    AccountsFile,
     changing,
     check_account_name,
+    now,
     open_to_others,
     read_accounts,
 )
 from services.console.accounts.passwords import Verifier, check_password
 from services.console.accounts.sessions import Sessions, SignedIn
 from services.console.accounts.sign_in_attempts import SignInLimits, network
+from services.console.accounts.view_tokens import PublishEvent, ViewTokens
 from services.console.errors import AccountsError, SignInBusyError, SignInError
 
 log = logging.getLogger(__name__)
@@ -34,12 +35,10 @@ _ACTIONS = ("add", "role", "password", "disable", "enable", "remove")
 # Rate-limit events of refused sign-ins; the next event has the number of those left out.
 _REFUSAL_EVENT_EVERY_S = 1.0
 
-PublishEvent = Callable[[Event.Severity, str, str, Mapping[str, str]], None]
-
 
 @dataclass
 class AuthService:
-    """A console's accounts, sessions and sign-in limits.
+    """A console's accounts, sessions, view tokens and sign-in limits.
 
     Args:
         publish_event: Publishes an event: severity, code, text, values.
@@ -49,6 +48,7 @@ class AuthService:
     site: str
     publish_event: PublishEvent
     sessions: Sessions = field(init=False)
+    tokens: ViewTokens = field(init=False)
     _limits: SignInLimits = field(default_factory=SignInLimits)
     _verifier: Verifier = field(default_factory=Verifier)
     _version: tuple[int, ...] = ()
@@ -62,15 +62,16 @@ class AuthService:
             AccountsError: If it is invalid, or no account can sign in.
         """
         self._version = _version(self.path)
-        accounts = read_accounts(self.path)
-        if not any(not each.disabled for each in accounts.values()):
+        found = read_accounts(self.path)
+        if all(each.disabled for each in found.accounts.values()):
             raise AccountsError(
                 f"{self.path}: no account can sign in: add one with "
                 f"`robomesh accounts add {self.path} NAME --role admin`"
             )
         if open_to_others(self.path):
             log.warning("%s is readable by other users of this machine: chmod 600 is right", self.path)
-        self.sessions = Sessions(accounts, on_end=self._publish_end)
+        self.sessions = Sessions(found.accounts, on_end=self._publish_end)
+        self.tokens = ViewTokens(found.tokens, self.publish_event)
 
     def close(self) -> None:
         """Stop the verifier's thread."""
@@ -81,26 +82,28 @@ class AuthService:
         while True:
             await asyncio.sleep(_CHECK_EVERY_S)
             self.sessions.expire(time.monotonic())
+            self.tokens.expire()
             self.reload()
 
     def reload(self, *, changed_by: SignedIn | None = None) -> None:
         """Reload the file if it has changed.
 
-        A missing file has no accounts; an invalid one changes nothing.
+        A missing file has no accounts and no tokens; an invalid one changes nothing.
         """
         version = _version(self.path)
         if version == self._version:
             return
         self._version = version
         try:
-            accounts: Accounts = read_accounts(self.path) if version else {}
+            found = read_accounts(self.path) if version else AccountsFile()
         except AccountsError as error:
             log.error("%s; the last valid accounts apply", error)
             self.publish_event(
                 Event.ERROR, "accounts.unreadable", f"{error}; the last valid accounts apply", {}
             )
             return
-        self.sessions.apply_accounts(accounts, changed_by=changed_by)
+        self.sessions.apply_accounts(found.accounts, changed_by=changed_by)
+        self.tokens.apply(found.tokens)
 
     # ------------------------------------------------------------------------- sessions
 
@@ -243,13 +246,14 @@ def change_account(
     Raises:
         AccountsError: If the change is invalid, or the file cannot be written.
     """
-    with changing(path) as accounts:
+    with changing(path) as found:
+        accounts = found.accounts
         account = accounts.get(name)
         if action == "add":
             if account is not None:
                 raise AccountsError(codes.ACCOUNT_TAKEN(name=name))
             role = role or AccountRole.MONITOR
-            accounts[name] = Account(name=name, role=role, hash=hashed, created=_now())
+            accounts[name] = Account(name=name, role=role, hash=hashed, created=now())
             return
         if account is None:
             there_are = ", ".join(accounts) or "none"
@@ -272,10 +276,6 @@ def change_account(
         admins = [each for each in accounts.values() if each.role is AccountRole.ADMIN and not each.disabled]
         if by_page and not admins:
             raise AccountsError(codes.ACCOUNT_LAST_ADMIN(name=name))
-
-
-def _now() -> datetime:
-    return datetime.now(UTC).replace(microsecond=0)
 
 
 def _values(name: str, address: str) -> dict[str, str]:

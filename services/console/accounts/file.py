@@ -1,4 +1,4 @@
-"""The accounts of a console: a TOML file with a name, a role and a password hash for each.
+"""The accounts of a console: a TOML file with a name, a role and a password hash for each, and view tokens.
 
     [[account]]
     name = "li"
@@ -6,32 +6,37 @@
     hash = "$argon2id$..."
     created = 2026-11-21T08:00:00Z
 
-It is written atomically and readable by its owner only. Changes hold a lock file next to it, so that the
-command line and the page's administrators do not overwrite each other's changes.
+View tokens are in `[[token]]` tables (`view_token.py`). The file is written atomically and readable by its
+owner only. Changes hold a lock file next to it, so that the command line and the page's administrators do not
+overwrite each other's changes.
 """
 
 import fcntl
 import os
 import stat
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
-from datetime import datetime
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from enum import Enum
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from robomesh import keys
 from robomesh import reason_codes as codes
 from robomesh.atomic_write import write_atomically
 from robomesh.errors import KeyNameError
 from robots.bounded_toml import read_toml
+from services.console.accounts.view_token import MOST_TOKENS, ViewToken, parse_token, token_lines, utc
 from services.console.errors import AccountsError
+
+Row = TypeVar("Row", "Account", ViewToken)
 
 _LONGEST_NAME = 32
 MOST_ACCOUNTS = 1000
 _KEYS = frozenset({"name", "role", "hash", "created", "disabled"})
+_CONTENTS = "an accounts file has [[account]] and [[token]] tables and nothing else"
 
 
 class AccountRole(Enum):
@@ -65,6 +70,14 @@ class Account:
 Accounts = Mapping[str, Account]
 
 
+@dataclass(frozen=True)
+class AccountsFile:
+    """What the file has, by name."""
+
+    accounts: dict[str, Account] = field(default_factory=dict)
+    tokens: dict[str, ViewToken] = field(default_factory=dict)
+
+
 def check_account_name(name: str) -> str:
     """Return the name if it is valid for an account: `<name>.<site>` is an operator's name.
 
@@ -94,8 +107,8 @@ def role_of(text: str) -> AccountRole:
         raise AccountsError(codes.ACCOUNT_ROLE(role=text, roles=roles)) from None
 
 
-def read_accounts(path: Path) -> dict[str, Account]:
-    """Read the accounts of a file, by name.
+def read_accounts(path: Path) -> AccountsFile:
+    """Read an accounts file.
 
     Raises:
         AccountsError: With the file, the place and what would be right.
@@ -111,21 +124,30 @@ def read_accounts(path: Path) -> dict[str, Account]:
         raise AccountsError(f"{path}: cannot be read: {reason}") from None
     except tomllib.TOMLDecodeError as error:
         raise AccountsError(f"{path}: not TOML: {error}") from None
-    rows = values.pop("account", [])
-    if values or not isinstance(rows, list):
-        raise AccountsError(f"{path}: an accounts file has [[account]] tables and nothing else")
-    if len(rows) > MOST_ACCOUNTS:
-        raise AccountsError(f"{path}: {len(rows)} accounts: {MOST_ACCOUNTS} at most")
-    accounts: dict[str, Account] = {}
+    found = AccountsFile()
+    accounts, tokens = values.pop("account", []), values.pop("token", [])
+    _read_rows(path, "account", accounts, _account, found.accounts, MOST_ACCOUNTS)
+    _read_rows(path, "token", tokens, parse_token, found.tokens, MOST_TOKENS)
+    if values:
+        raise AccountsError(f"{path}: {_CONTENTS}")
+    return found
+
+
+def _read_rows(
+    path: Path, kind: str, rows: Any, parse: Callable[[Any], Row], into: dict[str, Row], most: int
+) -> None:
+    if not isinstance(rows, list):
+        raise AccountsError(f"{path}: {_CONTENTS}")
+    if len(rows) > most:
+        raise AccountsError(f"{path}: {len(rows)} {kind}s: {most} at most")
     for number, row in enumerate(rows, 1):
         try:
-            account = _account(row)
+            parsed = parse(row)
         except AccountsError as error:
-            raise AccountsError(f"{path}: account {number}: {error}") from None
-        if account.name in accounts:
-            raise AccountsError(f"{path}: two accounts are named {account.name!r}")
-        accounts[account.name] = account
-    return accounts
+            raise AccountsError(f"{path}: {kind} {number}: {error}") from None
+        if parsed.name in into:
+            raise AccountsError(f"{path}: two {kind}s are named {parsed.name!r}")
+        into[parsed.name] = parsed
 
 
 def _account(row: Any) -> Account:
@@ -154,8 +176,8 @@ def _account(row: Any) -> Account:
 
 
 @contextmanager
-def changing(path: Path) -> Iterator[dict[str, Account]]:
-    """Yield the accounts of a file for changes; write them when the block ends without an error.
+def changing(path: Path) -> Iterator[AccountsFile]:
+    """Yield the contents of a file for changes; write them when the block ends without an error.
 
     Raises:
         AccountsError: If the file is invalid or cannot be written; the old file remains.
@@ -166,25 +188,31 @@ def changing(path: Path) -> Iterator[dict[str, Account]]:
         raise AccountsError(f"{path}: cannot be written: {error.strerror}") from None
     try:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        accounts = read_accounts(path) if path.exists() else {}
-        yield accounts
-        _write(path, accounts)
+        found = read_accounts(path) if path.exists() else AccountsFile()
+        yield found
+        _write(path, found)
     finally:
         os.close(lock)
 
 
-def _write(path: Path, accounts: Accounts) -> None:
+def _write(path: Path, found: AccountsFile) -> None:
     lines = ["# Accounts of a console: change them with `robomesh accounts`. A running console reloads them."]
-    for account in accounts.values():
-        created = account.created.isoformat().replace("+00:00", "Z")
+    for account in found.accounts.values():
         # None of these values contains a character that TOML would escape.
         lines += ["", "[[account]]", f'name = "{account.name}"', f'role = "{account.role.value}"']
-        lines += [f'hash = "{account.hash}"', f"created = {created}"]
+        lines += [f'hash = "{account.hash}"', f"created = {utc(account.created)}"]
         lines += ["disabled = true"] if account.disabled else []
+    for token in found.tokens.values():
+        lines += ["", *token_lines(token)]
     try:
         write_atomically(path, "\n".join([*lines, ""]).encode())
     except OSError as error:
         raise AccountsError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def now() -> datetime:
+    """Return the time for an entry of the file."""
+    return datetime.now(UTC).replace(microsecond=0)
 
 
 def open_to_others(path: Path) -> bool:

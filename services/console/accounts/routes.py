@@ -11,6 +11,7 @@ from typing import Any
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
+from starlette.types import Scope
 
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
@@ -110,7 +111,7 @@ class AccountRoutes:
         token, signed_in = await self.auth.sign_in(
             asked["name"].strip().lower(),
             asked["password"],
-            address=_address(request),
+            address=client_address(request.scope),
             agent=request.headers.get("user-agent", ""),
             before=request.scope.get("signed_in"),
         )
@@ -120,7 +121,7 @@ class AccountRoutes:
         """Accept the password again, to restore the right to command."""
         asked = await _json(request, "password")
         user = _signed_in(request)
-        token = await self.auth.unlock(user, asked["password"], address=_address(request))
+        token = await self.auth.unlock(user, asked["password"], address=client_address(request.scope))
         return self._with_token(self._me(user), token)
 
     async def sign_out(self, request: Request) -> Response:
@@ -142,7 +143,9 @@ class AccountRoutes:
         """Change the user's own password."""
         asked = await _json(request, "password", "new")
         user = _signed_in(request)
-        await self.auth.change_password(user, asked["password"], asked["new"], address=_address(request))
+        await self.auth.change_password(
+            user, asked["password"], asked["new"], address=client_address(request.scope)
+        )
         return self._me(user)
 
     async def sessions(self, request: Request) -> Response:
@@ -243,8 +246,9 @@ def _admin(request: Request) -> SignedIn:
     return user
 
 
-def _address(request: Request) -> str:
-    return request.client.host if request.client else "unknown"
+def client_address(scope: Scope) -> str:
+    """Return the client's IP address."""
+    return scope["client"][0] if scope.get("client") else "unknown"
 
 
 async def _json(request: Request, *texts: str) -> Json:

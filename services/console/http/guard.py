@@ -45,7 +45,7 @@ _MEDIA = ("/video/", "/image/")
 _MEDIA_POLICY = "default-src 'none'; img-src 'self'; media-src 'self'; base-uri 'none'; form-action 'none'; "
 # Exactly what the route of a view's page matches: below another path, as "/view/../index.html", the page with
 # controls could be found.
-_VIEW_PAGE = re.compile("/view/[^/]+/[^/]+/[^/]+")
+VIEW_PAGE = re.compile("/view/[^/]+/[^/]+/[^/]+")
 
 
 def refused_host(host: str, names: Collection[str]) -> Reason | None:
@@ -145,7 +145,7 @@ class Guard:
         added = self._headers
         if scope["type"] == "http" and scope["path"].startswith(_MEDIA):
             added = added | self._media_headers(headers)
-        elif scope["type"] == "http" and self._embed and _VIEW_PAGE.fullmatch(scope["path"]):
+        elif scope["type"] == "http" and self._embed and VIEW_PAGE.fullmatch(scope["path"]):
             added = self._framed_headers
 
         async def send_guarded(message: Message) -> None:

@@ -329,7 +329,8 @@ def _size(query: QueryParams) -> _Size:
     Raises:
         RefusedRequest: If it cannot be parsed.
     """
-    unknown = set(query) - set(_Size._fields)
+    # Without accounts all views are open, also by addresses with a token.
+    unknown = set(query) - {*_Size._fields, "token"}
     if unknown:
         raise RefusedRequest(400, codes.VIEW_PARAMETER(name=sorted(unknown)[0][:20]))
     text = query.get("fps", "0")

@@ -54,6 +54,7 @@ const CHINESE: Record<string, readonly [title: string, advice: string]> = {
   "router.imposter": ["路由器地址被他人占用", "查明该地址上是什么，然后重新启动路由器。"],
   "router.rules": ["权限规则无法读取", "用 robomesh keys 重新生成规则文件。"],
   "router.unlinked": ["与其他站点的路由器未连接", "检查站点文件 [router] connect，以及对方路由器是否运行。"],
+  "token.refused": ["令牌未知", "该地址的屏幕或程序使用旧网址，或在尝试令牌：请查明。"],
   "account.refused": ["多次登录失败", "询问账户持有人是否本人操作；若不是，请停用账户或更换密码。"],
   "accounts.unreadable": ["账户文件无法读取", "请修复账户文件；在此之前账户保持不变。"],
   "service.gone": ["服务离线", "查看其日志，并重新启动。"],

@@ -291,6 +291,31 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ["account.action", ["action '{action}' is unknown: there are {actions}", "未知操作“{action}”：现有 {actions}"]],
   ["account.failed", ["{detail}", "{detail}"]],
   [
+    "token.unknown",
+    [
+      "the token in this address is unknown: ask an administrator for a new address",
+      "此网址中的令牌未知：请向管理员索取新网址",
+    ],
+  ],
+  [
+    "token.revoked",
+    [
+      "token {token} of this address is revoked: ask an administrator for a new address",
+      "此网址的令牌 {token} 已吊销：请向管理员索取新网址",
+    ],
+  ],
+  [
+    "token.expired",
+    [
+      "token {token} of this address has expired: ask an administrator for a new address",
+      "此网址的令牌 {token} 已过期：请向管理员索取新网址",
+    ],
+  ],
+  [
+    "token.other_view",
+    ["token {token} opens only the view {view} of {robot}", "令牌 {token} 只能打开 {robot} 的视图 {view}"],
+  ],
+  [
     "account.short",
     [
       "the password is too short: use at least {least} characters; a few words are good",
