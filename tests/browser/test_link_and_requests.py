@@ -42,11 +42,11 @@ def test_a_flooding_controller_is_told_in_words(open_page, plant):
     port = plant.call(plant.stop_controller("pt600"))
     try:
         plant.call(plant.start_controller("pt600", port, demo=True, rate_hz=100.0, faults=("flood",)))
-        expect(page.locator(".headline .trouble.warning")).to_contain_text("flooded")
+        expect(page.locator(".messages .trouble.warning")).to_contain_text("flooded")
         plant.call(plant.stop_controller("pt600"))
     finally:
         plant.call(plant.start_controller("pt600", port, demo=True))
-    expect(page.locator(".headline .trouble.warning")).to_have_count(0)
+    expect(page.locator(".messages .trouble.warning")).to_have_count(0)
 
 
 def test_a_flood_of_refusals_is_shown_with_its_count(open_page, plant):

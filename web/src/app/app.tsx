@@ -12,12 +12,13 @@ import { timeOfDay } from "../i18n/format";
 import { language, switchLanguage, t } from "../i18n/texts";
 import { mustSignIn } from "../mesh/account";
 import { hello, lostAt } from "../mesh/connection";
-import { heldLease, release } from "../mesh/control";
+import { controlNotice, heldLease, release } from "../mesh/control";
 import { fleetRobots } from "../mesh/known-robots";
 import type { RobotName } from "../mesh/robot-name";
 import { canBe, isReplay } from "../mesh/robot-name";
 import { stop, stopNotice } from "../mesh/stop";
 import { RobotNotFound } from "../panels/robot-not-found";
+import { guardMovedControls } from "../ui/moved-controls";
 import { NoticeLine } from "../ui/notice-line";
 import { type Route, robotLink, robotOf, route } from "../ui/route";
 import { switchTheme, theme } from "../ui/theme";
@@ -77,6 +78,7 @@ export function App() {
   const title = [notFound ? "" : robot?.robot, page, "robomesh"].filter(Boolean).join(" · ");
   useEffect(() => void (document.title = title), [title]);
   useStopKey();
+  useEffect(() => guardMovedControls(() => (controlNotice.value = { kind: "refused", text: t("just_moved") })), []);
   // A replay has nothing to stop: STOP stays with the live robots.
   const robots = key && !replay ? [key] : fleetRobots.value;
   return (
@@ -248,7 +250,9 @@ function Banners() {
   const lost = lostAt.value;
   if (mustSignIn.value) return null; // the sign-in page says it
   return (
-    <div class="banners">
+    <>
+      {/* Over the page: their appearance must not move a control. */}
+      <div class="over-page banners">
       {lost === 0 && <div class="banner connecting">{t("connecting")}</div>}
       {lost !== null && lost > 0 && (
         <div class="banner warning" role="alert">
@@ -262,13 +266,14 @@ function Banners() {
           {t("router_lost")}
         </div>
       )}
+      </div>
       {hello.value?.insecure && (
         <div class="banner warning">
           <span class="shape warning" aria-hidden="true" />
           {hello.value.account ? a("insecure_signed_in") : t("insecure")}
         </div>
       )}
-    </div>
+    </>
   );
 }
 

@@ -7,6 +7,7 @@ import "../ui/state.css";
 import "./bar.css";
 import "./banners.css";
 import "../panels/robot-alarm.css";
+import "../panels/messages.css";
 import "../panels/robot-not-found.css";
 import "../ui/panel.css";
 import "./stop.css";

@@ -269,6 +269,10 @@ const TEXTS = {
   since: ["since {time}", "自 {time}"],
   taking: ["Asking for control…", "正在请求控制…"],
   taken: ["Motion stops when you leave this page.", "离开本页时运动将停止。"],
+  just_moved: [
+    "Not sent: the page had moved this button half a second before. Press it again.",
+    "未发送：按下前半秒内页面布局移动了此按钮。请再按一次。",
+  ],
   not_taken: ["Control not given: {text}", "未取得控制：{text}"],
   released: ["Control released.", "已释放控制。"],
   released_hidden: ["Control released because this page was hidden.", "页面被隐藏，已释放控制。"],

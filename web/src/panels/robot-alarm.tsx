@@ -14,9 +14,11 @@ export function RobotAlarm({ state, events }: { state: ControllerState | undefin
   const [dismissed, setDismissed] = useState(0);
   if (disobeys(state, events)) {
     return (
-      <div class="alarm-band" role="alert">
-        <span class="shape alarm" aria-hidden="true" />
-        {t("disobeys")}
+      <div class="over-page">
+        <div class="alarm-band" role="alert">
+          <span class="shape alarm" aria-hidden="true" />
+          {t("disobeys")}
+        </div>
       </div>
     );
   }
@@ -25,14 +27,16 @@ export function RobotAlarm({ state, events }: { state: ControllerState | undefin
   if (!event || at <= dismissed || (state && msBefore(state, event.timestamp) > SHOWN_MS)) return null;
   const time = stampTime(event.timestamp);
   return (
-    <div class="alarm-band past" role="alert">
-      <span class="shape alarm" aria-hidden="true" />
-      <span title={stampFull(event.timestamp)}>
-        {event.code === DISOBEYED ? t("disobeyed", { time }) : t("critical_at", { time, text: event.text })}
-      </span>
-      <button class="quiet" onClick={() => setDismissed(at)}>
-        {t("dismiss")}
-      </button>
+    <div class="over-page">
+      <div class="alarm-band past" role="alert">
+        <span class="shape alarm" aria-hidden="true" />
+        <span title={stampFull(event.timestamp)}>
+          {event.code === DISOBEYED ? t("disobeyed", { time }) : t("critical_at", { time, text: event.text })}
+        </span>
+        <button class="quiet" onClick={() => setDismissed(at)}>
+          {t("dismiss")}
+        </button>
+      </div>
     </div>
   );
 }

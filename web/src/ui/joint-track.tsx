@@ -85,7 +85,7 @@ export function JointTrack(props: TrackProps) {
     event.preventDefault();
   };
   return (
-    <div class={`track ${props.stale ? "stale" : ""}`} ref={track}>
+    <div class={`track ${props.stale ? "stale" : ""}`} ref={track} data-moves>
       <div class="track-bar" />
       {lower < 0 && upper > 0 && <div class="track-zero" style={{ left: share(0) }} />}
       {position !== undefined && <div class="track-position" style={{ left: share(position) }} />}

@@ -12,6 +12,8 @@ import type { RobotName } from "../../mesh/robot-name";
 import { disobeys, stateWord, stoppedByItself } from "../../mesh/robot-state";
 import { ageOf, isStale, jointsAge, useEvents, useTopic } from "../../mesh/topics";
 import { ControlPanel } from "../../panels/control/control-panel";
+import { ControlRequests } from "../../panels/control/who-controls";
+import { Messages } from "../../panels/messages";
 import { RobotAlarm } from "../../panels/robot-alarm";
 import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
 import type { Stage } from "../../scene/robot-scene";
@@ -144,6 +146,9 @@ function ProgramOfRobot({ site, robot }: RobotName) {
           <CheckPanel moved={!isRunning() && hasMoved(positions)} />
         </div>
         <div class="program-middle">
+          <Messages>
+            <ControlRequests robotKey={key} holder={holder} lease={lease?.message} />
+          </Messages>
           <SceneView
             robotKey={key}
             description={description?.message}

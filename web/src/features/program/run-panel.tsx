@@ -42,13 +42,13 @@ export function RunPanel(props: { robotKey: string; controller: ControllerState 
   const busy = notice?.kind === "busy";
   return (
     <Panel name="run-panel" title={p("run")}>
-      {state && state.outcome !== Outcome.OUTCOME_UNSPECIFIED && <Progress state={state} />}
       <div class="run-row">
-        <button class="action primary run" disabled={why !== "" || busy} title={why} onClick={run}>
+        <button class="action primary run" data-moves disabled={why !== "" || busy} title={why} onClick={run}>
           {p("run_named", { name })}
         </button>
       </div>
       <NoticeLine notice={notice} idle={why || p("run_hint")} />
+      {state && state.outcome !== Outcome.OUTCOME_UNSPECIFIED && <Progress state={state} />}
     </Panel>
   );
 }

@@ -196,6 +196,7 @@ function StepButton(props: { name: string; sign: 1 | -1; enabled: boolean; press
   return (
     <button
       class="step"
+      data-moves
       aria-label={props.name}
       title={props.name}
       disabled={!props.enabled}

@@ -12,6 +12,7 @@ import {
   LeaseSchema,
   ControllerState_Link as Link,
   ControllerState_Mode as Mode,
+  ProgramState_Outcome as Outcome,
   ProgramStateSchema,
 } from "../../gen/robomesh_pb";
 import { reasonsText, reasonText } from "../../i18n/reasons";
@@ -23,6 +24,8 @@ import { disobeys, stateWord, stoppedByItself, stopText } from "../../mesh/robot
 import type { Latest } from "../../mesh/topics";
 import { ageOf, isStale, jointsAge, useEvents, useTopic } from "../../mesh/topics";
 import { ControlPanel } from "../../panels/control/control-panel";
+import { ControlRequests } from "../../panels/control/who-controls";
+import { Messages } from "../../panels/messages";
 import { RobotAlarm } from "../../panels/robot-alarm";
 import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
 import { ToolPanel } from "../../panels/tool-panel";
@@ -89,6 +92,12 @@ export function RobotPage({ site, robot }: RobotName) {
           lostAt={lost}
           staged={(made) => (stage.current = made)}
         />
+        <Messages>
+          <Troubles site={site} controller={controller} events={events} />
+          {isShown(program, events) && program.message.outcome === Outcome.ENDED && <ProgramLine latest={program} />}
+          <ControlRequests robotKey={key} holder={holder} lease={lease?.message} />
+          <RecordPanel robotKey={key} description={description?.message} />
+        </Messages>
         <div class="side">
           <ControlPanel
             robotKey={key}
@@ -160,14 +169,12 @@ function Headline(props: {
     if (message.readOnly) facts.push(t("read_only"));
     if (message.legacyClients?.attached) facts.push(t("legacy_some", { count: message.legacyClients.attached }));
   }
-  const flooding = message?.health?.flooding === true;
-  const down = message?.link === Link.UP ? undefined : message;
-  const problem = message?.fault || down?.linkText;
-  const trouble = message?.fault || reasonsText(down?.linkReasons, down?.linkText);
   return (
     <div class="headline">
-      <h1>{props.name}</h1>
-      <State state={state} />
+      <div class="who">
+        <h1 title={props.name}>{props.name}</h1>
+        <State state={state} />
+      </div>
       <span class="facts dim">{facts.join(" · ")}</span>
       <a class="page-link" href={programLink(props.site, props.name)}>
         {t("program")}
@@ -175,9 +182,36 @@ function Headline(props: {
       <RecordButton robotKey={`robomesh/${props.site}/${props.name}`} />
       {description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
       <TopicChoice robotKey={`robomesh/${props.site}/${props.name}`} />
+      {/* Instead of less important facts, so that nothing below moves. */}
+      {isShown(program, events) && program.message.outcome !== Outcome.ENDED ? (
+        <ProgramLine latest={program} />
+      ) : (
+        <span class="provenance dim" lang="en" title={description?.provenance}>
+          {description?.provenance && `${description.title}: ${description.provenance}`}
+        </span>
+      )}
+    </div>
+  );
+}
+
+/** What is wrong with the robot or its link, in sentences. */
+function Troubles(props: {
+  site: string;
+  controller: Latest<ControllerState> | undefined;
+  events: readonly Event[];
+}) {
+  const { controller, events } = props;
+  const message = controller?.message;
+  const { level } = stateWord(controller, events);
+  const flooding = message?.health?.flooding === true;
+  const down = message?.link === Link.UP ? undefined : message;
+  const problem = message?.fault || down?.linkText;
+  const trouble = message?.fault || reasonsText(down?.linkReasons, down?.linkText);
+  return (
+    <>
       <ClockHint site={props.site} />
       {trouble && (
-        <span class={`trouble ${state.level}`} lang={trouble === problem ? "en" : undefined}>
+        <span class={`trouble ${level}`} lang={trouble === problem ? "en" : undefined}>
           {trouble}
         </span>
       )}
@@ -196,17 +230,6 @@ function Headline(props: {
           })}
         </span>
       )}
-      {/* Instead of less important facts, so that nothing below moves. */}
-      {isShown(program, events) ? (
-        <ProgramLine latest={program} />
-      ) : (
-        description?.provenance && (
-          <span class="provenance dim" lang="en" title={description.provenance}>
-            {description.title}: {description.provenance}
-          </span>
-        )
-      )}
-      <RecordPanel robotKey={`robomesh/${props.site}/${props.name}`} description={description} />
-    </div>
+    </>
   );
 }

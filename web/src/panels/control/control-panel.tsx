@@ -55,15 +55,15 @@ export function ControlPanel(props: {
       <WhoControls robotKey={robotKey} holder={holder} lease={props.lease} readOnly={state?.readOnly ?? false} />
       {isMonitor.value || (
         <div class="command-row">
-          <button class="action" disabled={!canMove} title={mine ? why : ""} onClick={home}>
+          <button class="action" data-moves disabled={!canMove} title={mine ? why : ""} onClick={home}>
             {t("home")}
           </button>
           {holding ? (
-            <button class="action primary" disabled={!canMove} onClick={() => send(Command.RESUME, t("resume"))}>
+            <button class="action primary" data-moves disabled={!canMove} onClick={() => send(Command.RESUME, t("resume"))}>
               {t("resume")}
             </button>
           ) : (
-            <button class="action" disabled={!canSend} onClick={() => send(Command.HOLD, t("hold"))}>
+            <button class="action" data-moves disabled={!canSend} onClick={() => send(Command.HOLD, t("hold"))}>
               {t("hold")}
             </button>
           )}
@@ -77,17 +77,19 @@ export function ControlPanel(props: {
           </button>
         </div>
       )}
-      {state && (state.stop || stoppedByItself(state)) ? (
-        <Stopped state={state} mine={mine} disobeyed={props.disobeyed} send={send} />
-      ) : (
-        isMonitor.value || (
-          <Speed
-            percent={state?.speedPercent}
-            enabled={canSend}
-            send={(value) => command(robotKey, Command.SPEED, t("what_speed", { value }), { speedPercent: value })}
-          />
-        )
-      )}
+      <div class="slot">
+        {state && (state.stop || stoppedByItself(state)) ? (
+          <Stopped state={state} mine={mine} disobeyed={props.disobeyed} send={send} />
+        ) : (
+          isMonitor.value || (
+            <Speed
+              percent={state?.speedPercent}
+              enabled={canSend}
+              send={(value) => command(robotKey, Command.SPEED, t("what_speed", { value }), { speedPercent: value })}
+            />
+          )
+        )}
+      </div>
       <NoticeLine
         notice={controlNotice.value}
         idle={

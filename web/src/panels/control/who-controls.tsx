@@ -69,7 +69,6 @@ export function WhoControls(props: {
   if (mayNotCommand() && !mine) return <NoControl />;
   return (
     <>
-      {props.holder && lease && <ControlRequests mine={mine} robotKey={robotKey} lease={lease} />}
       <div class="take-row">
         <label class="operator">
           <span class="dim">{t("operator")}</span>
@@ -132,7 +131,14 @@ export function WhoControls(props: {
 }
 
 /** Requests and offers of control: every page shows them, the operators concerned can answer. */
-function ControlRequests({ mine, robotKey, lease }: { mine: boolean; robotKey: string; lease: Lease }) {
+export function ControlRequests(props: { robotKey: string; holder: string | null; lease: Lease | undefined }) {
+  const { robotKey, holder, lease } = props;
+  const mine = holds(robotKey);
+  if ((mayNotCommand() && !mine) || !holder || !lease) return null;
+  return <Requests mine={mine} robotKey={robotKey} lease={lease} />;
+}
+
+function Requests({ mine, robotKey, lease }: { mine: boolean; robotKey: string; lease: Lease }) {
   const me = operator.value.trim();
   const { holder, offeredTo } = lease;
   const [declined, setDeclined] = useState<readonly string[]>([]);
@@ -149,7 +155,7 @@ function ControlRequests({ mine, robotKey, lease }: { mine: boolean; robotKey: s
   const asking = lease.askedBy.filter((each) => each.operator !== offeredTo && !declined.includes(idOf(each)));
   const shown = asking.slice(0, MOST_ASKERS_SHOWN);
   return (
-    <div role="status">
+    <div class="wishes" role="status">
       {offeredTo && !(toMe && declined.includes("offer")) && (
         <ControlRequest
           strong={toMe || mine}
@@ -157,16 +163,16 @@ function ControlRequests({ mine, robotKey, lease }: { mine: boolean; robotKey: s
         >
           {toMe && (
             <>
-              <button class="action primary" onClick={() => void accept(robotKey)}>
+              <button class="action primary" data-moves="new" onClick={() => void accept(robotKey)}>
                 {t("accept")}
               </button>
-              <button class="action" onClick={() => decline("offer")}>
+              <button class="action" data-moves="new" onClick={() => decline("offer")}>
                 {t("not_now")}
               </button>
             </>
           )}
           {mine && (
-            <button class="action" onClick={() => void offer(null)}>
+            <button class="action" data-moves="new" onClick={() => void offer(null)}>
               {t("withdraw")}
             </button>
           )}
@@ -181,10 +187,10 @@ function ControlRequests({ mine, robotKey, lease }: { mine: boolean; robotKey: s
         >
           {mine && (
             <>
-              <button class="action primary" onClick={() => handOver(asker)}>
+              <button class="action primary" data-moves="new" onClick={() => handOver(asker)}>
                 {t("hand_over", { name: asker.operator })}
               </button>
-              <button class="action" onClick={() => decline(idOf(asker))}>
+              <button class="action" data-moves="new" onClick={() => decline(idOf(asker))}>
                 {t("not_now")}
               </button>
             </>
