@@ -17,6 +17,14 @@ def button(page, name):
     return page.get_by_role("button", name=name, exact=True)
 
 
+def answer(page, name):
+    """Press a button of a request for control, which ignores presses while it is new."""
+    pressed = button(page, name)
+    expect(pressed).to_be_visible()
+    page.wait_for_timeout(800)
+    pressed.click()
+
+
 def stand_still(page, seconds):
     """Block the page's scripts for so long, as in a browser that is too slow."""
 

@@ -8,6 +8,7 @@ from playwright.sync_api import Error, expect
 
 from tests.browser.robot_page import (
     ARM,
+    answer,
     audited,
     button,
     clear_stop,
@@ -54,12 +55,12 @@ def test_one_asks_and_is_handed_control(open_arm):
         )
     assert carol.locator(".wish button").count() == 0
     assert serious(alice, ".wish") == []
-    button(alice, "Hand over to bob").click()
+    answer(alice, "Hand over to bob")
     expect(alice.locator(".wish")).to_contain_text("you are in control until bob accepts")
     expect(carol.locator(".wish")).to_have_text("alice offers control to bob.")
     expect(bob.locator(".wish")).to_contain_text("alice offers you control.")
     assert serious(bob) == []
-    button(bob, "Accept").click()
+    answer(bob, "Accept")
     expect(bob.locator(".holder")).to_have_text("You are in control")
     expect(alice.locator(".holder")).to_have_text("bob is in control")
     expect(alice.locator(".control .notice")).to_have_text("bob has accepted control.")
@@ -71,11 +72,11 @@ def test_an_offer_can_be_put_off_and_withdrawn(open_arm):
     alice, bob = open_arm(), open_arm()
     take(alice, "alice")
     ask(bob, "bob")
-    button(alice, "Hand over to bob").click()
-    button(bob, "Not now").click()
+    answer(alice, "Hand over to bob")
+    answer(bob, "Not now")
     expect(bob.locator(".wish")).to_have_count(0)
     expect(alice.locator(".wish")).to_contain_text("Offered to bob, no answer yet")
-    button(alice, "Withdraw").click()
+    answer(alice, "Withdraw")
     expect(alice.locator(".control .notice")).to_have_text("Offer withdrawn.")
     # She has answered him: his request does not come back. He sees how long ago he asked.
     expect(alice.locator(".wish")).to_have_count(0)
@@ -123,8 +124,8 @@ def test_a_running_motion_is_not_handed_over_but_stopped_by_a_take_over(open_arm
     ready(alice, "alice")
     move_slowly(alice)
     ask(bob, "bob")
-    button(alice, "Hand over to bob").click()
-    button(bob, "Accept").click()
+    answer(alice, "Hand over to bob")
+    answer(bob, "Accept")
     expect(bob.locator(".control .notice")).to_contain_text(
         "Control not given: alice's motion is still running"
     )

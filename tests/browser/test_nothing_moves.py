@@ -13,7 +13,7 @@ pytestmark = pytest.mark.browser
 ROBOTS = ("arm",)
 SIZES = [(1440, 900), (1024, 768), (360, 740)]
 # Left, top, width and height of every control that moves the robot, in the document.
-PLACES = """() => Object.fromEntries([...document.querySelectorAll("[data-moves]:not([data-moves=new])")].map((each) => {
+PLACES = """() => Object.fromEntries([...document.querySelectorAll("[data-moves='true']")].map((each) => {
     const box = each.getBoundingClientRect();
     let left = box.left, top = box.top;
     for (let parent = each.parentElement; parent; parent = parent.parentElement) {
