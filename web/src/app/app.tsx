@@ -253,19 +253,19 @@ function Banners() {
     <>
       {/* Over the page: their appearance must not move a control. */}
       <div class="over-page banners">
-      {lost === 0 && <div class="banner connecting">{t("connecting")}</div>}
-      {lost !== null && lost > 0 && (
-        <div class="banner warning" role="alert">
-          <span class="shape warning" aria-hidden="true" />
-          {t("reconnecting", { time: timeOfDay(lost) })}
-        </div>
-      )}
-      {lost === null && hello.value?.connected === false && (
-        <div class="banner warning" role="alert">
-          <span class="shape warning" aria-hidden="true" />
-          {t("router_lost")}
-        </div>
-      )}
+        {lost === 0 && <div class="banner connecting">{t("connecting")}</div>}
+        {lost !== null && lost > 0 && (
+          <div class="banner warning" role="alert">
+            <span class="shape warning" aria-hidden="true" />
+            {t("reconnecting", { time: timeOfDay(lost) })}
+          </div>
+        )}
+        {lost === null && hello.value?.connected === false && (
+          <div class="banner warning" role="alert">
+            <span class="shape warning" aria-hidden="true" />
+            {t("router_lost")}
+          </div>
+        )}
       </div>
       {hello.value?.insecure && (
         <div class="banner warning">

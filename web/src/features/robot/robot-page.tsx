@@ -195,11 +195,7 @@ function Headline(props: {
 }
 
 /** What is wrong with the robot or its link, in sentences. */
-function Troubles(props: {
-  site: string;
-  controller: Latest<ControllerState> | undefined;
-  events: readonly Event[];
-}) {
+function Troubles(props: { site: string; controller: Latest<ControllerState> | undefined; events: readonly Event[] }) {
   const { controller, events } = props;
   const message = controller?.message;
   const { level } = stateWord(controller, events);

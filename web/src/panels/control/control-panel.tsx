@@ -59,7 +59,12 @@ export function ControlPanel(props: {
             {t("home")}
           </button>
           {holding ? (
-            <button class="action primary" data-moves disabled={!canMove} onClick={() => send(Command.RESUME, t("resume"))}>
+            <button
+              class="action primary"
+              data-moves
+              disabled={!canMove}
+              onClick={() => send(Command.RESUME, t("resume"))}
+            >
               {t("resume")}
             </button>
           ) : (
