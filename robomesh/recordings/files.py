@@ -22,6 +22,9 @@ from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.records import number_in
 from robomesh.schemas import robomesh_pb2 as schema
 
+# Recordings of a merged file that are listed: another program may have written more.
+_MOST_LISTED = 1000
+
 
 def describe_file(path: Path) -> schema.Recording:
     """Describe a recording; if its writer was killed, the part that can be read.
@@ -69,7 +72,7 @@ def _described(path: Path, inode: int, size: int, mtime_ns: int) -> schema.Recor
     recording.attachments.extend(sorted(layout.attachments))
     counts = {channel: number for channel, number in layout.messages.items() if number}
     if len(layout.recordings) > 1 or not all(map(is_recorders, counts)):
-        recording.merged_from.extend(map(_merged, layout.recordings))
+        recording.merged_from.extend(map(_merged, layout.recordings[:_MOST_LISTED]))
     if not layout.whole:
         set_problem(recording, codes.RECORDING_KILLED())
     with contextlib.suppress(RecordingError, DecodeError):

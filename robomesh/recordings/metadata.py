@@ -88,15 +88,14 @@ def lost_in(records: Iterable[Metadata]) -> Counter[str]:
 
 def recordings_in(records: Iterable[Metadata]) -> tuple[OneRecording, ...]:
     """Return the recordings in a file, each once."""
+    abouts: dict[tuple[object, ...], Metadata] = {}
     ends: dict[str, list[Metadata]] = {}
-    # The old name does not tell recordings apart.
-    abouts: dict[tuple[str, frozenset[tuple[str, str]]], Metadata] = {}
     for record in records:
         if is_about(record.name):
-            entries = frozenset(record.metadata.items()) if record.name == _OLD_ABOUT else frozenset()
-            abouts.setdefault((record.name, entries), record)
+            abouts[record.name, *sorted(record.metadata.items())] = record
         elif is_end(record.name):
             ends.setdefault(record.name, []).append(record)
+    # Recordings of earlier versions share their names: then it is unknown whose end is whose.
     names = Counter(record.name for record in abouts.values())
     return tuple(
         _recording(record, ends.get(end_name(record.name), []) if names[record.name] == 1 else [])
