@@ -137,6 +137,7 @@ class Worker:
             numbers = self._nice, os.getpid(), self._memory_bytes, int(self._untrusted)
             self._process = process = await asyncio.create_subprocess_exec(
                 sys.executable,
+                "-P",
                 "-m",
                 self._module,
                 *map(str, numbers),

@@ -249,6 +249,7 @@ async def _start(program: Program, *, standby: bool = False) -> asyncio.subproce
 
     return await asyncio.create_subprocess_exec(
         sys.executable,
+        "-P",  # a file of the current folder must not hide a module
         "-m",
         "services.command_line.main",
         *program.arguments,

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +16,7 @@ from robomesh.session import SessionSettings
 from tests.conftest import free_port
 
 READY_S = 60.0
+PROGRAM = (sys.executable, "-m", "services.command_line.main")
 
 
 @dataclass
@@ -57,7 +58,7 @@ class RunningSite:
 def robomesh(*arguments: str, timeout_s: float = 40.0, text: str = "") -> subprocess.CompletedProcess[str]:
     """Run `robomesh` to its end."""
     return subprocess.run(
-        [sys.executable, "-m", "services.command_line.main", *arguments],
+        [*PROGRAM, *arguments],
         capture_output=True,
         text=True,
         timeout=timeout_s,
@@ -108,18 +109,23 @@ def running_site(
 
 
 @contextmanager
-def running_file(path: Path, router: str, console: str) -> Iterator[RunningSite]:
+def running_file(
+    path: Path, router: str, console: str, *, program: Sequence[str] = PROGRAM, folder: Path | None = None
+) -> Iterator[RunningSite]:
     """Run `robomesh up` with a site file; end it, with all its processes, when the block ends.
 
     Args:
         path: The site file.
         router: The address of the site's router, as the file has it.
         console: HOST:PORT of the page, as the file has it.
+        program: The words that start `robomesh`.
+        folder: Its current folder; None: that of the tests.
     """
     # The kernel interrupts the site when the tests' process dies, however it dies.
     end_with_the_tests = ("setpriv", "--pdeathsig", "INT") if shutil.which("setpriv") else ()
     process = subprocess.Popen(
-        [*end_with_the_tests, sys.executable, "-m", "services.command_line.main", "up", str(path)],
+        [*end_with_the_tests, *program, "up", str(path)],
+        cwd=folder,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

@@ -1,16 +1,20 @@
-"""The wheel in an environment of its own: `docs/python.md` runs there, and is a typed program."""
+"""The wheel in environments of its own: `docs/python.md` runs there, is a typed program, and a site runs."""
 
 import re
 import signal
 import subprocess
 import sys
+import urllib.request
 import zipfile
 from pathlib import Path
 
 import pytest
 
 import robomesh
-from tests.site import ONE_ARM, running_site, wait_until
+from deploy.locked_parts import UNUSED
+from tests.check_platforms import PYTHONS
+from tests.conftest import free_port
+from tests.site import ONE_ARM, running_file, running_site, site_file, wait_until
 
 pytestmark = pytest.mark.processes
 
@@ -18,6 +22,24 @@ ROOT = Path(__file__).parents[2]
 UV = ROOT / ".tools" / "bin" / "uv"
 DOCUMENT = ROOT / "docs" / "python.md"
 WAIT_S = 120.0
+# Asks every command, in one process, for its help, and prints how many there are.
+HELP = """
+import contextlib, io
+from services.command_line.commands import COMMANDS, load
+from services.command_line.main import run
+
+def paths(command, path):
+    yield path
+    for name, each in getattr(command, "commands", {}).items():
+        yield from paths(each, [*path, name])
+
+every = [path for name in COMMANDS for path in paths(load(name), [name])]
+for path in every:
+    with contextlib.redirect_stdout(io.StringIO()) as text:
+        assert run([*path, "--help"]) == 0, path
+    assert text.getvalue().startswith("Usage: robomesh " + " ".join(path)), path
+print(len(every))
+"""
 
 
 def output(*command, folder=None):
@@ -47,6 +69,23 @@ def python(wheel, tmp_path_factory):
     locked = ("--constraint", ROOT / "requirements.lock")
     output(UV, "pip", "install", "--quiet", "--python", python, *locked, wheel)
     return python
+
+
+@pytest.fixture(scope="module")
+def whole(wheel, tmp_path_factory):
+    """Return the interpreter of a new environment with the wheel and all its roles."""
+    python = tmp_path_factory.mktemp("whole") / "bin" / "python"
+    output(UV, "venv", "--quiet", "--python", sys.executable, python.parents[1])
+    locked = ("--constraint", ROOT / "requirements.lock", "--excludes", unused(python.parents[1]))
+    output(UV, "pip", "install", "--quiet", "--python", python, *locked, f"{wheel}[all]")
+    return python
+
+
+def unused(folder):
+    """Write the names of the packages that no role calls, 200 MB, into a file."""
+    path = folder / "unused.txt"
+    path.write_text("\n".join(UNUSED))
+    return path
 
 
 @pytest.fixture(scope="module")
@@ -122,3 +161,37 @@ def test_every_public_name_can_be_imported(python, empty):
 def test_the_command_line_runs_without_extras(python, router, empty):
     listed = output(python.with_name("robomesh"), "list", "--connect", router, folder=empty)
     assert "pt600" in listed
+
+
+def test_every_command_has_help(whole, empty):
+    assert int(output(whole, "-I", "-c", HELP, folder=empty)) > 60
+
+
+def test_a_site_runs_in_a_folder_with_modules_of_the_same_names(whole, tmp_path, empty):
+    for name in ("services", "robots", "numpy"):
+        (empty / f"{name}.py").write_text("raise SystemExit('the wrong module')")
+    router, console = f"tcp/127.0.0.1:{free_port()}", f"127.0.0.1:{free_port()}"
+    path = site_file(tmp_path / "site", robots=ONE_ARM, router=router, console=console)
+    robomesh_program = [str(whole.with_name("robomesh"))]
+    with running_file(path, router, console, program=robomesh_program, folder=empty) as site:
+        page = urllib.request.urlopen(site.console, timeout=WAIT_S).read().decode()
+        script = re.search(r'src="/?(assets/[^"]+\.js)"', page)[1]
+        assert urllib.request.urlopen(site.console + script, timeout=WAIT_S).status == 200
+
+        def listed():
+            return output(*robomesh_program, "list", "--connect", router, folder=empty)
+
+        roles = ("console", "gateway", "kinematics", "player", "recorder", "router", "simulator", "watch")
+        wait_until(lambda: all(role in listed() for role in roles), WAIT_S)
+    assert not [line for line in site.log if "wrong module" in line or "Traceback" in line]
+
+
+def test_the_classifiers_name_the_versions_of_python_that_are_checked(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        (metadata,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+        text = archive.read(metadata).decode()
+    assert re.findall(r"^Classifier: Programming Language :: Python :: (3\.\d+)$", text, re.MULTILINE) == [
+        *PYTHONS
+    ]
+    assert "Classifier: Typing :: Typed" in text
+    assert "License-Expression: Apache-2.0" in text
