@@ -116,3 +116,14 @@ def test_what_cannot_be_bundled_is_rejected(arguments, capsys):
     with pytest.raises(SystemExit):
         bundle.options(arguments)
     assert "error: " in capsys.readouterr().err
+
+
+def test_a_changed_page_is_reported_in_one_line_and_needs_no_network(unpacked):
+    build = [sys.executable, "web/build_page.py"]
+    current = subprocess.run(build, cwd=unpacked, capture_output=True, text=True, timeout=WAIT_S)
+    assert (current.returncode, current.stderr) == (0, "")
+    (unpacked / "web" / "src" / "app" / "app.tsx").touch()
+    changed = subprocess.run(build, cwd=unpacked, capture_output=True, text=True, timeout=WAIT_S)
+    assert changed.returncode == 2
+    assert changed.stderr.startswith("page: this folder came from a bundle, without the packages")
+    assert changed.stderr.count("\n") == 1

@@ -97,11 +97,16 @@ def install(*, tools: bool = False) -> None:
 
     Args:
         tools: Have the tools too; where they are, they stay.
+
+    Raises:
+        PageBuildError: If a step failed.
     """
     stamp = MODULES / ".package-lock.json"
     current = stamp.exists() and stamp.stat().st_mtime >= (PAGE / "package-lock.json").stat().st_mtime
     if current and (_has_tools() or not tools):
         return
+    if (ROOT / ".bundle").is_dir():
+        raise PageBuildError("this folder came from a bundle, without the packages that build a changed page")
     tools = tools or _has_tools()
     _say(f"packages of npm, {'210' if tools else '95'} MB")
     npm = _node_folder() / "lib" / "node_modules" / "npm" / "bin" / "npm-cli.js"
