@@ -100,6 +100,11 @@ def compose(
     )
 
 
+def looks(robot: RobotSnapshot) -> tuple[object, ...]:
+    """Return what changes in a robot's picture by time alone: it becomes stale, and so do its contacts."""
+    return is_stale(robot.state, robot.ages), current_contacts(robot.state, robot.ages)
+
+
 def _placed(robot: RobotSnapshot, appearance: Appearance) -> Placed:
     return Placed(
         appearance,

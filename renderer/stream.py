@@ -5,12 +5,13 @@ import logging
 import math
 import time
 from collections.abc import Coroutine, Sequence
+from dataclasses import replace
 from typing import Any, Protocol
 
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from renderer.composition import Composition, RobotSnapshot, compose
+from renderer.composition import Composition, RobotSnapshot, compose, looks
 from renderer.errors import RendererError
 from renderer.frame_scheduler import next_due
 from renderer.key_frames import KeyFrameClock
@@ -79,6 +80,8 @@ class Stream:
         self._video_watched = self._image_watched = False
         self._drawn_version: tuple[int, ...] = ()
         self._at_full_rate = 0  # pictures left of `_MEASURED_PICTURES`
+        # The picture that these repeat, and what it shows.
+        self._repeated: tuple[tuple[object, ...], Drawn] | None = None
         self._next_frame_at = self._drawn_at = self._image_at = self._not_before = -math.inf
         self._last_image: CompressedImage | None = None
         self._still: asyncio.Task[None] | None = None
@@ -167,10 +170,10 @@ class Stream:
         if appearance is None:
             return _nothing()
         try:
-            neighbours = [self._snapshot(each) for each in self._host.neighbours(state)]
-            composition = compose(self.spec, appearance, self._snapshot(state), neighbours)
+            robot, *neighbours = map(self._snapshot, (state, *self._host.neighbours(state)))
+            composition = compose(self.spec, appearance, robot, neighbours)
             source_time_ns, dated_by = state.source_time_ns or time.time_ns(), state.dated_by
-            drawn = await self._host.draw(self.name, self.spec, composition)
+            drawn = await self._draw(composition, (self._version(), *map(looks, (robot, *neighbours))))
         except Exception as error:
             self._failed(now, error)
             return _nothing()
@@ -192,6 +195,19 @@ class Stream:
             image=image,
         )
         return self._publish(now, drawn, job, source_time_ns, dated_by)
+
+    async def _draw(self, composition: Composition, shown: tuple[object, ...]) -> Drawn:
+        """Draw, or copy the last picture while pictures follow a key frame and show the same.
+
+        Drawing takes most of a picture's time without a GPU; the overlay is written in each picture.
+        """
+        if not self._at_full_rate or composition.follow or self.spec.show is not None:
+            self._repeated = None
+            return await self._host.draw(self.name, self.spec, composition)
+        if self._repeated is None or self._repeated[0] != shown:
+            self._repeated = shown, await self._host.draw(self.name, self.spec, composition)
+        drawn = self._repeated[1]
+        return replace(drawn, picture=drawn.picture.copy())
 
     def _snapshot(self, state: RobotState) -> RobotSnapshot:
         return RobotSnapshot(state, self._host.ages(state))

@@ -14,6 +14,7 @@ from renderer import frame_scheduler, post_processing, robots, service, stream
 from renderer.encoder import H264Encoder
 from renderer.errors import NoEncoderError, RendererError
 from renderer.service import Settings
+from renderer.studio import Studio
 from robomesh import reason_codes as codes
 from robomesh.errors import NoAnswerError
 from robomesh.schemas.robomesh_pb2 import ControllerState, Event, KeyFrameRequest, VideoFrames
@@ -160,8 +161,18 @@ def test_a_robot_at_rest_is_drawn_about_twice_a_second(mesh, tmp_path):
     run(main())
 
 
-def test_pictures_of_a_robot_at_rest_follow_a_requested_key_frame_at_the_full_rate(mesh, tmp_path):
-    """ffmpeg shows nothing before it has 21 pictures, which would take 10 s at two a second."""
+def test_pictures_of_a_robot_at_rest_follow_a_requested_key_frame_at_the_full_rate(
+    mesh, tmp_path, monkeypatch
+):
+    """ffmpeg shows nothing before it has 21 pictures, at two a second after 10 s. Most repeat a drawn one."""
+    drawn = []
+    draw = Studio.draw
+
+    def counted(self, *given, **named):
+        drawn.append(given)
+        return draw(self, *given, **named)
+
+    monkeypatch.setattr(Studio, "draw", counted)
 
     async def main():
         async with renderer_site(mesh, tmp_path) as (_, monitor):
@@ -172,8 +183,10 @@ def test_pictures_of_a_robot_at_rest_follow_a_requested_key_frame_at_the_full_ra
             async with asyncio.timeout(40):
                 while not (await monitor.ask(key, KeyFrameRequest())).forced:
                     await asyncio.sleep(0.1)
+            before = len(drawn)
             messages = await frames(video, stream._MEASURED_PICTURES)
             assert messages[-1][0].received - messages[0][0].received < 8.0
+            assert len(drawn) - before < stream._MEASURED_PICTURES / 2
 
     run(main())
 
