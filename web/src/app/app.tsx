@@ -11,12 +11,12 @@ import { a } from "../i18n/account";
 import { timeOfDay } from "../i18n/format";
 import { language, switchLanguage, t } from "../i18n/texts";
 import { mustSignIn } from "../mesh/account";
-import { hello, lostAt } from "../mesh/connection";
+import { hello, lostAt, reachable } from "../mesh/connection";
 import { controlNotice, heldLease, release } from "../mesh/control";
 import { fleetRobots } from "../mesh/known-robots";
 import type { RobotName } from "../mesh/robot-name";
 import { canBe, isReplay } from "../mesh/robot-name";
-import { stop, stopNotice } from "../mesh/stop";
+import { dismissStop, stop, stopAgain, stopNotice, unsentStop } from "../mesh/stop";
 import { RobotNotFound } from "../panels/robot-not-found";
 import { guardMovedControls } from "../ui/moved-controls";
 import { NoticeLine } from "../ui/notice-line";
@@ -205,20 +205,25 @@ function StopButton({ robots }: { robots: readonly string[] }) {
       {stopNotice.value && (
         <div class={`stop-notice ${stopNotice.value.kind}`}>
           <NoticeLine notice={stopNotice.value} />
-          <button class="quiet" onClick={() => (stopNotice.value = null)}>
+          {unsentStop.value && reachable.value && (
+            <button class="action" onClick={stopAgain}>
+              {t("stop_again")}
+            </button>
+          )}
+          <button class="quiet" onClick={dismissStop}>
             {t("dismiss")}
           </button>
         </div>
       )}
       <button
-        class="stop"
+        class={`stop ${reachable.value ? "" : "unreachable"}`}
         disabled={robots.length === 0}
         onClick={() => void stop(robots)}
         title={mustSignIn.value ? a("no_stop") : one ? t("stop_hint", { robot }) : t("stop_all_hint")}
       >
         <span class="stop-shape" aria-hidden="true" />
-        <span>{t(one ? "stop" : "stop_all")}</span>
-        {heldLease.value && <kbd>{t("stop_space")}</kbd>}
+        <span>{t(!reachable.value ? "stop_unreachable" : one ? "stop" : "stop_all")}</span>
+        {reachable.value && heldLease.value && <kbd>{t("stop_space")}</kbd>}
       </button>
     </div>
   );

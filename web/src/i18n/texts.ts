@@ -68,6 +68,9 @@ const TEXTS = {
     "{robot} 已锁定停止，但未送达控制器：{text}",
   ],
   stop_failed: ["Stop request to {robot} failed: {text}", "{robot} 的停止请求失败：{text}"],
+  stop_unreachable: ["Stop cannot be sent: use the emergency stop", "停止无法发送：请使用急停"],
+  stop_again: ["Send again", "重新发送"],
+  no_connection: ["No connection: nothing can be sent.", "无连接：无法发送。"],
   stop_sending: ["Asking {robot} to stop…", "正在请求 {robot} 停止…"],
   dismiss: ["Dismiss", "关闭"],
 

@@ -2,7 +2,7 @@
 
 import type { DescMessage, MessageInitShape, MessageShape } from "@bufbuild/protobuf";
 import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
-import { signal } from "@preact/signals";
+import { computed, signal } from "@preact/signals";
 import type { Reason, ToPage_Hello } from "../gen/robomesh_pb";
 import { FromPageSchema, ToPageSchema } from "../gen/robomesh_pb";
 import { reasonText } from "../i18n/reasons";
@@ -43,9 +43,11 @@ export class AskError extends Error {
 type Listener = (sample: Sample) => void;
 
 // The console waits as long for this page. A cut connection or a sleeping machine sends no notice.
-const QUIET_MS = 5000;
+const QUIET_MS = 300;
+/** Without a message for so long, a request may not arrive. */
+const SILENT_MS = 800;
 const ANSWER_TIMEOUT_MS = 15_000;
-const CHECK_INTERVAL_MS = 1000;
+const CHECK_INTERVAL_MS = 200;
 const PRESENCE_INTERVAL_MS = 20;
 /** The console ended this page's session; the reason says why. */
 const SIGNED_OUT = 4401;
@@ -55,6 +57,9 @@ export const hello = signal<ToPage_Hello | null>(null);
 export const presence = signal<ReadonlySet<string>>(new Set());
 /** When the connection was lost (ms since the Unix epoch); null: connected; 0: not yet connected. */
 export const lostAt = signal<number | null>(0);
+const silent = signal(false);
+/** False as soon as a request, also a stop request, may not arrive at the mesh. */
+export const reachable = computed(() => !silent.value && !lostAt.value && hello.value?.connected !== false);
 
 const listeners = new Map<string, Set<Listener>>();
 const newest = new Map<string, Sample>();
@@ -66,6 +71,8 @@ let lastAsk = 0n;
 let retryMs = 250;
 /** When the last message arrived [ms], and a function that closes an idle connection. */
 let receivedAt = 0;
+let heardAt = performance.now();
+let checkedAt = heardAt;
 let giveUp: () => void = () => undefined;
 
 /** Connect, and reconnect for ever.
@@ -83,7 +90,16 @@ export function keepConnected(ready: () => Promise<boolean | null>, ended: (why:
       else if (may === null) reconnect();
     });
   begin();
+  setInterval(checkSilence, CHECK_INTERVAL_MS);
   return begin;
+}
+
+function checkSilence(): void {
+  const at = performance.now();
+  // After a pause of this page, messages may wait behind this timer.
+  const late = at - checkedAt > 2 * CHECK_INTERVAL_MS;
+  checkedAt = at;
+  if (!late || silent.value) silent.value = at - heardAt > SILENT_MS;
 }
 
 function connect(reconnect: () => void, ended: (why: string) => void): void {
@@ -92,7 +108,10 @@ function connect(reconnect: () => void, ended: (why: string) => void): void {
   opened.binaryType = "arraybuffer";
   let queriedAt = performance.now(); // opening counts as an answer
   receivedAt = 0;
-  const received = () => (receivedAt = performance.now());
+  const received = () => {
+    receivedAt = heardAt = performance.now();
+    silent.value = false;
+  };
   const end = (code: number, reason: string) => {
     clearInterval(checkTimer);
     giveUp = () => undefined;

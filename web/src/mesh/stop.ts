@@ -1,23 +1,29 @@
 // The stop request: it needs no control and waits for nothing.
 
-import { signal } from "@preact/signals";
+import { effect, signal } from "@preact/signals";
 import { StopAnswerSchema, StopRequestSchema } from "../gen/robomesh_pb";
+import { timeOfDay } from "../i18n/format";
 import { reasonText } from "../i18n/reasons";
 import { t } from "../i18n/texts";
-import { AskError, ask, reopenIfSilent } from "./connection";
+import { AskError, ask, reachable, reopenIfSilent } from "./connection";
 import type { Notice } from "./control";
 import { operator, reasonOf } from "./control";
 
 const NOTICE_MS = 15_000; // how long the notice of a successful stop is shown
+const SENT_LATER_MS = 10_000; // a younger press is sent when the connection returns
 
 export const stopNotice = signal<Notice | null>(null);
+/** Robots of a press that had no answer, and when it was made [ms since the Unix epoch]. */
+export const unsentStop = signal<{ robotKeys: readonly string[]; at: number } | null>(null);
 
 /** Request a stop of each robot separately, so that a robot without an answer delays no other. */
-export async function stop(robotKeys: readonly string[]): Promise<void> {
+export async function stop(robotKeys: readonly string[], pressedAt = Date.now()): Promise<void> {
   const name = (key: string) => key.split("/").slice(1).join("/");
   stopNotice.value = { kind: "busy", text: t("stop_sending", { robot: robotKeys.map(name).join(", ") }) };
+  unsentStop.value = null;
   const by = operator.value.trim();
   const requestedAt = performance.now();
+  const unsent: string[] = [];
   const outcomes = await Promise.all(
     robotKeys.map(async (key): Promise<Notice> => {
       const robot = name(key);
@@ -27,17 +33,41 @@ export async function stop(robotKeys: readonly string[]): Promise<void> {
           ? { kind: "done", text: t("stop_done", { robot, id: String(answer.stopId) }) }
           : { kind: "refused", text: t("stop_latched", { robot, text: reasonText(answer.reason, answer.text) }) };
       } catch (error) {
-        // The next request must not use the same dead connection.
-        if (error instanceof AskError && error.noAnswer) reopenIfSilent(requestedAt);
+        if (error instanceof AskError && error.noAnswer) {
+          unsent.push(key);
+          // The next request must not use the same dead connection.
+          reopenIfSilent(requestedAt);
+        }
         return { kind: "refused", text: t("stop_failed", { robot, text: reasonOf(error) }) };
       }
     }),
   );
   const failed = outcomes.filter((outcome) => outcome.kind === "refused");
-  const notice: Notice = {
-    kind: failed.length ? "refused" : "done",
-    text: (failed.length ? failed : outcomes).map((outcome) => outcome.text).join(" "),
-  };
+  const text = (failed.length ? failed : outcomes).map((outcome) => outcome.text).join(" ");
+  const notice: Notice = failed.length
+    ? { kind: "refused", text: `${timeOfDay(pressedAt)} ${text}` }
+    : { kind: "done", text };
   stopNotice.value = notice;
+  if (unsent.length) unsentStop.value = { robotKeys: unsent, at: pressedAt };
   if (notice.kind === "done") setTimeout(() => stopNotice.value === notice && (stopNotice.value = null), NOTICE_MS);
 }
+
+/** Send the last press without an answer again. */
+export function stopAgain(): void {
+  if (unsentStop.value) void stop(unsentStop.value.robotKeys);
+}
+
+export function dismissStop(): void {
+  stopNotice.value = unsentStop.value = null;
+}
+
+// When the connection returns, a press of the last seconds is still meant; an older one is offered.
+let wasLost = false;
+effect(() => {
+  const press = unsentStop.value;
+  if (!reachable.value) wasLost = true;
+  else if (wasLost) {
+    wasLost = false;
+    if (press && Date.now() - press.at < SENT_LATER_MS) void stop(press.robotKeys, press.at);
+  }
+});

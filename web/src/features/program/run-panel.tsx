@@ -6,7 +6,9 @@ import { ProgramState_Outcome as Outcome } from "../../gen/robomesh_pb";
 import { clock, stampTime } from "../../i18n/format";
 import { p } from "../../i18n/program";
 import { reasonText } from "../../i18n/reasons";
+import { t } from "../../i18n/texts";
 import { Command, command } from "../../mesh/command";
+import { reachable } from "../../mesh/connection";
 import type { Notice } from "../../mesh/control";
 import { holds, ms } from "../../mesh/control";
 import { whyNoMotion } from "../../mesh/robot-state";
@@ -59,6 +61,7 @@ function whyNotRun(robotKey: string, controller: ControllerState | undefined, ru
   const error = isCurrent() ? errorsOf(checked.value?.answer)[0] : undefined;
   if (error) return p("run_error", { line: error.line, text: error.text });
   if (running) return p("run_running");
+  if (!reachable.value) return t("no_connection");
   if (!holds(robotKey)) return p("run_take");
   return whyNoMotion(controller);
 }

@@ -8,6 +8,7 @@ import { fixed, jointText, jointUnit } from "../../i18n/format";
 import { t } from "../../i18n/texts";
 import { isMonitor } from "../../mesh/account";
 import { Command, command } from "../../mesh/command";
+import { reachable } from "../../mesh/connection";
 import type { Notice } from "../../mesh/control";
 import { controlNotice, holds } from "../../mesh/control";
 import { useSteps } from "../../mesh/joint-steps";
@@ -45,7 +46,7 @@ export function JointsPanel(props: {
   const rows: readonly Description_Joint[] = description?.joints ?? [];
   const current = rows.map((joint) => positions.get(joint.name));
   const mine = holds(robotKey);
-  const why = whyNoMove(props.controller);
+  const why = reachable.value ? whyNoMove(props.controller) : t("no_connection");
   const enabled = mine && !stale && !why;
   useNoticeExpiry(notice, setNotice, props.motion);
 
@@ -105,7 +106,7 @@ export function JointsPanel(props: {
       ? t("steps_wait", { count: steps.waiting })
       : enabled
         ? t("joint_hint")
-        : mine
+        : mine || !reachable.value
           ? why
           : isMonitor.value
             ? ""

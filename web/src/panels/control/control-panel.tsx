@@ -6,6 +6,7 @@ import { t } from "../../i18n/texts";
 import { isMonitor } from "../../mesh/account";
 import type { CommandValues } from "../../mesh/command";
 import { Command, command } from "../../mesh/command";
+import { reachable } from "../../mesh/connection";
 import { controlNotice, holds } from "../../mesh/control";
 import type { Motion } from "../../mesh/notice-expiry";
 import { useNoticeExpiry } from "../../mesh/notice-expiry";
@@ -31,9 +32,9 @@ export function ControlPanel(props: {
   const { robotKey, holder } = props;
   const state = props.controller?.message;
   const mine = holds(robotKey);
-  const why = whyNoMotion(state);
+  const why = reachable.value ? whyNoMotion(state) : t("no_connection");
   const canMove = mine && !why;
-  const canSend = mine && !state?.stop && !state?.readOnly;
+  const canSend = mine && reachable.value && !state?.stop && !state?.readOnly;
   const send = (name: Command, what: string, values?: CommandValues, positions?: number[]) =>
     void command(robotKey, name, what, values, undefined, positions);
   const home = () =>
@@ -74,7 +75,7 @@ export function ControlPanel(props: {
           )}
           <button
             class="action"
-            disabled={!mine || state?.readOnly}
+            disabled={!mine || !reachable.value || state?.readOnly}
             aria-pressed={tracing}
             onClick={() => (tracing ? send(Command.TRACE_OFF, t("trace_off")) : send(Command.TRACE_ON, t("trace_on")))}
           >
@@ -98,7 +99,7 @@ export function ControlPanel(props: {
       <NoticeLine
         notice={controlNotice.value}
         idle={
-          state?.readOnly
+          state?.readOnly || !reachable.value
             ? why
             : !mine
               ? mayNotCommand()

@@ -6,6 +6,7 @@ import { stampFull } from "../../i18n/format";
 import { t } from "../../i18n/texts";
 import type { CommandValues } from "../../mesh/command";
 import { Command } from "../../mesh/command";
+import { reachable } from "../../mesh/connection";
 import { moves, stopText } from "../../mesh/robot-state";
 
 export function Stopped(props: {
@@ -37,7 +38,7 @@ export function Stopped(props: {
       </div>
       <button
         class="action"
-        disabled={!mine || moving}
+        disabled={!mine || moving || !reachable.value}
         title={moving ? t("reset_moving") : mine ? "" : t("reset_take")}
         onClick={() => props.send(Command.RESET, what, { stopId: stop?.id ?? 0n })}
       >

@@ -5,7 +5,7 @@ import { useEffect, useState } from "preact/hooks";
 import type { Lease, Lease_Asker } from "../../gen/robomesh_pb";
 import { ageText, stampFull, stampTime } from "../../i18n/format";
 import { t } from "../../i18n/texts";
-import { hello } from "../../mesh/connection";
+import { hello, reachable } from "../../mesh/connection";
 import {
   accept,
   holds,
@@ -93,16 +93,20 @@ export function WhoControls(props: {
         ) : other ? (
           <>
             {other !== operator.value.trim() && (
-              <button class="action primary" disabled={props.readOnly} onClick={() => open("ask")}>
+              <button class="action primary" disabled={props.readOnly || !reachable.value} onClick={() => open("ask")}>
                 {t("ask")}
               </button>
             )}
-            <button class="action" disabled={props.readOnly} onClick={() => open("take")}>
+            <button class="action" disabled={props.readOnly || !reachable.value} onClick={() => open("take")}>
               {t("take_over")}
             </button>
           </>
         ) : (
-          <button class="action primary" onClick={() => void take(robotKey)} disabled={props.readOnly}>
+          <button
+            class="action primary"
+            onClick={() => void take(robotKey)}
+            disabled={props.readOnly || !reachable.value}
+          >
             {t("take")}
           </button>
         )}
@@ -163,7 +167,12 @@ function Requests({ mine, robotKey, lease }: { mine: boolean; robotKey: string; 
         >
           {toMe && (
             <>
-              <button class="action primary" data-moves="new" onClick={() => void accept(robotKey)}>
+              <button
+                class="action primary"
+                data-moves="new"
+                disabled={!reachable.value}
+                onClick={() => void accept(robotKey)}
+              >
                 {t("accept")}
               </button>
               <button class="action" data-moves="new" onClick={() => decline("offer")}>
