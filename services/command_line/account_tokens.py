@@ -9,8 +9,8 @@ import typer
 from services.command_line.accounts_file import Where, accounts_file
 from services.command_line.options import Json, command_group
 from services.console.accounts.file import read_accounts
+from services.console.accounts.view_access import add_token, revoke_token
 from services.console.accounts.view_token import ViewToken
-from services.console.accounts.view_tokens import add_token, revoke_token
 from services.console.errors import AccountsError
 
 app = command_group("tokens", "Addresses that show one view of one robot without a sign-in.")

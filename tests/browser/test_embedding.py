@@ -7,7 +7,7 @@ import threading
 import pytest
 from playwright.async_api import async_playwright
 
-from services.console.accounts.view_tokens import revoke_token
+from services.console.accounts.view_access import revoke_token
 from tests.browser.conftest import ARGUMENTS, CHROMIUM, LAUNCH_MS, PATIENCE_MS
 from tests.conftest import run
 from tests.services.signing_in import PASSWORD

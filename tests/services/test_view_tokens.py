@@ -14,10 +14,10 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidStatus
 
 from services.command_line.main import run as command
-from services.console.accounts import view_tokens
+from services.console.accounts import view_access
 from services.console.accounts.auth_service import change_account
 from services.console.accounts.file import AccountRole, read_accounts
-from services.console.accounts.view_tokens import add_token, revoke_token
+from services.console.accounts.view_access import add_token, revoke_token
 from services.console.app import Hub, Settings, application
 from services.console.define.settings import DefineSettings
 from services.console.errors import AccountsError
@@ -216,7 +216,7 @@ def test_what_a_token_shows_ends_with_it(mesh, page, tmp_path, monkeypatch, path
                     revoke_token(file, "wall")
                     allow(file)
                 case "clock":
-                    monkeypatch.setattr(view_tokens, "datetime", Later)
+                    monkeypatch.setattr(view_access, "datetime", Later)
                 case "no file":
                     file.unlink()
             async with asyncio.timeout(40.0):

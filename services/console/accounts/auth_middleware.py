@@ -18,7 +18,7 @@ from services.console.accounts.auth_service import AuthService
 from services.console.accounts.rights import PASSWORD_AGAIN, lacks_right
 from services.console.accounts.routes import client_address, refused
 from services.console.accounts.sessions import SignedIn
-from services.console.accounts.view_tokens import TokenRequest
+from services.console.accounts.view_access import TokenRequest
 from services.console.errors import RefusedRequest, SignInError
 from services.console.http.error_responses import as_json
 from services.console.http.guard import VIEW_PAGE

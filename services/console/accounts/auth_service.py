@@ -24,7 +24,7 @@ from services.console.accounts.file import (
 from services.console.accounts.passwords import Verifier, check_password
 from services.console.accounts.sessions import Sessions, SignedIn
 from services.console.accounts.sign_in_attempts import SignInLimits, network
-from services.console.accounts.view_tokens import PublishEvent, ViewTokens
+from services.console.accounts.view_access import PublishEvent, ViewTokens
 from services.console.errors import AccountsError, SignInBusyError, SignInError
 
 log = logging.getLogger(__name__)
