@@ -7,6 +7,7 @@ import re
 import stat
 from contextlib import asynccontextmanager
 from datetime import UTC, datetime, timedelta
+from unittest.mock import create_autospec
 
 import pytest
 from starlette.routing import Mount, WebSocketRoute
@@ -15,9 +16,11 @@ from websockets.exceptions import InvalidStatus
 
 from services.command_line.main import run as command
 from services.console.accounts import view_access
-from services.console.accounts.auth_service import change_account
+from services.console.accounts.auth_middleware import AuthMiddleware
+from services.console.accounts.auth_service import AuthService, change_account
 from services.console.accounts.file import AccountRole, read_accounts
 from services.console.accounts.view_access import add_token, revoke_token
+from services.console.accounts.view_token import ViewToken
 from services.console.app import Hub, Settings, application
 from services.console.define.settings import DefineSettings
 from services.console.errors import AccountsError
@@ -303,6 +306,33 @@ def test_uses_changes_and_refusals_are_events_and_no_token_is_in_an_event_or_log
             assert token not in logged
             assert token not in file.read_text()
             assert stat.S_IMODE(file.stat().st_mode) == 0o600
+
+    run(main())
+
+
+def test_a_request_that_is_revoked_before_its_answer_is_refused():
+    """A cancelled handler without an answer would be the server's error 500."""
+    token = ViewToken(name="wall", robot="s/r", view="front", hash="", created=datetime.now(UTC))
+
+    async def main():
+        working, sent = asyncio.Event(), []
+
+        async def handle(scope, receive, send):
+            working.set()
+            await asyncio.Event().wait()
+
+        async def send(message):
+            sent.append(message)
+
+        middleware = AuthMiddleware(
+            handle, create_autospec(AuthService, sessions=None, tokens=None), "cookie", ()
+        )
+        granted = view_access.TokenRequest(token, set())
+        serving = asyncio.create_task(middleware._serve(granted, {"type": "http"}, None, send))
+        await working.wait()
+        granted.end()
+        await serving
+        assert sent[0]["status"] == 401
 
     run(main())
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from urllib.parse import parse_qsl, urlencode
 
 from starlette.routing import Match, Route
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from robomesh import reason_codes as codes
 from services.console.accounts.auth_service import AuthService
@@ -84,12 +84,21 @@ class AuthMiddleware:
     async def _serve(
         self, granted: SignedIn | TokenRequest, scope: Scope, receive: Receive, send: Send
     ) -> None:
+        started = False
+
+        async def send_and_note(message: Message) -> None:
+            nonlocal started
+            started = True
+            await send(message)
+
         try:
             with granted.serving():
-                await self._app(scope, receive, send)
+                await self._app(scope, receive, send_and_note)
         except asyncio.CancelledError:
             if not granted.ended:
                 raise
+            if not started:  # otherwise the answer just ends
+                await as_json(refused(401, codes.ACCOUNT_SIGN_IN()))(scope, receive, send)
 
     def _take_token(self, scope: Scope) -> tuple[str, str, str] | None:
         """Remove the token from a request for a view; return it with the robot and the view.
