@@ -303,7 +303,7 @@ def open_page(contexts, plant):
             "console",
             # 504: a service that is starting or busy did not answer yet; the page asks it again.
             lambda line: (
-                wrong.append(f"{line.type}: {line.text}")
+                wrong.append(f"{line.type}: {line.text} {line.location.get('url', '')}")
                 if line.type == "error" and "status of 504" not in line.text and not refused
                 else None
             ),
