@@ -31,8 +31,9 @@ def viewer_layout(site: str, robot: str, description: Description) -> Json:
     def key(topic: str) -> str:
         return robot_key(site, robot, topic)
 
-    views = [view.name for view in description.views] or ["free"]
-    video = next((name for name in ("close", "front") if name in views), views[0])
+    # The view that a recording has by default.
+    views = [view.name for view in description.views]
+    video = "free" if "free" in views or not views else views[0]
     panels: Json = {
         "3D!arm": _scene(site, description),
         "Image!video": {"imageMode": {"imageTopic": key(f"video/{video}")}, **_titled(video)},
