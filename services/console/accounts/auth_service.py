@@ -22,9 +22,10 @@ from services.console.accounts.file import (
     read_accounts,
 )
 from services.console.accounts.passwords import Verifier, check_password
+from services.console.accounts.refusal_events import PublishEvent, RefusalEvents
 from services.console.accounts.sessions import Sessions, SignedIn
 from services.console.accounts.sign_in_attempts import SignInLimits, network
-from services.console.accounts.view_access import PublishEvent, ViewTokens
+from services.console.accounts.view_access import ViewTokens
 from services.console.errors import AccountsError, SignInBusyError, SignInError
 
 log = logging.getLogger(__name__)
@@ -33,7 +34,6 @@ _CHECK_EVERY_S = 0.5
 _MOST_OF_NAME = 64
 _ACTIONS = ("add", "role", "password", "disable", "enable", "remove")
 # Rate-limit events of refused sign-ins; the next event has the number of those left out.
-_REFUSAL_EVENT_EVERY_S = 1.0
 
 
 @dataclass
@@ -52,8 +52,7 @@ class AuthService:
     _limits: SignInLimits = field(default_factory=SignInLimits)
     _verifier: Verifier = field(default_factory=Verifier)
     _version: tuple[int, ...] = ()
-    _refusals: int = 0
-    _refusal_published_at: float = -_REFUSAL_EVENT_EVERY_S
+    _refusals: RefusalEvents = field(init=False)
 
     def __post_init__(self) -> None:
         """Read the accounts file.
@@ -72,6 +71,7 @@ class AuthService:
             log.warning("%s is readable by other users of this machine: chmod 600 is right", self.path)
         self.sessions = Sessions(found.accounts, on_end=self._publish_end)
         self.tokens = ViewTokens(found.tokens, self.publish_event)
+        self._refusals = RefusalEvents(self.publish_event, "account.refused")
 
     def close(self) -> None:
         """Stop the verifier's thread."""
@@ -218,14 +218,8 @@ class AuthService:
 
     def _publish_refusal(self, name: str, address: str, why: str) -> None:
         """Publish a refusal. `name` is empty for an unknown name, which may be a mistyped password."""
-        self._refusals += 1
-        now = time.monotonic()
-        if now - self._refusal_published_at < _REFUSAL_EVENT_EVERY_S:
-            return
-        more = f" (and {self._refusals - 1} more refusals)" if self._refusals > 1 else ""
-        text = f"sign-in as {name or 'an unknown name'} from {address} refused: {why}{more}"
-        self.publish_event(Event.WARNING, "account.refused", text, _values(name, address))
-        self._refusals, self._refusal_published_at = 0, now
+        text = f"sign-in as {name or 'an unknown name'} from {address} refused: {why}"
+        self._refusals.publish(text, _values(name, address))
 
 
 def change_account(

@@ -8,7 +8,7 @@ import asyncio
 import math
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
@@ -18,6 +18,7 @@ from typing import Any
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import Event
 from services.console.accounts.file import changing, now, read_accounts
+from services.console.accounts.refusal_events import PublishEvent, RefusalEvents
 from services.console.accounts.sign_in_attempts import Attempts, network
 from services.console.accounts.view_token import (
     MOST_TOKENS,
@@ -28,11 +29,8 @@ from services.console.accounts.view_token import (
 )
 from services.console.errors import AccountsError, SignInError
 
-PublishEvent = Callable[[Event.Severity, str, str, Mapping[str, str]], None]
-
-# One event for each address of a token, and one of unknown tokens in a while.
+# A token's use is an event once for each address; so many pairs are remembered.
 _MOST_READERS = 1024
-_REFUSAL_EVENT_EVERY_S = 1.0
 
 
 @dataclass(eq=False)
@@ -78,7 +76,7 @@ class ViewTokens:
         self._running: set[TokenRequest] = set()
         self._attempts = Attempts(free=10, longest_s=900.0)
         self._readers: OrderedDict[tuple[str, str], None] = OrderedDict()
-        self._refusals, self._refusal_published_at = 0, -_REFUSAL_EVENT_EVERY_S
+        self._refusals = RefusalEvents(publish_event, "token.refused")
 
     def check(self, token: str, robot: str, view: str, *, address: str) -> TokenRequest:
         """Check the token of a request for a view of a robot (`<site>/<robot>`).
@@ -91,7 +89,7 @@ class ViewTokens:
             wait_s = self._attempts.wait_s(network(address), at)
             if wait_s <= 0:
                 self._attempts.begin(network(address), at)
-            self._publish_refusal(address)
+            self._refusals.publish(f"an unknown token from {address} was refused", {"address": address})
             if wait_s > 0:
                 raise SignInError(codes.ACCOUNT_WAIT(seconds=math.ceil(wait_s)), wait_s)
             raise SignInError(codes.TOKEN_UNKNOWN())
@@ -141,16 +139,6 @@ class ViewTokens:
     def _publish(self, token: ViewToken, code: str, text: str, **values: str) -> None:
         given = {"token": token.name, "robot": token.robot, "view": token.view, **values}
         self._publish_event(Event.INFO, code, text, given)
-
-    def _publish_refusal(self, address: str) -> None:
-        self._refusals += 1
-        at = time.monotonic()
-        if at - self._refusal_published_at < _REFUSAL_EVENT_EVERY_S:
-            return
-        more = f" (and {self._refusals - 1} more)" if self._refusals > 1 else ""
-        text = f"an unknown token from {address} was refused{more}"
-        self._publish_event(Event.WARNING, "token.refused", text, {"address": address})
-        self._refusals, self._refusal_published_at = 0, at
 
 
 def add_token(path: Path, name: str, robot: str, view: str, *, lasts: timedelta | None) -> str:

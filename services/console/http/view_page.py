@@ -34,7 +34,7 @@ from services.console.requested_views import robot_key
 from services.console.websocket.send_queues import NewestQueue
 
 PATH = "/view/{site}/{robot}/{view}"
-# The page takes the stream for cut after some times as long without a message.
+# The page reconnects after five seconds without a message.
 _GREETS_EACH_S = 1.0
 # A controller reports more often than a person reads.
 _LEAST_INTERVAL_S = 0.1
@@ -64,7 +64,7 @@ class ViewPage:
         return FileResponse(self.page / "view.html", headers={"Cache-Control": "no-store"})
 
     async def live(self, request: Request) -> Response:
-        """Send what the page shows, until its reader goes."""
+        """Send what the page shows until the reader disconnects."""
         view = await self.pictures.view(request)
         path = request.path_params
         try:
