@@ -31,9 +31,8 @@ def viewer_layout(site: str, robot: str, description: Description) -> Json:
     def key(topic: str) -> str:
         return robot_key(site, robot, topic)
 
-    # The view that a recording has by default.
-    views = [view.name for view in description.views]
-    video = "free" if "free" in views or not views else views[0]
+    # Every robot has it, and a recording has it by default.
+    video = "free"
     panels: Json = {
         "3D!arm": _scene(site, description),
         "Image!video": {"imageMode": {"imageTopic": key(f"video/{video}")}, **_titled(video)},

@@ -272,7 +272,7 @@ def test_the_layout_for_other_viewers_names_topics_and_services_that_there_are(s
             for each in panels[f"Plot!{name}"]["paths"]
         ),
     ]
-    assert {parse_key(key).topic for key in keys} == {"video/front", "controller", "joints", "kinematics"}
+    assert {parse_key(key).topic for key in keys} == {"video/free", "controller", "joints", "kinematics"}
     assert all(topic(parse_key(key).topic) for key in keys)
     assert len(panels["Plot!joints"]["paths"]) == 5
     commands = {each["serviceName"] for name, each in panels.items() if name.startswith("CallService")}
