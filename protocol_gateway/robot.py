@@ -364,6 +364,7 @@ class Robot:
                 policy=self._checks.policy,
                 unchecked=self._checks.problem,
                 check_starting=self._checks.starting,
+                program=self._programs.running,
                 now=now,
             )
         )

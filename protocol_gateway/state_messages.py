@@ -83,6 +83,7 @@ def controller_state(
     policy: Policy,
     unchecked: Reason | None,
     check_starting: bool,
+    program: schema.ControllerState.Program | None,
     now: Now,
 ) -> schema.ControllerState:
     """Return the controller's state; a value that the controller does not report is "unknown"."""
@@ -106,6 +107,7 @@ def controller_state(
         check_text="" if unchecked is None else unchecked.text,
         check_reason=None if unchecked is None else reason_message(unchecked),
         check_starting=check_starting,
+        program=program,
         counters=schema.LinkCounters(
             units_received=counters.units_received,
             units_malformed=counters.units_malformed,

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from renderer.appearance import Appearance, home_placements
 from renderer.clearance_line import ClearanceLine, line_of, same_line
 from renderer.overlay import Overlay, Row
+from robomesh.activity import activity_words
 from robomesh.schemas.robomesh_pb2 import ControllerState, Description, KinematicState
 from robomesh.topics import topic
 
@@ -263,8 +264,8 @@ def _state_words(controller: ControllerState | None) -> str:
     if controller.link != ControllerState.UP:
         link = ControllerState.Link.Name(controller.link)
         return f"controller {link.lower()}"
-    words = [ControllerState.Activity.Name(controller.activity), ControllerState.Mode.Name(controller.mode)]
-    known = [word.lower() for word in words if not word.endswith(("UNKNOWN", "UNSPECIFIED"))]
+    words = [activity_words(controller), ControllerState.Mode.Name(controller.mode).lower()]
+    known = [word for word in words if not word.endswith(("unknown", "unspecified"))]
     if controller.HasField("stop"):
         known.insert(0, "stop request latched")
     return ", ".join(dict.fromkeys(known))

@@ -99,7 +99,7 @@ def _checked(cell: Cell, result: CheckResult) -> Checked:
         warnings=(*(_reason(each) for each in result.violations if not each.refuses), *warnings),
         readable=not any(each.kind in _UNREADABLE for each in result.violations),
         steps=result.steps,
-        duration_s=result.duration_s,
+        durations_s=result.durations_s,
     )
 
 

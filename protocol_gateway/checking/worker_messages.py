@@ -64,7 +64,7 @@ class Checked:
         warnings: Allowed, but close.
         readable: The program could be parsed and planned.
         steps: Steps of a program.
-        duration_s: Duration of a program.
+        durations_s: Duration of each step of a program.
     """
 
     refusals: tuple[Reason, ...] = ()
@@ -72,7 +72,7 @@ class Checked:
     warnings: tuple[Reason, ...] = ()
     readable: bool = True
     steps: tuple[Step, ...] = ()
-    duration_s: float = 0.0
+    durations_s: tuple[float, ...] = ()
 
 
 Cells: TypeAlias = dict[str, CellDescription]

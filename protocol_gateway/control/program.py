@@ -13,7 +13,7 @@ ends its program.
 import asyncio
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from protocol_gateway.authority import lease_rules
@@ -73,6 +73,24 @@ class _Run:
     checked: Checked
 
 
+class _TimeLeft:
+    """Time that the steps left of a program need, the first of which has just begun.
+
+    Args:
+        durations_s: Durations of the steps left, by the program's check.
+    """
+
+    def __init__(self, durations_s: Sequence[float], now_s: float) -> None:
+        self._first_s, self._others_s = durations_s[0], sum(durations_s[1:])
+        self._now_s = now_s
+
+    def advance(self, now_s: float, *, paused: bool) -> float:
+        """Return the time left [s]; a step that takes longer than checked leaves the time of the others."""
+        self._first_s -= 0.0 if paused else now_s - self._now_s
+        self._now_s = now_s
+        return max(0.0, self._first_s) + self._others_s
+
+
 @dataclass(frozen=True)
 class _Prepared:
     """A program that was checked.
@@ -110,7 +128,16 @@ class Programs:
         self._control, self._checks, self._journal = control, checks, journal
         self._controller, self._publish = controller, publish
         self.state = _STATE()
+        self._wait_s: float | None = None
+        self._time_left = _TimeLeft((0.0,), 0.0)
         self._task: asyncio.Task[None] | None = None
+
+    @property
+    def running(self) -> schema.ControllerState.Program | None:
+        """State of the program that runs; None: none runs."""
+        if self.state.outcome != _STATE.RUNNING:
+            return None
+        return schema.ControllerState.Program(held=not self._not_held(), wait_s=self._wait_s)
 
     async def run(
         self, request: schema.CommandRequest, *, operator: str, source: str
@@ -205,13 +232,15 @@ class Programs:
         return _Prepared(None, finding.warning, run)
 
     def _start(self, run: _Run) -> None:
+        self._wait_s = None
         self.state = _STATE(
             outcome=_STATE.RUNNING,
             name=run.program.name,
             operator=run.operator,
             since=timestamp(time.time_ns()),
             steps=len(run.checked.steps),
-            duration_s=run.checked.duration_s,
+            duration_s=sum(run.checked.durations_s),
+            left_s=sum(run.checked.durations_s),
         )
         self._task = asyncio.create_task(self._run(run))
 
@@ -240,8 +269,10 @@ class Programs:
     async def _run_steps(self, run: _Run) -> Reason | None:
         """Execute a program's steps; return the reason of an abort."""
         for number, step in enumerate(run.checked.steps):
+            self._time_left = _TimeLeft(run.checked.durations_s[number:], time.monotonic())
             self.state.step, self.state.line = number + 1, step.line
             self.state.statement = one_line(run.lines[step.line - 1].partition("#")[0].strip(), LONGEST_TEXT)
+            self._wait_s = step.seconds if step.kind is StepKind.WAIT else None
             self._publish()
             problem = await self._step(run, step)
             if problem is not None:
@@ -281,6 +312,9 @@ class Programs:
     async def _wait_until(self, run: _Run, done: Callable[[], bool], *, moves: bool = False) -> Reason | None:
         """Wait until `done`; return the reason if the program must be aborted."""
         while True:
+            # A wait of the program goes on during a hold.
+            paused = self._wait_s is None and not self._not_held()
+            self.state.left_s = self._time_left.advance(time.monotonic(), paused=paused)
             if (problem := self._abort_reason(run)) is not None:
                 return problem
             if done():

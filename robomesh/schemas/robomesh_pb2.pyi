@@ -12,7 +12,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class ControllerState(_message.Message):
-    __slots__ = ("timestamp", "link", "mode", "activity", "homed", "trace", "fault", "last_unit_age_s", "controller_time_s", "counters", "read_only", "stop", "link_text", "rate_hz", "health", "audit_head", "legacy_clients", "speed_percent", "check", "check_text", "check_starting", "link_reasons", "check_reason")
+    __slots__ = ("timestamp", "link", "mode", "activity", "homed", "trace", "fault", "last_unit_age_s", "controller_time_s", "counters", "read_only", "stop", "link_text", "rate_hz", "health", "audit_head", "legacy_clients", "speed_percent", "check", "check_text", "check_starting", "link_reasons", "check_reason", "program")
     class Link(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         LINK_UNSPECIFIED: _ClassVar[ControllerState.Link]
@@ -71,6 +71,13 @@ class ControllerState(_message.Message):
     OFF: ControllerState.Check
     WARN: ControllerState.Check
     REQUIRE: ControllerState.Check
+    class Program(_message.Message):
+        __slots__ = ("held", "wait_s")
+        HELD_FIELD_NUMBER: _ClassVar[int]
+        WAIT_S_FIELD_NUMBER: _ClassVar[int]
+        held: bool
+        wait_s: float
+        def __init__(self, held: _Optional[bool] = ..., wait_s: _Optional[float] = ...) -> None: ...
     TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
     LINK_FIELD_NUMBER: _ClassVar[int]
     MODE_FIELD_NUMBER: _ClassVar[int]
@@ -94,6 +101,7 @@ class ControllerState(_message.Message):
     CHECK_STARTING_FIELD_NUMBER: _ClassVar[int]
     LINK_REASONS_FIELD_NUMBER: _ClassVar[int]
     CHECK_REASON_FIELD_NUMBER: _ClassVar[int]
+    PROGRAM_FIELD_NUMBER: _ClassVar[int]
     timestamp: _timestamp_pb2.Timestamp
     link: ControllerState.Link
     mode: ControllerState.Mode
@@ -117,7 +125,8 @@ class ControllerState(_message.Message):
     check_starting: bool
     link_reasons: _containers.RepeatedCompositeFieldContainer[Reason]
     check_reason: Reason
-    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., link: _Optional[_Union[ControllerState.Link, str]] = ..., mode: _Optional[_Union[ControllerState.Mode, str]] = ..., activity: _Optional[_Union[ControllerState.Activity, str]] = ..., homed: _Optional[_Union[ControllerState.Known, str]] = ..., trace: _Optional[_Union[ControllerState.Known, str]] = ..., fault: _Optional[str] = ..., last_unit_age_s: _Optional[float] = ..., controller_time_s: _Optional[float] = ..., counters: _Optional[_Union[LinkCounters, _Mapping]] = ..., read_only: _Optional[bool] = ..., stop: _Optional[_Union[StopState, _Mapping]] = ..., link_text: _Optional[str] = ..., rate_hz: _Optional[float] = ..., health: _Optional[_Union[LinkHealth, _Mapping]] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., legacy_clients: _Optional[_Union[LegacyClients, _Mapping]] = ..., speed_percent: _Optional[float] = ..., check: _Optional[_Union[ControllerState.Check, str]] = ..., check_text: _Optional[str] = ..., check_starting: _Optional[bool] = ..., link_reasons: _Optional[_Iterable[_Union[Reason, _Mapping]]] = ..., check_reason: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
+    program: ControllerState.Program
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., link: _Optional[_Union[ControllerState.Link, str]] = ..., mode: _Optional[_Union[ControllerState.Mode, str]] = ..., activity: _Optional[_Union[ControllerState.Activity, str]] = ..., homed: _Optional[_Union[ControllerState.Known, str]] = ..., trace: _Optional[_Union[ControllerState.Known, str]] = ..., fault: _Optional[str] = ..., last_unit_age_s: _Optional[float] = ..., controller_time_s: _Optional[float] = ..., counters: _Optional[_Union[LinkCounters, _Mapping]] = ..., read_only: _Optional[bool] = ..., stop: _Optional[_Union[StopState, _Mapping]] = ..., link_text: _Optional[str] = ..., rate_hz: _Optional[float] = ..., health: _Optional[_Union[LinkHealth, _Mapping]] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., legacy_clients: _Optional[_Union[LegacyClients, _Mapping]] = ..., speed_percent: _Optional[float] = ..., check: _Optional[_Union[ControllerState.Check, str]] = ..., check_text: _Optional[str] = ..., check_starting: _Optional[bool] = ..., link_reasons: _Optional[_Iterable[_Union[Reason, _Mapping]]] = ..., check_reason: _Optional[_Union[Reason, _Mapping]] = ..., program: _Optional[_Union[ControllerState.Program, _Mapping]] = ...) -> None: ...
 
 class LinkHealth(_message.Message):
     __slots__ = ("jitter_s", "network_round_trip_s", "answer_s", "flooding")
@@ -406,7 +415,7 @@ class CommandRequest(_message.Message):
     def __init__(self, lease: _Optional[str] = ..., id: _Optional[int] = ..., not_after: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., command: _Optional[_Union[CommandRequest.Command, str]] = ..., joint_positions: _Optional[_Iterable[float]] = ..., speed_percent: _Optional[float] = ..., stop_id: _Optional[int] = ..., program: _Optional[str] = ..., program_name: _Optional[str] = ...) -> None: ...
 
 class ProgramState(_message.Message):
-    __slots__ = ("timestamp", "outcome", "name", "operator", "since", "line", "statement", "step", "steps", "duration_s", "text", "reason")
+    __slots__ = ("timestamp", "outcome", "name", "operator", "since", "line", "statement", "step", "steps", "duration_s", "text", "reason", "left_s")
     class Outcome(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         OUTCOME_UNSPECIFIED: _ClassVar[ProgramState.Outcome]
@@ -429,6 +438,7 @@ class ProgramState(_message.Message):
     DURATION_S_FIELD_NUMBER: _ClassVar[int]
     TEXT_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
+    LEFT_S_FIELD_NUMBER: _ClassVar[int]
     timestamp: _timestamp_pb2.Timestamp
     outcome: ProgramState.Outcome
     name: str
@@ -441,7 +451,8 @@ class ProgramState(_message.Message):
     duration_s: float
     text: str
     reason: Reason
-    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., outcome: _Optional[_Union[ProgramState.Outcome, str]] = ..., name: _Optional[str] = ..., operator: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., line: _Optional[int] = ..., statement: _Optional[str] = ..., step: _Optional[int] = ..., steps: _Optional[int] = ..., duration_s: _Optional[float] = ..., text: _Optional[str] = ..., reason: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
+    left_s: float
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., outcome: _Optional[_Union[ProgramState.Outcome, str]] = ..., name: _Optional[str] = ..., operator: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., line: _Optional[int] = ..., statement: _Optional[str] = ..., step: _Optional[int] = ..., steps: _Optional[int] = ..., duration_s: _Optional[float] = ..., text: _Optional[str] = ..., reason: _Optional[_Union[Reason, _Mapping]] = ..., left_s: _Optional[float] = ...) -> None: ...
 
 class CommandAnswer(_message.Message):
     __slots__ = ("accepted", "text", "warning")

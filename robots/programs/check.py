@@ -100,8 +100,10 @@ def check_plan(
     checker = _Checker(arm.joints)
     ways = {name: np.atleast_2d(way) for name, way in others.items() if name != robot}
     segment_checker = SegmentChecker(cell, robot, ways, far=far)
+    ends_s = []
     for step, segment in segment_checker.segments(start, (*plan.steps, _final_step(start, plan.steps))):
         checker.take(step, segment)
+        ends_s.append(checker.time_s)
     ends = [replace(each, time_s=checker.time_s, until_s=checker.time_s) for each in plan.violations]
     found = (*_start_violations(arm.joints, start), *checker.limits, *checker.runs.violations())
     notes = (*_cover_notes(cell, robot, others), *_floor_notes(cell, found))
@@ -113,7 +115,9 @@ def check_plan(
         notes,
         checker.path,
     )
-    return replace(result, alone=cell.floor is None and not len(cell.fixtures) and not ways)
+    durations_s = np.diff(ends_s[:-1], prepend=0.0).tolist()
+    alone = cell.floor is None and not len(cell.fixtures) and not ways
+    return replace(result, durations_s=tuple(durations_s), alone=alone)
 
 
 @dataclass(frozen=True, eq=False)

@@ -138,6 +138,7 @@ class CheckResult:
         duration_s: Total of the motions, homing's rest and the waits.
         interpolation: The assumed interpolation of the controller.
         notes: Gaps in the check's coverage.
+        durations_s: Duration of each step.
         alone: Only self-collisions were checked: the cell has no floor, no fixture and no other robot.
     """
 
@@ -148,6 +149,7 @@ class CheckResult:
     interpolation: Reason
     notes: tuple[Reason, ...]
     path: SampledPath
+    durations_s: tuple[float, ...] = ()
     alone: bool = False
 
     @property

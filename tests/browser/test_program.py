@@ -155,7 +155,23 @@ def test_a_program_runs_or_is_stopped_and_everybody_sees_how_far_it_is_and_what_
     for seen in (page, other):
         progress(seen, "RUNNING", "waits")
         expect(seen.locator(".progress-line")).to_contain_text("left of 01:0", timeout=CHECKED_MS)
+        expect(seen.locator(".headline .state.motion")).to_have_text("Running · waits 60\u202fs")
     expect(page.locator(".editor-band.running")).to_have_count(1, timeout=CHECKED_MS)
+    # Only what the gateway would accept can be pressed.
+    expect(page.locator(".control .notice")).to_contain_text("A program runs")
+    for refused in (button(page, "Home"), page.get_by_label("Speed"), page.locator("button.run")):
+        expect(refused).to_be_disabled()
+    expect(button(page, "Hold")).to_be_enabled()
+    for path, place in (("/", ".tile"), ("/wall/test/arm/close", ".wall-tile"), ("/test/arm", ".headline")):
+        other.evaluate("path => (location.hash = path)", path)
+        expect(other.locator(f"{place} .state.motion")).to_have_text("Running · waits 60\u202fs")
+    expect(other.locator(".program-line")).to_contain_text("left")
+    other.evaluate(f"location.hash = '{PAGE}'")
+    button(page, "Hold").click()
+    for seen in (page, other):
+        expect(seen.locator(".headline .state.warning")).to_have_text("Holding")
+    expect(page.locator(".control .notice")).to_contain_text("Resume first")
+    expect(button(page, "Resume")).to_be_enabled()
     page.locator("button.stop").click()
     for seen in (page, other):
         progress(seen, "ENDED", "the page")

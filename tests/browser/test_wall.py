@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.rendering import rendering
-from tests.browser.robot_page import serious
+from tests.browser.robot_page import ARM, fault, serious, take
 
 pytestmark = pytest.mark.browser
 
@@ -59,6 +59,23 @@ def test_a_robot_that_there_is_not_is_said_so_and_a_picture_that_does_not_come_t
     page = open_page("#/wall/hall/nobody/close/hall/arm/front", drawn=False)
     expect(page.locator(".wall-tile").nth(0)).to_contain_text("not on the mesh")
     expect(page.locator(".wall-tile").nth(1)).to_contain_text("Waiting for a picture")
+
+
+def test_a_tile_gives_only_the_reason_of_its_state(open_page, plant):
+    page = open_page("#/wall/hall/arm/close/hall/replay-gone/close", drawn=False)
+    tile = page.locator(".wall-tile").nth(0)
+    expect(page.locator(".wall-tile").nth(1)).to_contain_text("This replay has ended")
+    state, reason = tile.locator(".state.alarm"), tile.locator(".wall-problem.alarm")
+    with fault(plant, "fault"):
+        expect(state).to_have_text("Fault")
+        expect(reason).to_contain_text("overheated")
+    expect(state).to_have_text("Stopped")
+    # The link's text, that it is connected, is no reason.
+    expect(reason).to_have_text("The controller has stopped by itself")
+    page.evaluate("path => (location.hash = path)", ARM)
+    take(page)
+    page.get_by_role("button", name="Reset", exact=True).click()
+    expect(page.locator(".headline .state")).to_have_text("Idle")
 
 
 def test_a_tile_asks_for_a_picture_of_its_size_which_moves_as_the_arm_does(open_page, rendered):

@@ -15,6 +15,7 @@ from protocol_gateway.checking.checker import Checker
 from protocol_gateway.control.deadlines import set_deadline
 from protocol_gateway.errors import CheckError
 from robomesh import reason_codes as codes
+from robomesh.activity import activity_words
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
@@ -210,12 +211,39 @@ def test_a_held_program_continues_with_resume(mesh, tmp_path):
             await until(lambda: site.joints[0] < -0.1)
             await site.command(C.HOLD)
             await until(lambda: site.controller.activity == STATE.HOLDING)
-            await asyncio.sleep(1.0)
-            assert states(site)[-1].outcome == RUN.RUNNING
+            held = len(states(site))
+            await until(lambda: len(states(site)) >= held + 3)
             await site.lease(A.RENEW, ttl_s=5)
+            assert states(site)[-1].outcome == RUN.RUNNING
+            # No time passes during the hold: a part of the first motion is left, and the whole second.
+            assert states(site)[-1].left_s == states(site)[held].left_s > 0.5
+            assert site.controller.program.held
             await site.command(C.RESUME)
-            await ended(site, RUN.DONE)
+            done = await ended(site, RUN.DONE)
+            assert done.left_s < 0.5
+            await until(lambda: not site.controller.HasField("program"))
             await standing(site, LAST)
+
+    run(main(), timeout_s=240)
+
+
+def test_an_arm_at_rest_whose_program_waits_is_published_as_running(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            await site.home()
+            await start(site, "wait 30\nmove_joints -40 90 -90 0 0\n")
+            await until(
+                lambda: site.controller.HasField("program") and site.controller.program.HasField("wait_s")
+            )
+            assert (site.controller.activity, site.controller.program.wait_s) == (STATE.IDLE, 30.0)
+            assert activity_words(site.controller) == "running, waits 30 s"
+            await until(lambda: states(site)[-1].statement == "wait 30")
+            left_s = states(site)[-1].left_s
+            assert 0 < left_s <= states(site)[-1].duration_s
+            await until(lambda: states(site)[-1].left_s < left_s - 0.5)
+            await site.stop(by="li")
+            await ended(site, RUN.ENDED)
+            await until(lambda: not site.controller.HasField("program"))
 
     run(main(), timeout_s=240)
 

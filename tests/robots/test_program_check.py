@@ -67,6 +67,16 @@ def test_collision_is_found_at_the_geometric_time_and_place(shelf: Cell) -> None
     assert touch.points[0] == pytest.approx([0.6, 0.5, 0.01], abs=0.05)
 
 
+def test_the_steps_durations_add_up_to_the_programs(arm_cell: Cell) -> None:
+    result = checked(arm_cell, "wait 1\nmove_joints 90 0\nmove_joints 0 0\n")
+    assert len(result.durations_s) == len(result.steps)
+    assert sum(result.durations_s) == pytest.approx(result.duration_s)
+    waits = [
+        s for step, s in zip(result.steps, result.durations_s, strict=True) if step.kind is StepKind.WAIT
+    ]
+    assert waits == [1.0]
+
+
 def test_nearer_than_the_warning_warns_and_nearer_than_the_stop_refuses(shelf: Cell) -> None:
     def at(gap_m: float) -> float:
         return degrees(asin((0.5 - gap_m) / hypot(*CORNER)) - atan2(CORNER[1], CORNER[0]))

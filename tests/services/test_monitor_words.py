@@ -77,8 +77,9 @@ def test_a_program_is_printed_with_step_line_time_and_outcome():
         step=12,
         steps=40,
         duration_s=125.5,
+        left_s=52.6,
     )
-    text = "program weld: step 12 of 40, line 7: move_line part; by li, 01:12 of 02:05"
+    text = "program weld: step 12 of 40, line 7: move_line part; by li, for 01:12, 00:53 left"
     assert program_words(state) == (text, "bold")
     assert program_words(state, stale=True) == (text, "dim strike")
     state.outcome, state.text = ProgramState.ENDED, "stopped by wang"

@@ -7,6 +7,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
+from robomesh.activity import activity_words
 from robomesh.clock import Clock, Reading, read_clock
 from robomesh.errors import NoAnswerError
 from robomesh.keys import ROOT, WHOLE_SITE, PresenceKey, is_replay, robot_key
@@ -174,6 +175,7 @@ async def _row(session: Session, site: str, robot: str) -> dict[str, Any]:
         "link": _State.Link.Name(state.link).lower(),
         "mode": _State.Mode.Name(state.mode).lower().removeprefix("mode_"),
         "activity": _State.Activity.Name(state.activity).lower().removeprefix("activity_"),
+        "state": activity_words(state),
         "stop_id": state.stop.id if state.HasField("stop") else None,
         "read_only": state.read_only,
         "rate_hz": state.rate_hz if state.HasField("rate_hz") else None,
@@ -190,6 +192,7 @@ def _row_without_gateway(site: str, robot: str, link: str) -> dict[str, Any]:
         "link": link,
         "mode": "unknown",
         "activity": "unknown",
+        "state": "unknown",
         "stop_id": None,
         "read_only": False,
         "rate_hz": None,

@@ -154,8 +154,8 @@ def _replay(row: dict[str, Any]) -> str:
 
 
 def _state(row: dict[str, Any]) -> str:
-    """Return the robot's activity, and what blocks its motion."""
-    words = [row["activity"]]
+    """Return what the robot does, and what blocks its motion."""
+    words = [row["state"]]
     if row["stop_id"] is not None:
         words.append(f"stop {row['stop_id']} latched")
     if row["read_only"]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
+from robomesh.activity import activity_words
 from robomesh.keys import WHOLE_SITE, is_replay, robot_key
 from robomesh.presence import MONITOR
 from robomesh.schemas import robomesh_pb2 as schema
@@ -190,7 +191,7 @@ class _Newest:
         if state is not None:
             head.append(f"   link {_word(_State.Link, state.link)}")
             head.append(
-                f"   {_word(_State.Activity, state.activity)}   mode {_word(_State.Mode, state.mode)}"
+                f"   {activity_words(state)}   mode {_word(_State.Mode, state.mode)}"
                 f"   homed {_word(_State.Known, state.homed)}",
                 style="" if state.link == _State.UP else "dim strike",
             )

@@ -1,5 +1,6 @@
 """Texts and JSON values of `robomesh monitor` besides the joints: clearances, checks, programs, replays."""
 
+import math
 from collections.abc import Iterable
 from datetime import datetime
 from typing import Any
@@ -112,10 +113,10 @@ def program_words(state: schema.ProgramState, *, stale: bool = False) -> Words |
     match state.outcome:
         case _Program.RUNNING:
             elapsed_s = (state.timestamp.ToNanoseconds() - state.since.ToNanoseconds()) * 1e-9
-            of = f" of {clock(state.duration_s)}" if state.duration_s > 0 else ""
+            left = f", {clock(math.ceil(state.left_s))} left" if state.HasField("left_s") else ""
             return (
                 f"program {state.name}: step {state.step} of {state.steps}, {where}; "
-                f"by {state.operator}, {clock(elapsed_s)}{of}"
+                f"by {state.operator}, for {clock(elapsed_s)}{left}"
             ), OLD if stale else "bold"
         case _Program.DONE:
             return f"program {state.name}: done, by {state.operator}", ""

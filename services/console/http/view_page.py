@@ -139,6 +139,8 @@ def _shown_payload(sample: Sample) -> bytes:
         if state.HasField("stop"):
             kept.stop.sent = state.stop.sent
             kept.stop.since.CopyFrom(state.stop.since)
+        if state.HasField("program"):
+            kept.program.CopyFrom(state.program)
     else:
         return sample.payload
     return kept.SerializeToString()

@@ -28,7 +28,6 @@ export const FLEET_TEXTS = {
   health_stale: ["site's health: stale {age}", "站点状态：过期 {age}"],
   far: ["over the slow link", "经慢速链路"],
   loading: ["Loading…", "正在加载…"],
-  nothing_comes: ["Nothing comes from it: its gateway or the line to it is gone.", "没有数据：网关离线或线路中断。"],
   far_hint: [
     "Another site than this console's: its picture comes over the slow link.",
     "不在本控制台所在站点：图像经慢速链路传输。",

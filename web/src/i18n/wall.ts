@@ -22,6 +22,7 @@ const TEXTS = {
   waiting: ["Waiting for a picture", "等待图像"],
   hidden: ["Not on the screen: not watched", "不在屏幕上：未接收"],
   gone: ["This robot is not on the mesh now", "该机器人目前不在网络上"],
+  replay_ended: ["This replay has ended", "此回放已结束"],
   remove: ["Take {robot}, {view} off the wall", "从视频墙移除 {robot}，{view}"],
   replay: ["replay", "回放"],
 } as const;

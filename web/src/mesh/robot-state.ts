@@ -2,7 +2,7 @@
 
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
 import { timestampMs } from "@bufbuild/protobuf/wkt";
-import type { ControllerState, Event } from "../gen/robomesh_pb";
+import type { ControllerState, ControllerState_Program, Event, ReplayState } from "../gen/robomesh_pb";
 import {
   ControllerState_Activity as Activity,
   ControllerState_Known as Known,
@@ -10,7 +10,7 @@ import {
   ControllerState_Mode as Mode,
 } from "../gen/robomesh_pb";
 import { stampTime } from "../i18n/format";
-import { reasonsText } from "../i18n/reasons";
+import { reasonsText, reasonText } from "../i18n/reasons";
 import type { TextName } from "../i18n/texts";
 import { t } from "../i18n/texts";
 import type { Latest } from "./topics";
@@ -21,27 +21,33 @@ export type Level = "normal" | "warning" | "alarm";
 
 export interface StateWord {
   word: TextName;
-  level: Level;
+  /** "motion": normal, and the arm moves or is about to. */
+  level: Level | "motion";
+  /** What it does in this state, in words. */
+  detail?: string;
 }
 
 const ACTIVITIES: Record<Activity, StateWord> = {
   [Activity.ACTIVITY_UNSPECIFIED]: { word: "state_unknown", level: "normal" },
   [Activity.ACTIVITY_UNKNOWN]: { word: "state_unknown", level: "normal" },
   [Activity.IDLE]: { word: "state_idle", level: "normal" },
-  [Activity.MOVING]: { word: "state_moving", level: "normal" },
-  [Activity.HOMING]: { word: "state_homing", level: "normal" },
+  [Activity.MOVING]: { word: "state_moving", level: "motion" },
+  [Activity.HOMING]: { word: "state_homing", level: "motion" },
   [Activity.HOLDING]: { word: "state_holding", level: "warning" },
   [Activity.STOPPED]: { word: "state_stopped", level: "alarm" },
   [Activity.FAULT]: { word: "state_fault", level: "alarm" },
 };
 
 const MOVES = new Set([Activity.MOVING, Activity.HOMING]);
+const NEEDS_RESUME_OR_RESET = new Set([Activity.HOLDING, Activity.STOPPED, Activity.FAULT]);
 const NOT_MOVING = new Set([Activity.IDLE, Activity.HOLDING, Activity.STOPPED, Activity.FAULT]);
 
 // The gateway waits as long before it reports this, then repeats it every 2 s.
 const STOP_RESPONSE_MS = 2000;
 const REPEAT_MS = 3000;
 export const DISOBEYED = "stop.disobeyed";
+const END_S = 0.01; // a recording's end, by its player's rounding
+const POSITIONS_STALE = "positions.stale";
 
 /** Return how long before a controller's report an event was [ms], by the gateway's clock. */
 export function msBefore(state: ControllerState, stamp: Timestamp | undefined): number {
@@ -74,7 +80,7 @@ export function stopText({ stop, activity }: ControllerState, disobeyed = false)
 export function stateWord(controller: Latest<ControllerState> | undefined, events?: readonly Event[]): StateWord {
   if (!controller) return { word: "state_unknown", level: "warning" };
   if (isStale("controller", ageOf(controller))) return { word: "state_stale", level: "warning" };
-  const { link, stop, fault, activity } = controller.message;
+  const { link, stop, fault, activity, program } = controller.message;
   if (disobeys(controller.message, events)) return { word: "state_disobeys", level: "alarm" };
   if (fault) return { word: "state_fault", level: "alarm" };
   if (stop && !stop.sent) return { word: "state_stop_unsent", level: "alarm" };
@@ -82,7 +88,35 @@ export function stateWord(controller: Latest<ControllerState> | undefined, event
   if (stop) return { word: NOT_MOVING.has(activity) ? "state_stopped" : "state_stop_sent", level: "alarm" };
   if (link === Link.DOWN) return { word: "state_no_link", level: "alarm" };
   if (link === Link.SILENT) return { word: "state_silent", level: "warning" };
+  if (program && !NEEDS_RESUME_OR_RESET.has(activity)) return programWord(program, activity);
   return ACTIVITIES[activity] ?? { word: "state_unknown", level: "warning" };
+}
+
+/** Return the state of an arm whose program runs: even at rest it is about to move by itself. */
+function programWord(program: ControllerState_Program, activity: Activity): StateWord {
+  if (program.held) return ACTIVITIES[Activity.HOLDING];
+  const running = { word: "state_running", level: "motion" } as const;
+  if (program.waitS !== undefined)
+    return { ...running, detail: t("running_waits", { seconds: Number(program.waitS.toFixed(2)) }) };
+  if (activity === Activity.HOMING) return { ...running, detail: t("running_homes") };
+  return activity === Activity.MOVING ? { ...running, detail: t("running_moves") } : running;
+}
+
+/** Return the state word of a replayed robot: the recorded one only while it plays. */
+export function replayWord(
+  replay: Latest<ReplayState> | undefined,
+  controller: Latest<ControllerState> | undefined,
+): StateWord {
+  if (!replay) return { word: "state_unknown", level: "normal" };
+  const { playing, positionS, durationS } = replay.message;
+  if (isStale("replay", ageOf(replay)) || (!playing && positionS >= durationS - END_S))
+    return { word: "state_replay_ended", level: "normal" };
+  return playing && controller ? stateWord(controller) : { word: "state_replay_paused", level: "normal" };
+}
+
+/** Return a state in words, with what the robot does in it. */
+export function stateText({ word, detail }: StateWord): string {
+  return detail ? `${t(word)} · ${detail}` : t(word);
 }
 
 /** Return whether the controller stopped without a request or has a fault; it moves again only after a reset. */
@@ -90,7 +124,7 @@ export function stoppedByItself(state: ControllerState | undefined): boolean {
   return state !== undefined && !state.stop && [Activity.STOPPED, Activity.FAULT].includes(state.activity);
 }
 
-/** Explain why the robot cannot be moved now, and what to do; empty: it can, as far as is known. */
+/** Explain why nothing moves the robot now, not even RESUME, and what to do; empty: it can move, as far as is known. */
 export function whyNoMotion(state: ControllerState | undefined): string {
   if (!state) return "";
   if (state.readOnly) return t("read_only_text");
@@ -98,11 +132,20 @@ export function whyNoMotion(state: ControllerState | undefined): string {
   if (state.link !== Link.UP) return t("no_motion_link");
   if (state.mode === Mode.LOCAL) return t("no_motion_local");
   if (stoppedByItself(state)) return t("own_reset_needs");
-  return "";
+  const stale = state.linkReasons.find(({ code }) => code === POSITIONS_STALE);
+  return stale ? t("no_motion_reason", { text: reasonText(stale, stale.text) }) : "";
 }
 
-/** Explain why no joint can be moved; a robot that is not homed can still be homed. */
-export function whyNoMove(state: ControllerState | undefined): string {
+/** Explain why no motion can begin, although a running or held one may go on; empty: it can. */
+export function whyNoNewMotion(state: ControllerState | undefined): string {
+  const why = whyNoMotion(state);
+  if (why || !state) return why;
+  if (state.activity === Activity.HOLDING || state.program?.held) return t("no_motion_held");
+  return state.program ? t("no_motion_program") : "";
+}
+
+/** Explain why no joint has a target; a robot that is not homed can still be homed. */
+export function whyNoTarget(state: ControllerState | undefined): string {
   return whyNoMotion(state) || (state?.homed === Known.NO ? t("no_motion_unhomed") : "");
 }
 
@@ -111,10 +154,24 @@ export function moves(state: ControllerState | undefined): boolean {
   return state !== undefined && MOVES.has(state.activity);
 }
 
-/** Describe what is wrong. */
-export function problemOf(state: ControllerState | undefined): string {
-  if (disobeys(state)) return t("disobeys");
-  if (state?.fault) return state.fault;
-  if (state?.stop) return stopText(state);
-  return reasonsText(state?.linkReasons, state?.linkText);
+/** Describe what is wrong: the reason of this state, and of no other. */
+export function problemOf({ word }: StateWord, state: ControllerState | undefined): string {
+  switch (word) {
+    case "state_stale":
+      return t("nothing_comes"); // the last report about the link is outdated
+    case "state_disobeys":
+      return t("disobeys");
+    case "state_fault":
+      return state?.fault || t("own_fault");
+    case "state_stopped":
+    case "state_stopping":
+    case "state_stop_sent":
+    case "state_stop_unsent":
+      return state?.stop ? stopText(state) : t("own_stop");
+    case "state_no_link":
+    case "state_silent":
+      return reasonsText(state?.linkReasons, state?.linkText);
+    default:
+      return "";
+  }
 }

@@ -3,14 +3,14 @@
 import { staleText } from "../i18n/format";
 import { t } from "../i18n/texts";
 import type { StateWord } from "../mesh/robot-state";
+import { stateText } from "../mesh/robot-state";
 
-/** A state word with the shape and colour of its level; of several, their number. */
+/** A state with the shape and colour of its level; of several, their number. */
 export function State({ state, count }: { state: StateWord; count?: number }) {
   return (
     <span class={`state ${state.level}`}>
       <span class={`shape ${state.level}`} aria-hidden="true" />
-      {count !== undefined && `${count} `}
-      {t(state.word)}
+      {count === undefined ? stateText(state) : `${count} ${t(state.word)}`}
     </span>
   );
 }

@@ -9,7 +9,7 @@ import { alarmsOf } from "../../mesh/alarms";
 import { lostAt } from "../../mesh/connection";
 import { fleetRobots } from "../../mesh/known-robots";
 import { robotSnapshot, useFleetSnapshots } from "../../mesh/robot-snapshots";
-import type { Level, StateWord } from "../../mesh/robot-state";
+import type { StateWord } from "../../mesh/robot-state";
 import { stateWord } from "../../mesh/robot-state";
 import { isClockOff, isMeshStale, isSilent, reportAge, useMesh } from "../../mesh/site-health";
 import { ageOf, now } from "../../mesh/topics";
@@ -20,7 +20,8 @@ import { RobotTile } from "./tile";
 
 const STATES = ["any_state", "needs_look", "faulty", "with_alarm"] as const;
 const ORDERS = ["by_name", "by_urgency"] as const;
-const LEVELS: readonly Level[] = ["alarm", "warning", "normal"];
+const LEVELS: readonly StateWord["level"][] = ["alarm", "warning", "motion", "normal"];
+const CALM: ReadonlySet<StateWord["level"]> = new Set(["motion", "normal"]);
 const EMPTY_AFTER_MS = 1500; // live robots have published by then
 
 const text = signal("");
@@ -80,7 +81,7 @@ function chosen(robots: readonly string[], states: ReadonlyMap<string, StateWord
   const level = (key: string) => states.get(key)?.level ?? "warning";
   const passes = {
     any_state: () => true,
-    needs_look: (key: string) => level(key) !== "normal" || alarmed(key) > 0,
+    needs_look: (key: string) => !CALM.has(level(key)) || alarmed(key) > 0,
     faulty: (key: string) => level(key) === "alarm",
     with_alarm: (key: string) => alarmed(key) > 0,
   }[state.value];

@@ -60,8 +60,7 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
   const stale = isStale("controller", unitAge);
   const leaseKnown = lease !== undefined && !isStale("lease", ageOf(lease));
   const holder = lease?.message.holder;
-  // The last report about the link is outdated.
-  const problem = state.word === "state_stale" ? f("nothing_comes") : problemOf(controller?.message);
+  const problem = problemOf(state, controller?.message);
   const alarms = alarmsOf.value.get(robotKey) ?? [];
   const worst = alarms.reduce((most, { priority }) => Math.max(most, priority), 0);
   const isRemote = hello.value !== null && hello.value.site !== site;
@@ -95,7 +94,7 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
         </div>
         {/* One line for each case, so that a tile's height never changes. */}
         <div class="tile-line">
-          {state.level !== "normal" && problem ? (
+          {problem ? (
             <p class={`tile-problem ${state.level}`} title={problem}>
               {problem}
             </p>

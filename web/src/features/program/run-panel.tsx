@@ -10,8 +10,8 @@ import { t } from "../../i18n/texts";
 import { Command, command } from "../../mesh/command";
 import { reachable } from "../../mesh/connection";
 import type { Notice } from "../../mesh/control";
-import { holds, ms } from "../../mesh/control";
-import { whyNoMotion } from "../../mesh/robot-state";
+import { holds } from "../../mesh/control";
+import { whyNoNewMotion } from "../../mesh/robot-state";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
 import type { Draft } from "./draft";
@@ -63,16 +63,13 @@ function whyNotRun(robotKey: string, controller: ControllerState | undefined, ru
   if (running) return p("run_running");
   if (!reachable.value) return t("no_connection");
   if (!holds(robotKey)) return p("run_take");
-  return whyNoMotion(controller);
+  return whyNoNewMotion(controller);
 }
 
 function Progress({ state }: { state: ProgramState }) {
-  const { outcome, name, operator, line, statement, step, steps, durationS, text } = state;
-  const level = outcome === Outcome.ENDED ? "alarm" : "normal";
+  const { outcome, name, operator, line, statement, step, steps, durationS, leftS, text } = state;
+  const level = { [Outcome.ENDED]: "alarm", [Outcome.RUNNING]: "motion" }[outcome as number] ?? "normal";
   const word = p(outcome === Outcome.RUNNING ? "is_running" : outcome === Outcome.DONE ? "is_done" : "is_ended");
-  // Both times are from the gateway's clock, published each second.
-  const gone = (ms(state.timestamp) - ms(state.since)) / 1000;
-  const left = outcome === Outcome.RUNNING ? durationS - gone : 0;
   return (
     <div class="progress" role="status" data-outcome={Outcome[outcome]}>
       <p class="progress-head">
@@ -92,7 +89,9 @@ function Progress({ state }: { state: ProgramState }) {
         {line > 0 && <span class="dim">{p("line", { line })}</span>} <code>{statement}</code>
         <span class="dim small">
           {p("step_of", { step, steps })}
-          {left > 0 && ` · ${p("time_left", { left: clock(left), all: clock(durationS) })}`}
+          {outcome === Outcome.RUNNING &&
+            leftS !== undefined &&
+            ` · ${p("time_left", { left: clock(Math.ceil(leftS)), all: clock(Math.ceil(durationS)) })}`}
         </span>
       </p>
       {text && <p class="progress-text">{reasonText(state.reason, text)}</p>}

@@ -14,7 +14,7 @@ import { controlNotice, holds } from "../../mesh/control";
 import { useSteps } from "../../mesh/joint-steps";
 import type { Motion } from "../../mesh/notice-expiry";
 import { useNoticeExpiry } from "../../mesh/notice-expiry";
-import { whyNoMove } from "../../mesh/robot-state";
+import { whyNoNewMotion, whyNoTarget } from "../../mesh/robot-state";
 import { ghostAt } from "../../scene/ghost";
 import { Choice } from "../../ui/choice";
 import { JointTrack } from "../../ui/joint-track";
@@ -46,19 +46,22 @@ export function JointsPanel(props: {
   const rows: readonly Description_Joint[] = description?.joints ?? [];
   const current = rows.map((joint) => positions.get(joint.name));
   const mine = holds(robotKey);
-  const why = reachable.value ? whyNoMove(props.controller) : t("no_connection");
-  const enabled = mine && !stale && !why;
+  const whyNone = reachable.value ? whyNoTarget(props.controller) : t("no_connection");
+  const why = whyNone || whyNoNewMotion(props.controller);
+  // A motion on hold keeps its target, and steps wait for RESUME.
+  const keepsTargets = mine && !stale && !whyNone;
+  const enabled = keepsTargets && !why;
   useNoticeExpiry(notice, setNotice, props.motion);
 
   // Show a target until it is reached or abandoned.
   const resting = props.controller?.activity !== Activity.MOVING && props.controller?.activity !== Activity.HOLDING;
   const off = targets.some((target, i) => target !== undefined && Math.abs(target - (current[i] ?? target)) > REACHED);
   useEffect(() => {
-    if (!enabled || (resting && !off)) setTargets([]);
+    if (!keepsTargets || (resting && !off)) setTargets([]);
     // Homing, a stop or the controller's refusal abandoned it.
     const abandoned = resting && off ? setTimeout(() => setTargets([]), ABANDONED_MS) : undefined;
     return () => clearTimeout(abandoned);
-  }, [enabled, resting, off]);
+  }, [keepsTargets, resting, off]);
   useEffect(() => {
     if (!mine) setNotice(null);
   }, [mine]);
@@ -92,7 +95,7 @@ export function JointsPanel(props: {
   };
   const [size, setSize] = useState<(typeof STEPS)[number]>("1");
   const unmoved = !MOVES.has(props.controller?.activity ?? Activity.ACTIVITY_UNKNOWN);
-  const steps = useSteps({ robotKey, joints: rows, current, enabled, resting: unmoved, tell: setNotice });
+  const steps = useSteps({ robotKey, joints: rows, current, enabled: keepsTargets, resting: unmoved, tell: setNotice });
   // The start of a step would be unknown during another motion.
   const canStep = enabled && (unmoved || steps.going);
   const units = [...new Set(rows.map((joint) => jointUnit(joint).unit))].join(" / ");

@@ -43,8 +43,8 @@ export function ProgramLine({ latest }: { latest: Latest<ProgramState> }) {
   );
 }
 
-function programText({ message, sample }: Latest<ProgramState>): string {
-  const { name, operator, line, statement, step, steps, durationS, text } = message;
+function programText({ message }: Latest<ProgramState>): string {
+  const { name, operator, line, statement, step, steps, leftS, text } = message;
   const at = t("program_at", { line, statement });
   switch (message.outcome) {
     case Outcome.DONE:
@@ -52,9 +52,9 @@ function programText({ message, sample }: Latest<ProgramState>): string {
     case Outcome.ENDED:
       return t("program_ended", { name, operator, at, text: reasonText(message.reason, text) });
     default: {
-      const reported = between(message.since, message.timestamp) / 1000;
-      const gone = clock(reported + (performance.now() - sample.arrived) / 1000);
-      const time = durationS > 0 ? t("program_of", { gone, all: clock(durationS) }) : gone;
+      const gone = clock(between(message.since, message.timestamp) / 1000);
+      // The gateway reports it each second, and not less of it while the program is held.
+      const time = leftS === undefined ? gone : t("program_left", { gone, left: clock(Math.ceil(leftS)) });
       return t("program_runs", { name, operator, at, time, step, steps });
     }
   }

@@ -1,11 +1,11 @@
 // One picture of the wall: live while visible, with the robot's state and the picture's age.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import type { ControllerState, Description } from "../../gen/robomesh_pb";
+import type { ControllerState, Description, ReplayState } from "../../gen/robomesh_pb";
 import { t, viewText } from "../../i18n/texts";
 import { w } from "../../i18n/wall";
 import { isReplay } from "../../mesh/robot-name";
-import { problemOf, stateWord } from "../../mesh/robot-state";
+import { problemOf, replayWord, stateText, stateWord } from "../../mesh/robot-state";
 import type { Latest } from "../../mesh/topics";
 import type { ViewName } from "../../ui/route";
 import { robotLink } from "../../ui/route";
@@ -18,6 +18,7 @@ export function WallTile(props: {
   shown: ViewName;
   controller: Latest<ControllerState> | undefined;
   description: Description | undefined;
+  replay: Latest<ReplayState> | undefined;
   known: boolean;
   remove: () => void;
 }) {
@@ -52,27 +53,31 @@ export function WallTile(props: {
   const label = `${shown.robot}, ${view}`;
   const watched = visible && width > 0 && height > 0 && props.known;
   const live = useLiveVideo(robotKey, watched ? requestFor(shown.view, width, height) : null, label);
-  const state = stateWord(controller);
-  const problem = state.level === "normal" ? "" : problemOf(controller?.message);
-  const word = !props.known
-    ? w("gone")
-    : !visible && live.any
-      ? w("hidden")
-      : live.any
-        ? ""
-        : live.problem || w("waiting");
+  const replayed = isReplay(shown.robot);
+  const state = replayed ? replayWord(props.replay, controller) : stateWord(controller);
+  const ended = replayed && (!props.known || state.word === "state_replay_ended");
+  const problem = problemOf(state, controller?.message);
+  const word = ended
+    ? w("replay_ended")
+    : !props.known
+      ? w("gone")
+      : !visible && live.any
+        ? w("hidden")
+        : live.any
+          ? ""
+          : live.problem || w("waiting");
   return (
     <article
       ref={place}
-      class={`wall-tile ${state.level} ${live.stale || !watched ? "stale" : ""}`}
+      class={`wall-tile ${state.level} ${live.stale || ended || !watched ? "stale" : ""}`}
       tabIndex={0}
-      aria-label={`${label}: ${t(state.word)}`}
+      aria-label={`${label}: ${stateText(state)}`}
       onDblClick={() => (location.hash = robotLink(shown.site, shown.robot))}
     >
       <div ref={pictured} class="wall-picture">
         {live.picture}
         {word && <p class="picture-word dim">{word}</p>}
-        {live.stale && (
+        {live.stale && !ended && (
           <p class="wall-stale">
             <span class="shape warning" aria-hidden="true" />
             <Age stale age={live.age} />
@@ -97,7 +102,7 @@ export function WallTile(props: {
             {t("reduced")}
           </span>
         )}
-        {isReplay(shown.robot) ? (
+        {replayed ? (
           <Tag kind="replay">{w("replay")}</Tag>
         ) : (
           description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>

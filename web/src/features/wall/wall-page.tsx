@@ -2,7 +2,7 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { Description } from "../../gen/robomesh_pb";
-import { ControllerStateSchema, DescriptionSchema } from "../../gen/robomesh_pb";
+import { ControllerStateSchema, DescriptionSchema, ReplayStateSchema } from "../../gen/robomesh_pb";
 import { t } from "../../i18n/texts";
 import { w } from "../../i18n/wall";
 import { addKnownRobots, fleetRobots } from "../../mesh/known-robots";
@@ -25,6 +25,7 @@ function viewNames(description: Description | undefined): readonly string[] {
 export function WallPage({ chosen }: { chosen: readonly ViewName[] }) {
   const controllers = useTopics(ControllerStateSchema, "robomesh/*/*/controller");
   const descriptions = useTopics(DescriptionSchema, "robomesh/*/*/description");
+  const replays = useTopics(ReplayStateSchema, "robomesh/*/*/replay");
   useEffect(() => addKnownRobots([...controllers.keys(), ...descriptions.keys()]));
   const [choosing, setChoosing] = useState(false);
   // Includes replays, unlike the fleet.
@@ -94,6 +95,7 @@ export function WallPage({ chosen }: { chosen: readonly ViewName[] }) {
               shown={one}
               controller={controllers.get(`${key}/controller`)}
               description={descriptions.get(`${key}/description`)?.message}
+              replay={replays.get(`${key}/replay`)}
               known={known.has(key)}
               remove={() => show(shown.filter((_, j) => j !== i))}
             />

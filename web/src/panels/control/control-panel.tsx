@@ -10,7 +10,7 @@ import { reachable } from "../../mesh/connection";
 import { controlNotice, holds } from "../../mesh/control";
 import type { Motion } from "../../mesh/notice-expiry";
 import { useNoticeExpiry } from "../../mesh/notice-expiry";
-import { stoppedByItself, whyNoMotion } from "../../mesh/robot-state";
+import { stoppedByItself, whyNoMotion, whyNoNewMotion } from "../../mesh/robot-state";
 import type { Latest } from "../../mesh/topics";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
@@ -32,8 +32,7 @@ export function ControlPanel(props: {
   const { robotKey, holder } = props;
   const state = props.controller?.message;
   const mine = holds(robotKey);
-  const why = reachable.value ? whyNoMotion(state) : t("no_connection");
-  const canMove = mine && !why;
+  const why = reachable.value ? whyNoNewMotion(state) : t("no_connection");
   const canSend = mine && reachable.value && !state?.stop && !state?.readOnly;
   const send = (name: Command, what: string, values?: CommandValues, positions?: number[]) =>
     void command(robotKey, name, what, values, undefined, positions);
@@ -56,14 +55,14 @@ export function ControlPanel(props: {
       <WhoControls robotKey={robotKey} holder={holder} lease={props.lease} readOnly={state?.readOnly ?? false} />
       {isMonitor.value || (
         <div class="command-row">
-          <button class="action" data-moves disabled={!canMove} title={mine ? why : ""} onClick={home}>
+          <button class="action" data-moves disabled={!mine || !!why} title={mine ? why : ""} onClick={home}>
             {t("home")}
           </button>
           {holding ? (
             <button
               class="action primary"
               data-moves
-              disabled={!canMove}
+              disabled={!mine || !reachable.value || whyNoMotion(state) !== ""}
               onClick={() => send(Command.RESUME, t("resume"))}
             >
               {t("resume")}
@@ -90,7 +89,7 @@ export function ControlPanel(props: {
           isMonitor.value || (
             <Speed
               percent={state?.speedPercent}
-              enabled={canSend}
+              enabled={canSend && !state?.program}
               send={(value) => command(robotKey, Command.SPEED, t("what_speed", { value }), { speedPercent: value })}
             />
           )
