@@ -1,5 +1,5 @@
 # One image a role, each with what that role needs and no more: a gateway holds no OpenGL. ROLE is one of
-# router, gateway, kinematics, simulator, recorder, player, renderer, console, watch, foxglove, ros2, keys, all.
+# router, gateway, kinematics, simulator, recorder, player, renderer, console, watch, store, foxglove, ros2, keys, all.
 #
 #   docker build --build-arg ROLE=gateway -t robomesh-gateway .
 
@@ -43,7 +43,7 @@ RUN --mount=type=cache,target=/root/.cache/uv \
  && /opt/robomesh/bin/python -m compileall -q /opt/robomesh
 # What a role keeps is below /data, each part a volume of its own; everything else may be read-only.
 RUN useradd --uid 10001 --create-home robomesh \
- && mkdir -p /data/audit /data/recordings /data/robots /data/watch /data/cache && chown -R robomesh /data
+ && mkdir -p /data/audit /data/recordings /data/robots /data/watch /data/programs /data/cache && chown -R robomesh /data
 ENV PATH=/opt/robomesh/bin:$PATH XDG_CACHE_HOME=/data/cache
 USER 10001
 WORKDIR /data

@@ -145,6 +145,7 @@ class Robot:
             journal=self._journal,
             controller=self._controller,
             publish=self._publish_state,
+            publish_source=publisher("program/source").put,
         )
         if settings.legacy_clients is not None:
             table = code_table(settings.codes)

@@ -32,6 +32,7 @@ class Quotas:
         checks: Program checks in parallel at one kinematics service.
         checks_a_minute: Program checks at one kinematics service.
         recordings_mib_a_minute: Answers from one recorder [MiB]: files, messages, values.
+        program_saves_a_minute: Changes of stored programs.
     """
 
     views: int = 16
@@ -39,6 +40,7 @@ class Quotas:
     checks: int = 2
     checks_a_minute: float = 120.0
     recordings_mib_a_minute: float = 4096.0
+    program_saves_a_minute: float = 120.0
 
 
 DEFAULT_QUOTAS = Quotas()

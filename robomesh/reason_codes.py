@@ -489,6 +489,65 @@ LINE_BENT = Code(
 PROGRAM_START_OUTSIDE = Code("program.start_outside", "at the start: {cause}")
 PROGRAM_LINE = Code("program.line", "line {line}: {cause}")
 PROGRAM_TOO_LONG = Code("program.too_long", "a program has at most {kib} KiB")
+PROGRAMS_NAME = Code(
+    "programs.name",
+    "'{name}' is not a valid name of a program",
+    'use 1 to {most} letters, digits, spaces and signs except / \\ : * ? " < > |, without a full stop at '
+    "the begin or end",
+)
+PROGRAMS_NAME_TAKEN = Code(
+    "programs.name_taken", "{robot} already has a program named '{name}'", "choose another name, or open it"
+)
+PROGRAMS_ROBOT = Code("programs.robot", "site {site} has no robot {robot}", "check the name")
+PROGRAMS_UNKNOWN = Code("programs.unknown", "{robot} has no stored program {id}", "list its programs")
+PROGRAMS_VERSION = Code(
+    "programs.version", "program '{name}' has no version {version}", "choose one from 1 to {newest}"
+)
+PROGRAMS_TEXT = Code(
+    "programs.text", "no program of {robot} with SHA-256 {sha256} is stored: it was refused, or it is too old"
+)
+PROGRAMS_CHANGED = Code(
+    "programs.changed",
+    "{author} has changed program '{name}' meanwhile: its version is {version} now",
+    "look at that version, then try again",
+)
+PROGRAMS_REASON = Code("programs.reason", "a program is deleted only with a reason", "write why")
+PROGRAMS_NOT_TEXT = Code("programs.not_text", "the program contains a NUL character", "choose a text file")
+PROGRAMS_FULL = Code(
+    "programs.full",
+    "the site's programs already take {most_mib:g} MiB, all that [programs] most_mib allows",
+    "raise it in the site file",
+)
+PROGRAMS_TOO_MANY = Code(
+    "programs.too_many",
+    "{robot} already has {most} programs, the most that a robot may have, with deleted ones",
+)
+PROGRAMS_VERSIONS = Code(
+    "programs.versions",
+    "program '{name}' already has {most} versions, the most that a program may have",
+    "save it under another name",
+)
+PROGRAMS_DISK = Code("programs.disk", "the store cannot write to its disk, so nothing has changed: {detail}")
+PROGRAMS_SAVED = Code("programs.saved", "{author} saved program '{name}', version {version}")
+PROGRAMS_ASIDE = Code(
+    "programs.aside",
+    "{author} saved program '{name}' on an older version: kept as version {version}, not as the current one",
+)
+PROGRAMS_RENAMED = Code("programs.renamed", "{author} renamed program '{old}' to '{name}'")
+PROGRAMS_RESTORED = Code(
+    "programs.restored", "{author} restored version {from_version} of program '{name}' as version {version}"
+)
+PROGRAMS_DELETED = Code(
+    "programs.deleted", "{author} deleted program '{name}' ({reason}); it can be restored"
+)
+PROGRAMS_DAMAGED = Code(
+    "programs.damaged",
+    "a stored program cannot be read ({detail})",
+    "restore the file from a backup and restart the store",
+)
+PROGRAMS_RUN_LOST = Code(
+    "programs.run_lost", "the text of program '{name}', which ran, is not kept: {detail}"
+)
 PROGRAM_MOVED = Code("program.moved", "the robot has moved since its program was checked")
 PROGRAM_HOLD = Code("program.hold", "HOLD arrived during its check: not started")
 PROGRAM_ASKER_GAVE_UP = Code(

@@ -39,6 +39,7 @@ class Role(Enum):
     SIMULATOR = "simulator"
     ROUTER = "router"
     WATCH = "watch"
+    STORE = "store"
     ROS2 = "ros2"
     OPERATOR = "operator"
     MONITOR = "monitor"

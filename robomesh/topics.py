@@ -41,6 +41,7 @@ _GATEWAY = frozenset({Role.GATEWAY})
 # A player publishes only robots named replay-<id>.
 _GATEWAY_OR_REPLAY = frozenset({Role.GATEWAY, Role.PLAYER})
 _KINEMATICS_OR_REPLAY = frozenset({Role.KINEMATICS, Role.PLAYER})
+_STORE = frozenset({Role.STORE})
 _COMMANDERS = frozenset({Role.OPERATOR, Role.CONSOLE})
 
 
@@ -133,10 +134,23 @@ _TOPICS = (
         publishers=_GATEWAY_OR_REPLAY,
     ),
     Topic(
+        name="program/source",
+        schema=schema.ProgramSource,
+        priority=Priority.INTERACTIVE_LOW,
+        publishers=_GATEWAY_OR_REPLAY,
+    ),
+    Topic(
         name="description",
         schema=schema.Description,
         priority=Priority.DATA,
         publishers=_KINEMATICS_OR_REPLAY,
+    ),
+    Topic(
+        name="programs",
+        schema=schema.ProgramList,
+        recorded=False,  # the site's work, not the robot's state
+        priority=Priority.DATA,
+        publishers=_STORE,
     ),
     Topic(
         name="recording",
@@ -382,6 +396,25 @@ _REQUESTS = (
         owners=frozenset({Role.WATCH}),
         askers=_COMMANDERS,
         in_name=True,
+    ),
+    # Below a site's `-`, with the author's name.
+    Request(
+        name="programs/request/*",
+        request=schema.ProgramRequest,
+        answer=schema.ProgramAnswer,
+        priority=Priority.DATA,
+        owners=_STORE,
+        askers=_COMMANDERS,
+        in_name=True,
+    ),
+    # Below a site's `-`.
+    Request(
+        name="programs/read",
+        request=schema.ProgramQuery,
+        answer=schema.ProgramContent,
+        priority=Priority.DATA,
+        owners=_STORE,
+        askers=EVERYONE,
     ),
     # Below replay-<id>.
     Request(

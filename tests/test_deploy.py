@@ -108,7 +108,10 @@ def test_a_unit_runs_a_command_that_there_is_for_every_role(unit):
     (line,) = re.findall(r"^ExecStart=(.*)$", unit.read_text(), re.MULTILINE)
     program, *words = shlex.split(line)
     assert program == "/opt/robomesh/bin/robomesh"
-    for role in ("router", "gateway", "kinematics", "recorder", "player", "renderer", "console", "watch"):
+    for role in (
+        *("router", "gateway", "kinematics", "recorder", "player"),
+        *("renderer", "console", "watch", "store"),
+    ):
         check_words([role if word == "%i" else word for word in words])
 
 

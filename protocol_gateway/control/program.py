@@ -34,8 +34,8 @@ from robomesh.messages import reason_message
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.texts import one_line
+from robots.programs import MOST_BYTES
 from robots.programs.steps import Step, StepKind
-from robots.programs.text import MOST_BYTES
 
 _C = schema.CommandRequest.Command
 _S = schema.Event.Severity
@@ -111,6 +111,7 @@ class Programs:
     Args:
         controller: Returns the current state of the controller.
         publish: Publishes the state of lease, stop and program.
+        publish_source: Publishes the text of a program that starts; it blocks on nothing.
 
     Attributes:
         state: State of the current or last program; its timestamp is set when it is published.
@@ -124,9 +125,10 @@ class Programs:
         journal: Journal,
         controller: Callable[[], Controller],
         publish: Callable[[], None],
+        publish_source: Callable[[schema.ProgramSource], object],
     ) -> None:
         self._control, self._checks, self._journal = control, checks, journal
-        self._controller, self._publish = controller, publish
+        self._controller, self._publish, self._publish_source = controller, publish, publish_source
         self.state = _STATE()
         self._wait_s: float | None = None
         self._time_left = _TimeLeft((0.0,), 0.0)
@@ -241,6 +243,12 @@ class Programs:
             steps=len(run.checked.steps),
             duration_s=sum(run.checked.durations_s),
             left_s=sum(run.checked.durations_s),
+        )
+        text = "\n".join(run.lines)
+        self._publish_source(
+            schema.ProgramSource(
+                timestamp=self.state.since, name=self.state.name, operator=run.operator, text=text
+            )
         )
         self._task = asyncio.create_task(self._run(run))
 

@@ -454,6 +454,18 @@ class ProgramState(_message.Message):
     left_s: float
     def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., outcome: _Optional[_Union[ProgramState.Outcome, str]] = ..., name: _Optional[str] = ..., operator: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., line: _Optional[int] = ..., statement: _Optional[str] = ..., step: _Optional[int] = ..., steps: _Optional[int] = ..., duration_s: _Optional[float] = ..., text: _Optional[str] = ..., reason: _Optional[_Union[Reason, _Mapping]] = ..., left_s: _Optional[float] = ...) -> None: ...
 
+class ProgramSource(_message.Message):
+    __slots__ = ("timestamp", "name", "operator", "text")
+    TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    OPERATOR_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    timestamp: _timestamp_pb2.Timestamp
+    name: str
+    operator: str
+    text: str
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., name: _Optional[str] = ..., operator: _Optional[str] = ..., text: _Optional[str] = ...) -> None: ...
+
 class CommandAnswer(_message.Message):
     __slots__ = ("accepted", "text", "warning")
     ACCEPTED_FIELD_NUMBER: _ClassVar[int]
@@ -1471,6 +1483,124 @@ class AlarmRequest(_message.Message):
     reason: str
     shelve_s: float
     def __init__(self, action: _Optional[_Union[AlarmRequest.Action, str]] = ..., ids: _Optional[_Iterable[str]] = ..., reason: _Optional[str] = ..., shelve_s: _Optional[float] = ...) -> None: ...
+
+class ProgramVersion(_message.Message):
+    __slots__ = ("number", "change", "timestamp", "author", "name", "sha256", "bytes", "based_on", "reason")
+    class Change(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        CHANGE_UNSPECIFIED: _ClassVar[ProgramVersion.Change]
+        SAVED: _ClassVar[ProgramVersion.Change]
+        ASIDE: _ClassVar[ProgramVersion.Change]
+        RENAMED: _ClassVar[ProgramVersion.Change]
+        RESTORED: _ClassVar[ProgramVersion.Change]
+        DELETED: _ClassVar[ProgramVersion.Change]
+        RUN: _ClassVar[ProgramVersion.Change]
+    CHANGE_UNSPECIFIED: ProgramVersion.Change
+    SAVED: ProgramVersion.Change
+    ASIDE: ProgramVersion.Change
+    RENAMED: ProgramVersion.Change
+    RESTORED: ProgramVersion.Change
+    DELETED: ProgramVersion.Change
+    RUN: ProgramVersion.Change
+    NUMBER_FIELD_NUMBER: _ClassVar[int]
+    CHANGE_FIELD_NUMBER: _ClassVar[int]
+    TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
+    AUTHOR_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    SHA256_FIELD_NUMBER: _ClassVar[int]
+    BYTES_FIELD_NUMBER: _ClassVar[int]
+    BASED_ON_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    number: int
+    change: ProgramVersion.Change
+    timestamp: _timestamp_pb2.Timestamp
+    author: str
+    name: str
+    sha256: str
+    bytes: int
+    based_on: int
+    reason: str
+    def __init__(self, number: _Optional[int] = ..., change: _Optional[_Union[ProgramVersion.Change, str]] = ..., timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., author: _Optional[str] = ..., name: _Optional[str] = ..., sha256: _Optional[str] = ..., bytes: _Optional[int] = ..., based_on: _Optional[int] = ..., reason: _Optional[str] = ...) -> None: ...
+
+class StoredProgram(_message.Message):
+    __slots__ = ("id", "current", "versions")
+    ID_FIELD_NUMBER: _ClassVar[int]
+    CURRENT_FIELD_NUMBER: _ClassVar[int]
+    VERSIONS_FIELD_NUMBER: _ClassVar[int]
+    id: str
+    current: ProgramVersion
+    versions: int
+    def __init__(self, id: _Optional[str] = ..., current: _Optional[_Union[ProgramVersion, _Mapping]] = ..., versions: _Optional[int] = ...) -> None: ...
+
+class ProgramList(_message.Message):
+    __slots__ = ("programs",)
+    PROGRAMS_FIELD_NUMBER: _ClassVar[int]
+    programs: _containers.RepeatedCompositeFieldContainer[StoredProgram]
+    def __init__(self, programs: _Optional[_Iterable[_Union[StoredProgram, _Mapping]]] = ...) -> None: ...
+
+class ProgramRequest(_message.Message):
+    __slots__ = ("action", "robot", "id", "based_on", "name", "text", "version", "reason")
+    class Action(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        ACTION_UNSPECIFIED: _ClassVar[ProgramRequest.Action]
+        SAVE: _ClassVar[ProgramRequest.Action]
+        RENAME: _ClassVar[ProgramRequest.Action]
+        DELETE: _ClassVar[ProgramRequest.Action]
+        RESTORE: _ClassVar[ProgramRequest.Action]
+    ACTION_UNSPECIFIED: ProgramRequest.Action
+    SAVE: ProgramRequest.Action
+    RENAME: ProgramRequest.Action
+    DELETE: ProgramRequest.Action
+    RESTORE: ProgramRequest.Action
+    ACTION_FIELD_NUMBER: _ClassVar[int]
+    ROBOT_FIELD_NUMBER: _ClassVar[int]
+    ID_FIELD_NUMBER: _ClassVar[int]
+    BASED_ON_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    VERSION_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    action: ProgramRequest.Action
+    robot: str
+    id: str
+    based_on: int
+    name: str
+    text: str
+    version: int
+    reason: str
+    def __init__(self, action: _Optional[_Union[ProgramRequest.Action, str]] = ..., robot: _Optional[str] = ..., id: _Optional[str] = ..., based_on: _Optional[int] = ..., name: _Optional[str] = ..., text: _Optional[str] = ..., version: _Optional[int] = ..., reason: _Optional[str] = ...) -> None: ...
+
+class ProgramAnswer(_message.Message):
+    __slots__ = ("program", "version")
+    PROGRAM_FIELD_NUMBER: _ClassVar[int]
+    VERSION_FIELD_NUMBER: _ClassVar[int]
+    program: StoredProgram
+    version: ProgramVersion
+    def __init__(self, program: _Optional[_Union[StoredProgram, _Mapping]] = ..., version: _Optional[_Union[ProgramVersion, _Mapping]] = ...) -> None: ...
+
+class ProgramQuery(_message.Message):
+    __slots__ = ("robot", "id", "version", "sha256")
+    ROBOT_FIELD_NUMBER: _ClassVar[int]
+    ID_FIELD_NUMBER: _ClassVar[int]
+    VERSION_FIELD_NUMBER: _ClassVar[int]
+    SHA256_FIELD_NUMBER: _ClassVar[int]
+    robot: str
+    id: str
+    version: int
+    sha256: str
+    def __init__(self, robot: _Optional[str] = ..., id: _Optional[str] = ..., version: _Optional[int] = ..., sha256: _Optional[str] = ...) -> None: ...
+
+class ProgramContent(_message.Message):
+    __slots__ = ("program", "versions", "version", "text")
+    PROGRAM_FIELD_NUMBER: _ClassVar[int]
+    VERSIONS_FIELD_NUMBER: _ClassVar[int]
+    VERSION_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    program: StoredProgram
+    versions: _containers.RepeatedCompositeFieldContainer[ProgramVersion]
+    version: ProgramVersion
+    text: str
+    def __init__(self, program: _Optional[_Union[StoredProgram, _Mapping]] = ..., versions: _Optional[_Iterable[_Union[ProgramVersion, _Mapping]]] = ..., version: _Optional[_Union[ProgramVersion, _Mapping]] = ..., text: _Optional[str] = ...) -> None: ...
 
 class ToPage(_message.Message):
     __slots__ = ("sample", "answer", "presence", "hello")

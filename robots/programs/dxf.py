@@ -19,7 +19,8 @@ from robots.joints import FloatArray
 from robots.meshes.declared_size import content
 from robots.meshes.dxf import UNITS_M, open_drawing
 from robots.poses import rpy_rotation
-from robots.programs.text import MOST_BYTES, MOST_LINES, pose_of
+from robots.programs import MOST_BYTES
+from robots.programs.text import MOST_LINES, pose_of
 from robots.programs.write import number, pose_words
 from robots.schema import nearest
 

@@ -32,6 +32,7 @@ from robomesh.reasons import Code, Reason
 from robots.errors import ProgramError
 from robots.joints import FloatArray, Joints, JointType
 from robots.poses import rpy_rotation
+from robots.programs import MOST_BYTES
 from robots.programs.statements import (
     Home,
     JointTarget,
@@ -49,7 +50,6 @@ from robots.programs.statements import (
 )
 from robots.schema import similar
 
-MOST_BYTES = 64 * 1024
 MOST_LINES = 10_000
 MOST_STEPS = 100_000
 MOST_DEPTH = 20

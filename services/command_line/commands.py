@@ -34,6 +34,7 @@ COMMANDS = {
     "renderer": Row("site.app", "Draw the robots off screen and publish video."),
     "console": Row("site.app", "Serve the page."),
     "watch": Row("site.app", "Hold the site's alarms, and check presence, clocks, versions and names."),
+    "store": Row("site.app", "Store the site's programs with all their versions."),
     "metrics": Row("site.app", "Print a Prometheus configuration that scrapes every service of a site."),
     "simulate": Row("site.app", "Run a simulated controller with the old text protocol."),
     "foxglove": Row("bridges", "Serve Foxglove and Lichtblick on a Foxglove WebSocket, ws://127.0.0.1:8765."),
@@ -58,6 +59,9 @@ COMMANDS = {
     "robot": Row("robot.commands", "Robot descriptions: check, show, import, export."),
     "mesh": Row("mesh", "Mesh files: inspect, convert."),
     "program": Row("program", "Teach programs: check, plan, from CAD."),
+    "programs": Row(
+        "programs", "Programs stored at a site: list, show, save, restore, diff, export, import."
+    ),
     "recordings": Row("recordings.app", "Recordings: list, inspect, play, export, fetch."),
     "audit": Row("audit", "The gateway's audit log."),
     "alarms": Row("alarms", "Alarms: list, acknowledge, shelve."),

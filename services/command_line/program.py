@@ -53,7 +53,7 @@ def check(
     from robots.programs.check import check_program
     from services.command_line.discovery import print_json
 
-    text = _text(file)
+    text = program_text(file)
     cell, name = _cell(robot, site, exact=exact)
     joints = cell.arms[name].joints
     others = {other: arm.joints.home for other, arm in cell.arms.items() if other != name}
@@ -95,7 +95,7 @@ def plan(
     cell, name = _cell(robot, site, exact=False)
     arm = cell.arms[name]
     try:
-        program = parse_program(_text(file), arm.joints)
+        program = parse_program(program_text(file), arm.joints)
     except ProgramError as error:
         for line, text in error.problems:
             print(f"{file}: line {line}: {text}", file=sys.stderr)
@@ -163,8 +163,13 @@ def from_dxf(
 # ------------------------------------------------------------------------------ input
 
 
-def _text(file: str) -> str:
-    from robots.programs.text import MOST_BYTES
+def program_text(file: str) -> str:
+    """Return a program's text; - reads standard input.
+
+    Raises:
+        ProgramFileError: If it cannot be read, is too long or is not UTF-8 text.
+    """
+    from robots.programs import MOST_BYTES
 
     try:
         if file == "-":

@@ -22,7 +22,7 @@ from services.site_file.part import PART_CONFIG
 _PAGES = ("define", "events", "program", "recordings", "settings", "wall")
 # The other parts of a site file; `services/site_file/site.py` has them.
 OTHER_PARTS = frozenset(
-    {"robot", "fixture", "recorder", "renderer", "console", "define", "audit", "watch", "quotas"}
+    {"robot", "fixture", "recorder", "renderer", "console", "define", "audit", "watch", "programs", "quotas"}
 )
 # `beijing` or `beijing=tls/10.1.0.1:7447`: a site that accepts ours, and its address if it has changed.
 _SITE_LINK = re.compile(r"([a-z0-9][a-z0-9_-]*)(?:=(\S+))?")
@@ -86,7 +86,7 @@ class Metrics(BaseModel):
 
     Attributes:
         listen: HOST:PORT of the router's metrics; absent: none. The other services use the next ports, in the
-            order gateway, kinematics, console, recorder, player, watch, renderer.
+            order gateway, kinematics, console, recorder, player, watch, renderer, store.
     """
 
     model_config = PART_CONFIG

@@ -80,6 +80,21 @@ class Watch(BaseModel):
     folder: Path = Path("watch")
 
 
+class Programs(BaseModel):
+    """Programs that the site stores.
+
+    Attributes:
+        folder: Folder of the programs.
+        most_mib: Quota of all saved versions [MiB].
+        runs_mib: Space for programs that ran without being saved; the oldest make room [MiB].
+    """
+
+    model_config = PART_CONFIG
+    folder: Path = Path("programs")
+    most_mib: Annotated[float, Field(ge=1, le=4096)] = 64
+    runs_mib: Annotated[float, Field(ge=1, le=4096)] = 16
+
+
 class Site(RoutedSite):
     """A whole site.
 
@@ -92,6 +107,7 @@ class Site(RoutedSite):
         define: Robots that are defined on the page.
         audit: Audit logs.
         watch: Alarms.
+        programs: Stored programs.
         quotas: Limits for each client's name.
     """
 
@@ -103,6 +119,7 @@ class Site(RoutedSite):
     define: Define = Define()
     audit: Audit = Audit()
     watch: Watch = Watch()
+    programs: Programs = Programs()
     quotas: Quotas = Quotas()
 
     @field_validator("robot")
@@ -282,6 +299,7 @@ def _resolve_paths(site: Site, folder: Path) -> Site:
             "define": site.define.model_copy(update={"folder": folder / site.define.folder}),
             "audit": site.audit.model_copy(update={"folder": folder / site.audit.folder}),
             "watch": site.watch.model_copy(update={"folder": folder / site.watch.folder}),
+            "programs": site.programs.model_copy(update={"folder": folder / site.programs.folder}),
             "console": resolve_console_paths(site.console, folder),
             **resolve_paths(site.router, site.keys, folder),
         }

@@ -15,7 +15,7 @@ from services.watch.conditions import Condition, condition_of
 from services.watch.mesh import Mesh, Process
 
 # One per robot or per site.
-_UNIQUE = ("gateway", "kinematics", "watch")
+_UNIQUE = ("gateway", "kinematics", "watch", "store")
 # Services that must run on every site. Others are optional; a missing simulated controller shows as a link
 # that is down.
 _REQUIRED = frozenset({*_UNIQUE, "router", "recorder", "player", "renderer", "console"})

@@ -10,6 +10,7 @@ from robomesh.reasons import Reason
 from robots.description import load
 from robots.errors import ProgramError
 from robots.joints import joints_of
+from robots.programs import MOST_BYTES
 from robots.programs.statements import (
     Home,
     JointTarget,
@@ -25,7 +26,7 @@ from robots.programs.statements import (
     Trace,
     Wait,
 )
-from robots.programs.text import MOST_BYTES, MOST_LINES, MOST_STEPS, parse_program, pose_of
+from robots.programs.text import MOST_LINES, MOST_STEPS, parse_program, pose_of
 from robots.programs.write import program_text
 
 JOINTS = joints_of(load("pt600"))

@@ -22,7 +22,8 @@ ROOT = Path(__file__).resolve().parents[2]
 CONTRACT = {
     "up": (),
     **dict.fromkeys(
-        ("router", "gateway", "kinematics", "recorder", "renderer", "console"), ("--site", "--connect")
+        ("router", "gateway", "kinematics", "recorder", "renderer", "console", "store"),
+        ("--site", "--connect"),
     ),
     "simulate": ("--robot", "--listen", "--rate", "--max-clients", "--demo", "--fault"),
     "list": ("--json",),
@@ -43,6 +44,12 @@ CONTRACT = {
     "recordings recover": (),
     "recordings export": (),
     "recordings play": (),
+    **dict.fromkeys(
+        (f"programs {each}" for each in ("list", "show", "save", "rename", "delete", "restore", "import")),
+        ("--connect", "--json"),
+    ),
+    "programs diff": ("--connect",),
+    "programs export": ("--force",),
     "audit verify": ("--head", "--json"),
     "keys init": (),
     "doctor": ("--security", "--json"),

@@ -75,6 +75,7 @@ def test_init_creates_a_certificate_for_each_service_and_enables_tls_once(site, 
         "player",
         "renderer",
         "console",
+        "store",
     ):
         assert read.tls_of(service).certificate == site.parent / "keys" / f"{service}.pem"
     written = {file: file.read_bytes() for file in (site.parent / "keys").rglob("*.*")}

@@ -62,7 +62,7 @@ def test_a_service_that_runs_alone_has_the_same_port_as_under_a_supervisor():
 
 def test_a_site_without_robots_starts_nothing_that_would_end_at_once():
     names = [each.name for each in programs(WITHOUT_ROBOTS, None, "tcp/127.0.0.1:7447")]
-    assert names == ["router", "console", "recorder", "player", "watch", "renderer"]
+    assert names == ["router", "console", "recorder", "player", "watch", "renderer", "store"]
 
 
 def test_port_0_is_a_free_one_for_each_and_without_an_address_nobody_serves():
@@ -78,9 +78,9 @@ def test_what_is_started_from_the_page_takes_a_free_port():
 
 
 def test_more_services_than_ports_are_refused():
-    with pytest.raises(ListenError, match="at most 65528 is right"):
+    with pytest.raises(ListenError, match="at most 65527 is right"):
         with_metrics(ALL, ("127.0.0.1", 65530))
-    with pytest.raises(ListenError, match="at most 65528 is right"):
+    with pytest.raises(ListenError, match="at most 65527 is right"):
         first_address(metered("127.0.0.1:65530"), "")
 
 

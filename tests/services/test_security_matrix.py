@@ -30,6 +30,7 @@ IN_NAME = (
     "lease/request/*",
     "command/*",
     "alarms/request/*",
+    "programs/request/*",
     "kinematics/check/*",
     "views/*",
     "video/*/keyframe/*",

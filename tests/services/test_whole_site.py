@@ -51,6 +51,7 @@ def test_list_names_the_robot_and_every_service_with_its_health(site):
         "console",
         "simulator",
         "watch",
+        "store",
     }
     found = {}
 

@@ -121,6 +121,12 @@ def watch(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER, metrics: Met
 
 
 @app.command()
+def store(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER, metrics: Metrics = "") -> None:
+    """Store the site's programs with all their versions."""
+    _run("store", site, connect, metrics)
+
+
+@app.command()
 def simulate(
     robot: Annotated[str, typer.Option(metavar="R", help="A library robot or a description.")] = "pt600",
     listen: Annotated[str, typer.Option(metavar="HOST:PORT")] = "127.0.0.1:5400",

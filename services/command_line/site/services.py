@@ -152,6 +152,20 @@ def _watch(site: "Site", _: Options) -> Any:
     return Settings(site=site.site, folder=site.watch.folder)
 
 
+def _store(site: "Site", _: Options) -> Any:
+    from services.store.settings import MIB, Settings
+
+    part = site.programs
+    return Settings(
+        site=site.site,
+        robots=tuple(robot.name for robot in site.robot),
+        folder=part.folder,
+        most_bytes=round(part.most_mib * MIB),
+        most_run_bytes=round(part.runs_mib * MIB),
+        quotas=site.quotas.settings,
+    )
+
+
 def _renderer(site: "Site", _: Options) -> Any:
     from renderer.service import Settings
 
@@ -208,5 +222,11 @@ SERVICES = {
         settings=_renderer,
         required=False,
         packages=("moderngl", "av", "cv2"),
+    ),
+    "store": Service(
+        module="services.store",
+        settings=_store,
+        required=False,
+        finishes="writing a program",
     ),
 }

@@ -748,6 +748,119 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ["program.start_outside", ["at the start: {cause}", "起始位置：{cause}"]],
   ["program.line", ["line {line}: {cause}", "第 {line} 行：{cause}"]],
   ["program.too_long", ["a program has at most {kib} KiB", "程序不得超过 {kib} KiB"]],
+  [
+    "programs.name",
+    [
+      "'{name}' is not a valid name of a program: use 1 to {most} letters, digits, spaces and signs except / \\ : * ? \" < > |, without a full stop at the begin or end",
+      '“{name}”不是有效的程序名：请使用 1 至 {most} 个字母、数字、空格及符号（不含 / \\ : * ? " < > |），首尾不得为句点',
+    ],
+  ],
+  [
+    "programs.name_taken",
+    [
+      "{robot} already has a program named '{name}': choose another name, or open it",
+      "{robot} 已有名为“{name}”的程序：请换一个名称，或打开该程序",
+    ],
+  ],
+  [
+    "programs.robot",
+    ["site {site} has no robot {robot}: check the name", "站点 {site} 没有机器人 {robot}：请检查名称"],
+  ],
+  [
+    "programs.unknown",
+    ["{robot} has no stored program {id}: list its programs", "{robot} 没有已存程序 {id}：请查看其程序列表"],
+  ],
+  [
+    "programs.version",
+    [
+      "program '{name}' has no version {version}: choose one from 1 to {newest}",
+      "程序“{name}”没有版本 {version}：请选择 1 至 {newest}",
+    ],
+  ],
+  [
+    "programs.text",
+    [
+      "no program of {robot} with SHA-256 {sha256} is stored: it was refused, or it is too old",
+      "未存储 {robot} 的 SHA-256 为 {sha256} 的程序：它曾被拒绝，或已过旧",
+    ],
+  ],
+  [
+    "programs.changed",
+    [
+      "{author} has changed program '{name}' meanwhile: its version is {version} now: look at that version, then try again",
+      "{author} 已在此期间更改程序“{name}”：现为版本 {version}：请先查看该版本，再重试",
+    ],
+  ],
+  ["programs.reason", ["a program is deleted only with a reason: write why", "删除程序必须说明原因：请填写"]],
+  [
+    "programs.not_text",
+    ["the program contains a NUL character: choose a text file", "程序含有 NUL 字符：请选择文本文件"],
+  ],
+  [
+    "programs.full",
+    [
+      "the site's programs already take {most_mib} MiB, all that [programs] most_mib allows: raise it in the site file",
+      "站点的程序已占用 {most_mib} MiB，达到 [programs] most_mib 的上限：请在站点文件中调高",
+    ],
+  ],
+  [
+    "programs.too_many",
+    [
+      "{robot} already has {most} programs, the most that a robot may have, with deleted ones",
+      "{robot} 已有 {most} 个程序（含已删除的），达到每个机器人的上限",
+    ],
+  ],
+  [
+    "programs.versions",
+    [
+      "program '{name}' already has {most} versions, the most that a program may have: save it under another name",
+      "程序“{name}”已有 {most} 个版本，达到每个程序的上限：请以另一名称保存",
+    ],
+  ],
+  [
+    "programs.disk",
+    [
+      "the store cannot write to its disk, so nothing has changed: {detail}",
+      "程序存储服务无法写入磁盘，因此未作任何更改：{detail}",
+    ],
+  ],
+  [
+    "programs.saved",
+    ["{author} saved program '{name}', version {version}", "{author} 保存了程序“{name}”，版本 {version}"],
+  ],
+  [
+    "programs.aside",
+    [
+      "{author} saved program '{name}' on an older version: kept as version {version}, not as the current one",
+      "{author} 基于较旧的版本保存了程序“{name}”：保留为版本 {version}，不作为当前版本",
+    ],
+  ],
+  ["programs.renamed", ["{author} renamed program '{old}' to '{name}'", "{author} 将程序“{old}”重命名为“{name}”"]],
+  [
+    "programs.restored",
+    [
+      "{author} restored version {from_version} of program '{name}' as version {version}",
+      "{author} 将程序“{name}”的版本 {from_version} 恢复为版本 {version}",
+    ],
+  ],
+  [
+    "programs.deleted",
+    [
+      "{author} deleted program '{name}' ({reason}); it can be restored",
+      "{author} 删除了程序“{name}”（{reason}）；可以恢复",
+    ],
+  ],
+  [
+    "programs.damaged",
+    [
+      "a stored program cannot be read ({detail}): restore the file from a backup and restart the store",
+      "一个已存程序无法读取（{detail}）：请从备份恢复该文件，然后重启程序存储服务",
+    ],
+  ],
+  [
+    "programs.run_lost",
+    ["the text of program '{name}', which ran, is not kept: {detail}", "运行过的程序“{name}”的文本未能保留：{detail}"],
+  ],
   ["program.moved", ["the robot has moved since its program was checked", "程序检查之后机器人已移动"]],
   ["program.hold", ["HOLD arrived during its check: not started", "检查期间收到保持命令：未开始"]],
   [

@@ -1,0 +1,198 @@
+"""The store service: answers requests for programs, publishes their lists, and keeps what ran."""
+
+import asyncio
+import contextlib
+import fcntl
+import logging
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from robomesh import reason_codes as codes
+from robomesh.errors import MessageError, RefusedError
+from robomesh.keys import ROOT, WHOLE_SITE, check_name, is_replay
+from robomesh.messages import reason_message
+from robomesh.publisher import Publisher
+from robomesh.quotas import Quota
+from robomesh.reasons import Reason
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.server import Request
+from robomesh.session import Session
+from robomesh.topics import check_operator
+from services.errors import ServiceError
+from services.store.programs import ProgramStore
+from services.store.settings import Settings
+
+log = logging.getLogger(__name__)
+
+_S = schema.Event.Severity
+_Version = schema.ProgramVersion
+# A predecessor may still be ending.
+_LOCK_WITHIN_S, _LOCK_RETRY_S = 10.0, 0.2
+_MOST_SOURCES = 1000
+
+
+class FolderInUseError(ServiceError):
+    """Another store uses the folder."""
+
+
+async def serve(session: Session, settings: Settings) -> None:
+    """Serve a site's programs until cancelled.
+
+    Raises:
+        FolderInUseError: If another store uses the folder.
+        OSError: If the folder cannot be read.
+    """
+    folder = settings.folder / check_name(settings.site, "site")
+    folder.mkdir(parents=True, exist_ok=True)
+    store = ProgramStore(folder, most_bytes=settings.most_bytes, most_run_bytes=settings.most_run_bytes)
+    with await _locked(folder):
+        await _Service(session, settings, store).run()
+
+
+class _Service:
+    """One run of the service."""
+
+    def __init__(self, session: Session, settings: Settings, store: ProgramStore) -> None:
+        self._session, self._settings, self._store = session, settings, store
+        self._saves = Quota("program_saves", a_minute=settings.quotas.program_saves_a_minute)
+        self._one_at_a_time = asyncio.Lock()
+        self._lists: dict[str, Publisher] = {}
+        self._events: dict[str, Publisher] = {}
+        session.measure("programs", "Stored programs, without deleted ones", lambda: store.count)
+        session.measure("programs_bytes", "Size of all saved versions", lambda: store.saved_bytes)
+
+    async def run(self) -> None:
+        """Run until cancelled."""
+        for reason in await asyncio.to_thread(lambda: [*self._store.open()]):
+            self._report(WHOLE_SITE, _S.ERROR, reason)
+        for robot in (*self._settings.robots, *self._store.robots):
+            self._add(robot)
+        site = self._settings.site
+        self._session.answer(site, WHOLE_SITE, "programs/request/*", self._change)
+        self._session.answer(site, WHOLE_SITE, "programs/read", self._read)
+        async with asyncio.TaskGroup() as group:
+            group.create_task(self._keep_runs())
+            group.create_task(self._find_robots())
+
+    async def _find_robots(self) -> None:
+        """Accept programs of robots that are started from the page."""
+        async for who, alive in self._session.watch_presence():
+            if alive and who.service == "gateway" and who.site == self._settings.site:
+                self._add(who.robot)
+
+    def _add(self, robot: str) -> None:
+        if robot not in self._lists:
+            self._store.add_robot(robot)
+            self._lists[robot] = self._session.declare_publisher(self._settings.site, robot, "programs")
+            self._lists[robot].put(self._store.programs(robot))
+
+    async def _change(self, request: Request) -> schema.ProgramAnswer:
+        """Save, rename, delete or restore a program; reply after the change is on disk.
+
+        Raises:
+            QuotaError: If the author saves too often.
+            RefusedError: If the request is not possible.
+        """
+        asked = request.message
+        assert isinstance(asked, schema.ProgramRequest)
+        author = check_operator(request.chunk)
+        self._saves.check(author, 1.0)
+        self._saves.count(author, 1.0)
+        async with self._one_at_a_time:
+            answer, old_name = await asyncio.to_thread(self._store.change, asked, author, time.time_ns())
+            if old_name is not None:
+                self._lists[asked.robot].put(self._store.programs(asked.robot))
+                reason = _reason(answer.version, old_name)
+                self._report(asked.robot, _S.INFO, reason, id=answer.program.id)
+        return answer
+
+    async def _read(self, request: Request) -> schema.ProgramContent:
+        asked = request.message
+        assert isinstance(asked, schema.ProgramQuery)
+        async with self._one_at_a_time:
+            return await asyncio.to_thread(self._store.read, asked)
+
+    async def _keep_runs(self) -> None:
+        key = f"{ROOT}/{self._settings.site}/*/program/source"
+        async for sample in self._session.subscribe(key, newest=_MOST_SOURCES):
+            robot = sample.parsed.robot
+            if is_replay(robot):
+                continue  # a replay runs nothing
+            try:
+                source = sample.message()
+            except MessageError as error:
+                log.warning("%s: %s", sample.key, error)
+                continue
+            assert isinstance(source, schema.ProgramSource)
+            self._add(robot)
+            try:
+                async with self._one_at_a_time:
+                    await asyncio.to_thread(self._store.keep_run, robot, source)
+            except RefusedError as error:
+                lost = codes.PROGRAMS_RUN_LOST(name=source.name, detail=error)
+                self._report(robot, _S.WARNING, lost)
+
+    def _report(self, robot: str, severity: schema.Event.Severity, reason: Reason, **values: str) -> None:
+        event = schema.Event(
+            severity=severity,
+            code=reason.code,
+            text=reason.text,
+            source="store",
+            values={**reason.values, **values},
+            reason=reason_message(reason),
+        )
+        event.timestamp.GetCurrentTime()
+        if robot not in self._events:
+            site = self._settings.site
+            self._events[robot] = self._session.declare_publisher(site, robot, "events/store")
+        self._events[robot].put(event)
+        log.log(logging.INFO if severity == _S.INFO else logging.WARNING, "%s: %s", robot, reason.text)
+
+
+def _reason(version: schema.ProgramVersion, old_name: str) -> Reason:
+    """Return what an event says of a new version."""
+    values = {"author": version.author, "name": version.name}
+    match version.change:
+        case _Version.ASIDE:
+            return codes.PROGRAMS_ASIDE(**values, version=version.number)
+        case _Version.RENAMED:
+            return codes.PROGRAMS_RENAMED(**values, old=old_name)
+        case _Version.RESTORED:
+            return codes.PROGRAMS_RESTORED(**values, version=version.number, from_version=version.based_on)
+        case _Version.DELETED:
+            return codes.PROGRAMS_DELETED(**values, reason=version.reason)
+        case _:
+            return codes.PROGRAMS_SAVED(**values, version=version.number)
+
+
+async def _locked(folder: Path) -> contextlib.AbstractContextManager[None]:
+    """Lock the folder: two services would overwrite each other's versions. A kill releases the lock.
+
+    Raises:
+        FolderInUseError: If another service keeps it.
+    """
+    file = os.open(folder / ".lock", os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    try:
+        until_s = time.monotonic() + _LOCK_WITHIN_S
+        while True:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                if time.monotonic() > until_s:
+                    raise FolderInUseError(f"{folder}: another store uses this folder") from None
+                await asyncio.sleep(_LOCK_RETRY_S)
+    except BaseException:
+        os.close(file)
+        raise
+    return _closing(file)
+
+
+@contextlib.contextmanager
+def _closing(file: int) -> Iterator[None]:
+    try:
+        yield
+    finally:
+        os.close(file)
