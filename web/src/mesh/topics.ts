@@ -1,7 +1,7 @@
 // What the page knows of the mesh: the newest message by key, and its age.
 
 import type { DescMessage, MessageShape } from "@bufbuild/protobuf";
-import { fromBinary } from "@bufbuild/protobuf";
+import { equals, fromBinary } from "@bufbuild/protobuf";
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Signal } from "@preact/signals";
@@ -19,10 +19,12 @@ export interface Latest<M> {
   sample: Sample;
 }
 
+const AGE_MS = 250;
+
 /** The clock for ages [ms], four times a second, for drawing. */
 export const now = signal(ageClock());
 const tick = () => (now.value = ageClock());
-setInterval(tick, 250);
+setInterval(tick, AGE_MS);
 // A hidden page ticks rarely: mark its data stale before it is visible again.
 document.addEventListener("visibilitychange", tick);
 
@@ -50,10 +52,18 @@ function start<S extends DescMessage>(schema: S, expression: string, topic: Watc
   let timer: ReturnType<typeof setTimeout> | undefined;
   const flush = () => {
     timer = undefined;
-    const next = new Map(topic.entries.value);
-    for (const [key, sample] of dirty) next.set(key, { key, sample, message: fromBinary(schema, sample.payload) });
+    const before = topic.entries.value;
+    const next = new Map(before);
+    for (const [key, sample] of dirty) {
+      const message = fromBinary(schema, sample.payload);
+      const shown = before.get(key);
+      // Often the same: only its age is new, which is drawn with `now`. The time of a rare message may matter.
+      const often = shown && sample.arrived - shown.sample.arrived < AGE_MS;
+      if (often && same(schema, message, shown.message)) shown.sample = sample;
+      else next.set(key, { key, sample, message });
+    }
+    if ([...dirty.keys()].some((key) => before.get(key) !== next.get(key))) topic.entries.value = next;
     dirty.clear();
-    topic.entries.value = next;
   };
   const stop = watch(expression, (sample) => {
     dirty.set(sample.key, sample);
@@ -63,6 +73,11 @@ function start<S extends DescMessage>(schema: S, expression: string, topic: Watc
     clearTimeout(timer);
     stop();
   };
+}
+
+/** Return whether two messages differ at most in their time. */
+function same<S extends DescMessage>(schema: S, one: MessageShape<S>, other: MessageShape<S>): boolean {
+  return equals(schema, { ...one, timestamp: undefined }, { ...other, timestamp: undefined });
 }
 
 /** Follow the newest message of every key that a key expression covers. */

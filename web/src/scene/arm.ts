@@ -65,7 +65,8 @@ export class Arm {
 
   /** Add a FrameTransforms payload. */
   placeFrames(payload: Uint8Array, sourceTimeMs: number, arrivedMs: number): void {
-    this.player.add(fromBinary(FrameTransformsSchema, payload), sourceTimeMs, arrivedMs);
+    const message = fromBinary(FrameTransformsSchema, payload);
+    if (this.player.add(message, sourceTimeMs, arrivedMs)) this.changed();
   }
 
   /** Place the links at a time of the page's clock [ms]; null: unchanged. */

@@ -15,6 +15,7 @@ interface Keyed {
 const BEHIND_MS = 60;
 const MAX_FRAMES = 12;
 const GAP_MS = 1000; // of source time at this page's rate
+const SAME_PLACE = 1e-4; // m, or an element of a quaternion: less than a pixel of the nearest view
 
 /** Frames on arrival, placements when drawn. */
 export class FramePlayer {
@@ -26,7 +27,8 @@ export class FramePlayer {
   private shownTime = Number.NEGATIVE_INFINITY; // source time of the last result, ms
   private passedTime = Number.NEGATIVE_INFINITY;
 
-  add(message: FrameTransforms, sourceTime: number, arrived: number): void {
+  /** Add a message; return whether the placements change because of it. */
+  add(message: FrameTransforms, sourceTime: number, arrived: number): boolean {
     const newest = this.frames.at(-1);
     const early = arrived - sourceTime / this.rate;
     if (newest && (sourceTime <= newest.time || sourceTime - newest.time > GAP_MS * Math.max(1, this.rate))) {
@@ -34,11 +36,26 @@ export class FramePlayer {
     }
     // A replay was paused: its frames are later from now on.
     if (early - this.skew > GAP_MS) this.skew = early;
-    this.frames.push({ time: sourceTime, poses: inSite(message) });
-    if (this.frames.length > MAX_FRAMES) this.frames.shift();
     // Forget slowly, which compensates for drifting clocks.
     this.skew = Math.min(this.skew + 0.05, early);
-    this.settled = false;
+    const poses = inSite(message);
+    const [before, last] = this.frames.slice(-2);
+    // At rest the last two frames share their poses, and the later one gets the time of the newest message.
+    if (before && last && before.poses === last.poses && alike(poses, last.poses)) {
+      last.time = sourceTime;
+      return !this.settled;
+    }
+    const latest = this.frames.at(-1);
+    const same = latest !== undefined && alike(poses, latest.poses);
+    this.frames.push({ time: sourceTime, poses: same ? latest.poses : poses });
+    if (this.frames.length > MAX_FRAMES) this.frames.shift();
+    this.settled &&= same;
+    return !this.settled;
+  }
+
+  /** Whether later placements differ from the last result. */
+  get moving(): boolean {
+    return !this.settled && this.frames.length > 0;
   }
 
   /** Set how fast source time passes; not 1 in replays only. */
@@ -78,14 +95,15 @@ export class FramePlayer {
   /** Return placements at a time of the page's clock [ms]; null: unchanged. */
   at(time: number): ReadonlyMap<string, THREE.Matrix4> | null {
     const newest = this.frames.at(-1);
-    if (!newest || this.settled) return null;
+    if (!newest) return null;
     const displayTime = (time - this.skew - BEHIND_MS) * this.rate;
+    this.shownTime = Math.min(displayTime, newest.time);
+    if (this.settled) return null;
     const after = this.frames.find((frame) => frame.time >= displayTime) ?? newest;
     const before = this.frames[this.frames.indexOf(after) - 1] ?? after;
-    this.shownTime = Math.min(displayTime, newest.time);
     const span = after.time - before.time;
     const share = span > 0 ? THREE.MathUtils.clamp((displayTime - before.time) / span, 0, 1) : 1;
-    this.settled = after === newest && share === 1;
+    this.settled = before.poses === newest.poses || (after === newest && share === 1);
     for (const [name, end] of after.poses) {
       const start = before.poses.get(name) ?? end;
       const position = start.position.clone().lerp(end.position, share);
@@ -95,6 +113,18 @@ export class FramePlayer {
     }
     return this.placements;
   }
+}
+
+function alike(first: Keyed["poses"], second: Keyed["poses"]): boolean {
+  if (first.size !== second.size) return false;
+  for (const [name, { position: p, rotation: r }] of first) {
+    const other = second.get(name);
+    if (!other) return false;
+    const { position: q, rotation: s } = other;
+    const apart = [p.x - q.x, p.y - q.y, p.z - q.z, r.x - s.x, r.y - s.y, r.z - s.z, r.w - s.w];
+    if (apart.some((value) => Math.abs(value) > SAME_PLACE)) return false;
+  }
+  return true;
 }
 
 const ONE = new THREE.Vector3(1, 1, 1);

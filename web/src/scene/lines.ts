@@ -8,6 +8,7 @@ const TRAIL_POINTS = 900;
 const END_RADIUS = 0.006; // m
 const MOST_WAITING = 20; // a second of data
 const NEAR_MS = 25; // half of the interval between two
+const SAME_PLACE = 1e-4; // m
 
 /** A line drawn over everything: a path behind a link stays visible. */
 function line(points: number): THREE.Line<THREE.BufferGeometry, THREE.LineBasicMaterial> {
@@ -76,7 +77,7 @@ export class Gap {
   private readonly line = line(2);
   private readonly material = new THREE.MeshBasicMaterial({ depthTest: false, transparent: true });
   private readonly ends = [0, 1].map(() => new THREE.Mesh(new THREE.SphereGeometry(END_RADIUS, 12, 8), this.material));
-  private words: { text: string; level: Level } = { text: "", level: "normal" };
+  private shown: Nearest | null = null;
   private waiting: { time: number; nearest: Nearest }[] = []; // by source time, ms
 
   constructor(private readonly label: HTMLElement) {
@@ -88,22 +89,35 @@ export class Gap {
 
   /** Add the nearest points at a source time [ms]. */
   add(nearest: Nearest, time: number): void {
-    if (time < (this.waiting.at(-1)?.time ?? time)) this.waiting = []; // a new publisher
+    const last = this.waiting.at(-1);
+    if (last && time < last.time)
+      this.waiting = []; // a new publisher
+    else if (last && alike(last.nearest, nearest)) return;
     this.waiting.push({ time, nearest });
     if (this.waiting.length > MOST_WAITING) this.waiting.shift();
   }
 
-  hide(): void {
+  /** Hide them; return whether they were shown. */
+  hide(): boolean {
+    const was = this.group.visible;
     this.waiting = [];
+    this.shown = null;
     this.group.visible = false;
+    return was;
   }
 
-  /** Show the nearest points of the arm's drawn source time [ms]. */
-  showAt(time: number, { dim, warning, alarm }: Palette): void {
+  /** Whether points wait for the arm's frames. */
+  get waits(): boolean {
+    return this.waiting.length > 0 && this.waiting.at(-1)?.nearest !== this.shown;
+  }
+
+  /** Show the nearest points of the arm's drawn source time [ms]; return whether they changed. */
+  showAt(time: number, { dim, warning, alarm }: Palette): boolean {
     const next = this.waiting.findIndex((each) => each.time > time + NEAR_MS);
-    const shown = this.waiting.at(next < 0 ? -1 : next - 1);
-    if (!shown || next === 0) return;
-    const { points, level, text } = shown.nearest;
+    const nearest = this.waiting.at(next < 0 ? -1 : next - 1)?.nearest;
+    if (!nearest || next === 0 || nearest === this.shown) return false;
+    this.shown = nearest;
+    const { points, level } = nearest;
     const positions = this.line.geometry.getAttribute("position") as THREE.BufferAttribute;
     points.forEach((point, i) => {
       positions.setXYZ(i, point.x, point.y, point.z);
@@ -114,17 +128,22 @@ export class Gap {
     this.line.material.color.set(colour);
     this.material.color.set(colour);
     this.group.visible = true;
-    this.words = { text, level };
+    return true;
   }
 
   /** Place the label next to the line's middle in the drawn picture of a size [px]. */
   placeLabel(camera: THREE.Camera, width: number, height: number): void {
     const [first, second] = this.ends.map((end) => end.position);
-    this.label.hidden = !this.group.visible;
-    if (this.label.hidden || !first || !second) return;
-    this.label.textContent = this.words.text;
-    this.label.dataset.level = this.words.level;
+    this.label.hidden = !this.shown;
+    if (!this.shown || !first || !second) return;
+    this.label.textContent = this.shown.text;
+    this.label.dataset.level = this.shown.level;
     const { x, y } = first.clone().lerp(second, 0.5).project(camera);
     this.label.style.translate = `${((x + 1) / 2) * width}px ${((1 - y) / 2) * height}px`;
   }
+}
+
+function alike(one: Nearest, other: Nearest): boolean {
+  const near = (index: 0 | 1) => one.points[index].distanceTo(other.points[index]) < SAME_PLACE;
+  return one.text === other.text && one.level === other.level && near(0) && near(1);
 }

@@ -8,27 +8,15 @@ import { View_Projection, ViewSchema } from "../gen/robomesh_pb";
 import { floorOf } from "../mesh/clearance";
 import type { Failed } from "./arm";
 import { Arm, loadOrReport, meshUrl } from "./arm";
+import { BackBuffer } from "./back-buffer";
+import { DrawBudget, qualities } from "./draw-budget";
+import { DrawLoop } from "./draw-loop";
 import type { Nearest } from "./lines";
 import { Gap, Path, Trail } from "./lines";
 import { colourEdges, paint, withEdges } from "./models";
-import { lights, palette, surround } from "./surroundings";
+import { KEY_LIGHT, lights, palette, surround } from "./surroundings";
 import { Viewpoint } from "./viewpoint";
-import {
-  countFrame,
-  disposeScene,
-  drawsInSoftware,
-  FrameFence,
-  fitToParent,
-  makeRenderer,
-  observeSize,
-  toneMap,
-} from "./webgl";
-
-const SLOW_FRAME_MS = 50; // a slower frame holds up the rest of the page
-// The first frame, and the first after the page was hidden, are slow on every machine.
-const MANY_SLOW_FRAMES = 3;
-const PAUSE_FACTOR = 3; // pause after a slow frame, in its durations
-const LONGEST_PAUSE_MS = 2000;
+import { countFrame, disposeScene, drawsInSoftware, makeRenderer, observeSize, parentSize, toneMap } from "./webgl";
 
 /** Interface for parts that other components add: see Program's gizmo. */
 export interface Stage {
@@ -62,10 +50,10 @@ export class RobotScene {
   private red: ReadonlySet<string> = new Set();
   private dirty = true;
   private framesShown = false;
-  private request = 0;
-  private readonly fence: FrameFence;
-  private nextAt = 0;
-  private slowFrames = 0; // in a row
+  private readonly loop: DrawLoop;
+  private readonly budget: DrawBudget;
+  private readonly back: BackBuffer | null;
+  private fitted = false;
   private disposed = false;
   private readonly observer: ResizeObserver;
 
@@ -77,7 +65,10 @@ export class RobotScene {
   ) {
     const software = drawsInSoftware();
     this.renderer = makeRenderer(software, canvas);
-    this.fence = new FrameFence(this.renderer, this.frameDrawn);
+    this.loop = new DrawLoop(this.renderer, this.draw, this.drawn);
+    this.budget = new DrawBudget(qualities(software));
+    this.back = software ? new BackBuffer(this.renderer) : null;
+    if (this.back) this.renderer.setPixelRatio(1); // a buffer's pixels
     this.renderer.shadowMap.enabled = !software;
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
     toneMap(this.renderer);
@@ -90,9 +81,9 @@ export class RobotScene {
       { clip: [0.02, 60], distance: [0.2, 12], damping: true, turnsFlat: false, polarMargin: 0.05 },
       this.changed,
     );
-    this.observer = observeSize(canvas, () => this.resize());
+    this.observer = observeSize(canvas, this.resize);
+    canvas.addEventListener("webglcontextrestored", this.resize);
     this.resize();
-    this.request = requestAnimationFrame(this.frame);
   }
 
   /** Set background, floor and lines to the page's theme. */
@@ -109,6 +100,7 @@ export class RobotScene {
 
   private readonly changed = (): void => {
     this.dirty = true;
+    this.loop.wake();
   };
 
   stage(): Stage {
@@ -164,6 +156,7 @@ export class RobotScene {
   /** Add a FrameTransforms payload. */
   placeFrames(payload: Uint8Array, sourceTimeMs: number, arrivedMs: number): void {
     this.arm.placeFrames(payload, sourceTimeMs, arrivedMs);
+    if (this.gap.waits) this.loop.wake();
   }
 
   /** Set a replay's rate; see `FramePlayer`. */
@@ -174,6 +167,7 @@ export class RobotScene {
   /** Draw the robot grey and translucent when its data is stale. */
   setStale(stale: boolean): void {
     this.arm.setStale(stale);
+    this.loop.hurry();
   }
 
   /** Add another robot of the cell, dimmed; it receives its own placements. */
@@ -202,7 +196,7 @@ export class RobotScene {
       colourEdges(group, names.has(name) ? alarm : dim);
     }
     this.canvas.dataset.red = [...names].sort().join(" ");
-    this.dirty = true;
+    this.changed();
   }
 
   /** Show the ghost at placements in the base frame; null hides it. */
@@ -214,25 +208,25 @@ export class RobotScene {
   showPath(points: readonly (readonly [number, number, number])[] | null): void {
     this.path.show(points);
     this.canvas.dataset.path = String(points?.length ?? 0);
-    this.dirty = true;
+    this.changed();
   }
 
   /** Show the two nearest points together with the arm at their source time [ms]; null: none. */
   showGap(nearest: Nearest | null, sourceTimeMs = 0): void {
     if (nearest) this.gap.add(nearest, sourceTimeMs);
-    else this.gap.hide();
-    this.dirty = true;
+    else if (this.gap.hide()) this.changed();
+    if (this.gap.waits) this.loop.wake();
   }
 
   showTrail(shown: boolean): void {
     this.trail.show(shown);
-    this.dirty = true;
+    this.changed();
   }
 
   showFrames(shown: boolean): void {
     this.framesShown = shown;
     this.arm.player.touch();
-    this.dirty = true;
+    this.changed();
   }
 
   /** Set the camera to a view of the description; its points are in the robot's base frame. */
@@ -276,40 +270,53 @@ export class RobotScene {
     this.viewpoint.turn(azimuth, polar);
   }
 
-  private resize(): void {
-    this.viewpoint.resize(fitToParent(this.renderer));
-    this.dirty = true;
-  }
-
-  /** After a slow frame, pause drawing; after several, drop shadows and extra pixels. */
-  private readonly frameDrawn = (tookMs: number, at: number): void => {
-    this.slowFrames = tookMs < SLOW_FRAME_MS ? 0 : this.slowFrames + 1;
-    if (this.slowFrames > 0) this.nextAt = at + Math.min(PAUSE_FACTOR * tookMs, LONGEST_PAUSE_MS);
-    if (this.slowFrames !== MANY_SLOW_FRAMES) return;
-    this.scene.traverse((part) => {
-      if (part instanceof THREE.DirectionalLight) part.castShadow = false;
-    });
-    if (this.renderer.getPixelRatio() > 1) {
-      this.renderer.setPixelRatio(1);
-      this.resize();
-    }
+  /** Take the size at the next frame: a resized canvas is empty until then. */
+  private readonly resize = (): void => {
+    this.fitted = false;
+    this.changed();
   };
 
-  private readonly frame = (): void => {
-    this.request = requestAnimationFrame(this.frame);
-    const at = performance.now();
-    if (!this.fence.isIdle(at) || at < this.nextAt) return;
+  private fit(): void {
+    this.fitted = true;
+    const { width, height } = parentSize(this.canvas);
+    const { pixelRatio } = this.budget.quality;
+    this.viewpoint.resize(width / height);
+    this.canvas.dataset.pixelRatio = String(pixelRatio);
+    if (this.back) this.back.resize(Math.ceil(width * pixelRatio), Math.ceil(height * pixelRatio));
+    else {
+      this.renderer.setPixelRatio(pixelRatio);
+      this.renderer.setSize(width, height, false);
+    }
+  }
+
+  private readonly drawn = (tookMs: number, at: number): void => {
+    this.back?.show();
+    this.gap.placeLabel(this.viewpoint.camera, this.canvas.clientWidth, this.canvas.clientHeight);
+    countFrame(this.canvas);
+    const { quality } = this.budget;
+    this.loop.pauseUntil(at + this.budget.take(tookMs, at));
+    if (this.budget.quality === quality) return;
+    const light = this.scene.getObjectByName(KEY_LIGHT);
+    if (light) light.castShadow = this.budget.quality.shadows;
+    this.resize();
+  };
+
+  private readonly draw = (at: number): boolean => {
     const placements = this.arm.placeAt(at);
     if (placements) this.place(placements);
+    if (this.gap.showAt(this.arm.player.shown, this.colours)) this.dirty = true;
+    const arms = [this.arm, ...this.neighbours];
     for (const neighbour of this.neighbours) if (neighbour.placeAt(at)) this.dirty = true;
     const { camera, controls } = this.viewpoint;
-    if (controls.enableDamping) controls.update();
-    if (!this.dirty) return;
+    if (controls.enableDamping) controls.update(); // calls `changed` until the camera is at rest
+    const dirty = this.dirty;
     this.dirty = false;
-    this.renderer.render(this.scene, camera);
-    this.gap.placeLabel(camera, this.canvas.clientWidth, this.canvas.clientHeight);
-    this.fence.start(at);
-    countFrame(this.canvas);
+    if (arms.some(({ player }) => player.moving)) this.loop.wake();
+    if (!dirty) return false;
+    if (!this.fitted) this.fit();
+    if (this.back) this.back.draw(this.scene, camera);
+    else this.renderer.render(this.scene, camera);
+    return true;
   };
 
   private place(placements: ReadonlyMap<string, THREE.Matrix4>): void {
@@ -319,17 +326,17 @@ export class RobotScene {
       axes.visible = this.framesShown;
       placement.decompose(axes.position, axes.quaternion, axes.scale);
     }
-    this.gap.showAt(this.arm.player.shown, this.colours);
     for (const at of this.arm.player.passed(`${this.prefix}/tool`)) this.trail.extend(at);
     this.dirty = true;
   }
 
   dispose(): void {
     this.disposed = true;
-    cancelAnimationFrame(this.request);
+    this.loop.dispose();
     this.observer.disconnect();
     this.viewpoint.dispose();
     for (const arm of [this.arm, ...this.neighbours]) arm.remove();
+    this.back?.dispose();
     disposeScene(this.scene, this.renderer);
   }
 }

@@ -32,11 +32,15 @@ export function palette(): Palette {
   };
 }
 
+/** Name of the light that casts shadows. */
+export const KEY_LIGHT = "key light";
+
 /** Return sky, key light with a shadow, and a fill light. */
 export function lights(): THREE.Object3D[] {
   const sky = new THREE.HemisphereLight("#f4f7fa", "#5b5f63", 1.5);
   sky.position.set(0, 0, 1);
   const key = new THREE.DirectionalLight("#fff8ee", 2.6);
+  key.name = KEY_LIGHT;
   key.position.set(1.6, -2.2, 3.4);
   key.castShadow = true;
   key.shadow.mapSize.set(1024, 1024);

@@ -1,4 +1,4 @@
-// WebGL set-up that every 3-D picture of the page shares: renderer, size, frame timing, disposal.
+// WebGL set-up that every 3-D picture of the page shares: renderer, size, disposal.
 
 import * as THREE from "three";
 
@@ -29,12 +29,15 @@ export function toneMap(renderer: THREE.WebGLRenderer): void {
   renderer.toneMappingExposure = 1.05;
 }
 
+/** Return the size of the element around a canvas [CSS px]. */
+export function parentSize(canvas: HTMLCanvasElement): { width: number; height: number } {
+  const box = (canvas.parentElement ?? canvas).getBoundingClientRect();
+  return { width: Math.max(1, Math.floor(box.width)), height: Math.max(1, Math.floor(box.height)) };
+}
+
 /** Size a renderer to the element around its canvas; return the aspect ratio. */
 export function fitToParent(renderer: THREE.WebGLRenderer): number {
-  const canvas = renderer.domElement;
-  const box = (canvas.parentElement ?? canvas).getBoundingClientRect();
-  const width = Math.max(1, Math.floor(box.width));
-  const height = Math.max(1, Math.floor(box.height));
+  const { width, height } = parentSize(renderer.domElement);
   renderer.setSize(width, height, false);
   return width / height;
 }
@@ -49,39 +52,6 @@ export function observeSize(canvas: HTMLCanvasElement, resized: () => void): Res
 /** Count the frames of a canvas, for tests. */
 export function countFrame({ dataset }: HTMLCanvasElement): void {
   dataset.drawn = String(Number(dataset.drawn ?? 0) + 1);
-}
-
-/** The time that the GPU needs for a frame, by a fence behind its commands. */
-export class FrameFence {
-  private sync: WebGLSync | null = null;
-  private startedAt = 0;
-  private readonly gl: WebGL2RenderingContext;
-
-  /** `drawn` receives each frame's duration and the time when its end was noticed [ms]. */
-  constructor(
-    renderer: THREE.WebGLRenderer,
-    private readonly drawn: (tookMs: number, at: number) => void,
-  ) {
-    this.gl = renderer.getContext() as WebGL2RenderingContext;
-  }
-
-  /** Set the fence behind a frame that began at a time of the page's clock [ms]. */
-  start(startedAt: number): void {
-    this.sync = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
-    this.gl.flush();
-    this.startedAt = startedAt;
-  }
-
-  /** Return whether no frame is being drawn. A lost context draws none. */
-  isIdle(at: number): boolean {
-    const { gl, sync } = this;
-    if (!sync) return true;
-    if (gl.getSyncParameter(sync, gl.SYNC_STATUS) !== gl.SIGNALED && !gl.isContextLost()) return false;
-    gl.deleteSync(sync);
-    this.sync = null;
-    this.drawn(at - this.startedAt, at);
-    return true;
-  }
 }
 
 /** Free the GPU memory of a scene's parts, and its renderer. */

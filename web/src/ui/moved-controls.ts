@@ -5,6 +5,7 @@
 
 const QUIET_MS = 500;
 const SAMPLE_MS = 100;
+const UNCHANGED_SAMPLE_MS = 1000; // for shifts without a change of the document
 const MOVED_PX = 1;
 
 interface Place {
@@ -14,6 +15,7 @@ interface Place {
 }
 
 const places = new WeakMap<Element, Place>();
+let sampledAt = -Infinity;
 
 /** Watch the controls; call `ignored` for each ignored press. Returns a function that ends it. */
 export function guardMovedControls(ignored: () => void): () => void {
@@ -31,17 +33,29 @@ export function guardMovedControls(ignored: () => void): () => void {
     event.preventDefault();
     event.stopImmediatePropagation();
   };
-  const timer = setInterval(sample, SAMPLE_MS);
+  let changed = true;
+  const observer = new MutationObserver(() => (changed = true));
+  const attributeFilter = ["class", "hidden", "open", "style"];
+  observer.observe(document.body, { subtree: true, childList: true, characterData: true, attributeFilter });
+  const onResize = () => (changed = true);
+  addEventListener("resize", onResize);
+  const timer = setInterval(() => {
+    if (!changed && performance.now() - sampledAt < UNCHANGED_SAMPLE_MS) return;
+    changed = false;
+    sample();
+  }, SAMPLE_MS);
   sample();
   for (const kind of ["pointerdown", "click"]) addEventListener(kind, onPress, true);
   return () => {
     clearInterval(timer);
+    observer.disconnect();
+    removeEventListener("resize", onResize);
     for (const kind of ["pointerdown", "click"]) removeEventListener(kind, onPress, true);
   };
 }
 
 function sample(): void {
-  const now = performance.now();
+  const now = (sampledAt = performance.now());
   for (const control of document.querySelectorAll("[data-moves]")) {
     const before = places.get(control);
     let { left, top } = control.getBoundingClientRect();

@@ -3,6 +3,7 @@
 import * as THREE from "three";
 import type { TransformControls } from "three/addons/controls/TransformControls.js";
 import { toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
+import { DrawLoop } from "../../scene/draw-loop";
 import type { DhRow } from "../../scene/forward-kinematics";
 import { makeGizmo } from "../../scene/gizmo";
 import { readGlb } from "../../scene/models";
@@ -81,8 +82,7 @@ export class DefineScene {
   private picture: Picture | null = null;
   private dragging: Dragging = "off";
   private inDrag = false;
-  private dirty = true;
-  private request = 0;
+  private readonly loop: DrawLoop;
   private floorScale = 1;
 
   /** @throws Error if the browser has no WebGL. */
@@ -92,6 +92,7 @@ export class DefineScene {
   ) {
     this.renderer = makeRenderer(drawsInSoftware(), canvas);
     toneMap(this.renderer);
+    this.loop = new DrawLoop(this.renderer, this.draw);
     this.view = new Viewpoint(
       canvas,
       { clip: [0.01, 500], distance: [0.05, 100], damping: false, turnsFlat: true, polarMargin: 0.02 },
@@ -103,8 +104,8 @@ export class DefineScene {
     this.setColours();
     this.listenToPointer();
     this.observer = observeSize(canvas, () => this.resize());
+    canvas.addEventListener("webglcontextrestored", this.loop.wake);
     this.resize();
-    this.frame();
   }
 
   /** Set background, floor and lines to the page's theme. */
@@ -306,7 +307,7 @@ export class DefineScene {
   }
 
   private touch(): void {
-    this.dirty = true;
+    this.loop.wake();
   }
 
   private resize(): void {
@@ -314,19 +315,17 @@ export class DefineScene {
     this.touch();
   }
 
-  private readonly frame = (): void => {
-    this.request = requestAnimationFrame(this.frame);
-    if (!this.dirty) return;
-    this.dirty = false;
+  private readonly draw = (): boolean => {
     this.gizmo.camera = this.view.camera;
     this.skeleton.scaleLetters(this.view.letterScale);
     this.renderer.render(this.scene, this.view.camera);
     countFrame(this.canvas);
+    return true;
   };
 
   dispose(): void {
     this.ending.abort();
-    cancelAnimationFrame(this.request);
+    this.loop.dispose();
     this.observer.disconnect();
     this.gizmo.detach();
     this.gizmo.dispose();

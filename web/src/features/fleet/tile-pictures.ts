@@ -4,8 +4,9 @@ import { effect } from "@preact/signals";
 import * as THREE from "three";
 import type { Description } from "../../gen/robomesh_pb";
 import { floorOf } from "../../mesh/clearance";
+import { DrawLoop } from "../../scene/draw-loop";
 import { palette } from "../../scene/surroundings";
-import { countFrame, drawsInSoftware, FrameFence, makeRenderer } from "../../scene/webgl";
+import { countFrame, drawsInSoftware, makeRenderer } from "../../scene/webgl";
 import { theme } from "../../ui/theme";
 import { type TileArm, tileArmOf } from "./tile-arm";
 
@@ -35,6 +36,7 @@ export class TilePicture {
     readonly rig: TileArm,
     private readonly smooth: boolean,
     readonly floor: THREE.Matrix4 | null,
+    private readonly changed: () => void,
   ) {}
 
   /** Set the joint positions [rad] or [m] that arrived at a time of the page's clock [ms]. */
@@ -45,11 +47,14 @@ export class TilePicture {
     this.to = positions;
     this.arrived = arrived;
     this.dirty = true;
+    this.changed();
   }
 
   setStale(stale: boolean): void {
-    this.dirty ||= stale !== this.stale;
+    if (stale === this.stale) return;
     this.stale = stale;
+    this.dirty = true;
+    this.changed();
   }
 
   /** Whether all meshes and a position are known. */
@@ -85,12 +90,10 @@ class Pictures {
   private width = 0;
   private height = 0;
   private atOnce = 2;
-  private request = 0;
-  private readonly fence: FrameFence;
-  private nextAt = 0;
+  private readonly loop: DrawLoop;
 
   constructor() {
-    this.fence = new FrameFence(this.renderer, this.batchDrawn);
+    this.loop = new DrawLoop(this.renderer, this.drawBatch, this.batchDrawn);
     this.camera.up.set(0, 0, 1);
     this.floor.matrixAutoUpdate = false;
     this.renderer.setPixelRatio(1);
@@ -102,7 +105,7 @@ class Pictures {
     this.scene.add(key, sky, this.floor);
     this.renderer.domElement.addEventListener("webglcontextrestored", () => this.drawAll());
     // A software renderer shares the processor with scrolling: let scrolling go first.
-    const scrolled = () => (this.nextAt = performance.now() + SCROLLED_MS);
+    const scrolled = () => this.loop.pauseUntil(performance.now() + SCROLLED_MS);
     if (this.software) addEventListener("scroll", scrolled, { capture: true, passive: true });
     effect(() => {
       void theme.value;
@@ -117,13 +120,14 @@ class Pictures {
 
   private drawAll(): void {
     for (const tile of this.tiles) tile.dirty = true;
+    this.loop.wake();
   }
 
   add(canvas: HTMLCanvasElement, prefix: string, description: Description): TilePicture {
     const rig = tileArmOf(prefix, description, () => this.drawAll());
-    const tile = new TilePicture(canvas, rig, !this.software, floorInBase(description));
+    const tile = new TilePicture(canvas, rig, !this.software, floorInBase(description), this.loop.wake);
     this.tiles.add(tile);
-    this.request ||= requestAnimationFrame(this.frame);
+    this.loop.wake();
     return tile;
   }
 
@@ -131,19 +135,20 @@ class Pictures {
     this.tiles.delete(tile);
   }
 
-  private readonly frame = (): void => {
-    this.request = this.tiles.size ? requestAnimationFrame(this.frame) : 0;
-    const at = performance.now();
-    if (!this.fence.isIdle(at) || at < this.nextAt) return;
+  private readonly drawBatch = (at: number): boolean => {
     const each = this.tiles.size <= FEW ? FEW_INTERVAL_MS : MANY_INTERVAL_MS;
-    const due = [...this.tiles].filter((tile) => tile.dirty && tile.ready && at - tile.drawnAt >= each);
-    if (due.length) this.draw(due.sort((a, b) => a.drawnAt - b.drawnAt).slice(0, this.atOnce), at);
+    const dirty = [...this.tiles].filter((tile) => tile.dirty && tile.ready);
+    const due = dirty.filter((tile) => at - tile.drawnAt >= each).sort((a, b) => a.drawnAt - b.drawnAt);
+    const batch = due.slice(0, this.atOnce);
+    if (batch.length) this.draw(batch, at);
+    if (dirty.length > batch.length || batch.some((tile) => tile.dirty)) this.loop.wake();
+    return batch.length > 0;
   };
 
   private readonly batchDrawn = (tookMs: number, at: number): void => {
     const slow = tookMs > 2 * SLOW_BATCH_MS; // it includes a frame of the display
     this.atOnce = Math.min(MOST_AT_ONCE, Math.max(1, this.atOnce + (slow ? -1 : 1)));
-    if (slow) this.nextAt = Math.max(this.nextAt, at + tookMs);
+    if (slow) this.loop.pauseUntil(at + tookMs);
   };
 
   private draw(tiles: readonly TilePicture[], at: number): void {
@@ -169,8 +174,7 @@ class Pictures {
         ?.drawImage(source, x, y, canvas.width, canvas.height, 0, 0, canvas.width, canvas.height);
       countFrame(canvas);
     });
-    this.fence.start(at);
-    this.nextAt = at + PAUSE_FACTOR * (performance.now() - at);
+    this.loop.pauseUntil(at + PAUSE_FACTOR * (performance.now() - at));
   }
 
   /** Size the canvases to their tiles, and the renderer to hold a batch of the largest. */

@@ -18,7 +18,17 @@ import { theme } from "../../ui/theme";
 const SPAN_S = 60;
 const STEP_MS = 100; // finer than a pixel
 const CLOCK_SET_MS = 5000;
+const SEEN_CHANGE = 0.02; // degrees or mm: less than half a pixel of the smallest range
+const NEW_S = 1; // curves end at the right edge
 const CURVES = ["--curve-1", "--curve-2", "--curve-3", "--curve-4", "--curve-5", "--curve-6", "--curve-7"];
+
+interface Rows {
+  time: number[];
+  values: (number | null)[][];
+  /** Values since `changedAt` [s]: later ones are equal. */
+  level: (number | null)[];
+  changedAt: number;
+}
 
 export function JointHistory({ robotKey, description }: { robotKey: string; description: Description | undefined }) {
   const place = useRef<HTMLDivElement>(null);
@@ -26,7 +36,7 @@ export function JointHistory({ robotKey, description }: { robotKey: string; desc
   const [any, setAny] = useState(false);
   const stopped = useRef(false);
   stopped.current = paused;
-  const [rows] = useState<{ time: number[]; values: (number | null)[][] }>({ time: [], values: [] });
+  const [rows] = useState<Rows>({ time: [], values: [], level: [], changedAt: 0 });
   const joints = description?.joints ?? [];
   const names = joints.map((joint) => joint.name).join(" ");
   const topic = jointsTopic(robotKey);
@@ -59,7 +69,12 @@ export function JointHistory({ robotKey, description }: { robotKey: string; desc
     });
     function append(time: number, value: (index: number) => number | null): void {
       rows.time.push(time);
-      for (const [i, column] of rows.values.entries()) column.push(value(i));
+      const values = rows.values.map((_, i) => value(i));
+      for (const [i, column] of rows.values.entries()) column.push(values[i] ?? null);
+      if (values.some((each, i) => differs(each, rows.level[i] ?? null))) {
+        rows.level = values;
+        rows.changedAt = time;
+      }
       while ((rows.time[0] ?? time) < time - SPAN_S - 2) {
         rows.time.shift();
         for (const column of rows.values) column.shift();
@@ -119,10 +134,15 @@ export function JointHistory({ robotKey, description }: { robotKey: string; desc
       [[], ...joints.map(() => [])],
       element,
     );
+    let same = false; // the drawn curves are level, from edge to edge
     const draw = () => {
       if (stopped.current) return;
       end = ageClock() / 1000;
+      const level = rows.changedAt < end - SPAN_S && (rows.time.at(-1) ?? 0) > end - NEW_S;
+      if (level && same) return;
+      same = level;
       plot.setData([rows.time, ...rows.values] as uPlot.AlignedData, true);
+      element.dataset.drawn = String(Number(element.dataset.drawn ?? 0) + 1);
     };
     const timer = setInterval(draw, 200);
     const observer = new ResizeObserver(() =>
@@ -158,6 +178,10 @@ export function JointHistory({ robotKey, description }: { robotKey: string; desc
       </div>
     </Panel>
   );
+}
+
+function differs(one: number | null, other: number | null): boolean {
+  return one === null || other === null ? one !== other : Math.abs(one - other) > SEEN_CHANGE;
 }
 
 /** Return a scale's range: the values and a margin, with a minimum so that noise does not fill it. */
