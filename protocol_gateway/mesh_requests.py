@@ -72,7 +72,7 @@ class MeshRequests:
         assert isinstance(message, schema.StopRequest)
         # A stop is never refused because of its texts.
         by, reason = one_line(message.by).strip(), one_line(message.reason).strip()
-        return self._control.stop(by=by or "somebody", reason=reason, source=MESH)
+        return self._control.stop(by=by or "somebody", reason=reason, source=MESH, page=message.page)
 
     async def _answer_lease(self, request: Request) -> schema.LeaseAnswer:
         message = request.message

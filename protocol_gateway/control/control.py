@@ -21,7 +21,7 @@ from protocol_gateway.control import effects, events
 from protocol_gateway.control.audit_trail import AuditTrail
 from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.effects import Finding, Program, Seen
-from protocol_gateway.control.entries import PROGRAM
+from protocol_gateway.control.entries import PROGRAM, page_values
 from protocol_gateway.control.evaluation import RunningProgram
 from protocol_gateway.control.robot_authority import RobotAuthority
 from protocol_gateway.errors import AuditError, LinkError
@@ -88,9 +88,13 @@ class Control:
 
     # --------------------------------------------------------------- requests
 
-    def stop(self, *, by: str, reason: str, source: str) -> schema.StopAnswer:
+    def stop(
+        self, *, by: str, reason: str, source: str, page: schema.PageReport | None = None
+    ) -> schema.StopAnswer:
         """Stop the robot; allowed for every sender at any time."""
-        result: events.StopResult = self.handle(events.StopRequested(by=by, reason=reason, source=source))
+        shown = {} if page is None else page_values(page)
+        event = events.StopRequested(by=by, reason=reason, source=source, page=shown)
+        result: events.StopResult = self.handle(event)
         return stop_answer(result)
 
     async def lease(self, request: schema.LeaseRequest, *, operator: str, source: str) -> schema.LeaseAnswer:

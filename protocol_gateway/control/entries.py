@@ -1,5 +1,8 @@
 """Audit entries of requests. No I/O; time is an argument."""
 
+import contextlib
+import math
+from collections.abc import Mapping
 from hashlib import sha256
 
 from protocol_gateway.audit.entry import Entry, Outcome
@@ -12,9 +15,9 @@ from protocol_gateway.control.events import (
     StopRequested,
     StopResult,
 )
-from protocol_gateway.text_limits import LONGEST_SENTENCE
+from protocol_gateway.text_limits import LONGEST_SENTENCE, LONGEST_TEXT
 from robomesh.reasons import Reason
-from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
+from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest, PageReport
 from robomesh.texts import one_line
 
 # Source of a program's steps.
@@ -83,9 +86,25 @@ def command_entries(event: CommandsRequested, outcome: Outcome, answer: Answer) 
             stop_id=request.stop_id,
             program_name=request.program_name,
             program_sha256=sha256(request.program.encode()).hexdigest() if request.program else "",
+            **page_values(request.page),
         )
         for request in event.requests
     )
+
+
+def page_values(report: PageReport) -> Mapping[str, str]:
+    """Return what a page reports that it showed, as values of an entry; nothing verifies them."""
+    values = {"page_view": one_line(report.view, LONGEST_TEXT)}
+    if report.HasField("picture"):
+        values["page_picture"] = str(report.picture)
+    if report.HasField("picture_time"):
+        with contextlib.suppress(ValueError):  # out of the range of dates
+            values["page_picture_time"] = report.picture_time.ToJsonString()
+    ages = {
+        "page_picture_age_s": report.picture_age_s if report.HasField("picture_age_s") else math.nan,
+        "page_state_age_s": report.state_age_s if report.HasField("state_age_s") else math.nan,
+    }
+    return values | {name: f"{age:.3f}" for name, age in ages.items() if math.isfinite(age)}
 
 
 def stop_entry(event: StopRequested, result: StopResult, now: Now) -> Entry:
@@ -100,6 +119,7 @@ def stop_entry(event: StopRequested, result: StopResult, now: Now) -> Entry:
         why=result.reason,
         stop_id=result.id,
         reason=event.reason,
+        **event.page,
     )
 
 

@@ -4,7 +4,8 @@ Requests have results: `StopRequested` a StopResult, `LeaseRequested` a LeaseRes
 Answer.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple, TypeAlias
 
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, Lease, Now
@@ -35,11 +36,16 @@ class LeaseResult(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class StopRequested:
-    """A client, an old client program or the gateway stops the robot."""
+    """A client, an old client program or the gateway stops the robot.
+
+    Attributes:
+        page: Values of the audit entry that the sender's page reports.
+    """
 
     by: str
     reason: str
     source: str
+    page: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -369,7 +369,7 @@ class LeaseAnswer(_message.Message):
     def __init__(self, lease: _Optional[str] = ..., holder: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., until: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., now: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class CommandRequest(_message.Message):
-    __slots__ = ("lease", "id", "not_after", "command", "joint_positions", "speed_percent", "stop_id", "program", "program_name")
+    __slots__ = ("lease", "id", "not_after", "command", "joint_positions", "speed_percent", "stop_id", "program", "program_name", "page")
     class Command(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         COMMAND_UNSPECIFIED: _ClassVar[CommandRequest.Command]
@@ -403,6 +403,7 @@ class CommandRequest(_message.Message):
     STOP_ID_FIELD_NUMBER: _ClassVar[int]
     PROGRAM_FIELD_NUMBER: _ClassVar[int]
     PROGRAM_NAME_FIELD_NUMBER: _ClassVar[int]
+    PAGE_FIELD_NUMBER: _ClassVar[int]
     lease: str
     id: int
     not_after: _timestamp_pb2.Timestamp
@@ -412,7 +413,22 @@ class CommandRequest(_message.Message):
     stop_id: int
     program: str
     program_name: str
-    def __init__(self, lease: _Optional[str] = ..., id: _Optional[int] = ..., not_after: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., command: _Optional[_Union[CommandRequest.Command, str]] = ..., joint_positions: _Optional[_Iterable[float]] = ..., speed_percent: _Optional[float] = ..., stop_id: _Optional[int] = ..., program: _Optional[str] = ..., program_name: _Optional[str] = ...) -> None: ...
+    page: PageReport
+    def __init__(self, lease: _Optional[str] = ..., id: _Optional[int] = ..., not_after: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., command: _Optional[_Union[CommandRequest.Command, str]] = ..., joint_positions: _Optional[_Iterable[float]] = ..., speed_percent: _Optional[float] = ..., stop_id: _Optional[int] = ..., program: _Optional[str] = ..., program_name: _Optional[str] = ..., page: _Optional[_Union[PageReport, _Mapping]] = ...) -> None: ...
+
+class PageReport(_message.Message):
+    __slots__ = ("view", "picture", "picture_time", "picture_age_s", "state_age_s")
+    VIEW_FIELD_NUMBER: _ClassVar[int]
+    PICTURE_FIELD_NUMBER: _ClassVar[int]
+    PICTURE_TIME_FIELD_NUMBER: _ClassVar[int]
+    PICTURE_AGE_S_FIELD_NUMBER: _ClassVar[int]
+    STATE_AGE_S_FIELD_NUMBER: _ClassVar[int]
+    view: str
+    picture: int
+    picture_time: _timestamp_pb2.Timestamp
+    picture_age_s: float
+    state_age_s: float
+    def __init__(self, view: _Optional[str] = ..., picture: _Optional[int] = ..., picture_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., picture_age_s: _Optional[float] = ..., state_age_s: _Optional[float] = ...) -> None: ...
 
 class ProgramState(_message.Message):
     __slots__ = ("timestamp", "outcome", "name", "operator", "since", "line", "statement", "step", "steps", "duration_s", "text", "reason", "left_s")
@@ -477,12 +493,14 @@ class CommandAnswer(_message.Message):
     def __init__(self, accepted: _Optional[bool] = ..., text: _Optional[str] = ..., warning: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
 
 class StopRequest(_message.Message):
-    __slots__ = ("reason", "by")
+    __slots__ = ("reason", "by", "page")
     REASON_FIELD_NUMBER: _ClassVar[int]
     BY_FIELD_NUMBER: _ClassVar[int]
+    PAGE_FIELD_NUMBER: _ClassVar[int]
     reason: str
     by: str
-    def __init__(self, reason: _Optional[str] = ..., by: _Optional[str] = ...) -> None: ...
+    page: PageReport
+    def __init__(self, reason: _Optional[str] = ..., by: _Optional[str] = ..., page: _Optional[_Union[PageReport, _Mapping]] = ...) -> None: ...
 
 class StopAnswer(_message.Message):
     __slots__ = ("stop_id", "sent", "text", "reason")

@@ -37,7 +37,7 @@ def stand_still(page, seconds):
 
 
 def take(page, name="li"):
-    # A browser that was seen to be slow gets leases of 5 s: a busy machine may leave it no time within 2.
+    # A browser that was seen to be slow gets leases of 4 s: a busy machine may leave it no time within 2.
     stand_still(page, 0.6)
     holder = page.locator(".holder")
     for _ in range(10):

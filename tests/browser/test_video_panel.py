@@ -40,12 +40,12 @@ def pixel(page):
 
 
 @contextmanager
-def repeated(act):
-    """Call an action ten times a second during the block."""
+def repeated(act, interval_s=0.1):
+    """Call an action again and again during the block."""
     end = threading.Event()
 
     def go():
-        while not end.wait(0.1):
+        while not end.wait(interval_s):
             act()
 
     thread = threading.Thread(target=go)

@@ -1,10 +1,12 @@
 """Control of one robot: units of several commands, leases, and events during a write to disk."""
 
 import asyncio
+import math
 from math import radians
 
 import pytest
 
+from protocol_gateway.audit.files import read_entries
 from protocol_gateway.control.events import (
     LeaseEnded,
     LinkLost,
@@ -45,6 +47,34 @@ def test_commands_of_one_unit_are_evaluated_after_the_previous_ones(tmp_path):
             assert [name for name, _ in bench.entries()] == ["ACQUIRE", "TRACE_ON", "HOME", "MOVE_ABSOLUTE"]
             with refused(codes.ROBOT_NOT_HOMED):
                 await bench.commands(move(*POSITIONS), first_id=4)
+
+    run(main())
+
+
+def test_what_the_page_showed_is_in_the_audit_log_but_no_part_of_the_command(tmp_path):
+    async def main():
+        async with control_bench(tmp_path) as bench:
+            await bench.lease(A.ACQUIRE)
+            page = schema.PageReport(view="front", picture=7, picture_age_s=0.25, state_age_s=math.nan)
+            page.picture_time.FromNanoseconds(1_700_000_000_123_456_000)
+            await bench.commands((C.TRACE_ON, {"page": page}))
+            # The same command, sent again by a page that shows a later picture.
+            page.picture += 1
+            await bench.commands((C.TRACE_ON, {"page": page}))
+            page.picture_time.seconds = 1 << 60
+            bench.control.stop(by="wang", reason="", source="mesh", page=page)
+            await until(lambda: len(bench.entries()) == 3)
+            first = {
+                "id": "1",
+                "page_view": "front",
+                "page_picture": "7",
+                "page_picture_time": "2023-11-14T22:13:20.123456Z",
+                "page_picture_age_s": "0.250",
+            }
+            values = [entry.values for entry in read_entries(tmp_path / "arm.jsonl")]
+            assert values[1] == first
+            assert values[2]["page_picture"] == "8"
+            assert "page_picture_time" not in values[2]
 
     run(main())
 

@@ -5,6 +5,7 @@ import { language } from "../i18n/texts";
 import { fetchAccount, reportActivity, signedOut } from "../mesh/account";
 import { keepConnected } from "../mesh/connection";
 import { followThisTab } from "../mesh/control";
+import { renewWhileBusy } from "../mesh/renewal";
 import { applyTheme } from "../ui/theme";
 import { App } from "./app";
 import "./styles";
@@ -13,6 +14,7 @@ isolateForeignTexts();
 applyTheme();
 document.documentElement.lang = language.value === "zh" ? "zh-Hans" : "en";
 followThisTab();
+renewWhileBusy();
 const maySee = async () => {
   const who = await fetchAccount();
   return who && (!who.accounts || who.account !== "");

@@ -8,6 +8,7 @@ import { t } from "../i18n/texts";
 import { ask } from "./connection";
 import type { Notice } from "./control";
 import { controlNotice, heldLease, reasonOf } from "./control";
+import { pageReport, whyFrozen } from "./sight";
 
 /** Values of a command beyond its name. */
 export interface CommandValues {
@@ -23,6 +24,7 @@ const ANSWERED_S = 2;
 // The gateway checks a program before it answers, and does not start it after this timeout.
 const CHECKED_S = 30;
 const MOTIONS: readonly Command[] = [Command.HOME, Command.MOVE_ABSOLUTE, Command.MOVE_RELATIVE, Command.RUN_PROGRAM];
+const STARTS_MOTION: readonly Command[] = [...MOTIONS, Command.RESUME];
 
 // Sequence numbers rise within a lease, so one counter serves all leases.
 let lastId = 0n;
@@ -45,6 +47,12 @@ export async function command(
     tell({ kind: "refused", text: t("not_sent", { text: t("take_first") }) });
     return false;
   }
+  const frozen = STARTS_MOTION.includes(name) ? whyFrozen(robotKey) : "";
+  if (frozen) {
+    tell({ kind: "refused", text: t("not_sent", { text: frozen }) });
+    return false;
+  }
+  const page = pageReport(robotKey);
   tell({ kind: "busy", text: t("sending", { what }) });
   const [validMs, withinS] = name === Command.RUN_PROGRAM ? [CHECKED_S * 1000, CHECKED_S] : [VALID_MS, ANSWERED_S];
   const request = {
@@ -52,6 +60,7 @@ export async function command(
     id: ++lastId,
     notAfter: timestampFromMs(Math.floor(performance.now() + mine.clockMs + validMs)),
     command: name,
+    ...(page && { page }),
     ...values,
   };
   try {

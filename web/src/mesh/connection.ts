@@ -102,9 +102,13 @@ function checkSilence(): void {
   if (!late || silent.value) silent.value = at - heardAt > SILENT_MS;
 }
 
+/** Return the address of the console's WebSocket. */
+export function meshAddress(): string {
+  return `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/mesh`;
+}
+
 function connect(reconnect: () => void, ended: (why: string) => void): void {
-  const scheme = location.protocol === "https:" ? "wss" : "ws";
-  const opened = new WebSocket(`${scheme}://${location.host}/mesh`);
+  const opened = new WebSocket(meshAddress());
   opened.binaryType = "arraybuffer";
   let queriedAt = performance.now(); // opening counts as an answer
   receivedAt = 0;
@@ -214,6 +218,19 @@ export async function ask<Q extends DescMessage, A extends DescMessage>(
     });
   });
   return fromBinary(answerSchema, await answer);
+}
+
+/** Return a request as a message, for another connection than this page's. */
+export function askMessage<Q extends DescMessage>(
+  key: string,
+  schema: Q,
+  request: MessageInitShape<Q>,
+): Uint8Array<ArrayBuffer> {
+  const payload = toBinary(schema, create(schema, request));
+  return toBinary(
+    FromPageSchema,
+    create(FromPageSchema, { message: { case: "ask", value: { id: 1n, key, payload } } }),
+  );
 }
 
 function takePending(id: bigint) {

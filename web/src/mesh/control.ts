@@ -1,7 +1,8 @@
 // Control of one robot from this tab: request, take, offer, accept, renew, release, lose.
 //
 // Only a visible tab renews a lease. A hidden, frozen or closed tab therefore loses control, and the robot
-// stops if it is moving. A tab that loses its connection has lost control immediately.
+// stops if it is moving. A tab that loses its connection has lost control immediately. While this thread is busy, a
+// worker renews for a while (renewal.ts).
 // A browser that proved slow asks for longer leases, and shows a message if it was still too slow.
 
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
@@ -41,7 +42,7 @@ export interface HeldLease {
 }
 
 const TTL_S = 2;
-const SLOW_TTL_S = 5; // the gateway's maximum
+const SLOW_TTL_S = 4; // a page that is blocked for 5 s has lost control
 const RENEW_INTERVAL_MS = 650;
 const SLOW_GAP_MS = 500;
 const SLOW_FOR_MS = 60_000; // after a long gap

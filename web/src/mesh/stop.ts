@@ -8,6 +8,7 @@ import { t } from "../i18n/texts";
 import { AskError, ask, reachable, reopenIfSilent } from "./connection";
 import type { Notice } from "./control";
 import { operator, reasonOf } from "./control";
+import { pageReport } from "./sight";
 
 const NOTICE_MS = 15_000; // how long the notice of a successful stop is shown
 const SENT_LATER_MS = 10_000; // a younger press is sent when the connection returns
@@ -28,7 +29,9 @@ export async function stop(robotKeys: readonly string[], pressedAt = Date.now())
     robotKeys.map(async (key): Promise<Notice> => {
       const robot = name(key);
       try {
-        const answer = await ask(`${key}/stop`, StopRequestSchema, { reason: "the page", by }, StopAnswerSchema);
+        const page = pageReport(key);
+        const request = { reason: "the page", by, ...(page && { page }) };
+        const answer = await ask(`${key}/stop`, StopRequestSchema, request, StopAnswerSchema);
         return answer.sent
           ? { kind: "done", text: t("stop_done", { robot, id: String(answer.stopId) }) }
           : { kind: "refused", text: t("stop_latched", { robot, text: reasonText(answer.reason, answer.text) }) };

@@ -11,6 +11,7 @@ import { t, viewText } from "../i18n/texts";
 import { distanceText, useClearanceLevel } from "../mesh/clearance";
 import { watch } from "../mesh/connection";
 import type { MomentState } from "../mesh/replay-moment";
+import { OWN_DRAWING, useShownView } from "../mesh/sight";
 import { ageOf, isStale, useTopic } from "../mesh/topics";
 import { Choice, Toggle } from "../ui/choice";
 import { theme } from "../ui/theme";
@@ -73,6 +74,7 @@ export function SceneView(props: {
   const prefix = robotKey.split("/").slice(1).join("/");
   const topic = framesTopic(robotKey);
   const framesAge = useFramesAge(robotKey, topic);
+  const drawn = useShownView(robotKey, OWN_DRAWING, topic, () => canvas.current);
   const replayed = description?.replay !== undefined;
   // A paused replay sends no frames, and they are not stale; its page shows whether it is available.
   const absent = props.arm === "absent" || props.arm === "coming";
@@ -125,9 +127,13 @@ export function SceneView(props: {
     const made = scene.current;
     if (!made || !description || !forward) return;
     const read = topic === "frames" ? (payload: Uint8Array) => payload : framesOf(prefix, description, forward);
-    return watch(`${robotKey}/${topic}`, (sample) =>
-      made.placeFrames(read(sample.payload), sample.sourceTime, sample.arrived),
-    );
+    return watch(`${robotKey}/${topic}`, (sample) => {
+      made.placeFrames(read(sample.payload), sample.sourceTime, sample.arrived);
+      const { sequence, sourceTime, newAt } = sample;
+      // After the loss of its WebGL context, as with a GPU's reset, the canvas shows an old picture.
+      const lost = canvas.current?.getContext("webgl2")?.isContextLost() !== false;
+      drawn.picture = lost ? null : { sequence, sourceTime, newAt };
+    });
   }, [identity, topic]);
   useEffect(() => scene.current?.setStale(stale), [stale, identity, loaded]);
   useEffect(() => scene.current?.setRate(rate), [rate, identity]);

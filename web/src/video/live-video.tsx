@@ -6,6 +6,8 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { CompressedImageSchema } from "../gen/foxglove/CompressedImage_pb";
 import { t } from "../i18n/texts";
 import { watch } from "../mesh/connection";
+import type { Picture } from "../mesh/sight";
+import { useShownView } from "../mesh/sight";
 import { isStale, now } from "../mesh/topics";
 import type { RequestedView } from "./requested-view";
 import { isStandardView, receiveView } from "./requested-view";
@@ -44,15 +46,19 @@ export function useLiveVideo(robotKey: string, wanted: RequestedView | null, lab
   // Read while drawing; its changes need no drawing.
   const [drawn] = useState<{ newAt: number | null; at: number }>({ newAt: null, at: 0 });
   const identity = wanted && JSON.stringify(wanted);
+  const place = video ? canvas : image;
+  const shown = useShownView(robotKey, wanted?.of ?? "", "video/*", () => place.current);
 
   useEffect(() => {
     drawn.newAt = null;
+    shown.picture = undefined;
     setProblem("");
     setStep(0);
     if (!wanted) return;
     drawn.at = performance.now();
-    const showPicture = (newAt: number | null, reduced: number) => {
-      drawn.newAt = newAt;
+    const showPicture = (picture: Picture, reduced: number) => {
+      shown.picture = picture;
+      drawn.newAt = picture?.newAt ?? null;
       drawn.at = performance.now();
       setAny(true);
       setProblem("");
@@ -77,7 +83,7 @@ export function useLiveVideo(robotKey: string, wanted: RequestedView | null, lab
           const { data, format } = fromBinary(CompressedImageSchema, sample.payload);
           const blob = new Blob([data as Uint8Array<ArrayBuffer>], { type: `image/${format || "jpeg"}` });
           setStill((old) => (old && URL.revokeObjectURL(old), URL.createObjectURL(blob)));
-          showPicture(sample.newAt, 0);
+          showPicture(sample, 0);
         });
       },
       () => performance.now() - drawn.at > QUIET_MS,
@@ -96,7 +102,7 @@ export function useLiveVideo(robotKey: string, wanted: RequestedView | null, lab
   );
   return {
     picture: picture || null,
-    place: video ? canvas : image,
+    place,
     any,
     age,
     stale: any && isStale("video/*", age),

@@ -5,15 +5,15 @@ import { CompressedVideoSchema } from "../gen/foxglove/CompressedVideo_pb";
 import { VideoFramesSchema } from "../gen/robomesh_pb";
 import type { Sample } from "../mesh/connection";
 import { watch } from "../mesh/connection";
+import type { Picture } from "../mesh/sight";
 import { codecName, isKeyFrame } from "./h264";
 
 /** Return whether this browser decodes video here (only over https, or on localhost). */
 export const decodesVideo = "VideoDecoder" in window;
 
 export interface VideoListener {
-  /** Called for each drawn picture; `newAt` is when it was new on this page's clock [ms], null: not known; `step`: how
-   * much the video is reduced for this browser's connection. */
-  drawn: (newAt: number | null, step: number) => void;
+  /** Called for each drawn picture; `step`: how much the video is reduced for this browser's connection. */
+  drawn: (picture: Picture, step: number) => void;
   failed: (text: string) => void;
 }
 
@@ -26,7 +26,7 @@ export function playVideo(key: string, canvas: HTMLCanvasElement, listener: Vide
   let drawing = 0;
   let clock = 0; // decode order; source times may repeat
   let step = 0;
-  const newAt = new Map<number, number | null>();
+  const pictures = new Map<number, Picture>();
 
   const draw = () => {
     drawing = 0;
@@ -36,8 +36,8 @@ export function playVideo(key: string, canvas: HTMLCanvasElement, listener: Vide
     if (canvas.width !== frame.displayWidth) canvas.width = frame.displayWidth;
     if (canvas.height !== frame.displayHeight) canvas.height = frame.displayHeight;
     context?.drawImage(frame, 0, 0);
-    listener.drawn(newAt.get(frame.timestamp) ?? null, step);
-    for (const time of newAt.keys()) if (time <= frame.timestamp) newAt.delete(time);
+    listener.drawn(pictures.get(frame.timestamp) ?? null, step);
+    for (const time of pictures.keys()) if (time <= frame.timestamp) pictures.delete(time);
     frame.close();
   };
   const begin = (name: string) => {
@@ -56,12 +56,12 @@ export function playVideo(key: string, canvas: HTMLCanvasElement, listener: Vide
     });
     decoder.configure({ codec: name, optimizeForLatency: true });
   };
-  const decode = (data: Uint8Array, at: number | null) => {
+  const decode = (data: Uint8Array, picture: Picture) => {
     const key = isKeyFrame(data);
     const name = key ? codecName(data) : null;
     if (name && name !== codec) begin(name);
     if (!codec || decoder?.state !== "configured") return;
-    newAt.set(++clock, at);
+    pictures.set(++clock, picture);
     decoder.decode(new EncodedVideoChunk({ type: key ? "key" : "delta", timestamp: clock, data }));
   };
   const take = (sample: Sample) => {
@@ -71,7 +71,8 @@ export function playVideo(key: string, canvas: HTMLCanvasElement, listener: Vide
         codec = ""; // a new stream begins with a key frame
       }
       if (sample.live) {
-        decode(fromBinary(CompressedVideoSchema, sample.payload).data, sample.newAt);
+        const { sequence, sourceTime, newAt } = sample;
+        decode(fromBinary(CompressedVideoSchema, sample.payload).data, { sequence, sourceTime, newAt });
         return;
       }
       for (const frame of fromBinary(VideoFramesSchema, sample.payload).frames) {

@@ -14,6 +14,7 @@ import { Choice, Toggle } from "../../ui/choice";
 import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
 import { NoticeLine } from "../../ui/notice-line";
 import { Select } from "../../ui/select";
+import { SeenPicture } from "../../video/seen-picture";
 import { Filters, SiteSelect } from "./alarm-panel";
 import { MAX_ROBOTS, searchAuditLogs } from "./audit-log-search";
 import type { AuditLine, EventEntry } from "./entries";
@@ -223,6 +224,7 @@ function Details({ entry, close }: { entry: Entry; close: () => void }) {
           </div>
         ))}
       </dl>
+      {audit && <SeenPicture site={entry.site} robot={entry.robot} entry={audit} />}
       <button class="quiet" onClick={close}>
         {e("close")}
       </button>

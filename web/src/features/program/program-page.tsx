@@ -10,6 +10,7 @@ import { handleLease } from "../../mesh/control";
 import { fleetRobots } from "../../mesh/known-robots";
 import type { RobotName } from "../../mesh/robot-name";
 import { disobeys, stateWord, stoppedByItself } from "../../mesh/robot-state";
+import { useShownState } from "../../mesh/sight";
 import { ageOf, isStale, jointsAge, useEvents, useTopic } from "../../mesh/topics";
 import { ControlPanel } from "../../panels/control/control-panel";
 import { ControlRequests } from "../../panels/control/who-controls";
@@ -79,6 +80,7 @@ function ProgramOfRobot({ site, robot }: RobotName) {
   useEffect(() => (stage ? addGizmo(stage) : undefined), [stage]);
   const age = jointsAge(joints, controller);
   const stale = isStale("joints", age);
+  useShownState(key, joints, controller);
   const holder = lease && !isStale("lease", ageOf(lease)) ? lease.message.holder : null;
   const state = controller?.message;
   const rows = description?.message.joints ?? [];

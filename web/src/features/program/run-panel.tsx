@@ -12,6 +12,8 @@ import { reachable } from "../../mesh/connection";
 import type { Notice } from "../../mesh/control";
 import { holds } from "../../mesh/control";
 import { whyNoNewMotion } from "../../mesh/robot-state";
+import { whyFrozen } from "../../mesh/sight";
+import { now } from "../../mesh/topics";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
 import type { Draft } from "./draft";
@@ -63,7 +65,7 @@ function whyNotRun(robotKey: string, controller: ControllerState | undefined, ru
   if (running) return p("run_running");
   if (!reachable.value) return t("no_connection");
   if (!holds(robotKey)) return p("run_take");
-  return whyNoNewMotion(controller);
+  return whyNoNewMotion(controller) || whyFrozen(robotKey, now.value);
 }
 
 function Progress({ state }: { state: ProgramState }) {

@@ -2,10 +2,11 @@
 
 import { effect, signal } from "@preact/signals";
 import type { CheckAnswer_Violation } from "../../gen/robomesh_pb";
+import { checkTarget, targetParts } from "../../mesh/target-check";
 import { ghostAt, redLinks, toolPath } from "../../scene/ghost";
 import { duration, moment, path, playing, positionsAt, violatingLinks } from "./checked-motion";
 import { checked } from "./program-check";
-import { robotKey } from "./program-robot";
+import { description, robotKey } from "./program-robot";
 import { taughtPositions, teachPositions } from "./taught-pose";
 
 /** The last violation that was clicked. */
@@ -37,7 +38,8 @@ export function startOverlay(): () => void {
       const at = moment.value;
       ghostAt(robotKey.value, taughtPositions.value ?? (of && at !== null ? positionsAt(of, at) : null));
     }),
-    effect(() => void (redLinks.value = violatingLinks.value)),
+    effect(() => checkTarget(robotKey.value, description.value?.joints ?? [], taughtPositions.value)),
+    effect(() => void (redLinks.value = taughtPositions.value ? targetParts.value : violatingLinks.value)),
     effect(() => {
       const points = path.value?.toolPositions ?? [];
       const count = Math.floor(points.length / 3);

@@ -4,6 +4,7 @@ import { useState } from "preact/hooks";
 import { jointText, jointUnit } from "../../i18n/format";
 import type { Words } from "../../i18n/program";
 import { noWords, p } from "../../i18n/program";
+import { targetProblem } from "../../mesh/target-check";
 import { Choice } from "../../ui/choice";
 import { JointTrack } from "../../ui/joint-track";
 import { JointValue } from "../../ui/joint-value";
@@ -38,6 +39,7 @@ export function TeachPanel() {
   };
   const startGhost = () => live && teach(live);
   const taught = taughtPositions.value;
+  const problem = taughtProblem.value || targetProblem.value;
   return (
     <Panel
       name="teach"
@@ -78,10 +80,7 @@ export function TeachPanel() {
             </button>
           </div>
           {method === "joints" ? <Sliders positions={taught} /> : <PosePanel />}
-          <NoticeLine
-            notice={taughtProblem.value ? { kind: "refused", text: taughtProblem.value } : null}
-            idle={p("moves_nothing")}
-          />
+          <NoticeLine notice={problem ? { kind: "refused", text: problem } : null} idle={p("moves_nothing")} />
         </div>
       )}
       <PointList tell={(words) => setOutcome({ words })} />

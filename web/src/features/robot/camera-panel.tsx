@@ -20,6 +20,8 @@ const PLACES: readonly VideoPlace[] = ["beside", "inset", "large"];
 /** The renderer's view of every robot, which follows the arm. */
 const CLOSE_VIEW = "close";
 const OWN_VIEW = "own";
+/** No video, for example because it is not live and would block motion. */
+const OFF = "off";
 /** A small picture of few bits, for slow links. */
 const SLOW_LINK_VIEW = "far";
 const OWN_SIZE = { width: 960, height: 540, fps: 30 };
@@ -43,12 +45,17 @@ export function CameraPanel(props: {
       CLOSE_VIEW,
       ...(isRemote(robotKey) ? [SLOW_LINK_VIEW] : []),
       OWN_VIEW,
+      OFF,
     ]),
   ];
   const shown = names.includes(view) ? view : (names[0] ?? "free");
   const own = useOwnView(shown === OWN_VIEW, props.sceneView);
-  const requested: RequestedView | null =
-    shown !== OWN_VIEW ? standardView(shown) : own && { of: OWN_VIEW, view: own, ...OWN_SIZE };
+  const isOff = shown === OFF;
+  const requested: RequestedView | null = isOff
+    ? null
+    : shown !== OWN_VIEW
+      ? standardView(shown)
+      : own && { of: OWN_VIEW, view: own, ...OWN_SIZE };
   const live = useLiveVideo(robotKey, requested, viewText(shown));
   const picture = useRef<HTMLDivElement>(null);
   const [, site = "", robot = ""] = robotKey.split("/");
@@ -60,7 +67,7 @@ export function CameraPanel(props: {
       (blob) => (setProblem(""), saveBlob(blob, `${name}.png`)),
       (error: Error) => setProblem(t("record_failed", { text: error.message })),
     );
-  const words = problem || recording.problem || live.problem || (live.video ? "" : t("camera_still"));
+  const words = problem || recording.problem || live.problem || (live.video || isOff ? "" : t("camera_still"));
   return (
     <Panel
       name="camera"
@@ -97,12 +104,14 @@ export function CameraPanel(props: {
     >
       <div ref={picture} class={`picture ${live.stale ? "stale" : ""}`}>
         {live.picture}
-        {!live.any && <p class="picture-word dim">{t("camera_waiting", { view: viewText(shown) })}</p>}
+        {!live.any && (
+          <p class="picture-word dim">{isOff ? t("video_is_off") : t("camera_waiting", { view: viewText(shown) })}</p>
+        )}
         <div class="picture-tools">
           <button class="quiet" disabled={!live.any} onClick={() => void savePicture()}>
             {t("save_still")}
           </button>
-          {shown !== OWN_VIEW && (
+          {shown !== OWN_VIEW && !isOff && (
             <button class="quiet" aria-pressed={recording.on} disabled={!live.any} onClick={recording.toggle}>
               {recording.on ? t("recording_video", { time: clock(recording.seconds) }) : t("record_video")}
             </button>

@@ -11,6 +11,7 @@ import { useAudit } from "../../mesh/topics";
 import { Choice } from "../../ui/choice";
 import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
 import { Panel } from "../../ui/panel";
+import { SeenPicture } from "../../video/seen-picture";
 import { LinkFacts } from "./link-facts";
 
 const SHOWN = ["events", "requests", "link"] as const;
@@ -35,7 +36,11 @@ export function EventsPanel(props: {
       ) : (
         <ol class="event-list" tabIndex={0} aria-label={t(shown)}>
           {empty && <li class="dim">{t("no_events")}</li>}
-          {shown === "events" ? events.map(EventLine) : audit.map(AuditLine)}
+          {shown === "events"
+            ? events.map(EventLine)
+            : audit.map((entry) => (
+                <AuditLine key={`${entry.number} ${entry.repeatedCount}`} robotKey={robotKey} entry={entry} />
+              ))}
         </ol>
       )}
     </Panel>
@@ -56,7 +61,8 @@ function EventLine(event: Event) {
   );
 }
 
-function AuditLine(entry: AuditEntry) {
+function AuditLine({ robotKey, entry }: { robotKey: string; entry: AuditEntry }) {
+  const [, site = "", robot = ""] = robotKey.split("/");
   const text = entryText(entry);
   const [word, level] = OUTCOMES[entry.outcome] ?? ["state_unknown", "normal"];
   return (
@@ -71,6 +77,7 @@ function AuditLine(entry: AuditEntry) {
           </strong>
         )}
         {text && <span lang={text === entry.text ? "en" : undefined}>{`: ${text}`}</span>}
+        <SeenPicture site={site} robot={robot} entry={entry} />
       </span>
     </li>
   );

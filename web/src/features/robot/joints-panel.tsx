@@ -15,7 +15,10 @@ import { useSteps } from "../../mesh/joint-steps";
 import type { Motion } from "../../mesh/notice-expiry";
 import { useNoticeExpiry } from "../../mesh/notice-expiry";
 import { whyNoNewMotion, whyNoTarget } from "../../mesh/robot-state";
-import { ghostAt } from "../../scene/ghost";
+import { whyFrozen } from "../../mesh/sight";
+import { checkTarget, targetParts, targetProblem } from "../../mesh/target-check";
+import { now } from "../../mesh/topics";
+import { ghostAt, redLinks } from "../../scene/ghost";
 import { Choice } from "../../ui/choice";
 import { JointTrack } from "../../ui/joint-track";
 import { JointValue } from "../../ui/joint-value";
@@ -46,7 +49,9 @@ export function JointsPanel(props: {
   const rows: readonly Description_Joint[] = description?.joints ?? [];
   const current = rows.map((joint) => positions.get(joint.name));
   const mine = holds(robotKey);
-  const whyNone = reachable.value ? whyNoTarget(props.controller) : t("no_connection");
+  const whyNone = reachable.value
+    ? whyNoTarget(props.controller) || whyFrozen(robotKey, now.value)
+    : t("no_connection");
   const why = whyNone || whyNoNewMotion(props.controller);
   // A motion on hold keeps its target, and steps wait for RESUME.
   const keepsTargets = mine && !stale && !whyNone;
@@ -72,10 +77,19 @@ export function JointsPanel(props: {
     rows.map((_, i) => (i === index ? value : (running[i] ?? current[i])));
   const show = (index: number, value: number | undefined) => {
     setPreview(value === undefined ? null : { index, value });
-    const wanted = value === undefined ? null : wantedAt(index, value);
-    ghostAt(robotKey, wanted?.every((each) => each !== undefined) ? (wanted as number[]) : null);
   };
-  useEffect(() => () => ghostAt(robotKey, null), [robotKey, enabled]);
+  useEffect(() => {
+    const wanted = enabled && preview ? wantedAt(preview.index, preview.value) : null;
+    const known = wanted?.every((each) => each !== undefined) ? (wanted as number[]) : null;
+    ghostAt(robotKey, known);
+    checkTarget(robotKey, rows, known);
+    return () => ghostAt(robotKey, null);
+  }, [robotKey, preview, enabled]);
+  useEffect(() => () => checkTarget(robotKey, [], null), [robotKey]);
+  useEffect(() => {
+    redLinks.value = targetParts.value;
+    return () => void (redLinks.value = new Set());
+  }, [targetParts.value]);
 
   const send = async (index: number, value: number) => {
     show(index, undefined);
@@ -103,8 +117,9 @@ export function JointsPanel(props: {
   const set = preview && rows[preview.index];
   // On a phone the control panel may be off the screen.
   const lost = controlNotice.value?.kind === "lost" ? controlNotice.value : null;
-  const idle = set
-    ? t("target_unsent", { joint: set.name, value: jointText(set, preview.value) })
+  const unsent = set && t("target_unsent", { joint: set.name, value: jointText(set, preview.value) });
+  const idle = unsent
+    ? unsent
     : steps.waiting
       ? t("steps_wait", { count: steps.waiting })
       : enabled
@@ -188,7 +203,15 @@ export function JointsPanel(props: {
         })}
       </div>
       <NoticeLine
-        notice={preview || (steps.waiting && notice?.kind !== "refused") ? null : (notice ?? lost)}
+        notice={
+          unsent
+            ? targetProblem.value
+              ? { kind: "refused", text: `${t("sentence", { text: unsent })} ${targetProblem.value}` }
+              : null
+            : steps.waiting && notice?.kind !== "refused"
+              ? null
+              : (notice ?? lost)
+        }
         idle={idle}
       />
     </Panel>

@@ -21,6 +21,7 @@ import { t } from "../../i18n/texts";
 import { handleLease } from "../../mesh/control";
 import type { RobotName } from "../../mesh/robot-name";
 import { disobeys, stateWord, stoppedByItself, stopText } from "../../mesh/robot-state";
+import { useShownState } from "../../mesh/sight";
 import type { Latest } from "../../mesh/topics";
 import { ageOf, isStale, jointsAge, useEvents, useTopic } from "../../mesh/topics";
 import { ControlPanel } from "../../panels/control/control-panel";
@@ -56,6 +57,7 @@ export function RobotPage({ site, robot }: RobotName) {
   const events = useEvents(key);
   const age = jointsAge(joints, controller);
   const stale = isStale("joints", age);
+  useShownState(key, joints, controller);
   const lost = useLostAt(stale, joints !== undefined);
   const holder = lease && !isStale("lease", ageOf(lease)) ? lease.message.holder : null;
   useEffect(() => {

@@ -11,7 +11,9 @@ import { controlNotice, holds } from "../../mesh/control";
 import type { Motion } from "../../mesh/notice-expiry";
 import { useNoticeExpiry } from "../../mesh/notice-expiry";
 import { stoppedByItself, whyNoMotion, whyNoNewMotion } from "../../mesh/robot-state";
+import { whyFrozen } from "../../mesh/sight";
 import type { Latest } from "../../mesh/topics";
+import { now } from "../../mesh/topics";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
 import { mayNotCommand } from "./no-control";
@@ -32,7 +34,8 @@ export function ControlPanel(props: {
   const { robotKey, holder } = props;
   const state = props.controller?.message;
   const mine = holds(robotKey);
-  const why = reachable.value ? whyNoNewMotion(state) : t("no_connection");
+  const frozen = whyFrozen(robotKey, now.value);
+  const why = reachable.value ? whyNoNewMotion(state) || frozen : t("no_connection");
   const canSend = mine && reachable.value && !state?.stop && !state?.readOnly;
   const send = (name: Command, what: string, values?: CommandValues, positions?: number[]) =>
     void command(robotKey, name, what, values, undefined, positions);
@@ -62,7 +65,7 @@ export function ControlPanel(props: {
             <button
               class="action primary"
               data-moves
-              disabled={!mine || !reachable.value || whyNoMotion(state) !== ""}
+              disabled={!mine || !reachable.value || whyNoMotion(state) !== "" || frozen !== ""}
               onClick={() => send(Command.RESUME, t("resume"))}
             >
               {t("resume")}
