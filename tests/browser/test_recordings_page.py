@@ -6,6 +6,7 @@ import re
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer
+from mcap_protobuf.schema import build_file_descriptor_set
 from playwright.sync_api import expect
 
 from robomesh.errors import RefusedError
@@ -19,6 +20,7 @@ pytestmark = pytest.mark.browser
 ROBOT = "robomesh/hall/pt600"
 NAME = "swing"
 QUARTER = "quarter.mcap"
+RUNS = "runs.mcap"
 LONG_S = 3.0  # of motion
 _Ask = schema.RecorderRequest
 
@@ -48,6 +50,7 @@ def recorded(plant, tmp_path_factory):
         closed = await ask_recorder(plant, _Ask.TRACE_OFF)
         path = next(folder.rglob(closed.file))
         of_quarter(path)
+        with_runs(path)
         path.with_name("empty.mcap").touch()
         return tasks, closed.file
 
@@ -78,6 +81,42 @@ def of_quarter(path):
             writer.add_message(
                 channels[channel.id], message.log_time, message.data, message.publish_time, message.sequence
             )
+        writer.finish()
+
+
+def with_runs(path):
+    """Write a recording's robot, and two runs of a program: 12 steps each, and one that is refused."""
+    with path.open("rb") as file, path.with_name(RUNS).open("wb") as to:
+        reader, writer = make_reader(file), Writer(to)
+        began = reader.get_summary().statistics.message_start_time
+        writer.start()
+        topics = {}
+        for topic, kind in (("events", schema.Event), ("audit", schema.AuditEntry)):
+            data = build_file_descriptor_set(kind).SerializeToString()
+            known = writer.register_schema(kind.DESCRIPTOR.full_name, "protobuf", data)
+            topics[kind] = writer.register_channel(f"{ROBOT}/{topic}", "protobuf", known)
+        described = {}
+        for schema_, channel, message in reader.iter_messages():
+            if not channel.topic.endswith("/description") or channel.id in described:
+                continue
+            known = writer.register_schema(schema_.name, schema_.encoding, schema_.data)
+            described[channel.id] = writer.register_channel(channel.topic, "protobuf", known)
+            writer.add_message(described[channel.id], began, message.data, began)
+
+        def add(at_s, message):
+            at = began + int(at_s * 1e9)
+            message.timestamp.FromNanoseconds(at)
+            writer.add_message(topics[type(message)], at, message.SerializeToString(), at)
+
+        for start in (0.1, 5.1):
+            started = schema.Event(code="program.started", text="li runs square", severity=schema.Event.INFO)
+            add(start, started)
+            for number in range(13):
+                outcome = schema.AuditEntry.REFUSED if number == 12 else schema.AuditEntry.ACCEPTED
+                step = schema.AuditEntry(
+                    operator="li", source="program", request="MOVE_ABSOLUTE", outcome=outcome
+                )
+                add(start + 0.3 * (number + 1), step)
         writer.finish()
 
 
@@ -237,3 +276,16 @@ def test_the_list_and_the_player_fit_a_phone_and_axe_finds_nothing_serious(open_
     assert page.locator(".transport .play").bounding_box()["height"] >= 44
     expect(page.locator(".chart")).to_be_visible()
     assert serious(page) == []
+
+
+def test_the_steps_of_a_run_are_folded_under_it(open_page, recorded):
+    page = open_page(f"#/recordings/hall/{RUNS}", drawn=False)
+    rows = page.locator(".recorded-events li")
+    expect(rows).to_have_count(4)  # two runs, and the refused step of each
+    run = rows.first.get_by_role("button", name="12 steps")
+    expect(run).to_have_attribute("aria-expanded", "false")
+    run.click()
+    expect(rows).to_have_count(16)
+    expect(rows.nth(1)).to_contain_text("li asked move absolute")
+    run.click()
+    expect(rows).to_have_count(4)

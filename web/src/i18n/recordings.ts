@@ -136,6 +136,8 @@ const TEXTS = {
 
   events: ["Events", "事件"],
   no_events: ["No event was recorded.", "没有录制到事件。"],
+  run_step: ["1 step", "1 个步骤"],
+  run_steps: ["{count} steps", "{count} 个步骤"],
   events_cut: ["The first {count} are shown.", "仅显示前 {count} 条。"],
   events_refused: ["The events cannot be read: {text}", "无法读取事件：{text}"],
   asked: ["{who} asked {what}", "{who} 请求 {what}"],

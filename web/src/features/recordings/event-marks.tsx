@@ -3,7 +3,7 @@
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { ReadonlySignal } from "@preact/signals";
 import { useComputed, useSignal } from "@preact/signals";
-import { useEffect } from "preact/hooks";
+import { useEffect, useMemo, useState } from "preact/hooks";
 import { eventText } from "../../i18n/event-text";
 import { count, fullTime } from "../../i18n/format";
 import { momentText } from "../../i18n/recording-format";
@@ -11,6 +11,7 @@ import { r } from "../../i18n/recordings";
 import { t } from "../../i18n/texts";
 import { SEVERITIES } from "../../ui/event-mark";
 import { Panel } from "../../ui/panel";
+import { foldSteps } from "./fold-steps";
 import type { RecordedEvent, RequestState } from "./recorder-requests";
 import "./contents.css";
 
@@ -29,7 +30,8 @@ function sideOf(share: number): string {
 
 export function EventMarks(props: { events: readonly RecordedEvent[]; duration: number; seek: (to: number) => void }) {
   const { duration } = props;
-  const shown = [...props.events]
+  const shown = foldSteps(props.events)
+    .map(({ happened }) => happened)
     .sort((first, second) => second.event.severity - first.event.severity)
     .slice(0, MOST_MARKS)
     .sort((first, second) => first.at - second.at);
@@ -64,43 +66,68 @@ export function EventList(props: {
 }) {
   const { value, problem } = props.asked;
   const list = value?.list ?? NONE;
+  const rows = useMemo(() => foldSteps(list), [list]);
+  const [open, setOpen] = useState<ReadonlySet<RecordedEvent>>(new Set());
+  const shown = useMemo(
+    () =>
+      rows.flatMap(({ happened, steps }) => [
+        { happened, steps, isStep: false },
+        ...(open.has(happened) ? steps : []).map((step) => ({ happened: step, steps: [], isStep: true })),
+      ]),
+    [rows, open],
+  );
+  const toggle = (run: RecordedEvent) => {
+    const next = new Set(open);
+    if (!next.delete(run)) next.add(run);
+    setOpen(next);
+  };
   const times = useSignal<readonly number[]>([]);
-  useEffect(() => void (times.value = list.map(({ at }) => at)), [list]);
+  useEffect(() => void (times.value = shown.map(({ happened }) => happened.at)), [shown]);
   const last = useComputed(() => {
     const moment = props.moment.value + 1e-3; // read in any case: it triggers the computed signal
     return times.value.findLastIndex((at) => at <= moment);
   }).value;
   return (
-    <Panel name="events" title={r("events")} end={list.length > 0 && <span class="dim">{count(list.length)}</span>}>
+    <Panel name="events" title={r("events")} end={rows.length > 0 && <span class="dim">{count(rows.length)}</span>}>
       <ol class="event-list recorded-events" tabIndex={0} aria-label={r("events")}>
         {!value && !problem && <li class="skeleton">{"\u00a0"}</li>}
         {problem && <li class="state warning">{r("events_refused", { text: problem })}</li>}
         {value && list.length === 0 && <li class="dim">{r("no_events")}</li>}
-        {list.map((happened, i) => {
-          const [word, level] = severityOf(happened);
-          const { event, at } = happened;
-          return (
-            <li key={i} aria-current={i === last ? "true" : undefined}>
-              <button
-                title={`${event.timestamp ? fullTime(timestampMs(event.timestamp)) : ""} · ${event.source} · ${event.code}`}
-                onClick={() => props.seek(at)}
-              >
-                <time>{momentText(at)}</time>
-                <span class="event-text">
-                  {level !== "normal" && (
-                    <span class={`mark state ${level}`}>
-                      <span class={`shape ${level}`} aria-hidden="true" />
-                      {word}
-                    </span>
-                  )}
-                  {eventText(event)}
-                </span>
+        {shown.map(({ happened, steps, isStep }, i) => (
+          <li key={i} class={isStep ? "run-step" : undefined} aria-current={i === last ? "true" : undefined}>
+            <EventButton happened={happened} seek={props.seek} />
+            {steps.length > 0 && (
+              <button class="run-steps" aria-expanded={open.has(happened)} onClick={() => toggle(happened)}>
+                <span class="turn" aria-hidden="true" />
+                {steps.length === 1 ? r("run_step") : r("run_steps", { count: count(steps.length) })}
               </button>
-            </li>
-          );
-        })}
+            )}
+          </li>
+        ))}
         {value?.cut && <li class="dim">{r("events_cut", { count: count(list.length) })}</li>}
       </ol>
     </Panel>
+  );
+}
+
+function EventButton({ happened, seek }: { happened: RecordedEvent; seek: (to: number) => void }) {
+  const [word, level] = severityOf(happened);
+  const { event, at } = happened;
+  return (
+    <button
+      title={`${event.timestamp ? fullTime(timestampMs(event.timestamp)) : ""} · ${event.source} · ${event.code}`}
+      onClick={() => seek(at)}
+    >
+      <time>{momentText(at)}</time>
+      <span class="event-text">
+        {level !== "normal" && (
+          <span class={`mark state ${level}`}>
+            <span class={`shape ${level}`} aria-hidden="true" />
+            {word}
+          </span>
+        )}
+        {eventText(event)}
+      </span>
+    </button>
   );
 }
