@@ -4,7 +4,7 @@ A site runs as real processes: an arm at rest, whose joint states still arrive a
 `load`: first paint, joint names, and what is transferred until then, each time in a new browser context.
 `cost`: processor time of the browser's processes and the number of drawn pictures, at rest and moving.
 `busy`: how late the page's main thread answers a timer while other processes use both cores.
-`heap`: the page's JavaScript heap after garbage collection, each minute, and its slope.
+`heap`: the page's JavaScript heap after garbage collection, twice a minute, and its slope.
 
     ./dev run python benchmarks/robot_page.py [--only load,cost,busy,heap] [--seconds 20] [--rounds 5]
                                               [--minutes 15] [--json]
@@ -237,12 +237,12 @@ def heap(browser: Browser, address: str, minutes: float) -> dict[str, Any]:
     """Measure the heap after garbage collection [MB] and its slope [kB a minute] without the first fifth."""
     with opened(browser, address) as (page, session):
         sizes: list[float] = []
-        for _ in range(round(minutes) + 1):
+        for _ in range(round(2 * minutes) + 1):
             session.send("HeapProfiler.collectGarbage")
             sizes.append(session.send("Runtime.getHeapUsage")["usedSize"] / 1e6)
-            page.wait_for_timeout(60_000)
+            page.wait_for_timeout(30_000)
     kept = sizes[len(sizes) // 5 :]
-    slope = float(np.polyfit(np.arange(len(kept)), kept, 1)[0]) * 1000
+    slope = float(np.polyfit(np.arange(len(kept)) / 2, kept, 1)[0]) * 1000
     return {"sizes_mb": [round(size, 3) for size in sizes], "slope_kb_per_minute": round(slope, 2)}
 
 

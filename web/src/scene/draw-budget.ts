@@ -1,9 +1,11 @@
 // The share of time that 3-D may take, so that the rest of the page, and control, have enough on a slow machine.
 //
-// The rate gives way first, down to a few frames a second, then the quality. Quality returns slowly.
+// The rate gives way first, down to a few frames a second, then the quality, and at the lowest quality the rate again.
+// Quality returns slowly.
 
 const PAUSE_FACTOR = 3; // pause after a slow frame, in its durations
 const LONGEST_PAUSE_MS = 360;
+const LONGEST_COARSE_PAUSE_MS = 2000; // at the lowest quality
 // The first frame, and the first after the page was hidden, are slow on every machine.
 const MANY_SLOW_FRAMES = 3;
 const SHORTEST_TRIAL_MS = 10_000;
@@ -54,7 +56,8 @@ export class DrawBudget {
     if (tookMs > SLOW_MS / 2) this.fastSince = null;
     else this.fastSince ??= at;
     if (this.fastSince !== null && at - this.fastSince > this.trialMs) this.raise(at);
-    return tookMs < SLOW_MS ? 0 : Math.min(PAUSE_FACTOR * tookMs, LONGEST_PAUSE_MS);
+    const longest = this.level + 1 === this.levels.length ? LONGEST_COARSE_PAUSE_MS : LONGEST_PAUSE_MS;
+    return tookMs < SLOW_MS ? 0 : Math.min(PAUSE_FACTOR * tookMs, longest);
   }
 
   private lower(at: number): void {

@@ -1,6 +1,7 @@
 // Lines in the 3-D view: the tool's trail, a path that it would take, the shortest distance.
 
 import * as THREE from "three";
+import type { Vector3 as Point } from "../gen/robomesh_pb";
 import type { Level } from "../mesh/robot-state";
 import type { Palette } from "./surroundings";
 
@@ -66,7 +67,7 @@ export class Path {
 
 /** The two nearest points in the site's frame [m], their level, and their distance in words. */
 export interface Nearest {
-  points: readonly [THREE.Vector3, THREE.Vector3];
+  points: readonly [Point | undefined, Point | undefined];
   level: Level;
   text: string;
 }
@@ -120,8 +121,9 @@ export class Gap {
     const { points, level } = nearest;
     const positions = this.line.geometry.getAttribute("position") as THREE.BufferAttribute;
     points.forEach((point, i) => {
-      positions.setXYZ(i, point.x, point.y, point.z);
-      this.ends[i]?.position.copy(point);
+      const at = vector(point);
+      positions.setXYZ(i, at.x, at.y, at.z);
+      this.ends[i]?.position.copy(at);
     });
     positions.needsUpdate = true;
     const colour = { normal: dim, warning, alarm }[level];
@@ -144,6 +146,10 @@ export class Gap {
 }
 
 function alike(one: Nearest, other: Nearest): boolean {
-  const near = (index: 0 | 1) => one.points[index].distanceTo(other.points[index]) < SAME_PLACE;
+  const near = (index: 0 | 1) => vector(one.points[index]).distanceTo(vector(other.points[index])) < SAME_PLACE;
   return one.text === other.text && one.level === other.level && near(0) && near(1);
+}
+
+function vector(point: Point | undefined): THREE.Vector3 {
+  return new THREE.Vector3(point?.x, point?.y, point?.z);
 }

@@ -2,8 +2,7 @@
 
 import { create } from "@bufbuild/protobuf";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { Vector3 } from "three";
-import type { Description, Vector3 as Point, View } from "../gen/robomesh_pb";
+import type { Description, View } from "../gen/robomesh_pb";
 import { KinematicStateSchema, ReplayStateSchema, View_Projection, ViewSchema } from "../gen/robomesh_pb";
 import { staleText, timeOfDay } from "../i18n/format";
 import { r } from "../i18n/recordings";
@@ -15,18 +14,32 @@ import { OWN_DRAWING, useShownView } from "../mesh/sight";
 import { ageOf, isStale, useTopic } from "../mesh/topics";
 import { Choice, Toggle } from "../ui/choice";
 import { theme } from "../ui/theme";
-import { forwardOf } from "./forward-kinematics";
 import { useFramesAge } from "./frames-age";
 import { ghost, redLinks, toolPath } from "./ghost";
 import type { Nearest } from "./lines";
 import { Neighbours } from "./neighbours";
-import type { Stage } from "./robot-scene";
-import { RobotScene } from "./robot-scene";
-import { framesOf, framesTopic } from "./topic-selection";
+import type { RobotScene, Stage } from "./robot-scene";
+import { framesTopic } from "./topic-selection";
 
 // Eye of the free camera relative to its target, in multiples of the arm's reach.
 const FREE_EYE = { x: 1.2, y: -1.69, z: 0.72 };
 const NOMINAL_REACH = 1.1; // m, until the description arrives
+
+type Drawing = typeof import("./drawing");
+let drawing: Drawing | null = null;
+
+/** Return what draws in 3-D, loaded once it is `wanted`; null until then. */
+function useDrawing(wanted: boolean, failed: (why: string) => void): Drawing | null {
+  const [loaded, setLoaded] = useState(drawing);
+  useEffect(() => {
+    if (!wanted || loaded) return;
+    import("./drawing").then(
+      (all) => setLoaded((drawing = all)),
+      (error: unknown) => failed(error instanceof Error ? error.message : String(error)),
+    );
+  }, [wanted, loaded]);
+  return loaded;
+}
 
 /** Return the views of a description, the free one first. */
 export function viewsOf(description: Description | undefined): readonly View[] {
@@ -87,22 +100,24 @@ export function SceneView(props: {
     () => description && JSON.stringify([description.links, description.fixtures, description.baseToSite]),
     [description],
   );
+  // The joints are shown first.
+  const code = useDrawing(description !== undefined, setProblem);
   const forward = useMemo(
     () =>
       description &&
-      forwardOf(
+      code?.forwardOf(
         description.urdf,
         description.joints.map((joint) => joint.name),
       ),
-    [description],
+    [description, code],
   );
   useEffect(() => {
-    if (!canvas.current || !label.current || !description) return;
+    if (!canvas.current || !label.current || !description || !code) return;
     setProblem("");
     setLoaded(false);
     let made: RobotScene;
     try {
-      made = new RobotScene(canvas.current, prefix, label.current);
+      made = new code.RobotScene(canvas.current, prefix, label.current);
     } catch {
       setProblem(t("no_webgl"));
       return;
@@ -122,11 +137,11 @@ export function SceneView(props: {
       made.dispose();
       scene.current = null;
     };
-  }, [identity]);
+  }, [identity, code]);
   useEffect(() => {
     const made = scene.current;
-    if (!made || !description || !forward) return;
-    const read = topic === "frames" ? (payload: Uint8Array) => payload : framesOf(prefix, description, forward);
+    if (!made || !description || !forward || !code) return;
+    const read = topic === "frames" ? (payload: Uint8Array) => payload : code.framesOf(prefix, description, forward);
     return watch(`${robotKey}/${topic}`, (sample) => {
       made.placeFrames(read(sample.payload), sample.sourceTime, sample.arrived);
       const { sequence, sourceTime, newAt } = sample;
@@ -134,21 +149,21 @@ export function SceneView(props: {
       const lost = canvas.current?.getContext("webgl2")?.isContextLost() !== false;
       drawn.picture = lost ? null : { sequence, sourceTime, newAt };
     });
-  }, [identity, topic]);
-  useEffect(() => scene.current?.setStale(stale), [stale, identity, loaded]);
-  useEffect(() => scene.current?.setRate(rate), [rate, identity]);
+  }, [identity, topic, code]);
+  useEffect(() => scene.current?.setStale(stale), [stale, identity, loaded, code]);
+  useEffect(() => scene.current?.setRate(rate), [rate, identity, code]);
   useEffect(() => scene.current?.setColours(), [theme.value]);
-  useEffect(() => scene.current?.showTrail(trail), [trail, identity]);
-  useEffect(() => scene.current?.showFrames(frames), [frames, identity]);
+  useEffect(() => scene.current?.showTrail(trail), [trail, identity, code]);
+  useEffect(() => scene.current?.showFrames(frames), [frames, identity, code]);
   const shown = ghost.value?.robotKey === robotKey ? ghost.value.positions : null;
   useEffect(() => scene.current?.showGhost(shown && (forward?.(shown) ?? null)), [shown, forward, loaded]);
-  useEffect(() => scene.current?.setRed(redLinks.value), [redLinks.value, identity]);
-  useEffect(() => scene.current?.showPath(toolPath.value), [toolPath.value, identity]);
+  useEffect(() => scene.current?.setRed(redLinks.value), [redLinks.value, identity, code]);
+  useEffect(() => scene.current?.showPath(toolPath.value), [toolPath.value, identity, code]);
   const near = useNearest(robotKey);
-  useEffect(() => scene.current?.showGap(near?.nearest ?? null, near?.sourceTime), [near, identity]);
+  useEffect(() => scene.current?.showGap(near?.nearest ?? null, near?.sourceTime), [near, identity, code]);
   const views = viewsOf(description);
   const chosen = views.find((each) => each.name === view) ?? freeView([]);
-  useEffect(() => scene.current?.look(chosen), [chosen.name, identity]);
+  useEffect(() => scene.current?.look(chosen), [chosen.name, identity, code]);
 
   const onKey = (event: KeyboardEvent) => {
     const step = 0.1;
@@ -225,11 +240,8 @@ function useNearest(robotKey: string): { nearest: Nearest; sourceTime: number } 
   const known = clearance && !isStale("kinematics", ageOf(latest));
   return useMemo(() => {
     if (!known) return null;
-    const points = [at(clearance.firstPoint), at(clearance.secondPoint)] as const;
-    return { nearest: { points, level, text: distanceText(clearance) }, sourceTime: latest.sample.sourceTime };
+    const { firstPoint, secondPoint } = clearance;
+    const nearest = { points: [firstPoint, secondPoint] as const, level, text: distanceText(clearance) };
+    return { nearest, sourceTime: latest.sample.sourceTime };
   }, [known, clearance, level]);
-}
-
-function at(point: Point | undefined): Vector3 {
-  return new Vector3(point?.x, point?.y, point?.z);
 }
