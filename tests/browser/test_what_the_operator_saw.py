@@ -20,6 +20,7 @@ pytestmark = pytest.mark.browser
 ROBOTS = ("arm",)
 BLOCK, BITS = 32, 16
 PRESSES = 100
+KEY_FRAME_EACH = 10
 # At each press: the number on the canvas, as the browser shows it to the operator.
 READ = """(canvas, block, bits) => {
     const pixels = canvas.getContext('2d').getImageData(0, 0, block * bits, block).data;
@@ -42,21 +43,26 @@ class NumberedVideo:
     """Video whose pictures show their numbers as black and white squares, one a bit."""
 
     def __init__(self, publisher):
-        self._publisher, self._number = publisher, 0
+        self._publisher = publisher
+        self.count = 0
         self.sequences = {}
         self._codec = av.CodecContext.create("libx264", "w")
         self._codec.width, self._codec.height, self._codec.pix_fmt = BLOCK * BITS, BLOCK, "yuv420p"
-        self._codec.options = {"preset": "superfast", "tune": "zerolatency", "x264-params": "keyint=10"}
+        self._codec.options = {
+            "preset": "superfast",
+            "tune": "zerolatency",
+            "x264-params": f"keyint={KEY_FRAME_EACH}",
+        }
 
     def publish(self):
-        self._number += 1
-        squares = [255 * (self._number >> bit & 1) for bit in range(BITS)]
+        self.count += 1
+        squares = [255 * (self.count >> bit & 1) for bit in range(BITS)]
         row = np.repeat(np.array(squares, dtype=np.uint8), BLOCK)
         picture = np.repeat(np.tile(row, (BLOCK, 1))[:, :, np.newaxis], 3, axis=2)
         (packet,) = self._codec.encode(av.VideoFrame.from_ndarray(picture, format="rgb24"))
         message = CompressedVideo(data=bytes(packet), format="h264")
         header = self._publisher.put(message, key_frame=packet.is_keyframe)
-        self.sequences[self._number] = header.sequence
+        self.sequences[self.count] = header.sequence
 
 
 @pytest.fixture
@@ -184,6 +190,9 @@ def test_the_picture_of_a_request_is_opened_from_a_recording(open_page, plant, v
     with repeated(video.publish):
         page.wait_for_selector('.camera canvas[data-drawn="true"]')
         ready(page)
+        homed = video.count
+        # A recording begins with the pictures since the last key frame.
+        wait_until(lambda: video.count > homed + 2 * KEY_FRAME_EACH)
         trace = page.locator(".command-row button[aria-pressed]")
         if trace.get_attribute("aria-pressed") == "true":
             trace.click()
