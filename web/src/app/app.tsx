@@ -2,26 +2,23 @@
 
 import { signal } from "@preact/signals";
 import type { ComponentType } from "preact";
-import { useEffect, useRef } from "preact/hooks";
-import { AccountMenu } from "../features/account/account-menu";
+import { useEffect } from "preact/hooks";
 import { SignIn } from "../features/account/sign-in";
-import { AlarmBadge } from "../features/events/alarm-badge";
 import { FleetPage } from "../features/fleet/fleet-page";
 import { a } from "../i18n/account";
 import { timeOfDay } from "../i18n/format";
-import { language, switchLanguage, t } from "../i18n/texts";
+import { language, t } from "../i18n/texts";
 import { mustSignIn } from "../mesh/account";
 import { hello, lostAt, reachable } from "../mesh/connection";
 import { controlNotice, heldLease, release } from "../mesh/control";
 import { fleetRobots } from "../mesh/known-robots";
-import type { RobotName } from "../mesh/robot-name";
 import { canBe, isReplay } from "../mesh/robot-name";
 import { dismissStop, stop, stopAgain, stopNotice, unsentStop } from "../mesh/stop";
 import { RobotNotFound } from "../panels/robot-not-found";
 import { guardMovedControls } from "../ui/moved-controls";
 import { NoticeLine } from "../ui/notice-line";
-import { type Route, robotLink, robotOf, route } from "../ui/route";
-import { switchTheme, theme } from "../ui/theme";
+import { type Route, robotOf, route } from "../ui/route";
+import { Bar } from "./bar";
 
 /** Return a component that loads its page when it is first shown. */
 function onDemand<Props>(load: () => Promise<ComponentType<Props>>) {
@@ -65,7 +62,6 @@ const RecordingsPage = onDemand(async () => (await import("../features/recording
 const EventsPage = onDemand(async () => (await import("../features/events/events-page")).EventsPage);
 const SettingsPage = onDemand(async () => (await import("../features/settings/settings-page")).SettingsPage);
 
-const PAGES = ["fleet", "wall", "recordings", "define", "events", "settings"] as const;
 export function App() {
   const shown = route.value;
   const robot = robotOf(shown);
@@ -83,36 +79,12 @@ export function App() {
   const robots = key && !replay ? [key] : fleetRobots.value;
   return (
     <>
-      <header class="bar">
-        <a class="brand" href="#/" aria-label={`robomesh, ${t("fleet")}`}>
-          <Mark />
-          <span>robomesh</span>
-        </a>
-        <nav class="crumbs" aria-label={t("pages")}>
-          {mustSignIn.value ? null : robot || shown.page === "program" ? (
-            <Crumbs page={shown.page} robot={robot} />
-          ) : (
-            <PageLinks current={shown.page} />
-          )}
-        </nav>
-        <div class="bar-end">
-          {mustSignIn.value || <AlarmBadge />}
-          <AccountMenu />
-          <button class="quiet in-settings" onClick={switchLanguage} title={t("language_hint")}>
-            {t("language")}
-          </button>
-          <button
-            class="quiet in-settings"
-            onClick={switchTheme}
-            title={t("theme_hint", { theme: t(theme.value === "dark" ? "theme_dark" : "theme_light") })}
-          >
-            {t(theme.value === "dark" ? "theme_light" : "theme_dark")}
-          </button>
-        </div>
+      <SkipLink />
+      <Bar>
         <StopButton robots={mustSignIn.value ? [] : robots} />
-      </header>
+      </Bar>
       <Banners />
-      <main lang={language.value === "zh" ? "zh-Hans" : "en"}>
+      <main id="page" tabIndex={-1} lang={language.value === "zh" ? "zh-Hans" : "en"}>
         {mustSignIn.value ? (
           <SignIn />
         ) : robot && notFound ? (
@@ -122,6 +94,15 @@ export function App() {
         )}
       </main>
     </>
+  );
+}
+
+/** The first stop of the Tab key: past the bar, to the page. Not a link: a hash is another page here. */
+function SkipLink() {
+  return (
+    <button class="skip-link" onClick={() => document.getElementById("page")?.focus()}>
+      {t("skip")}
+    </button>
   );
 }
 
@@ -148,52 +129,6 @@ function Page({ route, robotKey }: { route: Route; robotKey: string }) {
     case "fleet":
       return <FleetPage />;
   }
-}
-
-/** The way to a robot's page or its program; without a robot, to the choice of one to program. */
-function Crumbs({ page, robot }: { page: Route["page"]; robot: RobotName | null }) {
-  const program = page === "program";
-  return (
-    <>
-      <a href="#/">{t("fleet")}</a>
-      <span aria-hidden="true">/</span>
-      {robot && (
-        <>
-          <span class="dim">{robot.site}</span>
-          <span aria-hidden="true">/</span>
-          {program ? <a href={robotLink(robot.site, robot.robot)}>{robot.robot}</a> : <strong>{robot.robot}</strong>}
-          {program && <span aria-hidden="true">/</span>}
-        </>
-      )}
-      {program && <strong>{t("program")}</strong>}
-    </>
-  );
-}
-
-/** Links to the pages in a row; on a narrow screen, in a menu with the name of the current page. */
-function PageLinks({ current }: { current: Route["page"] }) {
-  const menu = useRef<HTMLDetailsElement>(null);
-  const close = () => menu.current?.removeAttribute("open");
-  const links = () =>
-    PAGES.map((page) => (
-      <a
-        key={page}
-        href={page === "fleet" ? "#/" : `#/${page}`}
-        aria-current={page === current ? "page" : undefined}
-        onClick={close}
-      >
-        {t(page)}
-      </a>
-    ));
-  return (
-    <>
-      <span class="page-links">{links()}</span>
-      <details ref={menu} class="page-menu" onKeyDown={(event) => event.key === "Escape" && close()}>
-        <summary>{t(current === "robot" ? "fleet" : current)}</summary>
-        <div>{links()}</div>
-      </details>
-    </>
-  );
 }
 
 function StopButton({ robots }: { robots: readonly string[] }) {
@@ -279,15 +214,5 @@ function Banners() {
         </div>
       )}
     </>
-  );
-}
-
-function Mark() {
-  return (
-    <svg viewBox="0 0 32 32" width="28" height="28" aria-hidden="true">
-      <path class="mark-arm" d="M6 27h12M10 27V17l9-8 7 5" />
-      <circle class="mark-joint" cx="10" cy="17" r="3" />
-      <circle class="mark-joint" cx="19" cy="9" r="3" />
-    </svg>
   );
 }

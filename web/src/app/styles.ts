@@ -29,3 +29,4 @@ import "../ui/plot.css";
 import "../features/robot/camera-panel.css";
 import "../features/robot/low-bandwidth.css";
 import "./breakpoints.css";
+import "./touch.css";

@@ -3,11 +3,11 @@
 import { inLanguage } from "./texts";
 
 const TEXTS = {
-  define: ["Define a robot", "定义机器人"],
+  define: ["New robot", "新建机器人"],
   loading: ["Loading…", "正在加载…"],
   not_loaded: ["{name} cannot be opened: {text}", "无法打开 {name}：{text}"],
 
-  start_title: ["Define a robot", "定义机器人"],
+  start_title: ["New robot", "新建机器人"],
   start_words: [
     "Give each joint its Denavit–Hartenberg row and each link its shape; then run it here, simulated, on the mesh.",
     "为每个关节给出 D-H 参数，为每个连杆给出外形；随后即可在此仿真运行。",

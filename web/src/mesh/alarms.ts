@@ -35,13 +35,36 @@ export function followAlarms(): () => void {
 // Unacknowledged alarms come first.
 const STATES = [State.UNACKNOWLEDGED, State.RETURNED, State.ACKNOWLEDGED, State.SHELVED];
 
+const byState = (a: Alarm, b: Alarm) => STATES.indexOf(a.state) - STATES.indexOf(b.state);
+const byPriority = (a: Alarm, b: Alarm) => b.priority - a.priority;
+const byTime = (a: Alarm, b: Alarm) => lastMs(b) - lastMs(a);
+/** Orders of alarms; a later comparison counts where the ones before it find no difference. */
+export const ALARM_ORDERS = {
+  order_priority: [byPriority, byState, byTime],
+  order_state: [byState, byPriority, byTime],
+  order_time: [byTime],
+} as const;
+
+/** Return alarms in an order. */
+export function sorted(some: readonly Alarm[], order: keyof typeof ALARM_ORDERS): Alarm[] {
+  const comparisons = ALARM_ORDERS[order];
+  return [...some].sort((a, b) => {
+    for (const compare of comparisons) {
+      const difference = compare(a, b);
+      if (difference !== 0) return difference;
+    }
+    return 0;
+  });
+}
+
 /** Every alarm, most urgent first. */
 export const alarms = computed<readonly Alarm[]>(() =>
-  [...lists.value]
-    .flatMap(([site, { message }]) => message.alarms.map((alarm) => ({ ...alarm, site: alarm.site || site })))
-    .sort(
-      (a, b) => STATES.indexOf(a.state) - STATES.indexOf(b.state) || b.priority - a.priority || lastMs(b) - lastMs(a),
+  sorted(
+    [...lists.value].flatMap(([site, { message }]) =>
+      message.alarms.map((alarm) => ({ ...alarm, site: alarm.site || site })),
     ),
+    "order_priority",
+  ),
 );
 
 /** Active alarms that are not shelved, by `robomesh/<site>/<robot>`. */

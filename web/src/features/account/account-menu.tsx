@@ -1,10 +1,11 @@
 // The account menu in the bar: name and role, sign-out, new password.
 
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useRef, useState } from "preact/hooks";
 import { a, roleText } from "../../i18n/account";
 import { commandSuspended, isMonitor, me, signOut } from "../../mesh/account";
 import { hello } from "../../mesh/connection";
 import { ChangePassword } from "../../panels/change-password";
+import { useDismissal } from "../../ui/dismissal";
 import "./account-menu.css";
 
 export function AccountMenu() {
@@ -14,19 +15,13 @@ export function AccountMenu() {
     setChanging(false);
     menu.current?.removeAttribute("open");
   };
-  useEffect(() => {
-    const elsewhere = (event: Event) => {
-      if (event.target instanceof Node && !menu.current?.contains(event.target)) close();
-    };
-    addEventListener("pointerdown", elsewhere);
-    return () => removeEventListener("pointerdown", elsewhere);
-  }, []);
+  useDismissal(menu, close);
   const who = me.value;
   if (!who?.account) return null;
   const { account, role } = who;
   const operator = hello.value?.operator || who.operator;
   return (
-    <details ref={menu} class="account-menu" onKeyDown={(event) => event.key === "Escape" && close()}>
+    <details ref={menu} class="account-menu">
       <summary title={a("menu", { account, role: roleText(role) })}>
         <span class="account-name">{account}</span> <span class="account-role dim">{roleText(role)}</span>
       </summary>

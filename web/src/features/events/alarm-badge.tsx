@@ -1,4 +1,4 @@
-// The alarm badge of every page: unacknowledged alarms by priority; grey while there is none.
+// The alarm badge of every page: the most urgent unacknowledged alarms, in words; grey while there is none.
 
 import { useEffect } from "preact/hooks";
 import { e } from "../../i18n/events";
@@ -6,6 +6,9 @@ import { anyWatch, counts, followAlarms, silentSites } from "../../mesh/alarms";
 import { startSound } from "../../panels/alarm-sound";
 import { PriorityMark, priorityWord } from "../../ui/priority-mark";
 import "./alarm-badge.css";
+
+/** Return "3 high". */
+const numbered = ({ priority, count }: (typeof counts.value)[number]) => `${count} ${priorityWord(priority)}`;
 
 export function AlarmBadge() {
   useEffect(() => {
@@ -15,25 +18,29 @@ export function AlarmBadge() {
     };
   }, []);
   const counted = counts.value;
+  const [worst] = counted;
+  const others = counted.slice(1).reduce((sum, { count }) => sum + count, 0);
   const silent = silentSites();
   const words = silent.length
     ? e("badge_silent", { sites: silent.join(", ") })
     : !anyWatch.value
       ? e("badge_unknown")
       : counted.length
-        ? e("badge", { counts: counted.map(({ priority, count }) => `${count} ${priorityWord(priority)}`).join(", ") })
+        ? e("badge", { counts: counted.map(numbered).join(", ") })
         : e("badge_none");
   return (
     <a class={`alarm-badge ${counted.length ? "" : "calm"}`} href="#/events" title={words}>
       <span class="unseen">{words}</span>
       {silent.length > 0 && <span class="shape warning" aria-hidden="true" />}
       <span class="badge-counts" aria-hidden="true">
-        {counted.map(({ priority, count }) => (
-          <PriorityMark key={priority} of={priority}>
-            {count}
-          </PriorityMark>
-        ))}
-        {counted.length === 0 && e(silent.length ? "badge_stale" : anyWatch.value ? "badge_calm" : "badge_dash")}
+        {worst ? (
+          <>
+            <PriorityMark of={worst.priority}>{numbered(worst)}</PriorityMark>
+            {others > 0 && <span class="dim">+{others}</span>}
+          </>
+        ) : (
+          e(silent.length ? "badge_stale" : anyWatch.value ? "badge_calm" : "badge_dash")
+        )}
       </span>
     </a>
   );

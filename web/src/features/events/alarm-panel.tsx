@@ -9,6 +9,7 @@ import { t } from "../../i18n/texts";
 import type { Alarm } from "../../mesh/alarms";
 import {
   Action,
+  ALARM_ORDERS,
   act,
   alarms,
   anyWatch,
@@ -19,6 +20,7 @@ import {
   Priority,
   State,
   silentSites,
+  sorted,
 } from "../../mesh/alarms";
 import { hello } from "../../mesh/connection";
 import type { Notice } from "../../mesh/control";
@@ -51,6 +53,7 @@ export function AlarmPanel() {
   const [least, setLeast] = useState<keyof typeof LEAST>("any_priority");
   const [site, setSite] = useState("");
   const [text, setText] = useState("");
+  const [order, setOrder] = useState<keyof typeof ALARM_ORDERS>("order_priority");
   const [selected, setSelected] = useState<ReadonlySet<string>>(new Set());
   const [shelving, setShelving] = useState<readonly Alarm[] | null>(null);
   const [notice, setNotice] = useState<Notice | null>(null);
@@ -64,7 +67,7 @@ export function AlarmPanel() {
       (!site || alarm.site === site) &&
       wordsOf(alarm).toLowerCase().includes(searchText),
   );
-  const drawn = listed.slice(0, MOST_SHOWN);
+  const drawn = sorted(listed, order).slice(0, MOST_SHOWN);
   const chosen = drawn.filter((alarm) => selected.has(nameOf(alarm)));
   const open = drawn.filter(isUnacknowledged);
   const openChosen = chosen.filter(isUnacknowledged);
@@ -112,6 +115,13 @@ export function AlarmPanel() {
             values={Object.keys(LEAST) as (keyof typeof LEAST)[]}
             text={e}
             choose={setLeast}
+          />
+          <Select
+            label={e("order")}
+            value={order}
+            values={Object.keys(ALARM_ORDERS) as (keyof typeof ALARM_ORDERS)[]}
+            text={e}
+            choose={setOrder}
           />
           <SiteSelect site={site} sites={all.map((alarm) => alarm.site)} choose={setSite} />
           <input

@@ -18,7 +18,7 @@ import {
 import { reasonsText, reasonText } from "../../i18n/reasons";
 import type { TextName } from "../../i18n/texts";
 import { t } from "../../i18n/texts";
-import { handleLease } from "../../mesh/control";
+import { handleLease, holds } from "../../mesh/control";
 import type { RobotName } from "../../mesh/robot-name";
 import { disobeys, stateWord, stoppedByItself, stopText } from "../../mesh/robot-state";
 import { useShownState } from "../../mesh/sight";
@@ -28,7 +28,7 @@ import { ControlPanel } from "../../panels/control/control-panel";
 import { ControlRequests } from "../../panels/control/who-controls";
 import { Messages } from "../../panels/messages";
 import { RobotAlarm } from "../../panels/robot-alarm";
-import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
+import { NoRobot, useRobotSearch } from "../../panels/robot-not-found";
 import { ToolPanel } from "../../panels/tool-panel";
 import type { Stage } from "../../scene/robot-scene";
 import { SceneView } from "../../scene/scene-view";
@@ -72,12 +72,12 @@ export function RobotPage({ site, robot }: RobotName) {
     stopped: state?.stop !== undefined || stoppedByItself(state),
     positions: (description?.message.joints ?? []).map((joint) => positions.get(joint.name)),
   };
-  if (useRobotNotFound(key, Boolean(controller ?? description ?? lease)))
-    return <RobotNotFound site={site} robot={robot} />;
+  const search = useRobotSearch(key, Boolean(controller ?? description ?? lease));
+  if (search !== "found") return <NoRobot search={search} site={site} robot={robot} />;
   return (
     <>
       <RobotAlarm state={state} events={events} />
-      <div class={`robot video-${videoPlace}`}>
+      <div class={`robot video-${videoPlace} ${holds(key) ? "in-control" : ""}`}>
         <Headline
           site={site}
           name={robot}
@@ -171,27 +171,31 @@ function Headline(props: {
     if (message.readOnly) facts.push(t("read_only"));
     if (message.legacyClients?.attached) facts.push(t("legacy_some", { count: message.legacyClients.attached }));
   }
+  const runs = isShown(program, events) && program.message.outcome !== Outcome.ENDED;
   return (
     <div class="headline">
-      <div class="who">
-        <h1 title={props.name}>{props.name}</h1>
-        <State state={state} />
+      <div class="glance">
+        <div class="who">
+          <h1 title={props.name}>{props.name}</h1>
+          <State state={state} />
+        </div>
+        <span class="facts dim">{facts.join(" · ")}</span>
+        {description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
+        {runs && <ProgramLine latest={program} />}
       </div>
-      <span class="facts dim">{facts.join(" · ")}</span>
-      <a class="page-link" href={programLink(props.site, props.name)}>
-        {t("program")}
-      </a>
-      <RecordButton robotKey={`robomesh/${props.site}/${props.name}`} />
-      {description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
-      <TopicChoice robotKey={`robomesh/${props.site}/${props.name}`} />
-      {/* Instead of less important facts, so that nothing below moves. */}
-      {isShown(program, events) && program.message.outcome !== Outcome.ENDED ? (
-        <ProgramLine latest={program} />
-      ) : (
-        <span class="provenance dim" lang="en" title={description?.provenance}>
-          {description?.provenance && `${description.title}: ${description.provenance}`}
-        </span>
-      )}
+      <div class="about-robot">
+        <a class="page-link" href={programLink(props.site, props.name)}>
+          {t("program")}
+        </a>
+        <RecordButton robotKey={`robomesh/${props.site}/${props.name}`} />
+        <TopicChoice robotKey={`robomesh/${props.site}/${props.name}`} />
+        {/* A program replaces less important facts, so that nothing below moves. */}
+        {runs || (
+          <span class="provenance dim" lang="en" title={description?.provenance}>
+            {description?.provenance && `${description.title}: ${description.provenance}`}
+          </span>
+        )}
+      </div>
     </div>
   );
 }

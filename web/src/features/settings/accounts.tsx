@@ -103,7 +103,7 @@ function Row({ account, change }: { account: Account; change: Change }) {
         ) : openForm === "remove" ? (
           <>
             <span>{s("remove_sure", { name })}</span>
-            <button class="action" onClick={() => run("remove")}>
+            <button class="action destructive" onClick={() => run("remove")}>
               {s("remove")}
             </button>
             <button class="quiet" onClick={() => setOpen(null)}>
@@ -118,7 +118,7 @@ function Row({ account, change }: { account: Account; change: Change }) {
             <button class="quiet" onClick={() => run(disabled ? "enable" : "disable")}>
               {s(disabled ? "enable" : "disable")}
             </button>
-            <button class="quiet" onClick={() => setOpen("remove")}>
+            <button class="quiet destructive" onClick={() => setOpen("remove")}>
               {s("remove")}
             </button>
           </>

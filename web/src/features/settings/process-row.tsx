@@ -54,7 +54,7 @@ export function ProcessRow(props: { of: string; seen: Seen; latest: Latest<MeshS
           </details>
         )}
       </th>
-      <td>
+      <td data-column={s("age")}>
         {goneAt !== null ? (
           <Marked wrong>{s("gone", { time: timeOfDay(goneAt) })}</Marked>
         ) : silent ? (
@@ -63,20 +63,25 @@ export function ProcessRow(props: { of: string; seen: Seen; latest: Latest<MeshS
           s("fresh")
         )}
       </td>
-      <td>{seen.host || DASH}</td>
-      <td title={differs ? s("version_differs", { version: mine }) : ""}>
+      <td data-column={s("host")}>{seen.host || DASH}</td>
+      <td data-column={s("version")} title={differs ? s("version_differs", { version: mine }) : ""}>
         <Marked wrong={differs}>{seen.version || DASH}</Marked>
       </td>
-      <td>{seen.roundTripS === undefined ? DASH : milliseconds(seen.roundTripS)}</td>
-      <td title={seen.roundTripS === undefined ? "" : s("give_or_take", { value: milliseconds(seen.roundTripS / 2) })}>
+      <td data-column={s("round_trip")}>{seen.roundTripS === undefined ? DASH : milliseconds(seen.roundTripS)}</td>
+      <td
+        data-column={s("clock")}
+        title={seen.roundTripS === undefined ? "" : s("give_or_take", { value: milliseconds(seen.roundTripS / 2) })}
+      >
         <Marked wrong={isClockOff(seen)}>{clockText(seen)}</Marked>
       </td>
-      <td>
+      <td data-column={s("lost")}>
         <Marked wrong={Number(seen.lost) > LOSS * Number(seen.lost + seen.received)}>{lossText(seen)}</Marked>
       </td>
-      <td>{fixed(seen.cpu * 100, 0)} %</td>
-      <td>{count(Math.round(Number(seen.memoryBytes) / MIB))} MiB</td>
-      <td title={stampFull(seen.started)}>{seen.started ? forText(timestampMs(seen.started)) : DASH}</td>
+      <td data-column={s("cpu")}>{fixed(seen.cpu * 100, 0)} %</td>
+      <td data-column={s("memory")}>{count(Math.round(Number(seen.memoryBytes) / MIB))} MiB</td>
+      <td data-column={s("started")} title={stampFull(seen.started)}>
+        {seen.started ? forText(timestampMs(seen.started)) : DASH}
+      </td>
     </tr>
   );
 }

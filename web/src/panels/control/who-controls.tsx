@@ -1,13 +1,14 @@
 // The operator in control, requests and offers of control; and how to take, request or accept it.
 
 import type { ComponentChildren } from "preact";
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import type { Lease, Lease_Asker } from "../../gen/robomesh_pb";
 import { ageText, stampFull, stampTime } from "../../i18n/format";
 import { t } from "../../i18n/texts";
 import { hello, reachable } from "../../mesh/connection";
 import {
   accept,
+  controlNotice,
   holds,
   ms,
   offer,
@@ -103,7 +104,7 @@ export function WhoControls(props: {
           </>
         ) : (
           <button
-            class="action primary"
+            class="action primary take"
             onClick={() => void take(robotKey)}
             disabled={props.readOnly || !reachable.value}
           >
@@ -134,10 +135,29 @@ export function WhoControls(props: {
   );
 }
 
+/** Say so when this operator's request for control has expired without an answer. */
+function useExpiredRequest(lease: Lease | undefined, mine: boolean): void {
+  const asked = useRef<{ by: string; holder: string; since: number } | null>(null);
+  const me = operator.value.trim();
+  useEffect(() => {
+    if (!lease) return;
+    const { holder } = lease;
+    const since = ms(lease.since);
+    const before = asked.current;
+    const pending = me !== "" && lease.askedBy.some((asker) => asker.operator === me);
+    asked.current = pending ? { by: me, holder, since } : null;
+    // Control that ended, was offered or was handed over answers the request.
+    const answered = mine || lease.offeredTo === me || holder !== before?.holder || since !== before.since;
+    if (before?.by === me && !pending && !answered)
+      controlNotice.value = { kind: "refused", text: t("ask_expired", { name: holder }) };
+  }, [lease, mine, me]);
+}
+
 /** Requests and offers of control: every page shows them, the operators concerned can answer. */
 export function ControlRequests(props: { robotKey: string; holder: string | null; lease: Lease | undefined }) {
   const { robotKey, holder, lease } = props;
   const mine = holds(robotKey);
+  useExpiredRequest(lease, mine);
   if ((mayNotCommand() && !mine) || !holder || !lease) return null;
   return <Requests mine={mine} robotKey={robotKey} lease={lease} />;
 }
