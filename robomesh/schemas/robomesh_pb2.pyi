@@ -1660,7 +1660,7 @@ class ToPage(_message.Message):
         alive: bool
         def __init__(self, key: _Optional[str] = ..., alive: _Optional[bool] = ...) -> None: ...
     class Hello(_message.Message):
-        __slots__ = ("version", "site", "insecure", "stale", "connected", "session", "account", "operator", "may_command")
+        __slots__ = ("version", "site", "insecure", "stale", "connected", "session", "account", "operator", "may_command", "presence_known")
         class Stale(_message.Message):
             __slots__ = ("topic", "after_s")
             TOPIC_FIELD_NUMBER: _ClassVar[int]
@@ -1677,6 +1677,7 @@ class ToPage(_message.Message):
         ACCOUNT_FIELD_NUMBER: _ClassVar[int]
         OPERATOR_FIELD_NUMBER: _ClassVar[int]
         MAY_COMMAND_FIELD_NUMBER: _ClassVar[int]
+        PRESENCE_KNOWN_FIELD_NUMBER: _ClassVar[int]
         version: str
         site: str
         insecure: bool
@@ -1686,7 +1687,8 @@ class ToPage(_message.Message):
         account: str
         operator: str
         may_command: bool
-        def __init__(self, version: _Optional[str] = ..., site: _Optional[str] = ..., insecure: _Optional[bool] = ..., stale: _Optional[_Iterable[_Union[ToPage.Hello.Stale, _Mapping]]] = ..., connected: _Optional[bool] = ..., session: _Optional[str] = ..., account: _Optional[str] = ..., operator: _Optional[str] = ..., may_command: _Optional[bool] = ...) -> None: ...
+        presence_known: bool
+        def __init__(self, version: _Optional[str] = ..., site: _Optional[str] = ..., insecure: _Optional[bool] = ..., stale: _Optional[_Iterable[_Union[ToPage.Hello.Stale, _Mapping]]] = ..., connected: _Optional[bool] = ..., session: _Optional[str] = ..., account: _Optional[str] = ..., operator: _Optional[str] = ..., may_command: _Optional[bool] = ..., presence_known: _Optional[bool] = ...) -> None: ...
     SAMPLE_FIELD_NUMBER: _ClassVar[int]
     ANSWER_FIELD_NUMBER: _ClassVar[int]
     PRESENCE_FIELD_NUMBER: _ClassVar[int]

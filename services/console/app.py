@@ -1,6 +1,7 @@
 """The console's server: serves the built page and connects its WebSockets to the mesh."""
 
 import asyncio
+import contextlib
 import functools
 import logging
 import ssl
@@ -22,6 +23,7 @@ from starlette.websockets import WebSocket
 
 from robomesh import keys, topics
 from robomesh import reason_codes as codes
+from robomesh.errors import NoAnswerError
 from robomesh.health import own_version
 from robomesh.keys import PresenceKey
 from robomesh.schemas.robomesh_pb2 import Event, ToPage
@@ -148,6 +150,8 @@ class Hub:
         self.views = Views(session)
         self.pictures = Pictures(self.subscriptions, self.views, session, self.asker)
         self._alive: set[PresenceKey] = set()
+        # After a start or a lost link, tokens arrive one by one.
+        self._presence_known = False
         self._browsers: set[Browser] = set()
         self._closed_browsers = Counter[str]()  # samples of closed browsers
         self.exposed = exposed
@@ -162,7 +166,12 @@ class Hub:
             )
 
     async def __aenter__(self) -> "Hub":
-        work = self._watch_presence(), self._watch_router(), asyncio.to_thread(png.prepare)
+        work = (
+            self._watch_presence(),
+            self._watch_presence_known(),
+            self._watch_router(),
+            asyncio.to_thread(png.prepare),
+        )
         self._tasks = [asyncio.create_task(each) for each in work]
         if self.auth is not None:
             self._tasks.append(asyncio.create_task(self.auth.follow()))
@@ -200,6 +209,8 @@ class Hub:
         for each in self._alive:
             browser.send_message(_presence(each, alive=True))
         self._browsers.add(browser)
+        if self._presence_known:
+            browser.greet()  # again, now that it has all presence
         try:
             if user is None:
                 await browser.run(websocket)
@@ -246,6 +257,7 @@ class Hub:
             session=browser.operator.id,
             may_command=browser.user is None or browser.user.may_command,
             operator=browser.own_name,
+            presence_known=self._presence_known and browser in self._browsers,
         )
         if browser.user is not None:
             hello.account = browser.user.account.name
@@ -259,6 +271,18 @@ class Hub:
             (self._alive.add if alive else self._alive.discard)(token)
             for browser in self._browsers:
                 browser.send_message(_presence(token, alive=alive))
+
+    async def _watch_presence_known(self) -> None:
+        while True:
+            await asyncio.sleep(_CONNECTION_CHECK_EVERY_S)
+            if not self.session.connected:
+                self._presence_known = False
+            elif not self._presence_known:
+                with contextlib.suppress(NoAnswerError):
+                    self._presence_known = self._alive.issuperset(await self.session.present())
+                if self._presence_known:
+                    for browser in self._browsers:
+                        browser.greet()
 
     async def _watch_router(self) -> None:
         connected = self.session.connected

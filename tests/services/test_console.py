@@ -122,6 +122,23 @@ def test_a_page_is_greeted_with_the_stale_times_of_the_topic_table(mesh, page):
     run(main())
 
 
+def test_a_page_learns_when_it_has_the_presence_of_every_robot(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, other):
+            other.declare_presence("s", "r", "gateway")
+            async with browse(address) as first:
+                await first.until(lambda: first.other and first.other[-1].hello.presence_known)
+                known = [each.presence.key for each in first.other if each.HasField("presence")]
+                assert any(key.startswith("robomesh/s/r/alive/gateway/") for key in known)
+            async with browse(address) as second:
+                await second.until(lambda: second.other and second.other[-1].hello.presence_known)
+                order = [each.WhichOneof("message") for each in second.other]
+                assert order[0] == order[-1] == "hello"
+                assert "presence" in order[1:-1]
+
+    run(main())
+
+
 def test_payload_and_attachment_reach_the_page_as_they_were(mesh, page):
     async def main():
         async with console(mesh, page) as (address, other), browse(address) as browser:

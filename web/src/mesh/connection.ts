@@ -250,6 +250,7 @@ export function receive(bytes: Uint8Array): void {
   const { message } = fromBinary(ToPageSchema, bytes);
   switch (message.case) {
     case "hello":
+      if (message.value.presenceKnown) applyPresenceChanges();
       hello.value = message.value;
       lostAt.value = null;
       break;

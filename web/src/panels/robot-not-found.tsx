@@ -1,26 +1,46 @@
 // The page of a robot that does not exist, with links to those that do.
 
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../i18n/texts";
 import { hello, lostAt } from "../mesh/connection";
 import { fleetRobots } from "../mesh/known-robots";
 import type { RobotName } from "../mesh/robot-name";
+import { isReplay } from "../mesh/robot-name";
 import { robotLink } from "../ui/route";
 
+/** How long a console may take to know every robot, just after its start. */
 const SEARCH_MS = 4000;
 
-/** Return whether a live connection received nothing of a robot for some seconds; `known`: something was received. */
-export function useRobotNotFound(robotKey: string, known: boolean): boolean {
+/** Whether a robot exists: while it is not known, nothing of it is shown, controls least of all. */
+export type Search = "found" | "looking" | "missing";
+
+/** Look for a robot; `known`: something was received of it. */
+export function useRobotSearch(robotKey: string, known: boolean): Search {
   const [waited, setWaited] = useState(false);
-  const there = known || fleetRobots.value.includes(robotKey);
+  const found = useRef("");
+  if (known || fleetRobots.value.includes(robotKey)) found.current = robotKey;
+  const there = found.current === robotKey;
   const connected = lostAt.value === null && hello.value?.connected === true;
+  // A replay has no presence of its own.
+  const complete = hello.value?.presenceKnown === true && !isReplay(robotKey.split("/")[2] ?? "");
   useEffect(() => {
     setWaited(false);
     if (there || !connected) return;
     const timer = setTimeout(() => setWaited(true), SEARCH_MS);
     return () => clearTimeout(timer);
   }, [robotKey, there, connected]);
-  return waited && !there;
+  if (there) return "found";
+  return waited || (connected && complete) ? "missing" : "looking";
+}
+
+/** In the place of a robot's page while it is not known whether the robot exists, or that it does not. */
+export function NoRobot({ search, ...robot }: RobotName & { search: Search }) {
+  if (search === "missing") return <RobotNotFound {...robot} />;
+  return (
+    <p class="missing looking dim" role="status">
+      {t("looking_for", { ...robot })}
+    </p>
+  );
 }
 
 export function RobotNotFound({ site, robot }: RobotName) {

@@ -16,7 +16,7 @@ import { ControlPanel } from "../../panels/control/control-panel";
 import { ControlRequests } from "../../panels/control/who-controls";
 import { Messages } from "../../panels/messages";
 import { RobotAlarm } from "../../panels/robot-alarm";
-import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
+import { NoRobot, useRobotSearch } from "../../panels/robot-not-found";
 import type { Stage } from "../../scene/robot-scene";
 import { SceneView } from "../../scene/scene-view";
 import { programLink, robotLink } from "../../ui/route";
@@ -121,7 +121,8 @@ function ProgramOfRobot({ site, robot }: RobotName) {
     if (lease) handleLease(key, lease.message);
   }, [key, lease]);
 
-  if (useRobotNotFound(key, isKnownRobot)) return <RobotNotFound site={site} robot={robot} />;
+  const search = useRobotSearch(key, isKnownRobot);
+  if (search !== "found") return <NoRobot search={search} site={site} robot={robot} />;
   const motion = {
     running: lease?.message.motion === true,
     stopped: state?.stop !== undefined || stoppedByItself(state),

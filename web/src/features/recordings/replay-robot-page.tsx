@@ -10,7 +10,7 @@ import { Replay } from "../../mesh/replay";
 import { useMomentState } from "../../mesh/replay-moment";
 import type { RobotName } from "../../mesh/robot-name";
 import { ageOf, isStale, useTopic } from "../../mesh/topics";
-import { RobotNotFound, useRobotNotFound } from "../../panels/robot-not-found";
+import { NoRobot, useRobotSearch } from "../../panels/robot-not-found";
 import { ToolPanel } from "../../panels/tool-panel";
 import { SceneView } from "../../scene/scene-view";
 import { Panel } from "../../ui/panel";
@@ -35,7 +35,8 @@ export function ReplayRobotPage({ site, robot }: RobotName) {
   const moment = usePosition(replay);
   const arm = useMomentState(replay, "frames", 1);
   const gone = latest !== undefined && isStale("replay", ageOf(latest));
-  if (useRobotNotFound(key, Boolean(latest ?? description))) return <RobotNotFound site={site} robot={robot} />;
+  const search = useRobotSearch(key, Boolean(latest ?? description));
+  if (search !== "found") return <NoRobot search={search} site={site} robot={robot} />;
   const state = latest?.message;
   return (
     <div class="player of-robot" data-replay={robot}>
