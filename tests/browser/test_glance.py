@@ -1,0 +1,165 @@
+"""The page at a glance: first screen of a phone, touch targets, the bar of every page, choice of a robot."""
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from protocol_gateway.authority import lease_rules
+from tests.browser.robot_page import ARM, button, take
+
+pytestmark = pytest.mark.browser
+
+PAGES = {
+    "#/": ".tile .state",
+    "#/hall/arm": '[data-joint="waist"]',
+    "#/wall": ".wall-tile",
+    "#/recordings": "h1",
+    "#/program": "main h1",
+    "#/program/hall/arm": ".program",
+    "#/define": "h1",
+    "#/events": ".alarms",
+    "#/settings": ".panel.mesh",
+    "#/hall/nowhere": "main h1",
+}
+# Buttons, links and fields that a finger would miss. A link in a sentence is as high as its line; a box
+# is as large as its label.
+SMALL = """() => [...document.querySelectorAll(
+    "a[href], button, select, summary, textarea, input:not([type=file]), [role=slider]")]
+  .filter(each => each.checkVisibility({visibilityProperty: true}) && !each.matches(".skip-link"))
+  .filter(each => !(each.matches("p a") && each.parentElement.textContent !== each.textContent))
+  .map(each => [each, (each.closest("label") ?? each).getBoundingClientRect()])
+  .filter(([, box]) => box.width > 1 && (box.width < 44 || box.height < 44))
+  .map(([each, box]) => `${each.outerHTML.slice(0, 90)} ${box.width} x ${box.height}`)"""
+NAMES = ["Fleet", "Wall", "Recordings", "Events", "New robot", "Settings"]
+
+
+def visit(page, path):
+    page.evaluate("path => (location.hash = path)", path)
+    expect(page.locator(PAGES[path]).first).to_be_visible()
+
+
+def box_of(page, selector):
+    place = page.locator(selector)
+    expect(place).to_be_visible()
+    return place.bounding_box()
+
+
+def bottom_of(page, selector):
+    box = box_of(page, selector)
+    return box["y"] + box["height"]
+
+
+@pytest.mark.parametrize(("width", "height"), [(360, 740), (768, 1024)])
+def test_every_touch_target_of_every_page_is_large_enough_for_a_finger(open_page, width, height):
+    page = open_page("", width, height, has_touch=True, drawn=False, refused=True)
+    found = {}
+    for path in PAGES:
+        visit(page, path)
+        found[path] = page.evaluate(SMALL)
+        assert page.evaluate("document.documentElement.scrollWidth") == width
+    visit(page, ARM)
+    take(page)
+    found["in control"] = page.evaluate(SMALL)
+    button(page, "Release").click()
+    assert found == {path: [] for path in found}
+
+
+def test_the_first_screen_of_a_phone_has_picture_state_stop_and_joints(open_page):
+    page = open_page(ARM, 360, 740, has_touch=True, drawn=False)
+    expect(page.locator("[data-joint]")).to_have_count(5)
+    stop = box_of(page, "button.stop")["y"]
+    for shown in (".panel.scene", ".headline .state", '[data-joint="roll"]'):
+        assert bottom_of(page, shown) <= stop
+    control = box_of(page, ".panel.control")
+    assert control["height"] <= 64
+    take(page)
+    assert box_of(page, ".panel.control")["height"] > control["height"]
+    for name in ("Home", "Hold", "waist +1°"):
+        expect(button(page, name)).to_be_visible()
+    button(page, "Release").click()
+    expect(button(page, "waist +1°")).to_be_hidden()
+    assert box_of(page, ".panel.control")["height"] >= control["height"]
+
+
+def test_the_first_screen_at_200_percent_shows_the_robot(open_page):
+    page = open_page(ARM, 720, 450, device_scale_factor=2, drawn=False)
+    expect(page.locator("[data-joint]")).to_have_count(5)
+    scene, stop = box_of(page, ".panel.scene"), box_of(page, "button.stop")
+    assert scene["height"] >= 200
+    assert scene["y"] + scene["height"] <= stop["y"]
+    assert bottom_of(page, '[data-joint="shoulder"]') <= stop["y"]
+
+
+def test_every_page_has_the_same_bar(open_page):
+    page = open_page(drawn=False, refused=True)
+    bars = []
+    for path in PAGES:
+        visit(page, path)
+        links = page.locator("header nav a:visible")
+        expect(links).to_have_text(NAMES)
+        bars.append([each.bounding_box() for each in links.all()])
+    assert all(bar == bars[0] for bar in bars)
+    page.set_viewport_size({"width": 360, "height": 740})
+    for path in ("#/wall", ARM):
+        visit(page, path)
+        page.locator("header summary[aria-label=Pages]").click()
+        expect(page.locator("header nav a:visible")).to_have_text(NAMES)
+        page.keyboard.press("Escape")
+        expect(page.locator("header nav a:visible")).to_have_count(0)
+
+
+def test_the_bar_leads_to_another_robot_by_a_few_letters(open_page):
+    page = open_page(ARM, drawn=False)
+    page.get_by_role("button", name="arm Choose another robot").click()
+    options = page.get_by_role("option")
+    expect(options).to_have_text([re.compile("^arm"), re.compile("^pt600")])
+    expect(options.nth(1)).to_contain_text(re.compile("Moving|Idle"))
+    page.keyboard.press("ArrowDown")
+    expect(options.nth(1)).to_have_attribute("aria-selected", "true")
+    page.keyboard.press("Escape")
+    expect(options).to_have_count(0)
+    page.keyboard.press("Enter")  # the focus is at the button again
+    page.keyboard.type("hall pt")
+    expect(options).to_have_count(1)
+    page.keyboard.press("Enter")
+    expect(page.locator("h1")).to_have_text("pt600")
+    # A program's page leads to the other robot's program.
+    visit(page, "#/program/hall/arm")
+    page.get_by_role("button", name="arm Choose another robot").click()
+    page.keyboard.type("pt6")
+    page.keyboard.press("Enter")
+    expect(page).to_have_url(re.compile("#/program/hall/pt600$"))
+
+
+def test_a_request_for_control_that_expires_says_so_to_its_operator(open_page, monkeypatch):
+    monkeypatch.setattr(lease_rules, "ASKED_FOR_S", 2.0)
+    mine, other = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
+    take(mine, "li")
+    other.get_by_label("Your name").fill("bob")
+    button(other, "Ask for control").click()
+    other.get_by_label("Reason").press("Enter")
+    expect(mine.locator(".wish")).to_contain_text("bob asks for control")
+    expect(other.locator(".control .notice")).to_contain_text("li did not answer your request")
+    expect(mine.locator(".wish")).to_have_count(0)
+    button(mine, "Release").click()
+
+
+def test_a_robot_that_does_not_exist_is_said_at_once_without_any_control_before(open_page):
+    page = open_page(drawn=False)
+    expect(page.locator(".tile").first).to_be_visible()
+    # Everything that the page shows from now on.
+    page.evaluate(
+        """() => { window.seen = new Set();
+        new MutationObserver(() => {
+            for (const name of [".control", ".step", ".scene", ".looking", ".missing h1"])
+                if (document.querySelector(name)) window.seen.add(name);
+        }).observe(document, {childList: true, subtree: true}); }"""
+    )
+    page.evaluate("location.hash = '#/hall/nowhere'")
+    expect(page.locator("main h1")).to_have_text("There is no robot nowhere at hall.")
+    page.evaluate("location.hash = '#/program/hall/nowhere'")
+    expect(page.locator("main h1")).to_have_text("There is no robot nowhere at hall.")
+    assert page.evaluate("[...window.seen]") == [".missing h1"]
+    visit(page, ARM)
+    expect(page.locator(".panel.control")).to_be_visible()
