@@ -17,7 +17,9 @@ PAGES = {
     "#/hall/arm": '[data-joint="waist"]',
     "#/wall": ".wall-tile",
     "#/recordings": "h1",
-    "#/program/hall/arm": ".program, main h1",
+    "#/program": "main h1",
+    "#/program/hall/arm": ".program",
+    "#/hall/nowhere": "main h1",
     "#/events": ".alarm-line",
     "#/settings": ".panel.mesh",
 }
@@ -69,9 +71,25 @@ def test_axe_finds_nothing_serious_on_any_page_and_a_chinese_page_is_chinese(
     for path in PAGES:
         visit(page, path)
         found[path] = serious(page)
+        if (headings := page.locator("h1").count()) != 1:
+            found[path] += [f"{headings} headings of the first level"]
         if language == "zh":
             found[path] += page.evaluate(ENGLISH)
     assert found == {path: [] for path in PAGES}
+
+
+def test_the_first_stop_of_the_tab_key_skips_the_bar(open_page):
+    page = open_page("#/settings", drawn=False)
+    expect(page.locator(PAGES["#/settings"])).to_be_visible()
+    page.keyboard.press("Tab")
+    skip = page.get_by_role("button", name="Skip to the page")
+    expect(skip).to_be_focused()
+    expect(skip).to_be_in_viewport()
+    page.keyboard.press("Enter")
+    expect(page.locator("main")).to_be_focused()
+    expect(skip).not_to_be_in_viewport()
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.closest('main') !== null")
 
 
 def test_no_page_scrolls_sideways_on_a_phone_and_everything_is_large_enough_for_a_thumb(open_page, alarmed):

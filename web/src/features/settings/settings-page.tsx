@@ -1,5 +1,6 @@
 // The settings page: health of the mesh, presence, this browser, and the console's accounts.
 
+import { t } from "../../i18n/texts";
 import { me } from "../../mesh/account";
 import { hello } from "../../mesh/connection";
 import { About } from "./about";
@@ -15,6 +16,7 @@ import "./settings-page.css";
 export function SettingsPage() {
   return (
     <div class="settings-page">
+      <h1 class="unseen">{t("settings")}</h1>
       <ThisConsole hello={hello.value} />
       <Appearance />
       <MeshPanel />

@@ -29,6 +29,7 @@ export function ViewPage({ site, robot, view }: ViewName) {
   const stale = problem !== "" || isStale("video/*", age);
   return (
     <main class={stale ? "frame stale" : "frame"}>
+      <h1 class="unseen">{label}</h1>
       <div class="frame-picture">
         {address && <img src={address} alt={label} />}
         {stale && (
