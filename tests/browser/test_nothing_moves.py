@@ -76,7 +76,7 @@ def test_a_press_on_a_control_that_has_just_moved_is_ignored(page):
         const box = document.querySelector(".step").getBoundingClientRect();
         return [box.left + box.width / 2, box.top + box.height / 2];
     }"""
-    step.scroll_into_view_if_needed()
+    step.evaluate("each => each.scrollIntoView({block: 'center'})")  # not under STOP
     page.wait_for_timeout(600)
     waist = page.locator("[data-joint]").first
     at_rest = waist.inner_text()

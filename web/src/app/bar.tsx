@@ -79,7 +79,7 @@ function PageMenu({ current }: { current: Route["page"] }) {
         <svg viewBox="0 0 24 24" width="24" height="24" aria-hidden="true">
           <path d="M4 7h16M4 12h16M4 17h16" />
         </svg>
-        {current !== "robot" && current !== "program" && <strong>{t(current)}</strong>}
+        {current !== "robot" && !robotOf(route.value) && <strong>{t(current)}</strong>}
       </summary>
       <nav aria-label={t("pages")}>
         <PageLinks current={current} chosen={close} />
