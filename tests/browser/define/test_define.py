@@ -311,6 +311,65 @@ def test_a_urdf_and_its_shapes_become_rows(open_page, tmp_path):
     assert np.allclose(drawn, reported, atol=1e-9)
 
 
+SAME_NAMES = """<robot name="two"><link name="base">{base}</link><link name="arm">{arm}</link>
+<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><origin xyz="0 0 0.2"/>
+<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+
+
+def shapes_of(link):
+    """Return a link's elements, whose two files have one name in two folders."""
+    return "".join(
+        f'<{kind}><geometry><mesh filename="package://two/meshes/{kind}/{link}.stl"/></geometry></{kind}>'
+        for kind in ("visual", "collision")
+    )
+
+
+def stl(triangles):
+    """Return a surface of so many triangles."""
+    vertex = "vertex {} {} {}\n".format
+    facets = (
+        "facet normal 0 0 1\nouter loop\n"
+        + vertex(0, 0, 0)
+        + vertex(math.cos(i / 9), math.sin(i / 9), 0.1)
+        + vertex(math.cos((i + 1) / 9), math.sin((i + 1) / 9), 0.1)
+        + "endloop\nendfacet\n"
+        for i in range(triangles)
+    )
+    return f"solid s\n{''.join(facets)}endsolid s\n".encode()
+
+
+def test_a_urdf_and_files_of_one_name_are_read_in_one_drop_and_unused_ones_are_named(open_page):
+    page = open_page("#/define")
+    urdf = SAME_NAMES.format(base=shapes_of("base"), arm=shapes_of("arm")).encode()
+    links = [(f"{link}.stl", stl(count)) for link in ("base", "arm") for count in (7, 31)]
+    drop(page, ("two.urdf", urdf), *links, ("spare.stl", stl(3)), ("notes.txt", b"by hand"))
+    notices = page.locator(".file-notices, .define")
+    expect(notices.first).to_contain_text("two.urdf read: 4 of its 4 mesh files found.")
+    expect(notices.first).to_contain_text("Not used by this robot: spare.stl, notes.txt.")
+    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "2")
+    # The finer one is what is seen.
+    choose(page, 0)
+    expect(page.locator(".define")).to_contain_text("31 triangles")
+
+
+def test_found_and_missing_files_of_a_urdf_are_counted(open_page):
+    page = open_page("#/define")
+    urdf = SAME_NAMES.format(base=shapes_of("base"), arm=shapes_of("arm")).encode()
+    drop(page, ("two.urdf", urdf), ("base.stl", stl(7)))
+    # Without a second file, the one serves both.
+    expect(page.locator(".missing-files")).to_contain_text("2 mesh files found, 2 missing.")
+    drop(page, ("arm.stl", stl(7)))
+    expect(page.locator(".define")).to_contain_text("two.urdf read: 4 of its 4 mesh files found.")
+    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "2")
+
+
+def test_a_xacro_file_is_refused_with_what_to_do(open_page):
+    page = open_page("#/define")
+    drop(page, ("arm.urdf.xacro", b"<robot/>"), ("base.stl", stl(7)))
+    expect(page.locator("main")).to_contain_text("arm.urdf.xacro is a template, not a URDF.")
+    expect(page.locator(".chain-row")).to_have_count(0)
+
+
 def test_a_urdf_whose_first_axis_points_down_keeps_its_base_frame(open_page, plant):
     page = open_page("#/define")
     drop(page, ("down.urdf", KUKA_LIKE.encode()))

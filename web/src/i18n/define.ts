@@ -44,6 +44,17 @@ const TEXTS = {
   urdf_twice: ["A URDF starts a robot of its own: choose New first.", "URDF 会开始新的机器人：请先选择“新建”。"],
   nothing_dropped: ["There is no file in what was dropped.", "拖入内容中没有文件。"],
   none_to_read: ["There is no mesh file, URDF or zip among them.", "其中没有网格文件、URDF 或 zip。"],
+  urdf_read: [
+    "{name} read: {found} of its {count} mesh files found.",
+    "已读取 {name}：找到 {count} 个网格文件中的 {found} 个。",
+  ],
+  unused: ["Not used by this robot: {names}.", "此机器人未使用：{names}。"],
+  unused_more: ["Not used by this robot: {names} and {more} more.", "此机器人未使用：{names} 以及另外 {more} 个文件。"],
+  xacro: [
+    "{name} is a template, not a URDF. Convert it (xacro FILE > robot.urdf), and drop the URDF together with the meshes.",
+    "{name} 是模板，不是 URDF。请先转换（xacro 文件 > robot.urdf），再将 URDF 与网格文件一起拖入。",
+  ],
+  missing_count: ["{found} mesh files found, {missing} missing.", "找到 {found} 个网格文件，缺少 {missing} 个。"],
   missing_title: ["Files that others refer to are missing", "缺少被引用的文件"],
   missing_for: ["{file} refers to", "{file} 引用"],
   missing_words: ["Drop them here, or choose them.", "请拖入或选择这些文件。"],

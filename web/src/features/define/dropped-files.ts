@@ -8,14 +8,17 @@ import type { Draft, Identity } from "./draft";
 import { draft, editDraft, identity, isOpen, openDraft } from "./draft";
 import { insertJoint, nameFromFile, unusedName } from "./edits";
 import { cacheFile } from "./file-cache";
-import { missingFiles, readShape, resolvePath, setShape } from "./mesh-files";
+import { baseName, missingFiles, readShape, resolvePath, setShape } from "./mesh-files";
 import { choosePart, resetSelection } from "./selection";
 import type { MeshInfo } from "./server-requests";
 import { importRobot, mesh, unzip, upload } from "./server-requests";
+import { filesByAddress, PART_OF_SHAPE, partsBeside, placeOf } from "./urdf-files";
 
 /** File types that may be meshes; the server decides which it can read. */
 const SHAPE = /\.(wrl|wrz|vrml|3ds|stl|obj|ply|off|dae|glb|gltf|dxf|ste?p|ige?s)(\.gz)?$/i;
+const USEFUL = [SHAPE, PART_OF_SHAPE, /\.(urdf|toml|zip)$/i];
 const MESH_FOLDER = "meshes";
+const MOST_NAMED = 6; // of the files that are not taken
 
 /** A file with its path in the dropped folder, or its name. */
 export interface Dropped {
@@ -34,9 +37,16 @@ export const reading = signal("");
 export const fileNotices = signal<readonly Notice[]>([]);
 /** Paths of missing files that the user skipped. */
 export const skippedFiles = signal<ReadonlySet<string>>(new Set());
-/** A URDF that waits for files. */
-export const waitingUrdf = signal<{ file: string; files: Record<string, string>; missing: string[] } | null>(null);
+/** A URDF that waits for files; `found` is the number of its shapes that are there. */
+export const waitingUrdf = signal<{
+  file: string;
+  files: Record<string, string>;
+  found: number;
+  missing: string[];
+} | null>(null);
 
+/** Sizes of uploaded files [bytes] by SHA-256. */
+const sizes = new Map<string, number>();
 let last: Promise<void> = Promise.resolve();
 /** The page or draft that the files were dropped on. */
 let target: Identity | null = null;
@@ -99,13 +109,19 @@ async function filesOf(entry: FileSystemEntry): Promise<Dropped[]> {
 /** Upload and keep files; return SHA-256 by path. A zip archive counts as its files. */
 async function sendAll(dropped: readonly Dropped[]): Promise<Map<string, string>> {
   const sent = new Map<string, string>();
+  // Files of several folders that were dropped without them.
+  const free = (path: string, number = 2): string => {
+    const other = `${number}/${path}`;
+    return sent.has(other) ? free(path, number + 1) : other;
+  };
   for (const [index, { path, file }] of dropped.entries()) {
     if (isClosed()) break;
     reading.value = d("reading", { name: file.name, number: index + 1, count: dropped.length });
     try {
       const { sha } = await upload(file.name, file);
       await cacheFile(sha, file);
-      if (!/\.zip$/i.test(path)) sent.set(path, sha);
+      sizes.set(sha, file.size);
+      if (!/\.zip$/i.test(path)) sent.set(sent.has(path) ? free(path) : path, sha);
       else for (const [inside, its] of Object.entries(await unzip(file.name, sha))) sent.set(inside, its);
     } catch (error) {
       refuse(file.name, error);
@@ -129,7 +145,9 @@ async function take(dropped: readonly Dropped[], asRobot: boolean): Promise<void
   const sorted = [...dropped].sort((one, other) =>
     one.path.localeCompare(other.path, "en", { numeric: true, sensitivity: "base" }),
   );
-  const sent = await sendAll(sorted);
+  const useful = sorted.filter(({ path }) => USEFUL.some((each) => each.test(path)));
+  const others = sorted.filter((each) => !useful.includes(each)).map(({ path }) => path);
+  const sent = await sendAll(useful);
   if (isClosed()) return;
   const paths = [...sent.keys()];
   const robotFile =
@@ -137,8 +155,10 @@ async function take(dropped: readonly Dropped[], asRobot: boolean): Promise<void
     paths.find((path) => /\.urdf$/i.test(path)) ??
     (asRobot ? paths.find((path) => /\.(wrl|wrz|vrml)$/i.test(path)) : undefined);
   const waiting = waitingUrdf.value;
+  const template = others.find((path) => /\.xacro$/i.test(path));
   if (waiting && !robotFile) await readUrdf(waiting.file, { ...waiting.files, ...Object.fromEntries(sent) });
-  else if (robotFile) await readUrdf(robotFile, Object.fromEntries(sent));
+  else if (robotFile) await readUrdf(robotFile, Object.fromEntries(sent), { others });
+  else if (template) notice("refused", d("xacro", { name: template }));
   else await takeShapes(sent);
 }
 
@@ -255,25 +275,33 @@ export function takeShapeFor(dropped: readonly Dropped[], find: (of: Description
 export function continueWithoutMissing(): Promise<void> {
   const waiting = waitingUrdf.value;
   return enqueue(async () => {
-    if (waiting) await readUrdf(waiting.file, waiting.files, true);
+    if (waiting) await readUrdf(waiting.file, waiting.files, { without: true });
   });
 }
 
-/** Open a URDF's robot; if files are missing, wait for them. */
-async function readUrdf(file: string, files: Record<string, string>, without = false): Promise<void> {
+/** Open a URDF's robot; if files are missing, wait for them unless it is opened `without` them.
+ *
+ * `others`: paths of dropped files that no robot can use. */
+async function readUrdf(
+  file: string,
+  files: Record<string, string>,
+  { without = false, others = [] }: { without?: boolean; others?: readonly string[] } = {},
+): Promise<void> {
   reading.value = d("reading", { name: file, number: 1, count: 1 });
   try {
     if (draft.value) throw new Error(d("urdf_twice"));
-    let answer = await importRobot(file, files);
-    // Place files without folders where the URDF expects them.
-    const placed = placedWhereMissing(file, files, answer.missing);
-    if (placed) {
-      files = placed;
-      answer = await importRobot(file, files);
-    }
+    // Alone, a URDF misses every file that it names.
+    const alone = /\.urdf$/i.test(file) ? { [file]: files[file] ?? "" } : files;
+    const named = (await importRobot(file, alone)).missing;
+    const { placed, used } = placedFor(named, file, files);
+    const answer = await importRobot(file, { ...files, ...placed });
     if (isClosed()) return;
+    const found = named.length - answer.missing.length;
+    const unused = Object.keys(files).filter((path) => alone !== files && path !== file && !used.has(path));
+    nameUnused([...unused, ...others]);
     if (answer.missing.length > 0 && !without) {
-      waitingUrdf.value = { file, files, missing: answer.missing };
+      const kept = alone === files ? files : { ...alone, ...placed };
+      waitingUrdf.value = { file, files: kept, found, missing: answer.missing };
       return;
     }
     waitingUrdf.value = null;
@@ -281,24 +309,34 @@ async function readUrdf(file: string, files: Record<string, string>, without = f
     const made: Draft = { description: complete(answer.description), files: answer.files };
     resetSelection();
     openDraft(made);
+    if (alone !== files && named.length > 0) notice("done", d("urdf_read", { name: file, found, count: named.length }));
     for (const text of answer.notes) notice("done", text);
   } catch (error) {
     refuse(file, error);
   }
 }
 
-function placedWhereMissing(file: string, files: Readonly<Record<string, string>>, missing: readonly string[]) {
-  const byName = new Map(Object.entries(files).map(([path, sha]) => [baseName(path), sha]));
+/** Return files at the places where a URDF expects them, and the paths that are used for it. */
+function placedFor(addresses: readonly string[], urdf: string, files: Readonly<Record<string, string>>) {
+  const paths = Object.keys(files);
+  const candidates = paths.map((path) => ({ path, size: sizes.get(files[path] ?? "") ?? 0 }));
   const placed: Record<string, string> = {};
-  for (const address of missing) {
-    const sha = byName.get(baseName(address));
-    const [, inPackage] = /^(?:package|model):\/\/(.*)$/.exec(address) ?? [];
-    const path = inPackage ?? resolvePath(file, address.replace(/^file:(\/\/)?/, ""));
-    if (sha && files[path] !== sha) placed[path] = sha;
+  const used = new Set<string>();
+  const place = (to: string, path: string) => {
+    placed[to] = files[path] ?? "";
+    used.add(path);
+  };
+  for (const [address, path] of filesByAddress(addresses, candidates)) {
+    const to = placeOf(urdf, address);
+    place(to, path);
+    for (const [part, partPath] of partsBeside(path, to, paths)) place(part, partPath);
   }
-  return Object.keys(placed).length > 0 ? { ...files, ...placed } : null;
+  return { placed, used };
 }
 
-function baseName(path: string): string {
-  return (path.split("/").at(-1) ?? path).toLowerCase();
+function nameUnused(paths: readonly string[]): void {
+  if (paths.length === 0) return;
+  const names = paths.slice(0, MOST_NAMED).join(", ");
+  const more = paths.length - MOST_NAMED;
+  notice("done", more > 0 ? d("unused_more", { names, more }) : d("unused", { names }));
 }

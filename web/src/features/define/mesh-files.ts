@@ -83,3 +83,8 @@ export function resolvePath(file: string, name: string): string {
   }
   return steps.join("/");
 }
+
+/** Return a path's last step in lower case: drives differ in whether they keep the case. */
+export function baseName(path: string): string {
+  return (path.split("/").at(-1) ?? path).toLowerCase();
+}

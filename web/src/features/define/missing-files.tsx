@@ -19,6 +19,7 @@ export function MissingFiles() {
     <section class="panel missing-files" aria-label={d("missing_title")} role="alert">
       <div>
         <h2>{d("missing_title")}</h2>
+        {waiting && <p>{d("missing_count", { found: waiting.found, missing: waiting.missing.length })}</p>}
         <ul>
           {missing.map(({ of, name }) => (
             <li key={`${of} ${name}`}>
