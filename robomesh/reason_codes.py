@@ -173,6 +173,7 @@ HTTP_METHOD = Code("http.method", "{path} does not take {method}")
 
 ACCOUNT_SIGN_IN = Code("account.sign_in", "no account is signed in", "sign in first")
 ACCOUNT_WRONG = Code("account.wrong", "the account or the password is wrong")
+ACCOUNT_PASSWORD_WRONG = Code("account.password_wrong", "the current password is wrong")
 ACCOUNT_WAIT = Code("account.wait", "too many attempts", "try again in {seconds} s")
 ACCOUNT_BUSY = Code("account.busy", "too many passwords wait to be verified", "try again in a moment")
 ACCOUNT_NOT_ADMIN = Code("account.not_admin", "{account} is not an administrator")
@@ -252,6 +253,9 @@ LEASE_NOT_WRITTEN = Code(
 # Reasons for the end of control.
 ENDED_RELEASED = Code("lease.ended.released", "{name} released control")
 ENDED_RELEASED_WHY = Code("lease.ended.released_why", "{name} released control: {reason}")
+ENDED_HIDDEN = Code("lease.ended.hidden", "{name}'s page was hidden or closed")
+ENDED_NO_RIGHT = Code("lease.ended.no_right", "{name} is a monitor now")
+ENDED_SIGNED_OUT = Code("lease.ended.signed_out", "{name} was signed out")
 ENDED_HANDED_OVER = Code("lease.ended.handed_over", "handed over to {name}")
 ENDED_TAKEN = Code("lease.ended.taken", "taken by {name}: {reason}")
 ENDED_EXPIRED = Code("lease.ended.expired", "{name}'s lease was not renewed within {seconds:g} s")

@@ -13,7 +13,7 @@ from tomlkit.items import AoT, Table
 
 from robots.bounded_toml import check_bounds
 
-_VALUES = ("name", "title", "provenance", "units", "urdf", "packages")
+_VALUES = ("name", "title", "title_zh", "provenance", "provenance_zh", "units", "urdf", "packages")
 # Written as [table]; every other table is written inline.
 _TABLES = ("base", "tool", "collision")
 _ARRAYS = ("joint", "link", "frame", "constraint")

@@ -116,14 +116,26 @@ class Link(Body):
     name: Name | None = None
 
 
-class Joint(_Table):
+class TitledJoint(_Table):
+    """A joint's identifier, and its titles for people.
+
+    Attributes:
+        title: Title in English; empty: the name.
+        title_zh: Title in Chinese; empty: `title`.
+    """
+
+    name: Name
+    title: str = ""
+    title_zh: str = ""
+
+
+class Joint(TitledJoint):
     """A joint, its standard D-H row and the link that it moves.
 
     `link to previous link = Rot(z, theta) Trans(0, 0, d) Trans(a, 0, 0) Rot(x, alpha)`. The joint's position
     is added to theta of a rotary joint and to d of a prismatic one.
     """
 
-    name: Name
     type: JointType = JointType.ROTARY
     a: Number
     alpha: Number
@@ -171,10 +183,9 @@ class Collision(_Table):
     ignore: tuple[tuple[str, str], ...] = ()
 
 
-class JointSettings(_Table):
+class JointSettings(TitledJoint):
     """Values of a URDF's joint that URDF does not have, and limits tighter than the URDF's."""
 
-    name: Name
     limits: Range | None = None
     max_speed: Positive | None = None
     max_acceleration: Positive | None = None
@@ -196,11 +207,17 @@ class UrdfTool(Pose):
 
 
 class RobotDescription(_Table):
-    """A robot's description file, in the file's units: the values that both forms have."""
+    """A robot's description file, in the file's units: the values that both forms have.
+
+    Attributes:
+        title_zh, provenance_zh: In Chinese; empty: `title` and `provenance`.
+    """
 
     name: Annotated[str, StringConstraints(pattern=ROBOT_NAME)]
     title: str = ""
+    title_zh: str = ""
     provenance: str = ""
+    provenance_zh: str = ""
     units: Units = Units()
     tool: Pose = Pose()
     frames: tuple[Frame, ...] = Field((), alias="frame")

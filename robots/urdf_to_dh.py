@@ -91,8 +91,8 @@ def dh_form(description: UrdfDescription) -> DhForm:
         return place, inverse(chain.link_to_base(place)) @ link_to_base @ frame_to_link
 
     names = (BASE_LINK, *chain.link_names)
-    values: dict[str, Any] = {"name": description.name, "title": description.title}
-    values["provenance"] = description.provenance
+    kept = ("name", "title", "title_zh", "provenance", "provenance_zh")
+    values: dict[str, Any] = {key: getattr(description, key) for key in kept}
     if not np.array_equal(chain.frames[0], np.eye(4)):
         values["base"] = {"pose": _pose_values(chain.frames[0])}
     values["joint"] = list(_joint_values(chain, joints))

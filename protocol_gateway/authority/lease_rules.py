@@ -249,6 +249,23 @@ class LeaseOutcome(NamedTuple):
     ended: LeaseEnd | None = None
 
 
+_RELEASED_FOR = {
+    LeaseRequest.HIDDEN: codes.ENDED_HIDDEN,
+    LeaseRequest.NO_RIGHT: codes.ENDED_NO_RIGHT,
+    LeaseRequest.SIGNED_OUT: codes.ENDED_SIGNED_OUT,
+}
+
+
+def _release_reason(request: LeaseRequest, operator: str) -> Reason:
+    """Return why a lease ends that its holder's client releases."""
+    if request.cause in _RELEASED_FOR:
+        return _RELEASED_FOR[request.cause](name=operator)
+    reason = request.reason.strip()
+    if reason:
+        return codes.ENDED_RELEASED_WHY(name=operator, reason=reason)
+    return codes.ENDED_RELEASED(name=operator)
+
+
 def request_lease(
     authority: Authority, request: LeaseRequest, *, operator: str, now: Now, secret: str
 ) -> LeaseOutcome:
@@ -275,12 +292,7 @@ def request_lease(
             )
             return LeaseOutcome(replace(authority, lease=renewed), done(codes.LEASE_RENEWED()), renewed)
         case action.RELEASE if mine and lease is not None:
-            why = (
-                codes.ENDED_RELEASED_WHY(name=operator, reason=reason)
-                if reason
-                else codes.ENDED_RELEASED(name=operator)
-            )
-            free, ended = end_lease(authority, why)
+            free, ended = end_lease(authority, _release_reason(request, operator))
             return LeaseOutcome(free, done(codes.LEASE_RELEASED()), ended=ended)
         case action.OFFER if mine and lease is not None:
             offered = replace(lease, offered_to="" if request.to == operator else request.to)

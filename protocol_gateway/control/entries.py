@@ -66,6 +66,7 @@ def lease_entry(event: LeaseRequested, outcome: Outcome, answer: Answer, now: No
         ttl_s=request.ttl_s,
         to=request.to,
         reason=request.reason,
+        cause=LeaseRequest.Cause.Name(request.cause) if request.cause else "",
     )
 
 

@@ -321,7 +321,7 @@ class Lease(_message.Message):
     def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., holder: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., until: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., offered_to: _Optional[str] = ..., motion: _Optional[bool] = ..., ended: _Optional[str] = ..., asked_by: _Optional[_Iterable[_Union[Lease.Asker, _Mapping]]] = ..., ended_reason: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
 
 class LeaseRequest(_message.Message):
-    __slots__ = ("action", "lease", "ttl_s", "to", "reason", "session")
+    __slots__ = ("action", "lease", "ttl_s", "to", "reason", "session", "cause")
     class Action(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         ACTION_UNSPECIFIED: _ClassVar[LeaseRequest.Action]
@@ -340,19 +340,31 @@ class LeaseRequest(_message.Message):
     ACCEPT: LeaseRequest.Action
     TAKE: LeaseRequest.Action
     ASK: LeaseRequest.Action
+    class Cause(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        CAUSE_UNSPECIFIED: _ClassVar[LeaseRequest.Cause]
+        HIDDEN: _ClassVar[LeaseRequest.Cause]
+        NO_RIGHT: _ClassVar[LeaseRequest.Cause]
+        SIGNED_OUT: _ClassVar[LeaseRequest.Cause]
+    CAUSE_UNSPECIFIED: LeaseRequest.Cause
+    HIDDEN: LeaseRequest.Cause
+    NO_RIGHT: LeaseRequest.Cause
+    SIGNED_OUT: LeaseRequest.Cause
     ACTION_FIELD_NUMBER: _ClassVar[int]
     LEASE_FIELD_NUMBER: _ClassVar[int]
     TTL_S_FIELD_NUMBER: _ClassVar[int]
     TO_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
     SESSION_FIELD_NUMBER: _ClassVar[int]
+    CAUSE_FIELD_NUMBER: _ClassVar[int]
     action: LeaseRequest.Action
     lease: str
     ttl_s: float
     to: str
     reason: str
     session: str
-    def __init__(self, action: _Optional[_Union[LeaseRequest.Action, str]] = ..., lease: _Optional[str] = ..., ttl_s: _Optional[float] = ..., to: _Optional[str] = ..., reason: _Optional[str] = ..., session: _Optional[str] = ...) -> None: ...
+    cause: LeaseRequest.Cause
+    def __init__(self, action: _Optional[_Union[LeaseRequest.Action, str]] = ..., lease: _Optional[str] = ..., ttl_s: _Optional[float] = ..., to: _Optional[str] = ..., reason: _Optional[str] = ..., session: _Optional[str] = ..., cause: _Optional[_Union[LeaseRequest.Cause, str]] = ...) -> None: ...
 
 class LeaseAnswer(_message.Message):
     __slots__ = ("lease", "holder", "since", "until", "now")
@@ -627,7 +639,7 @@ class EventList(_message.Message):
     def __init__(self, events: _Optional[_Iterable[_Union[Event, _Mapping]]] = ...) -> None: ...
 
 class Description(_message.Message):
-    __slots__ = ("name", "title", "provenance", "robot_toml", "urdf", "joints", "links", "frames", "views", "constraints", "base_to_site", "cell", "simulated", "fixtures", "warning_distance", "stop_distance", "replay", "stale_after_s", "floor")
+    __slots__ = ("name", "title", "provenance", "robot_toml", "urdf", "joints", "links", "frames", "views", "constraints", "base_to_site", "cell", "simulated", "fixtures", "warning_distance", "stop_distance", "replay", "stale_after_s", "title_zh", "provenance_zh", "floor")
     class Floor(_message.Message):
         __slots__ = ("height", "warning_distance", "stop_distance")
         HEIGHT_FIELD_NUMBER: _ClassVar[int]
@@ -651,7 +663,7 @@ class Description(_message.Message):
         start: _timestamp_pb2.Timestamp
         def __init__(self, id: _Optional[str] = ..., site: _Optional[str] = ..., robot: _Optional[str] = ..., file: _Optional[str] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
     class Joint(_message.Message):
-        __slots__ = ("name", "type", "lower", "upper", "max_speed", "home", "max_acceleration", "max_jerk")
+        __slots__ = ("name", "type", "lower", "upper", "max_speed", "home", "max_acceleration", "max_jerk", "title", "title_zh")
         class Type(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
             __slots__ = ()
             TYPE_UNSPECIFIED: _ClassVar[Description.Joint.Type]
@@ -668,6 +680,8 @@ class Description(_message.Message):
         HOME_FIELD_NUMBER: _ClassVar[int]
         MAX_ACCELERATION_FIELD_NUMBER: _ClassVar[int]
         MAX_JERK_FIELD_NUMBER: _ClassVar[int]
+        TITLE_FIELD_NUMBER: _ClassVar[int]
+        TITLE_ZH_FIELD_NUMBER: _ClassVar[int]
         name: str
         type: Description.Joint.Type
         lower: float
@@ -676,7 +690,9 @@ class Description(_message.Message):
         home: float
         max_acceleration: float
         max_jerk: float
-        def __init__(self, name: _Optional[str] = ..., type: _Optional[_Union[Description.Joint.Type, str]] = ..., lower: _Optional[float] = ..., upper: _Optional[float] = ..., max_speed: _Optional[float] = ..., home: _Optional[float] = ..., max_acceleration: _Optional[float] = ..., max_jerk: _Optional[float] = ...) -> None: ...
+        title: str
+        title_zh: str
+        def __init__(self, name: _Optional[str] = ..., type: _Optional[_Union[Description.Joint.Type, str]] = ..., lower: _Optional[float] = ..., upper: _Optional[float] = ..., max_speed: _Optional[float] = ..., home: _Optional[float] = ..., max_acceleration: _Optional[float] = ..., max_jerk: _Optional[float] = ..., title: _Optional[str] = ..., title_zh: _Optional[str] = ...) -> None: ...
     class Link(_message.Message):
         __slots__ = ("name", "mesh", "mesh_sha256", "color")
         NAME_FIELD_NUMBER: _ClassVar[int]
@@ -739,6 +755,8 @@ class Description(_message.Message):
     STOP_DISTANCE_FIELD_NUMBER: _ClassVar[int]
     REPLAY_FIELD_NUMBER: _ClassVar[int]
     STALE_AFTER_S_FIELD_NUMBER: _ClassVar[int]
+    TITLE_ZH_FIELD_NUMBER: _ClassVar[int]
+    PROVENANCE_ZH_FIELD_NUMBER: _ClassVar[int]
     FLOOR_FIELD_NUMBER: _ClassVar[int]
     name: str
     title: str
@@ -758,8 +776,10 @@ class Description(_message.Message):
     stop_distance: float
     replay: Description.Replay
     stale_after_s: float
+    title_zh: str
+    provenance_zh: str
     floor: Description.Floor
-    def __init__(self, name: _Optional[str] = ..., title: _Optional[str] = ..., provenance: _Optional[str] = ..., robot_toml: _Optional[str] = ..., urdf: _Optional[str] = ..., joints: _Optional[_Iterable[_Union[Description.Joint, _Mapping]]] = ..., links: _Optional[_Iterable[_Union[Description.Link, _Mapping]]] = ..., frames: _Optional[_Iterable[_Union[Description.NamedFrame, _Mapping]]] = ..., views: _Optional[_Iterable[_Union[View, _Mapping]]] = ..., constraints: _Optional[_Iterable[_Union[Description.Constraint, _Mapping]]] = ..., base_to_site: _Optional[_Iterable[float]] = ..., cell: _Optional[str] = ..., simulated: _Optional[bool] = ..., fixtures: _Optional[_Iterable[_Union[Description.Fixture, _Mapping]]] = ..., warning_distance: _Optional[float] = ..., stop_distance: _Optional[float] = ..., replay: _Optional[_Union[Description.Replay, _Mapping]] = ..., stale_after_s: _Optional[float] = ..., floor: _Optional[_Union[Description.Floor, _Mapping]] = ...) -> None: ...
+    def __init__(self, name: _Optional[str] = ..., title: _Optional[str] = ..., provenance: _Optional[str] = ..., robot_toml: _Optional[str] = ..., urdf: _Optional[str] = ..., joints: _Optional[_Iterable[_Union[Description.Joint, _Mapping]]] = ..., links: _Optional[_Iterable[_Union[Description.Link, _Mapping]]] = ..., frames: _Optional[_Iterable[_Union[Description.NamedFrame, _Mapping]]] = ..., views: _Optional[_Iterable[_Union[View, _Mapping]]] = ..., constraints: _Optional[_Iterable[_Union[Description.Constraint, _Mapping]]] = ..., base_to_site: _Optional[_Iterable[float]] = ..., cell: _Optional[str] = ..., simulated: _Optional[bool] = ..., fixtures: _Optional[_Iterable[_Union[Description.Fixture, _Mapping]]] = ..., warning_distance: _Optional[float] = ..., stop_distance: _Optional[float] = ..., replay: _Optional[_Union[Description.Replay, _Mapping]] = ..., stale_after_s: _Optional[float] = ..., title_zh: _Optional[str] = ..., provenance_zh: _Optional[str] = ..., floor: _Optional[_Union[Description.Floor, _Mapping]] = ...) -> None: ...
 
 class View(_message.Message):
     __slots__ = ("name", "eye", "target", "up", "projection", "mount", "field_of_view", "height")

@@ -10,6 +10,7 @@ from robots.description import RobotDescription
 from robots.glb import shapes_glb
 from robots.joints import FloatArray, JointType, joints_of
 from robots.kinematic_tree import color_text, named_frames, tree_of
+from robots.schema import DhDescription, TitledJoint, UrdfDescription
 from robots.views import views_of
 
 _TYPES = {
@@ -58,7 +59,9 @@ def describe(
     message = schema.Description(
         name=description.name,
         title=description.title or description.name,
+        title_zh=description.title_zh,
         provenance=description.provenance,
+        provenance_zh=description.provenance_zh,
         robot_toml=description.text,
         urdf=urdf,
         base_to_site=base_to_site.ravel().tolist(),
@@ -98,6 +101,8 @@ def add_surroundings(
 def _add_joints(message: schema.Description, description: RobotDescription) -> None:
     """Add the joints and the constraints between them."""
     joints = joints_of(description)
+    assert isinstance(description, DhDescription | UrdfDescription)
+    titled: dict[str, TitledJoint] = {row.name: row for row in description.joints}
     for index, name in enumerate(joints.names):
         message.joints.add(
             name=name,
@@ -108,6 +113,8 @@ def _add_joints(message: schema.Description, description: RobotDescription) -> N
             home=joints.home[index],
             max_acceleration=joints.max_acceleration[index],
             max_jerk=joints.max_jerk[index],
+            title=titled[name].title if name in titled else "",
+            title_zh=titled[name].title_zh if name in titled else "",
         )
     for constraint in joints.constraints:
         message.constraints.add(

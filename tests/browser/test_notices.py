@@ -93,7 +93,7 @@ def test_a_window_that_is_closed_has_not_given_control_back(open_page):
     move_slowly(alice)
     alice.close()
     expect(bob.locator(".stopped")).to_contain_text(
-        re.compile("alice's page or program has disconnected|window hidden or closed")
+        re.compile("alice's page or program has disconnected|page was hidden or closed")
     )
     take(bob, "bob")
     bob.get_by_role("button", name="Reset stop").click()

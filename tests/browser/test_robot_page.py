@@ -145,7 +145,7 @@ def test_a_hidden_page_gives_control_back(open_page):
     )
     expect(page.locator(".control .notice")).to_contain_text("this page was hidden")
     expect(page.locator(".holder")).to_have_text("Nobody is in control")
-    expect(page.locator(".event-list")).to_contain_text("li released control: window hidden or closed")
+    expect(page.locator(".event-list")).to_contain_text("li's page was hidden or closed")
 
 
 def test_going_to_another_page_gives_control_back(open_page):

@@ -8,6 +8,7 @@ from playwright.sync_api import expect
 from robomesh.schemas.robomesh_pb2 import AuditQuery
 from services.console.accounts import sessions
 from services.console.accounts.auth_service import change_account
+from services.console.accounts.file import AccountRole
 from tests.browser.conftest import NO_WEBGL, Plant, run_plant
 from tests.browser.robot_page import ARM, button, serious
 from tests.services.certificates import self_signed
@@ -15,6 +16,8 @@ from tests.services.signing_in import PASSWORD, accounts_file
 from tests.site import wait_until
 
 pytestmark = pytest.mark.browser
+
+NEW = "four arms in a hall"
 
 
 @pytest.fixture(scope="module")
@@ -139,6 +142,44 @@ def test_who_is_disabled_is_told_so_and_sees_nothing_more(open_tab, accounts):
     expect(page.locator(".sign-in")).to_contain_text("nothing of it would be live")
     expect(page.locator("[data-joint]")).to_have_count(0)
     change_account(accounts, "enable", "zhao")
+
+
+def test_who_becomes_a_monitor_is_told_so_and_so_is_everybody_else(open_tab, accounts):
+    page = open_tab()
+    sign_in(page, "li")
+    button(page, "Take control").click()
+    expect(page.locator(".holder")).to_have_text("You are in control")
+    change_account(accounts, "role", "li", role=AccountRole.MONITOR)
+    expect(page.locator(".control .notice")).to_have_text("Control lost: li.hall is a monitor now")
+    expect(page.locator(".event-list")).to_contain_text("control ended: li.hall is a monitor now")
+    change_account(accounts, "role", "li", role=AccountRole.OPERATOR)
+
+
+def test_a_password_is_changed_with_progress_and_a_wrong_one_is_named(open_tab):
+    page = open_tab()
+    sign_in(page, "li")
+    signed_in(page).click()
+    button(page, "Change password").click()
+    sheet, outcome = page.locator(".account-sheet"), page.locator(".account-sheet [role=status]")
+    present = page.get_by_label("Present password", exact=True)
+    for name, value in (
+        ("Present password", "not the password"),
+        ("New password", NEW),
+        ("New password again", NEW),
+    ):
+        page.get_by_label(name, exact=True).fill(value)
+    waiting = []
+    page.route("**/account/password", waiting.append)
+    button(page, "Change").click()
+    expect(button(page, "Changing…")).to_be_disabled()
+    waiting[0].continue_()
+    expect(outcome).to_have_text("Not changed: the current password is wrong")
+    expect(present).to_be_focused()
+    expect(present).to_have_value("")
+    present.fill("x")
+    expect(outcome).to_have_text("\u00a0")
+    assert serious(page) == []
+    expect(sheet).to_be_visible()
 
 
 def test_the_right_to_command_that_rests_is_given_back_for_the_password(open_tab, monkeypatch):

@@ -27,7 +27,7 @@ def owner(other):
 
     async def lease(request):
         asked.append(("lease", request.chunk, request.message))
-        return schema.LeaseAnswer(holder=request.chunk)
+        return schema.LeaseAnswer(holder=request.chunk, lease="secret")
 
     async def stop(request):
         asked.append(("stop", "", request.message))
@@ -281,7 +281,7 @@ def test_a_change_of_the_accounts_file_ends_sessions_at_once(mesh, page, tmp_pat
 def test_a_lesser_role_holds_at_once_and_takes_control_away(mesh, page, tmp_path):
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, other, path):
-            owner(other)
+            asked = owner(other)
             await client.sign_in("li")
             async with client.browse() as browser:
                 await hello(browser)
@@ -298,8 +298,34 @@ def test_a_lesser_role_holds_at_once_and_takes_control_away(mesh, page, tmp_path
                 async with asyncio.timeout(5.0):
                     while [who for who in await other.present() if who.service == "operator"]:
                         await asyncio.sleep(0.01)
+                # The gateway learns why, for every page.
+                assert released(asked) == [("secret", schema.LeaseRequest.NO_RIGHT)]
 
     run(main())
+
+
+def test_control_of_a_session_that_ends_is_released_with_the_cause(mesh, page, tmp_path):
+    async def main():
+        async with guarded(mesh, page, tmp_path) as (client, other, path):
+            asked = owner(other)
+            await client.sign_in("li")
+            async with client.browse() as browser:
+                await hello(browser)
+                assert (await browser.ask(1, f"{LEASE}/li.s", lease())).ok
+                change_account(path, "disable", "li")
+                assert await closing(browser) == (SIGNED_OUT, "disabled")
+                async with asyncio.timeout(10.0):
+                    while [who for who in await other.present() if who.service == "operator"]:
+                        await asyncio.sleep(0.01)
+            assert released(asked) == [("secret", schema.LeaseRequest.SIGNED_OUT)]
+
+    run(main())
+
+
+def released(asked):
+    """Return the leases that were released, with their causes."""
+    leases = [message for what, _, message in asked if what == "lease"]
+    return [(each.lease, each.cause) for each in leases if each.action == ACTION.RELEASE]
 
 
 def test_an_invalid_accounts_file_is_reported_and_keeps_sessions(mesh, page, tmp_path):
@@ -357,7 +383,7 @@ def test_a_new_password_of_ones_own_keeps_this_session_and_ends_the_others(mesh,
             new = "four arms in a hall"
             refused = await client.post("/account/password", {"password": "a wrong one", "new": new})
             assert (refused[0], refused[2]["error"]) == (401, "wrong")
-            assert code_of(refused) == "account.wrong"
+            assert code_of(refused) == "account.password_wrong"
             short = await client.post("/account/password", {"password": PASSWORD, "new": "short"})
             assert (short[0], short[2]["error"], code_of(short)) == (422, "short", "account.short")
             assert short[2]["refusal"]["values"] == {"least": "10"}

@@ -143,6 +143,8 @@ def test_the_description_names_meshes_that_are_served_as_glb(mesh):
             description = await last_value(session, "robomesh/hall/arm/description")
             assert description.joints[0].name == "waist"
             assert description.provenance.startswith("nominal")
+            assert description.provenance_zh.startswith("标称值")
+            assert [joint.title_zh for joint in description.joints][:3] == ["腰部", "肩部", "肘部"]
             assert "<robot" in description.urdf
             assert 'name = "pt600"' in description.robot_toml
             for link in description.links:

@@ -163,7 +163,7 @@ class AuthService:
         # The file may have changed during verification.
         if not right or account is None or self.sessions.accounts.get(name) != account:
             self._publish_refusal(name if known else "", address, "name or password wrong")
-            raise SignInError(codes.ACCOUNT_WRONG())
+            raise SignInError(codes.ACCOUNT_PASSWORD_WRONG() if session else codes.ACCOUNT_WRONG())
         self._limits.succeed(name, address, session=session)
         return account
 

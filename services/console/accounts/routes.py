@@ -30,6 +30,7 @@ _WORDS = {
     codes.PASSWORD_AGAIN.name: "resting",
     codes.NOT_JSON_OBJECT.name: "not_json",
     codes.NEEDS_TEXT.name: "missing",
+    codes.ACCOUNT_PASSWORD_WRONG.name: "wrong",
     codes.ACCOUNT_ROLE.name: "refused",
     codes.ACCOUNT_ACTION.name: "refused",
     codes.ACCOUNT_FAILED.name: "refused",

@@ -19,7 +19,14 @@ from robomesh import reason_codes as codes
 from robomesh.errors import BusyError, NoAnswerError, RefusedError, RobomeshError
 from robomesh.messages import reason_message
 from robomesh.reasons import Reason
-from robomesh.schemas.robomesh_pb2 import FromPage, KeyFrameRequest, ToPage, ViewAnswer, ViewRequest
+from robomesh.schemas.robomesh_pb2 import (
+    FromPage,
+    KeyFrameRequest,
+    LeaseRequest,
+    ToPage,
+    ViewAnswer,
+    ViewRequest,
+)
 from robomesh.session import Session
 from robomesh.topics import History
 from services.console.accounts.rights import check_own_name, check_right, in_own_name, parse_request
@@ -108,7 +115,7 @@ class Browser:
     def rights_changed(self) -> None:
         """Apply changed rights: control without the right to it ends immediately."""
         if self.user is not None and not self.user.account.may_command:
-            self.operator.close()
+            self.operator.close(LeaseRequest.NO_RIGHT)
         self.greet()
 
     def send_message(self, message: ToPage) -> None:
@@ -136,7 +143,8 @@ class Browser:
                 async with asyncio.timeout(_CLOSED_WITHIN_S):
                     await websocket.close(_POLICY_VIOLATION, _close_reason(reason))
         finally:
-            self.operator.close()
+            signed_out = self.user is not None and self.user.ended
+            self.operator.close(LeaseRequest.SIGNED_OUT if signed_out else None)
             for expression in tuple(self._watches):
                 self._unwatch(expression)
             line.on_ready = self._line = None
@@ -251,10 +259,11 @@ class Browser:
         try:
             key, row = parse_request(ask.key)
             asked = self._allowed(ask, key, row)
-            with self.operator.during_request(key, asked):
+            with self.operator.during_request(key, asked) as answered:
                 payload = await self._session.ask_bytes(
                     key, asked, timeout_s=min(ask.timeout_s or 2.0, _LONGEST_ASK_S)
                 )
+                answered(payload)
         except (RefusedError, NoAnswerError) as error:
             # The page treats a busy service like a timeout: it retries while its lease lasts.
             no_answer = isinstance(error, NoAnswerError | BusyError)

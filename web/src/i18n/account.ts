@@ -64,6 +64,7 @@ const TEXTS = {
   changed: ["Changed. Other places where you were signed in are signed out.", "已更改。其他登录地点均已登出。"],
   not_changed: ["Not changed: {text}", "未更改：{text}"],
   change: ["Change", "更改"],
+  changing: ["Changing…", "正在更改…"],
   cancel: ["Cancel", "取消"],
   close: ["Close", "关闭"],
 
@@ -75,6 +76,7 @@ const TEXTS = {
     "The right to command rests: nobody touched this page for half an hour, or the last password is twelve hours old. Give the password again to take control.",
     "控制权限已暂停：本页半小时无人操作，或上次输入密码已过十二小时。再次输入密码即可请求控制权。",
   ],
+  unlocking: ["Checking the password…", "正在验证密码…"],
   unlock: ["Give the right back", "恢复权限"],
 } as const satisfies Record<string, readonly [string, string]>;
 

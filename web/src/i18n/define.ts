@@ -167,7 +167,9 @@ const TEXTS = {
   name: ["Name", "名称"],
   name_hint: ["lower-case letters, digits, - and _", "小写字母、数字、- 和 _"],
   title: ["Title", "标题"],
+  title_zh: ["Title in Chinese", "中文标题"],
   provenance: ["Provenance", "来源"],
+  provenance_zh: ["Provenance in Chinese", "中文来源"],
   provenance_hint: [
     "Where the dimensions come from: a data sheet, a measurement, a guess.",
     "尺寸来源：数据手册、测量或估计。",
@@ -177,6 +179,8 @@ const TEXTS = {
   unit_angle: ["Angles", "角度"],
   units_hint: ["All numbers are converted.", "所有数值将被换算。"],
   joint_name: ["Joint name", "关节名称"],
+  joint_title: ["Title", "标题"],
+  joint_title_zh: ["Title in Chinese", "中文标题"],
   type: ["Type", "类型"],
   limits: ["Limits", "限位"],
   lower: ["Lower limit", "下限"],

@@ -2,9 +2,9 @@
 
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
 import { timestampMs } from "@bufbuild/protobuf/wkt";
-import type { Description_Joint } from "../gen/robomesh_pb";
+import type { Description, Description_Joint } from "../gen/robomesh_pb";
 import { Description_Joint_Type } from "../gen/robomesh_pb";
-import { t } from "./texts";
+import { language, t } from "./texts";
 
 const DEGREES = 180 / Math.PI;
 const UPRIGHT = 1e-6; // the cosine of a pitch so close to 90 degrees is noise
@@ -36,6 +36,20 @@ export function jointUnit(joint: Description_Joint): JointUnit {
   return joint.type === Description_Joint_Type.PRISMATIC
     ? { unit: "mm", decimals: 1, factor: 1000 }
     : { unit: "°", decimals: 2, factor: DEGREES };
+}
+
+/** Return a joint's title in the page's language; its name is the identifier. */
+export function jointTitle({ name, title, titleZh }: Description_Joint): string {
+  return (language.value === "zh" && titleZh) || title || name;
+}
+
+/** Return a robot's title and the source of its dimensions, in the page's language. */
+export function robotTitle({ title, titleZh }: Description): string {
+  return (language.value === "zh" && titleZh) || title;
+}
+
+export function provenanceText({ provenance, provenanceZh }: Description): string {
+  return (language.value === "zh" && provenanceZh) || provenance;
 }
 
 export function jointText(joint: Description_Joint, value: number | undefined): string {

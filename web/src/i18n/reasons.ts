@@ -267,6 +267,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ["http.method", ["{path} does not take {method}", "{path} 不接受 {method}"]],
   ["account.sign_in", ["no account is signed in: sign in first", "没有账户登录：请先登录"]],
   ["account.wrong", ["the account or the password is wrong", "账户或密码错误"]],
+  ["account.password_wrong", ["the current password is wrong", "当前密码错误"]],
   ["account.wait", ["too many attempts: try again in {seconds} s", "尝试次数过多：请在 {seconds} 秒后重试"]],
   ["account.busy", ["too many passwords wait to be verified: try again in a moment", "等待验证的密码过多：请稍后重试"]],
   ["account.not_admin", ["{account} is not an administrator", "{account} 不是管理员"]],
@@ -393,6 +394,9 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ],
   ["lease.ended.released", ["{name} released control", "{name} 释放了控制权"]],
   ["lease.ended.released_why", ["{name} released control: {reason}", "{name} 释放了控制权：{reason}"]],
+  ["lease.ended.hidden", ["{name}'s page was hidden or closed", "{name} 的页面被隐藏或关闭"]],
+  ["lease.ended.no_right", ["{name} is a monitor now", "{name} 现在仅有监视权限"]],
+  ["lease.ended.signed_out", ["{name} was signed out", "{name} 已被登出"]],
   ["lease.ended.handed_over", ["handed over to {name}", "已移交给 {name}"]],
   ["lease.ended.taken", ["taken by {name}: {reason}", "被 {name} 接管：{reason}"]],
   [

@@ -9,7 +9,12 @@ import type { Timestamp } from "@bufbuild/protobuf/wkt";
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
 import type { Lease, LeaseAnswer } from "../gen/robomesh_pb";
-import { LeaseRequest_Action as Action, LeaseAnswerSchema, LeaseRequestSchema } from "../gen/robomesh_pb";
+import {
+  LeaseRequest_Action as Action,
+  LeaseRequest_Cause as Cause,
+  LeaseAnswerSchema,
+  LeaseRequestSchema,
+} from "../gen/robomesh_pb";
 import { reasonText } from "../i18n/reasons";
 import type { TextName } from "../i18n/texts";
 import { t } from "../i18n/texts";
@@ -102,7 +107,7 @@ function askLease(
   robotKey: string,
   who: string,
   action: Action,
-  values: { lease?: string; to?: string; reason?: string } = {},
+  values: { lease?: string; to?: string; reason?: string; cause?: Cause } = {},
 ): Promise<LeaseAnswer> {
   const request = { action, ttlS: ttlS(), session: hello.value?.session ?? "", ...values };
   return ask(`${robotKey}/lease/request/${who}`, LeaseRequestSchema, request, LeaseAnswerSchema, TTL_S / 2);
@@ -220,17 +225,17 @@ function lose(reason: string, known = false): void {
 }
 
 // Published with the release; a tab that is closed is hidden first.
-const releaseHidden = () => release(t("released_hidden"), "window hidden or closed");
+const releaseHidden = () => release(t("released_hidden"), Cause.HIDDEN);
 
-/** Release control if this tab has it; every page shows `reason`. */
-export async function release(text: string = t("released"), reason = ""): Promise<void> {
+/** Release control if this tab has it; every page shows the cause. */
+export async function release(text: string = t("released"), cause?: Cause): Promise<void> {
   const mine = heldLease.value;
   if (!mine) return;
   clearTimeout(renewing);
   heldLease.value = null;
   controlNotice.value = { kind: "done", text };
   try {
-    await askLease(mine.robotKey, mine.operator, Action.RELEASE, { lease: mine.lease, reason });
+    await askLease(mine.robotKey, mine.operator, Action.RELEASE, { lease: mine.lease, ...(cause && { cause }) });
   } catch {
     // The lease expires within its time to live.
   }

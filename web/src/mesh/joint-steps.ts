@@ -5,7 +5,7 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { Description_Joint } from "../gen/robomesh_pb";
-import { jointText } from "../i18n/format";
+import { jointText, jointTitle } from "../i18n/format";
 import { t } from "../i18n/texts";
 import { Command, command } from "./command";
 import type { Notice } from "./control";
@@ -67,7 +67,7 @@ export function useSteps(props: {
     const at = current[step.index];
     const joint = joints[step.index];
     if (!joint || at === undefined) return;
-    const what = `${joint.name} ${step.offset > 0 ? "+" : ""}${jointText(joint, step.offset)}`;
+    const what = `${jointTitle(joint)} ${step.offset > 0 ? "+" : ""}${jointText(joint, step.offset)}`;
     const mine = { ...step, target: at + step.offset, what, accepted: false };
     setGoing(mine);
     const jointPositions = joints.map((_, i) => (i === step.index ? step.offset : 0));
@@ -93,7 +93,8 @@ export function useSteps(props: {
   // Each advance by a twentieth of the step restarts the timeout.
   useEffect(() => {
     if (!going?.accepted) return;
-    const joint = joints[going.index]?.name ?? "";
+    const moved = joints[going.index];
+    const joint = moved ? jointTitle(moved) : "";
     const done = () => {
       setGoing(null);
       tell({

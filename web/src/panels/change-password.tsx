@@ -4,6 +4,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { a } from "../i18n/account";
 import type { Me } from "../mesh/account";
 import { me, post } from "../mesh/account";
+import { RefusedRequest } from "../mesh/refusal";
 import { PasswordField } from "../ui/password-field";
 import "./account-form.css";
 
@@ -12,21 +13,36 @@ export function ChangePassword({ close }: { close: () => void }) {
   const [newPassword, setNewPassword] = useState("");
   const [repeated, setRepeated] = useState("");
   const [outcome, setOutcome] = useState<{ done: boolean; text: string } | null>(null);
+  const [busy, setBusy] = useState(false);
   const form = useRef<HTMLFormElement>(null);
   // Pass Escape to the sheet, and focus the first field.
-  useEffect(() => form.current?.querySelector<HTMLInputElement>("input:not([hidden])")?.focus(), []);
+  const focusFirst = () => form.current?.querySelector<HTMLInputElement>("input:not([hidden])")?.focus();
+  useEffect(focusFirst, []);
+  // An outcome belongs to the passwords that were sent.
+  const entered = (set: (value: string) => void) => (value: string) => {
+    setOutcome(null);
+    set(value);
+  };
   const send = async () => {
+    if (busy) return;
     if (newPassword !== repeated) {
       setOutcome({ done: false, text: a("differ") });
       return;
     }
+    setOutcome(null);
+    setBusy(true);
     try {
       me.value = await post<Me>("password", { password: oldPassword, new: newPassword });
       setOutcome({ done: true, text: a("changed") });
     } catch (error) {
       const text = error instanceof Error ? error.message : String(error);
       setOutcome({ done: false, text: a("not_changed", { text }) });
+      if (error instanceof RefusedRequest && error.reason?.code === "account.password_wrong") {
+        setOldPassword("");
+        focusFirst();
+      }
     }
+    setBusy(false);
   };
   return (
     <form
@@ -39,15 +55,20 @@ export function ChangePassword({ close }: { close: () => void }) {
     >
       {/* For password managers: the account's name. */}
       <input type="text" name="username" autocomplete="username" value={me.value?.account} readOnly hidden />
-      <PasswordField label={a("old_password")} kind="current-password" value={oldPassword} set={setOldPassword} />
+      <PasswordField
+        label={a("old_password")}
+        kind="current-password"
+        value={oldPassword}
+        set={entered(setOldPassword)}
+      />
       <PasswordField
         label={a("new_password")}
         kind="new-password"
         value={newPassword}
-        set={setNewPassword}
+        set={entered(setNewPassword)}
         hint={a("new_hint")}
       />
-      <PasswordField label={a("new_again")} kind="new-password" value={repeated} set={setRepeated} />
+      <PasswordField label={a("new_again")} kind="new-password" value={repeated} set={entered(setRepeated)} />
       <p class={outcome && !outcome.done ? "sign-in-problem" : ""} role="status">
         {outcome?.text ?? "\u00a0"}
       </p>
@@ -56,8 +77,8 @@ export function ChangePassword({ close }: { close: () => void }) {
           {a(outcome?.done ? "close" : "cancel")}
         </button>
         {!outcome?.done && (
-          <button type="submit" class="action primary">
-            {a("change")}
+          <button type="submit" class="action primary" disabled={busy}>
+            {a(busy ? "changing" : "change")}
           </button>
         )}
       </div>

@@ -3,7 +3,7 @@
 import type { ComponentChildren } from "preact";
 import type { Description, KinematicState } from "../gen/robomesh_pb";
 import { Description_Joint_Type } from "../gen/robomesh_pb";
-import { fixed, toDegrees } from "../i18n/format";
+import { fixed, jointTitle, toDegrees } from "../i18n/format";
 import { t } from "../i18n/texts";
 import { distanceText, ownLevel, pairText, useClearanceLevel } from "../mesh/clearance";
 import type { Level } from "../mesh/robot-state";
@@ -120,7 +120,12 @@ function nearestLimit(state: KinematicState | undefined, description: Descriptio
     if (nearest && nearest.share <= share) continue;
     const joint = description?.joints.find((each) => each.name === name);
     const slides = joint?.type === Description_Joint_Type.PRISMATIC;
-    nearest = { name, share, value: slides ? margin * 1000 : toDegrees(margin), unit: slides ? "mm" : "°" };
+    nearest = {
+      name: joint ? jointTitle(joint) : name,
+      share,
+      value: slides ? margin * 1000 : toDegrees(margin),
+      unit: slides ? "mm" : "°",
+    };
   }
   return nearest;
 }

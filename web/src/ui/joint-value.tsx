@@ -2,7 +2,7 @@
 
 import { useState } from "preact/hooks";
 import type { Description_Joint } from "../gen/robomesh_pb";
-import { DASH, fixed, jointUnit } from "../i18n/format";
+import { DASH, fixed, jointTitle, jointUnit } from "../i18n/format";
 import { t } from "../i18n/texts";
 import { Unit } from "./unit";
 
@@ -43,7 +43,7 @@ export function JointValue(props: {
         <button
           class="value-button"
           title={t("type_target")}
-          aria-label={`${t("joint_type", { joint: joint.name })}: ${text}`}
+          aria-label={`${t("joint_type", { joint: jointTitle(joint) })}: ${text}`}
           onClick={() => setTyped("")}
         >
           {text}
@@ -56,7 +56,7 @@ export function JointValue(props: {
           autocomplete="off"
           maxLength={12}
           placeholder={text}
-          aria-label={t("joint_type", { joint: joint.name })}
+          aria-label={t("joint_type", { joint: jointTitle(joint) })}
           title={t("type_target")}
           ref={focus}
           value={typed}

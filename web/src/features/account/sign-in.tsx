@@ -37,6 +37,15 @@ export function SignIn() {
   };
   return (
     <section class="sign-in" aria-label={a("sign_in")}>
+      {/* For narrow screens, where the bar has no space for them. */}
+      <p class="sign-in-look">
+        <button class="quiet" onClick={switchLanguage} title={t("language_hint")}>
+          {t("language")}
+        </button>
+        <button class="quiet" onClick={switchTheme}>
+          {t(theme.value === "dark" ? "theme_light" : "theme_dark")}
+        </button>
+      </p>
       <form
         onSubmit={(event) => {
           event.preventDefault();
@@ -81,15 +90,6 @@ export function SignIn() {
           {how && a(how.insecure && !how.secure ? "insecure" : how.secure ? "secure" : "this_machine")}
         </p>
         <p class="dim">{a("no_stop")}</p>
-        {/* For narrow screens, where the bar has no space for them. */}
-        <p class="sign-in-look">
-          <button class="quiet" onClick={switchLanguage} title={t("language_hint")}>
-            {t("language")}
-          </button>
-          <button class="quiet" onClick={switchTheme}>
-            {t(theme.value === "dark" ? "theme_light" : "theme_dark")}
-          </button>
-        </p>
       </footer>
     </section>
   );

@@ -21,6 +21,9 @@ export interface Body {
 
 export interface Joint {
   name: string;
+  /** For people, in English and Chinese; empty: the name. */
+  title: string;
+  title_zh: string;
   type: JointType;
   a: number;
   alpha: number;
@@ -60,7 +63,9 @@ export interface Units {
 export interface Description {
   name: string;
   title: string;
+  title_zh: string;
   provenance: string;
+  provenance_zh: string;
   units: Units;
   /** Its pose is the first row's frame, in the base link's. */
   base: Body & { pose: Pose };
@@ -103,7 +108,9 @@ export function complete(given: GivenDescription): Description {
   return {
     name: given.name ?? "",
     title: given.title ?? "",
+    title_zh: given.title_zh ?? "",
     provenance: given.provenance ?? "",
+    provenance_zh: given.provenance_zh ?? "",
     units,
     base: { ...body(given.base), pose: pose(given.base?.pose) },
     joint: (given.joint ?? []).map((row) => ({
@@ -137,10 +144,15 @@ export function concise(from: Description): object {
   return {
     name: from.name,
     ...(from.title && { title: from.title }),
+    ...(from.title_zh && { title_zh: from.title_zh }),
     ...(from.provenance && { provenance: from.provenance }),
+    ...(from.provenance_zh && { provenance_zh: from.provenance_zh }),
     units: from.units,
     base: { ...shape(from.base), ...(!isZero(from.base.pose) && { pose: from.base.pose }) },
-    joint: from.joint.map((row) => ({
+    joint: from.joint.map(({ name, title, title_zh, ...row }) => ({
+      name,
+      ...(title && { title }),
+      ...(title_zh && { title_zh }),
       ...row,
       link: { ...(row.link.name && { name: row.link.name }), ...shape(row.link) },
     })),
@@ -200,6 +212,8 @@ const USUAL = {
 export function newJoint(name: string, type: JointType, units: Units): Joint {
   return {
     name,
+    title: "",
+    title_zh: "",
     type,
     a: 0,
     alpha: 0,

@@ -85,6 +85,15 @@ function JointDetails({ joint, index, description }: { joint: Joint; index: numb
           unit={unit}
           set={(value) => set("home", (own) => void (own.home = value))}
         />
+        {(["title", "title_zh"] as const).map((key) => (
+          <TextField
+            key={key}
+            path={`${path}/${key}`}
+            label={d(`joint_${key}`)}
+            value={joint[key]}
+            set={(title) => set(key, (own) => void (own[key] = title))}
+          />
+        ))}
         {limit(0)}
         {limit(1)}
       </div>
@@ -101,7 +110,7 @@ function JointDetails({ joint, index, description }: { joint: Joint; index: numb
           />
         ))}
       </div>
-      {["name", "type", "a", "alpha", "d", "theta", "limits", "home", ...MOTION].map((key) => (
+      {["name", "title", "title_zh", "type", "a", "alpha", "d", "theta", "limits", "home", ...MOTION].map((key) => (
         <ProblemWords key={key} path={`${path}/${key}`} />
       ))}
     </Section>

@@ -9,8 +9,8 @@ import { ProblemWords, Section, SelectField, TextField } from "./fields";
 export function RobotTab() {
   const now = draft.value;
   if (!now) return null;
-  const { name, title, provenance, units } = now.description;
-  const text = (key: "name" | "title" | "provenance", value: string, hint = "") => (
+  const { name, title, title_zh, provenance, provenance_zh, units } = now.description;
+  const text = (key: "name" | "title" | "title_zh" | "provenance" | "provenance_zh", value: string, hint = "") => (
     <>
       <TextField
         path={key}
@@ -31,7 +31,9 @@ export function RobotTab() {
       <Section title={d("robot")}>
         {text("name", name, d("name_hint"))}
         {text("title", title)}
+        {text("title_zh", title_zh)}
         {text("provenance", provenance, d("provenance_hint"))}
+        {text("provenance_zh", provenance_zh)}
       </Section>
       <Section title={d("units")}>
         <div class="grid-2">

@@ -6,7 +6,7 @@ import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
 import type { Description } from "../../gen/robomesh_pb";
 import { DescriptionSchema } from "../../gen/robomesh_pb";
 import { f } from "../../i18n/fleet";
-import { staleText, stampFull, stampTime } from "../../i18n/format";
+import { robotTitle, staleText, stampFull, stampTime } from "../../i18n/format";
 import { t } from "../../i18n/texts";
 import { alarmsOf } from "../../mesh/alarms";
 import { hello, watch } from "../../mesh/connection";
@@ -74,7 +74,7 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
         </div>
         <div class="tile-line dim">
           <span class="tile-title">
-            {description?.title || "\u00a0"}
+            {description ? robotTitle(description) : "\u00a0"}
             {isRemote && <span title={f("far_hint")}> · {f("far")}</span>}
           </span>
           {stale ? (

@@ -3,7 +3,7 @@
 import { useEffect, useRef } from "preact/hooks";
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
-import { jointUnit } from "../../i18n/format";
+import { jointTitle, jointUnit } from "../../i18n/format";
 import { p } from "../../i18n/program";
 import { plotAppearance } from "../../ui/plot-appearance";
 import { theme } from "../../ui/theme";
@@ -54,7 +54,7 @@ export function MotionCurves() {
         series: [
           {},
           ...joints.map((joint, i) => ({
-            label: joint.name,
+            label: jointTitle(joint),
             scale: unitOf(i),
             stroke: colour(CURVES[i % CURVES.length] ?? "--text"),
             width: 1.5,
@@ -122,7 +122,7 @@ export function MotionCurves() {
         {joints.map((joint, i) => (
           <span key={joint.name}>
             <span class={`curve curve-${(i % CURVES.length) + 1}`} aria-hidden="true" />
-            {joint.name}
+            {jointTitle(joint)}
           </span>
         ))}
         {near && (

@@ -1,7 +1,7 @@
 // Teaching: points from the live robot, from sliders or from a pose; and the list of points.
 
 import { useState } from "preact/hooks";
-import { jointText, jointUnit } from "../../i18n/format";
+import { jointText, jointTitle, jointUnit } from "../../i18n/format";
 import type { Words } from "../../i18n/program";
 import { noWords, p } from "../../i18n/program";
 import { targetProblem } from "../../mesh/target-check";
@@ -97,10 +97,10 @@ function Sliders({ positions }: { positions: readonly number[] }) {
     <div class="joint-rows">
       {description.value?.joints.map((joint, index) => (
         <div key={joint.name} class="joint-row">
-          <span class="joint-name">{joint.name}</span>
+          <span class="joint-name">{jointTitle(joint)}</span>
           <div class="joint-range">
             <JointTrack
-              label={p("ghost_joint", { joint: joint.name })}
+              label={p("ghost_joint", { joint: jointTitle(joint) })}
               lower={joint.lower}
               upper={joint.upper}
               position={livePositions.value?.[index]}

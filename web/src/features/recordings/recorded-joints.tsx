@@ -2,7 +2,7 @@
 
 import type { JointStates } from "../../gen/foxglove/JointStates_pb";
 import type { Description } from "../../gen/robomesh_pb";
-import { jointText } from "../../i18n/format";
+import { jointText, jointTitle } from "../../i18n/format";
 
 export function RecordedJoints({
   description,
@@ -19,7 +19,7 @@ export function RecordedJoints({
         const share = value === undefined ? 0 : (value - joint.lower) / (joint.upper - joint.lower || 1);
         return (
           <div key={joint.name}>
-            <dt>{joint.name}</dt>
+            <dt>{jointTitle(joint)}</dt>
             <dd class="track-bar" aria-hidden="true">
               {value !== undefined && <span style={{ left: `${100 * Math.min(1, Math.max(0, share))}%` }} />}
             </dd>

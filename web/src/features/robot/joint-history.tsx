@@ -6,7 +6,7 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
 import type { Description } from "../../gen/robomesh_pb";
-import { jointUnit } from "../../i18n/format";
+import { jointTitle, jointUnit } from "../../i18n/format";
 import { t } from "../../i18n/texts";
 import { ageClock } from "../../mesh/age-clock";
 import { watch } from "../../mesh/connection";
@@ -123,7 +123,7 @@ export function JointHistory({ robotKey, description }: { robotKey: string; desc
         series: [
           {},
           ...joints.map((joint, i) => ({
-            label: joint.name,
+            label: jointTitle(joint),
             scale: jointUnit(joint).unit,
             stroke: colour(CURVES[i % CURVES.length] ?? "--text"),
             width: 1.5,
@@ -169,7 +169,7 @@ export function JointHistory({ robotKey, description }: { robotKey: string; desc
         {joints.map((joint, i) => (
           <span key={joint.name}>
             <span class={`curve curve-${(i % CURVES.length) + 1}`} aria-hidden="true" />
-            {joint.name}
+            {jointTitle(joint)}
           </span>
         ))}
       </div>

@@ -4,7 +4,7 @@ import { useEffect, useState } from "preact/hooks";
 import type { JointStates } from "../../gen/foxglove/JointStates_pb";
 import type { ControllerState, Description, Description_Joint } from "../../gen/robomesh_pb";
 import { ControllerState_Activity as Activity } from "../../gen/robomesh_pb";
-import { fixed, jointText, jointUnit } from "../../i18n/format";
+import { fixed, jointText, jointTitle, jointUnit } from "../../i18n/format";
 import { t } from "../../i18n/texts";
 import { isMonitor } from "../../mesh/account";
 import { Command, command } from "../../mesh/command";
@@ -97,7 +97,7 @@ export function JointsPanel(props: {
     const wanted = wantedAt(index, value);
     if (!joint || wanted.some((each) => each === undefined)) return;
     setTargets(wanted.map((each, i) => (i === index || running[i] !== undefined ? each : undefined)));
-    const what = `${joint.name} ${jointText(joint, value)}`;
+    const what = `${jointTitle(joint)} ${jointText(joint, value)}`;
     const accepted = await command(
       robotKey,
       Command.MOVE_ABSOLUTE,
@@ -117,7 +117,7 @@ export function JointsPanel(props: {
   const set = preview && rows[preview.index];
   // On a phone the control panel may be off the screen.
   const lost = controlNotice.value?.kind === "lost" ? controlNotice.value : null;
-  const unsent = set && t("target_unsent", { joint: set.name, value: jointText(set, preview.value) });
+  const unsent = set && t("target_unsent", { joint: jointTitle(set), value: jointText(set, preview.value) });
   const idle = unsent
     ? unsent
     : steps.waiting
@@ -159,7 +159,7 @@ export function JointsPanel(props: {
             ) : (
               <StepButton
                 name={t(sign > 0 ? "step_plus" : "step_minus", {
-                  joint: joint.name,
+                  joint: jointTitle(joint),
                   step: unit === "°" ? `${size}°` : `${size}\u202f${unit}`,
                 })}
                 sign={sign}
@@ -169,11 +169,13 @@ export function JointsPanel(props: {
             );
           return (
             <div key={joint.name} class={`joint-row ${beyond ? "beyond" : ""}`}>
-              <span class="joint-name">{joint.name}</span>
+              <span class="joint-name" title={joint.name}>
+                {jointTitle(joint)}
+              </span>
               {stepBy(-1)}
               <div class="joint-range">
                 <JointTrack
-                  label={t("joint_target", { joint: joint.name })}
+                  label={t("joint_target", { joint: jointTitle(joint) })}
                   lower={joint.lower}
                   upper={joint.upper}
                   position={position}

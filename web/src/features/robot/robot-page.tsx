@@ -15,6 +15,7 @@ import {
   ProgramState_Outcome as Outcome,
   ProgramStateSchema,
 } from "../../gen/robomesh_pb";
+import { provenanceText, robotTitle } from "../../i18n/format";
 import { reasonsText, reasonText } from "../../i18n/reasons";
 import type { TextName } from "../../i18n/texts";
 import { t } from "../../i18n/texts";
@@ -159,6 +160,7 @@ function Headline(props: {
   const { controller, description, program, events } = props;
   const message = controller?.message;
   const state = stateWord(controller, events);
+  const source = description && provenanceText(description);
   const facts: string[] = [];
   // Do not show stale state as current.
   if (message && !isStale("controller", ageOf(controller))) {
@@ -191,8 +193,8 @@ function Headline(props: {
         <TopicChoice robotKey={`robomesh/${props.site}/${props.name}`} />
         {/* A program replaces less important facts, so that nothing below moves. */}
         {runs || (
-          <span class="provenance dim" lang="en" title={description?.provenance}>
-            {description?.provenance && `${description.title}: ${description.provenance}`}
+          <span class="provenance dim" lang={source === description?.provenance ? "en" : undefined} title={source}>
+            {description && source && `${robotTitle(description)}: ${source}`}
           </span>
         )}
       </div>

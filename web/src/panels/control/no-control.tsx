@@ -15,14 +15,19 @@ export function mayNotCommand(): boolean {
 export function NoControl() {
   const [password, setPassword] = useState("");
   const [problem, setProblem] = useState("");
+  const [busy, setBusy] = useState(false);
   if (isMonitor.value) return <p class="no-control">{a("monitor_only", { account: me.value?.account ?? "" })}</p>;
   const send = async () => {
+    if (busy) return;
+    setProblem("");
+    setBusy(true);
     try {
       await unlock(password);
     } catch (error) {
       setProblem(error instanceof Error ? error.message : String(error));
     }
     setPassword("");
+    setBusy(false);
   };
   return (
     <form
@@ -36,13 +41,11 @@ export function NoControl() {
       <p>{a("unlock_says")}</p>
       <input type="text" name="username" autocomplete="username" value={me.value?.account} readOnly hidden />
       <PasswordField label={a("password")} kind="current-password" value={password} set={setPassword} />
-      {problem && (
-        <p class="sign-in-problem" role="alert">
-          {problem}
-        </p>
-      )}
-      <button type="submit" class="action primary">
-        {a("unlock")}
+      <p class="sign-in-problem" role="alert">
+        {problem}
+      </p>
+      <button type="submit" class="action primary" disabled={busy}>
+        {a(busy ? "unlocking" : "unlock")}
       </button>
     </form>
   );
