@@ -198,7 +198,7 @@ def test_a_step_beyond_a_limit_is_refused_at_its_row_with_value_and_limit(open_a
     )
     expect(page.locator(".limit.refused")).to_have_text("−110")
     button(page, "Requests").click()
-    refusal = page.locator(".event-list li").filter(has_text="MOVE_RELATIVE").first
+    refusal = page.locator(".event-list li").filter(has_text="elbow −5.00°").first
     expect(refusal).to_contain_text("refused")
     button(page, "elbow +5°").click()
     expect(page.locator('[data-joint="elbow"]')).to_have_text("−105.00°")

@@ -115,15 +115,19 @@ def test_the_audit_of_every_robot_is_there_and_its_logs_are_searched_when_asked(
     page = open_page(EVENTS, drawn=False)
     journal = page.locator(".journal")
     button(journal, "Requests").click()
-    asked = journal.locator(".journal-line").filter(has_text="wang").filter(has_text="ACQUIRE")
+    asked = journal.locator(".journal-line").filter(has_text="wang: take control")
     expect(asked).not_to_have_count(0)
     journal.get_by_label("Robot", exact=True).select_option(label="arm")
     button(journal, "Search the audit logs").click()
     expect(journal.locator(".notice")).to_have_text(re.compile("^Found in the logs: [1-9]"))
-    refused = journal.locator(".journal-line").filter(has_text="OFFER").first
-    expect(refused).to_contain_text("refused wang OFFER: no operator is in control, or the lease has ended")
+    refused = journal.locator(".journal-line").filter(has_text="zhao").first
+    expect(refused).to_contain_text(
+        "refused wang: offer control to zhao – no operator is in control, or the lease has ended"
+    )
     button(page, "中文").click()
-    expect(refused).to_contain_text("已拒绝 wang OFFER: 无人控制，或控制权已结束：请先取得控制（ACQUIRE）")
+    expect(refused).to_contain_text(
+        "已拒绝 wang：提出将控制权移交给 zhao——无人控制，或控制权已结束：请先取得控制（ACQUIRE）"
+    )
     refused.click()
     expect(page.locator(".entry-details [lang=en]")).to_contain_text(
         "no operator is in control, or the lease"

@@ -174,7 +174,7 @@ def test_a_program_runs_or_is_stopped_and_everybody_sees_how_far_it_is_and_what_
     expect(button(page, "Resume")).to_be_enabled()
     page.locator("button.stop").click()
     for seen in (page, other):
-        progress(seen, "ENDED", "the page")
+        progress(seen, "ENDED", "stopped by li")
     page.get_by_role("button", name=re.compile("Reset stop")).click(timeout=CHECKED_MS)
     expect(page.get_by_role("button", name=re.compile("Reset stop"))).to_have_count(0, timeout=CHECKED_MS)
     button(page, "Release").click()

@@ -5,7 +5,9 @@ import type { Event } from "../gen/robomesh_pb";
 import { Event_Severity as Severity } from "../gen/robomesh_pb";
 import { alarmTitle } from "./alarm-text";
 import { isolated } from "./foreign-text";
+import { stampTime } from "./format";
 import { reasonText } from "./reasons";
+import { isSaid, operatorText } from "./stop-words";
 import { language, t } from "./texts";
 
 // Events that need no action. A code that can also be an alarm is listed for its normal severity.
@@ -101,8 +103,9 @@ export function eventText(event: Event): string {
   const reason = values.reason;
   switch (code) {
     case "stop.latched": {
-      const text = t(values.sent === "True" ? "event_stop" : "event_stop_unsent", { by });
-      return reason && reason !== "console" ? `${text} ${t("stop_reason", { reason })}` : text;
+      const time = stampTime(event.timestamp);
+      const text = t(values.sent === "True" ? "event_stop" : "event_stop_unsent", { by: operatorText(by), time });
+      return isSaid(reason) ? `${text} ${t("stop_reason", { reason })}` : text;
     }
     case "stop.sent":
       return t("event_stop_sent");

@@ -1,6 +1,7 @@
 // Why a request is refused, control ended or a motion is not checked: reasons of the mesh in the page's language.
 
 import type { Reason } from "../gen/robomesh_pb";
+import { isSaid } from "./stop-words";
 import { inLanguage, language, t } from "./texts";
 
 /** Sentences by code, English and Chinese, with the parameters of robomesh/reason_codes.py; {cause}: the causes. */
@@ -1639,9 +1640,12 @@ export function reasonsText(reasons: readonly Reason[] = [], text = ""): string 
   return reasons.length > 0 ? reasons.map((reason) => reasonText(reason)).join(t("list_separator")) : text;
 }
 
+const STOPPED = "program.stopped";
+const STOPPED_WITHOUT_REASON = ["stopped by {by}", "由 {by} 停止"] as const;
+
 /** Undefined: the code is unknown, or a parameter did not fit into the answer. */
 function sentence({ code, values, causes }: Reason): string | undefined {
-  const pair = SENTENCES.get(code);
+  const pair = code === STOPPED && !isSaid(values.reason) ? STOPPED_WITHOUT_REASON : SENTENCES.get(code);
   if (!pair) return undefined;
   const known = causes.map((cause) => reasonText(cause));
   const shown = Object.fromEntries(Object.entries(values).map(([name, value]) => [name, word(name, value)]));

@@ -11,6 +11,7 @@ import {
 } from "../gen/robomesh_pb";
 import { stampTime } from "../i18n/format";
 import { reasonsText, reasonText } from "../i18n/reasons";
+import { operatorText } from "../i18n/stop-words";
 import type { TextName } from "../i18n/texts";
 import { t } from "../i18n/texts";
 import type { Latest } from "./topics";
@@ -73,7 +74,7 @@ export function stopText({ stop, activity }: ControllerState, disobeyed = false)
       : NOT_MOVING.has(activity)
         ? "stopped_by"
         : "stop_sent_by";
-  return t(text, { by: stop.by || "–", time: stampTime(stop.since) });
+  return t(text, { by: operatorText(stop.by), time: stampTime(stop.since) });
 }
 
 /** Return the state word of a robot, the most urgent first. */

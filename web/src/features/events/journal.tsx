@@ -3,7 +3,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "../../gen/robomesh_pb";
 import { alarmTitle } from "../../i18n/alarm-text";
-import { entryText } from "../../i18n/audit-text";
+import { entrySentence, entryText } from "../../i18n/audit-text";
 import { eventText } from "../../i18n/event-text";
 import { e } from "../../i18n/events";
 import { count, stampFull } from "../../i18n/format";
@@ -187,12 +187,10 @@ function EventWords({ entry: { event } }: { entry: EventEntry }) {
 function AuditWords({ entry: { audit } }: { entry: AuditLine }) {
   const [word, level] = OUTCOMES[audit.outcome] ?? ["state_unknown", "normal"];
   const repeated = audit.repeatedCount > 0n ? ` × ${count(audit.repeatedCount)}` : "";
-  const text = entryText(audit);
   return (
     <>
-      <Mark word={word} level={level} /> <strong>{audit.operator || audit.source}</strong> {audit.request}
+      {level !== "normal" && <Mark word={word} level={level} />} {entrySentence(audit)}
       {repeated}
-      {text && <span lang={text === audit.text ? "en" : undefined}>{`: ${text}`}</span>}
     </>
   );
 }

@@ -1,8 +1,8 @@
 // Events of the robot, audited requests, newest first, and the state of its link.
 
 import { useState } from "preact/hooks";
-import type { AuditEntry, ControllerState, Event } from "../../gen/robomesh_pb";
-import { entryText } from "../../i18n/audit-text";
+import type { AuditEntry, ControllerState, Description_Joint, Event } from "../../gen/robomesh_pb";
+import { entrySentence } from "../../i18n/audit-text";
 import { eventText } from "../../i18n/event-text";
 import { count, stampFull, stampTime } from "../../i18n/format";
 import { t } from "../../i18n/texts";
@@ -20,6 +20,7 @@ export function EventsPanel(props: {
   robotKey: string;
   events: readonly Event[];
   controller: Latest<ControllerState> | undefined;
+  joints: readonly Description_Joint[];
 }) {
   const { robotKey, events } = props;
   const [shown, setShown] = useState<(typeof SHOWN)[number]>("events");
@@ -39,7 +40,12 @@ export function EventsPanel(props: {
           {shown === "events"
             ? events.map(EventLine)
             : audit.map((entry) => (
-                <AuditLine key={`${entry.number} ${entry.repeatedCount}`} robotKey={robotKey} entry={entry} />
+                <AuditLine
+                  key={`${entry.number} ${entry.repeatedCount}`}
+                  robotKey={robotKey}
+                  entry={entry}
+                  joints={props.joints}
+                />
               ))}
         </ol>
       )}
@@ -61,22 +67,21 @@ function EventLine(event: Event) {
   );
 }
 
-function AuditLine({ robotKey, entry }: { robotKey: string; entry: AuditEntry }) {
-  const [, site = "", robot = ""] = robotKey.split("/");
-  const text = entryText(entry);
+function AuditLine(props: { robotKey: string; entry: AuditEntry; joints: readonly Description_Joint[] }) {
+  const { entry } = props;
+  const [, site = "", robot = ""] = props.robotKey.split("/");
   const [word, level] = OUTCOMES[entry.outcome] ?? ["state_unknown", "normal"];
   return (
-    <li title={`${stampFull(entry.timestamp)} · ${entry.source}`}>
+    <li title={`${stampFull(entry.timestamp)} · ${entry.source} · ${entry.request}`}>
       <time>{stampTime(entry.timestamp)}</time>
       <span class="event-text">
-        <Mark word={word} level={level} />
-        <strong>{entry.operator || entry.source}</strong> {entry.request}
+        {level !== "normal" && <Mark word={word} level={level} />}
+        {entrySentence(entry, props.joints)}
         {entry.repeatedCount > 0n && (
           <strong class="repeated" title={t("repeated", { count: count(entry.repeatedCount) })}>
             {` × ${count(entry.repeatedCount)}`}
           </strong>
         )}
-        {text && <span lang={text === entry.text ? "en" : undefined}>{`: ${text}`}</span>}
         <SeenPicture site={site} robot={robot} entry={entry} />
       </span>
     </li>

@@ -121,7 +121,12 @@ export function RobotPage({ site, robot }: RobotName) {
             age={joints ? age : undefined}
           />
           <ToolPanel robotKey={key} kinematics={kinematics} description={description?.message} />
-          <EventsPanel robotKey={key} events={events} controller={controller} />
+          <EventsPanel
+            robotKey={key}
+            events={events}
+            controller={controller}
+            joints={description?.message.joints ?? []}
+          />
         </div>
         <CameraPanel
           robotKey={key}

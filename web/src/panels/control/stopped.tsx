@@ -3,6 +3,7 @@
 import type { ControllerState } from "../../gen/robomesh_pb";
 import { ControllerState_Activity as Activity } from "../../gen/robomesh_pb";
 import { stampFull } from "../../i18n/format";
+import { isSaid } from "../../i18n/stop-words";
 import { t } from "../../i18n/texts";
 import type { CommandValues } from "../../mesh/command";
 import { Command } from "../../mesh/command";
@@ -31,7 +32,7 @@ export function Stopped(props: {
         </strong>
         <p>
           {stop && !stop.sent && `${t("stopped_unsent")} `}
-          {stop?.reason && stop.reason !== "console" && `${t("stop_reason", { reason: stop.reason })} `}
+          {isSaid(stop?.reason) && `${t("stop_reason", { reason: stop.reason })} `}
           {!stop && state.fault && `${state.fault}. `}
           {needs}
         </p>
