@@ -194,7 +194,7 @@ def test_a_step_beyond_a_limit_is_refused_at_its_row_with_value_and_limit(open_a
     button(page, "5").click()
     button(page, "elbow −5°").click()
     expect(page.locator(".joints .notice")).to_have_text(
-        "Not sent: joint elbow at -115.00° is beyond its limit -110.00°."
+        "Not sent: joint elbow at −115.00° is beyond its limit −110.00°."
     )
     expect(page.locator(".limit.refused")).to_have_text("−110")
     button(page, "Requests").click()

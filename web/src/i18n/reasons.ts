@@ -1654,4 +1654,8 @@ function sentence({ code, values, causes }: Reason): string | undefined {
   return names.every((name) => all[name]) ? inLanguage(pair, all) : undefined;
 }
 
-const word = (name: string, value: string): string => (language.value === "zh" && WORDS[`${name}:${value}`]) || value;
+const NEGATIVE = /^-(?=\d+(\.\d+)?( ?(°|%|mm|m|rad|s))?$)/;
+
+/** Return a parameter in the page's language; a number has the page's minus sign. */
+const word = (name: string, value: string): string =>
+  (language.value === "zh" && WORDS[`${name}:${value}`]) || value.replace(NEGATIVE, "−");
