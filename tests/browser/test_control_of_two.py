@@ -202,6 +202,8 @@ def test_a_step_beyond_a_limit_is_refused_at_its_row_with_value_and_limit(open_a
     expect(refusal).to_contain_text("refused")
     button(page, "elbow +5°").click()
     expect(page.locator('[data-joint="elbow"]')).to_have_text("−105.00°")
+    done = re.compile(r"^\S+li: elbow \+5\.00°, done in \d+\.\d\u202fs$")
+    expect(page.locator(".event-list li").first).to_have_text(done)
     expect(page.locator(".limit.refused")).to_have_count(0)
 
 

@@ -169,7 +169,7 @@ def test_a_password_is_changed_with_progress_and_a_wrong_one_is_named(open_tab):
     ):
         page.get_by_label(name, exact=True).fill(value)
     waiting = []
-    page.route("**/account/password", waiting.append)
+    page.route("**/account/password", lambda route: waiting.append(route))
     button(page, "Change").click()
     expect(button(page, "Changing…")).to_be_disabled()
     waiting[0].continue_()

@@ -3,7 +3,7 @@
 import type { AuditEntry, Description_Joint } from "../gen/robomesh_pb";
 import { AuditEntry_Outcome as Outcome } from "../gen/robomesh_pb";
 import { isolated } from "./foreign-text";
-import { jointText, jointTitle } from "./format";
+import { fixed, jointText, jointTitle } from "./format";
 import { reasonText } from "./reasons";
 import { inLanguage, t } from "./texts";
 
@@ -41,12 +41,15 @@ const OUTCOME_SAYS_ALL = new Set(["EXPIRE", "REVOKE", "PROGRAM_END", "STOP_AGAIN
 /** Return the reason's sentence; entries of older gateways have only the gateway's text. */
 export const entryText = (entry: AuditEntry): string => reasonText(entry.reason, entry.text);
 
-/** Return an entry as one sentence; `joints` give the numbers of a motion their names and units. */
-export function entrySentence(entry: AuditEntry, joints: readonly Description_Joint[] = []): string {
+/** Return an entry as one sentence.
+ *
+ * `joints` give the numbers of a motion their names and units; `tookS`: how long the motion took [s]. */
+export function entrySentence(entry: AuditEntry, joints: readonly Description_Joint[] = [], tookS?: number): string {
   const who = isolated(entry.operator || entry.source);
   const why = entryText(entry);
   if (OUTCOME_SAYS_ALL.has(entry.request) && why) return t("entry_of", { who, what: why });
-  const what = asked(entry, joints);
+  const sent = asked(entry, joints);
+  const what = tookS === undefined ? sent : t("entry_done", { what: sent, seconds: fixed(tookS, 1) });
   if (entry.outcome === Outcome.ACCEPTED) {
     // Of an accepted request the text is a warning of its check; of others it repeats what was asked.
     const warning = entry.reason?.code.startsWith("check.") ? why : "";

@@ -447,6 +447,7 @@ const TEXTS = {
   audit_entries: ["Audit entries", "审计条目"],
   audit_head: ["Audit head", "审计链头"],
   entry_of: ["{who}: {what}", "{who}：{what}"],
+  entry_done: ["{what}, done in {seconds}\u202fs", "{what}，用时 {seconds}\u202fs"],
   entry_refused: ["{what} – {why}", "{what}——{why}"],
   entry_warned: ["{what}; warning: {why}", "{what}；注意：{why}"],
   event_stop: ["{by} asked for a stop at {time}.", "{by} 于 {time} 请求停止。"],

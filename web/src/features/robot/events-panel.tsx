@@ -6,6 +6,7 @@ import { entrySentence } from "../../i18n/audit-text";
 import { eventText } from "../../i18n/event-text";
 import { count, stampFull, stampTime } from "../../i18n/format";
 import { t } from "../../i18n/texts";
+import { useMotionTimes } from "../../mesh/motion-times";
 import type { Latest } from "../../mesh/topics";
 import { useAudit } from "../../mesh/topics";
 import { Choice } from "../../ui/choice";
@@ -25,6 +26,7 @@ export function EventsPanel(props: {
   const { robotKey, events } = props;
   const [shown, setShown] = useState<(typeof SHOWN)[number]>("events");
   const audit = useAudit(robotKey);
+  const times = useMotionTimes(audit, props.controller?.message);
   const empty = (shown === "events" ? events : audit).length === 0;
   return (
     <Panel
@@ -45,6 +47,7 @@ export function EventsPanel(props: {
                   robotKey={robotKey}
                   entry={entry}
                   joints={props.joints}
+                  took={times.get(entry.number)}
                 />
               ))}
         </ol>
@@ -67,7 +70,13 @@ function EventLine(event: Event) {
   );
 }
 
-function AuditLine(props: { robotKey: string; entry: AuditEntry; joints: readonly Description_Joint[] }) {
+function AuditLine(props: {
+  robotKey: string;
+  entry: AuditEntry;
+  joints: readonly Description_Joint[];
+  /** Duration of its motion [s], once known. */
+  took: number | undefined;
+}) {
   const { entry } = props;
   const [, site = "", robot = ""] = props.robotKey.split("/");
   const [word, level] = OUTCOMES[entry.outcome] ?? ["state_unknown", "normal"];
@@ -76,7 +85,7 @@ function AuditLine(props: { robotKey: string; entry: AuditEntry; joints: readonl
       <time>{stampTime(entry.timestamp)}</time>
       <span class="event-text">
         {level !== "normal" && <Mark word={word} level={level} />}
-        {entrySentence(entry, props.joints)}
+        {entrySentence(entry, props.joints, props.took)}
         {entry.repeatedCount > 0n && (
           <strong class="repeated" title={t("repeated", { count: count(entry.repeatedCount) })}>
             {` × ${count(entry.repeatedCount)}`}
