@@ -205,7 +205,7 @@ def test_the_picture_of_a_request_is_opened_from_a_recording(open_page, plant, v
         until(plant, lambda recording: not recording.open)
         button(page, "Release").click()
     button(page, "Requests").click()
-    page.locator(".event-list li").filter(has_text="TRACE_OFF").first.get_by_role("button").click()
+    page.locator(".event-list li").filter(has_text="trace off").first.get_by_role("button").click()
     dialog = page.get_by_role("dialog", name="What the page showed")
     still = dialog.locator("canvas")
     expect(still).to_be_visible()
@@ -216,5 +216,5 @@ def test_the_picture_of_a_request_is_opened_from_a_recording(open_page, plant, v
     page.keyboard.press("Escape")
     expect(dialog).to_have_count(0)
     # A picture that no recording has is said to be missing.
-    page.locator(".event-list li").filter(has_text="HOME").first.get_by_role("button").click()
+    page.locator(".event-list li").filter(has_text=": Home").first.get_by_role("button").click()
     expect(dialog).to_contain_text("No recording of this site has this picture.")
