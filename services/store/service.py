@@ -79,7 +79,8 @@ class _Service:
     async def _find_robots(self) -> None:
         """Accept programs of robots that are started from the page."""
         async for who, alive in self._session.watch_presence():
-            if alive and who.service == "gateway" and who.site == self._settings.site:
+            of_robot = who.service == "gateway" and who.robot != WHOLE_SITE
+            if alive and of_robot and who.site == self._settings.site:
                 self._add(who.robot)
 
     def _add(self, robot: str) -> None:

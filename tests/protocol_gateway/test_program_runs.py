@@ -5,6 +5,7 @@ import contextlib
 import json
 import os
 import signal
+from hashlib import sha256
 from math import radians
 
 import psutil
@@ -19,7 +20,7 @@ from robomesh.activity import activity_words
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
-from tests.conftest import run
+from tests.conftest import last_value, run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, simulator, until
 from tests.protocol_gateway.test_checked_motion import POST, checked, one_robot_cell, standing
 
@@ -120,6 +121,10 @@ def test_a_program_runs_to_its_end_and_publishes_its_steps(mesh, tmp_path, check
             assert site.controller.trace == STATE.YES
             entries = [(each.request, each.source) for each in site.seen["audit"]]
             run_at = entries.index(("RUN_PROGRAM", "mesh"))
+            source = await last_value(site.session, site.key("program/source"))
+            assert (source.text, source.name, source.operator) == (GOOD, "weld", "li")
+            audited = site.seen["audit"][run_at].values["program_sha256"]
+            assert sha256(source.text.encode()).hexdigest() == audited
             # Renewals have no entry: the next ones are the program's.
             assert [request for request, _ in entries[run_at + 1 : run_at + 5]] == [
                 *("SPEED", "HOME", "SPEED", "MOVE_ABSOLUTE"),

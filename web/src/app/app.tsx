@@ -115,7 +115,7 @@ function Page({ route, robotKey }: { route: Route; robotKey: string }) {
         <RobotPage key={robotKey} {...route.robot} />
       );
     case "program":
-      return <ProgramPage shown={route.robot} />;
+      return <ProgramPage shown={route.robot} sha256={route.sha256} />;
     case "define":
       return <DefinePage name={route.name} />;
     case "wall":

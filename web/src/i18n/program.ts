@@ -5,8 +5,8 @@ import { inLanguage } from "./texts";
 const TEXTS = {
   choose: ["Program a robot", "机器人编程"],
   choose_words: [
-    "Choose the robot that the program is for. Each robot's draft is kept in this browser.",
-    "请选择要编程的机器人。每台机器人的草稿都保存在此浏览器中。",
+    "Choose the robot that the program is for. The site stores its programs; a draft is kept in this browser.",
+    "请选择要编程的机器人。程序存储在站点；草稿保存在此浏览器中。",
   ],
   program_of: ["Program of {robot}", "{robot} 的程序"],
   to_robot: ["Robot", "机器人"],
@@ -15,7 +15,7 @@ const TEXTS = {
   name: ["Program name", "程序名称"],
   new: ["New", "新建"],
   new_hint: ["Begins anew with an example. Undo brings the text back.", "以示例重新开始。可用撤销恢复原文。"],
-  open: ["Open…", "打开…"],
+  open: ["Open file…", "打开文件…"],
   save: ["Save file", "保存文件"],
   save_hint: [
     "Downloads the program. The draft itself is kept in this browser as you type.",

@@ -20,8 +20,8 @@ export type Route =
   | { page: "fleet" | "events" | "settings" }
   /** `#/<site>/<robot>`; a replay is a robot too. */
   | { page: "robot"; robot: RobotName }
-  /** `#/program/<site>/<robot>`; null: `#/program`, which offers a choice of robots. */
-  | { page: "program"; robot: RobotName | null }
+  /** `#/program/<site>/<robot>`, then a text's SHA-256; null: `#/program`, which offers a choice of robots. */
+  | { page: "program"; robot: RobotName | null; sha256: string }
   /** `#/define/<name>`; "": a new robot. */
   | { page: "define"; name: string }
   /** `#/recordings`, the list; then `/<site>/<file>` for one recording or two to compare. */
@@ -48,7 +48,9 @@ function readRoute(): Route {
     case "program": {
       const robot = readRobot(rest);
       // A replay has no program: show its own page.
-      return robot && isReplay(robot.robot) ? { page: "robot", robot } : { page: "program", robot };
+      return robot && isReplay(robot.robot)
+        ? { page: "robot", robot }
+        : { page: "program", robot, sha256: rest[2] ?? "" };
     }
     default: {
       const robot = readRobot([first, ...rest]);
@@ -102,8 +104,9 @@ export function robotLink(site: string, robot: string): string {
   return link(site, robot);
 }
 
-export function programLink(site: string, robot: string): string {
-  return link("program", site, robot);
+/** Link to a robot's program; to the text of one that ran, by its SHA-256. */
+export function programLink(site: string, robot: string, ...sha256: readonly string[]): string {
+  return link("program", site, robot, ...sha256);
 }
 
 /** Link to the list, to one recording, or to two to compare. */

@@ -13,6 +13,7 @@ import { fleetRobots } from "../../mesh/known-robots";
 import { Choice, Toggle } from "../../ui/choice";
 import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
 import { NoticeLine } from "../../ui/notice-line";
+import { programLink } from "../../ui/route";
 import { Select } from "../../ui/select";
 import { SeenPicture } from "../../video/seen-picture";
 import { Filters, SiteSelect } from "./alarm-panel";
@@ -218,7 +219,9 @@ function Details({ entry, close }: { entry: Entry; close: () => void }) {
         {facts.map(([name, value]) => (
           <div key={name}>
             <dt>{name}</dt>
-            <dd>{value}</dd>
+            <dd>
+              {name === "program_sha256" ? <a href={programLink(entry.site, entry.robot, value)}>{value}</a> : value}
+            </dd>
           </div>
         ))}
       </dl>

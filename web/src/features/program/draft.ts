@@ -6,18 +6,27 @@ import { computed, effect, signal } from "@preact/signals";
 
 export interface Draft {
   robotKey: string;
-  /** The file's name, shown to all while the program runs. */
+  /** The program's name, shown to all while it runs. */
+  name: string;
+  text: string;
+  /** The version that it was opened from or saved as; null: it was never saved. */
+  base: Base | null;
+}
+
+export interface Base {
+  id: string;
+  version: number;
   name: string;
   text: string;
 }
 
 interface Step {
-  text: string;
+  draft: Draft;
   cursor: number;
 }
 
 const STORAGE_PREFIX = "robomesh.program/";
-const FIRST_NAME = "program";
+export const FIRST_NAME = "program";
 export const FILE_ENDING = ".prog";
 const MOST_STEPS = 200;
 const TOGETHER_MS = 800; // text typed without a longer pause is one step
@@ -28,6 +37,11 @@ export const draft = signal<Draft | null>(null);
 export const storageError = signal("");
 const past = signal<readonly Step[]>([]);
 const future = signal<readonly Step[]>([]);
+/** Whether the draft differs from the version that it is based on. */
+export const isUnsaved = computed(() => {
+  const now = draft.value;
+  return now !== null && (now.text !== (now.base?.text ?? "") || (now.base !== null && now.name !== now.base.name));
+});
 export const canUndo = computed(() => past.value.length > 0);
 export const canRedo = computed(() => future.value.length > 0);
 
@@ -37,18 +51,26 @@ let typedAt = 0;
 /** Open a robot's draft; false: it had none, and gets an empty one. */
 export function openDraft(robotKey: string): boolean {
   const kept = storedDraft(robotKey);
-  draft.value = kept ?? { robotKey, name: FIRST_NAME, text: "" };
+  draft.value = kept ?? { robotKey, name: FIRST_NAME, text: "", base: null };
   past.value = future.value = [];
   return kept !== null;
 }
 
 function storedDraft(robotKey: string): Draft | null {
   try {
-    const { name, text } = JSON.parse(localStorage.getItem(STORAGE_PREFIX + robotKey) ?? "null") as Partial<Draft>;
-    return typeof name === "string" && typeof text === "string" ? { robotKey, name, text } : null;
+    const { name, text, base } = JSON.parse(
+      localStorage.getItem(STORAGE_PREFIX + robotKey) ?? "null",
+    ) as Partial<Draft>;
+    const isDraft = typeof name === "string" && typeof text === "string";
+    return isDraft ? { robotKey, name, text, base: isBase(base) ? base : null } : null;
   } catch {
     return null; // none, or edited by hand
   }
+}
+
+function isBase(value: Partial<Base> | null | undefined): value is Base {
+  const texts = [value?.id, value?.name, value?.text];
+  return texts.every((each) => typeof each === "string") && typeof value?.version === "number";
 }
 
 effect(() => {
@@ -56,7 +78,7 @@ effect(() => {
   // An empty draft is not kept: the example is for robots without a draft.
   if (!now?.text) return;
   try {
-    localStorage.setItem(STORAGE_PREFIX + now.robotKey, JSON.stringify({ name: now.name, text: now.text }));
+    localStorage.setItem(STORAGE_PREFIX + now.robotKey, JSON.stringify({ ...now, robotKey: undefined }));
     storageError.value = "";
   } catch (error) {
     storageError.value = String(error);
@@ -72,7 +94,7 @@ export function setField(element: HTMLTextAreaElement | null): void {
 export function recordTyping(): void {
   if (!field) return;
   const now = performance.now();
-  change(field.value, now - typedAt < TOGETHER_MS);
+  changeText(field.value, now - typedAt < TOGETHER_MS);
   typedAt = now;
 }
 
@@ -88,10 +110,27 @@ export function startDraft(text: string): void {
 
 /** Replace the whole text as one undo step, and move the cursor to the end of a line. */
 export function replace(text: string, line = 1): void {
-  if (!field) return;
-  change(text, false);
+  replaceDraft({ text }, line);
+}
+
+/** Replace parts of the draft as one undo step. */
+export function replaceDraft(parts: Partial<Omit<Draft, "robotKey">>, line = 1): void {
+  if (!field || !draft.value) return;
+  const before = draft.value;
+  const after = { ...before, ...parts };
+  if (after.text !== before.text || after.name !== before.name || after.base !== before.base) change(after, false);
   typedAt = 0;
-  show({ text, cursor: text.split("\n").slice(0, line).join("\n").length });
+  show(after.text, after.text.split("\n").slice(0, line).join("\n").length);
+}
+
+/** Start a program that was never saved, as one undo step. */
+export function startProgram(text: string, name: string): void {
+  replaceDraft({ text, name, base: null });
+}
+
+/** Say which version the draft is based on from now on; no undo step. */
+export function setBase(base: Base): void {
+  if (draft.value) draft.value = { ...draft.value, name: base.name, base };
 }
 
 /** Insert a text at the cursor, replacing the selection. */
@@ -99,19 +138,23 @@ export function insert(text: string): void {
   if (!field) return;
   const { value, selectionStart, selectionEnd } = field;
   const before = value.slice(0, selectionStart) + text;
-  change(before + value.slice(selectionEnd), false);
-  show({ text: before + value.slice(selectionEnd), cursor: before.length });
+  changeText(before + value.slice(selectionEnd), false);
+  show(before + value.slice(selectionEnd), before.length);
+}
+
+function changeText(text: string, together: boolean): void {
+  if (draft.value && text !== draft.value.text) change({ ...draft.value, text }, together);
 }
 
 /** `together`: part of the previous step. */
-function change(text: string, together: boolean): void {
+function change(after: Draft, together: boolean): void {
   const before = draft.value;
-  if (!before || text === before.text) return;
+  if (!before) return;
   if (!together || !canUndo.value) {
-    past.value = [...past.value, { text: before.text, cursor: field?.selectionStart ?? 0 }].slice(-MOST_STEPS);
+    past.value = [...past.value, { draft: before, cursor: field?.selectionStart ?? 0 }].slice(-MOST_STEPS);
   }
   future.value = [];
-  draft.value = { ...before, text };
+  draft.value = after;
 }
 
 export function undo(): void {
@@ -126,13 +169,15 @@ function step(from: typeof past, to: typeof past): void {
   const after = from.value.at(-1);
   if (!field || !draft.value || !after) return;
   from.value = from.value.slice(0, -1);
-  to.value = [...to.value, { text: draft.value.text, cursor: field.selectionStart }];
-  draft.value = { ...draft.value, text: after.text };
+  to.value = [...to.value, { draft: draft.value, cursor: field.selectionStart }];
+  // A version that was saved since then stays saved.
+  const saved = draft.value.base && draft.value.base.id === after.draft.base?.id ? draft.value.base : after.draft.base;
+  draft.value = { ...after.draft, base: saved };
   typedAt = 0;
-  show(after);
+  show(after.draft.text, after.cursor);
 }
 
-function show({ text, cursor }: Step): void {
+function show(text: string, cursor: number): void {
   if (!field) return;
   field.value = text;
   field.focus({ preventScroll: true });
@@ -140,13 +185,11 @@ function show({ text, cursor }: Step): void {
   requestAnimationFrame(() => scrollTo(cursorLine())); // once its lines are painted
 }
 
-/** Save the draft as a file. */
-export function download(): void {
-  const now = draft.value;
-  if (!now?.text) return;
+/** Download a text as a file. */
+export function download(text: string, name: string): void {
   const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([now.text], { type: "text/plain" }));
-  link.download = `${now.name.trim() || FIRST_NAME}${FILE_ENDING}`;
+  link.href = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
+  link.download = `${name.trim() || FIRST_NAME}${FILE_ENDING}`;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }

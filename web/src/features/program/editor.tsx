@@ -5,10 +5,11 @@ import { useLayoutEffect, useRef } from "preact/hooks";
 import { p } from "../../i18n/program";
 import { Panel } from "../../ui/panel";
 import { lineAtMoment } from "./checked-motion";
-import { download, draft, insert, LINE_PX, recordTyping, redo, setField, storageError, undo } from "./draft";
+import { draft, insert, LINE_PX, recordTyping, redo, setField, storageError, undo } from "./draft";
 import { checked, isCurrent } from "./program-check";
 import { highlightSyntax } from "./program-text";
 import { runningLine } from "./running-program";
+import { save } from "./stored-programs";
 import { severityOf } from "./violation-severity";
 import "./editor.css";
 
@@ -66,8 +67,8 @@ export function Editor() {
             }}
             onKeyDown={(event) => {
               const letter = event.ctrlKey || event.metaKey ? event.key.toLowerCase() : "";
-              const action = letter === "z" ? (event.shiftKey ? redo : undo) : { y: redo, s: download }[letter];
-              if (action && !event.altKey) event.preventDefault(), action();
+              const action = letter === "z" ? (event.shiftKey ? redo : undo) : { y: redo, s: save }[letter];
+              if (action && !event.altKey) event.preventDefault(), void action();
             }}
             onPaste={(event) => {
               // The browser's own layout takes seconds for a thousand lines.

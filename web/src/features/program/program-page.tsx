@@ -2,7 +2,13 @@
 
 import { useEffect, useLayoutEffect, useState } from "preact/hooks";
 import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
-import { ControllerStateSchema, DescriptionSchema, LeaseSchema, ProgramStateSchema } from "../../gen/robomesh_pb";
+import {
+  ControllerStateSchema,
+  DescriptionSchema,
+  LeaseSchema,
+  ProgramListSchema,
+  ProgramStateSchema,
+} from "../../gen/robomesh_pb";
 import type { Words } from "../../i18n/program";
 import { noWords, p } from "../../i18n/program";
 import { t } from "../../i18n/texts";
@@ -32,6 +38,8 @@ import { example } from "./program-text";
 import { RunPanel } from "./run-panel";
 import { isRunning, program } from "./running-program";
 import { startOverlay } from "./scene-overlay";
+import { StoredPanel } from "./stored-panel";
+import { lastAction, say, showHash, shown, stored } from "./stored-programs";
 import { addGizmo } from "./teach-gizmo";
 import { TeachPanel } from "./teach-panel";
 import { Timeline } from "./timeline";
@@ -42,8 +50,8 @@ const MOVED = 0.005; // rad or m: a larger distance from the check's start makes
 const SHOWN_MS = 8000;
 
 /** The page of a robot's program; without a robot, the choice of one. */
-export function ProgramPage({ shown }: { shown: RobotName | null }) {
-  return shown ? <ProgramOfRobot key={`${shown.site}/${shown.robot}`} {...shown} /> : <Choose />;
+export function ProgramPage({ shown, sha256 }: { shown: RobotName | null; sha256: string }) {
+  return shown ? <ProgramOfRobot key={`${shown.site}/${shown.robot}`} {...shown} sha256={sha256} /> : <Choose />;
 }
 
 function Choose() {
@@ -67,13 +75,14 @@ function Choose() {
   );
 }
 
-function ProgramOfRobot({ site, robot }: RobotName) {
+function ProgramOfRobot({ site, robot, sha256 }: RobotName & { sha256: string }) {
   const key = `robomesh/${site}/${robot}`;
   const controller = useTopic(ControllerStateSchema, `${key}/controller`);
   const lease = useTopic(LeaseSchema, `${key}/lease`);
   const description = useTopic(DescriptionSchema, `${key}/description`);
   const joints = useTopic(JointStatesSchema, `${key}/joints`);
   const running = useTopic(ProgramStateSchema, `${key}/program`);
+  const programs = useTopic(ProgramListSchema, `${key}/programs`);
   const events = useEvents(key);
   const [outcome, setOutcome] = useOutcome();
   const [stage, setStage] = useState<Stage | null>(null);
@@ -103,6 +112,7 @@ function ProgramOfRobot({ site, robot }: RobotName) {
       described.value = undefined;
       livePositions.value = null;
       program.value = null;
+      stored.value = shown.value = null;
     };
   }, [key, isKnownRobot]);
   const [empty, setEmpty] = useState(false);
@@ -111,6 +121,14 @@ function ProgramOfRobot({ site, robot }: RobotName) {
   useEffect(() => {
     program.value = running && !isStale("program", ageOf(running)) ? running.message : null;
   }, [running, running && isStale("program", ageOf(running))]);
+  useEffect(() => void (stored.value = isKnownRobot && programs ? programs.message : null), [programs, isKnownRobot]);
+  useEffect(() => {
+    if (sha256 && isKnownRobot) void showHash(key, sha256);
+  }, [key, sha256, isKnownRobot]);
+  useEffect(() => {
+    const timer = setTimeout(() => say(noWords), lastAction.value.refused ? 4 * SHOWN_MS : SHOWN_MS);
+    return () => clearTimeout(timer);
+  }, [lastAction.value]);
   // Show an example program to a beginner.
   useEffect(() => {
     if (!empty || rows.length === 0 || !description) return;
@@ -145,7 +163,11 @@ function ProgramOfRobot({ site, robot }: RobotName) {
         </div>
         <div class="program-left">
           <Toolbar tell={setOutcome} />
-          <Editor />
+          {/* The editor stays mounted: its field takes what is opened. */}
+          <div class="program-text" hidden={shown.value !== null}>
+            <Editor />
+          </div>
+          {shown.value && <StoredPanel robotKey={key} />}
           <CheckPanel moved={!isRunning() && hasMoved(positions)} />
         </div>
         <div class="program-middle">

@@ -1,74 +1,159 @@
-// The toolbar above the text: name, files, undo and redo.
+// The toolbar above the text: name, saving, the site's programs, files, undo and redo; and what is saved.
 
 import { useRef } from "preact/hooks";
 import type { Words } from "../../i18n/program";
 import { p } from "../../i18n/program";
-import { canRedo, canUndo, download, draft, FILE_ENDING, redo, rename, replace, undo } from "./draft";
+import { s } from "../../i18n/stored-programs";
+import { canRedo, canUndo, download, draft, FILE_ENDING, isUnsaved, redo, rename, startProgram, undo } from "./draft";
+import { readProgramFile } from "./program-files";
 import { description } from "./program-robot";
 import { example } from "./program-text";
+import {
+  isDeleted,
+  lastAction,
+  mayChange,
+  programOfDraft,
+  save,
+  saving,
+  shown,
+  showVersion,
+  stored,
+  timeOf,
+  unusedProgramName,
+} from "./stored-programs";
 import "./toolbar.css";
-
-const LARGEST = 64 * 1024; // the check's maximum
 
 export function Toolbar({ tell }: { tell: (words: Words) => void }) {
   const input = useRef<HTMLInputElement>(null);
   const now = draft.value;
   const begin = () => {
     if (!description.value) return;
-    replace(example(description.value, p("example_comment")));
+    startProgram(example(description.value, p("example_comment")), unusedProgramName());
+    shown.value = null;
     tell(() => p("replaced"));
   };
   const openFile = async (file: File) => {
-    if (file.size > LARGEST) return tell(() => p("too_large", { name: file.name, size: Math.ceil(file.size / 1024) }));
-    const text = await file.text();
-    if (text.includes("\0")) return tell(() => p("no_text", { name: file.name }));
-    replace(text.replace(/\r\n?/g, "\n"));
-    rename(file.name.replace(/\.[^.]*$/, ""));
+    const found = await readProgramFile(file);
+    if ("problem" in found) {
+      const values = { name: file.name, size: Math.ceil(file.size / 1024) };
+      return tell(() => p(found.problem, values));
+    }
+    startProgram(found.text, found.name);
+    shown.value = null;
     tell(() => p("opened", { name: file.name }));
   };
+  const isNew = !now?.base || now.base.name !== now.name;
   return (
-    <div class="program-tools" role="toolbar" aria-label={p("file")}>
-      <label class="program-name">
-        <span class="dim small">{p("name")}</span>
+    <>
+      <div class="program-tools" role="toolbar" aria-label={p("file")}>
+        <label class="program-name">
+          <span class="dim small">{p("name")}</span>
+          <input
+            type="text"
+            autocomplete="off"
+            spellcheck={false}
+            maxLength={60}
+            value={now?.name ?? ""}
+            disabled={!now}
+            onInput={(event) => rename(event.currentTarget.value)}
+          />
+        </label>
+        <div class="program-buttons">
+          <button
+            class="action primary"
+            onClick={() => void save()}
+            disabled={!now?.text || saving.value || !mayChange.value || (!isUnsaved.value && now.base !== null)}
+            title={mayChange.value ? s("save_hint") : s("monitor")}
+          >
+            {s(now?.base && isNew ? "save_as" : "save")}
+          </button>
+          <button
+            class="action"
+            aria-pressed={shown.value !== null}
+            title={s("programs_hint")}
+            onClick={() => {
+              shown.value = shown.value ? null : { kind: "list" };
+            }}
+          >
+            {s("programs")}
+          </button>
+          <button class="action" onClick={begin} disabled={!now || !description.value} title={p("new_hint")}>
+            {p("new")}
+          </button>
+          <button class="action" disabled={!now} onClick={() => input.current?.click()}>
+            {p("open")}
+          </button>
+          <button
+            class="action"
+            onClick={() => now && download(now.text, now.name)}
+            disabled={!now?.text}
+            title={p("save_hint")}
+          >
+            {p("save")}
+          </button>
+          <button class="action" disabled={!canUndo.value} onClick={undo}>
+            {p("undo")}
+          </button>
+          <button class="action" disabled={!canRedo.value} onClick={redo}>
+            {p("redo")}
+          </button>
+        </div>
         <input
-          type="text"
-          autocomplete="off"
-          spellcheck={false}
-          maxLength={60}
-          value={now?.name ?? ""}
-          disabled={!now}
-          onInput={(event) => rename(event.currentTarget.value)}
+          ref={input}
+          class="file-input"
+          type="file"
+          accept={`${FILE_ENDING},.txt,text/plain`}
+          tabIndex={-1}
+          aria-label={p("open")}
+          onChange={(event) => {
+            const file = event.currentTarget.files?.[0];
+            if (file) void openFile(file).finally(() => input.current && (input.current.value = ""));
+          }}
         />
-      </label>
-      <div class="program-buttons">
-        <button class="action" onClick={begin} disabled={!now || !description.value} title={p("new_hint")}>
-          {p("new")}
-        </button>
-        <button class="action" disabled={!now} onClick={() => input.current?.click()}>
-          {p("open")}
-        </button>
-        <button class="action" onClick={download} disabled={!now?.text} title={p("save_hint")}>
-          {p("save")}
-        </button>
-        <button class="action" disabled={!canUndo.value} onClick={undo}>
-          {p("undo")}
-        </button>
-        <button class="action" disabled={!canRedo.value} onClick={redo}>
-          {p("redo")}
-        </button>
       </div>
-      <input
-        ref={input}
-        class="file-input"
-        type="file"
-        accept={`${FILE_ENDING},.txt,text/plain`}
-        tabIndex={-1}
-        aria-label={p("open")}
-        onChange={(event) => {
-          const file = event.currentTarget.files?.[0];
-          if (file) void openFile(file).finally(() => input.current && (input.current.value = ""));
-        }}
-      />
-    </div>
+      <StoreLine />
+    </>
   );
+}
+
+/** Where the draft stands to what the site stores. Its height is fixed: nothing below moves. */
+function StoreLine() {
+  const now = draft.value;
+  const program = programOfDraft.value;
+  const current = program?.current;
+  const base = now?.base;
+  const isNewer = base && current && (current.number > base.version || isDeleted(program));
+  const said = lastAction.value;
+  const words = said.words() || (now ? stateOfDraft() : "");
+  return (
+    <p class="store-line" data-unsaved={isUnsaved.value}>
+      <span
+        class={`store-words ${said.words() && said.refused ? "refused" : isNewer ? "newer" : "dim"}`}
+        role={said.refused ? "alert" : "status"}
+        title={words}
+      >
+        {words || "\u00a0"}
+      </span>
+      {isNewer && now && (
+        <button
+          class="quiet"
+          onClick={() => void showVersion(now.robotKey, base.id, 0, isUnsaved.value ? null : base.version)}
+        >
+          {s("compare")}
+        </button>
+      )}
+    </p>
+  );
+}
+
+function stateOfDraft(): string {
+  const base = draft.value?.base;
+  const program = programOfDraft.value;
+  const current = program?.current;
+  if (!stored.value) return s("no_store");
+  if (!base || !program || !current) return draft.value?.text ? s("never_saved") : "";
+  const values = { author: current.author, version: current.number, time: timeOf(current), reason: current.reason };
+  if (isDeleted(program)) return s("gone", values);
+  if (current.number > base.version) return s(isUnsaved.value ? "newer_unsaved" : "newer", values);
+  return isUnsaved.value ? s("unsaved", { version: base.version }) : s("is_saved", values);
 }

@@ -1,0 +1,147 @@
+// The programs that the site stores, in place of the text: their list, their versions, and differences.
+
+import { useRef, useState } from "preact/hooks";
+import { p } from "../../i18n/program";
+import { s } from "../../i18n/stored-programs";
+import { t } from "../../i18n/texts";
+import { Toggle } from "../../ui/choice";
+import { Panel } from "../../ui/panel";
+import { draft, FILE_ENDING, isUnsaved } from "./draft";
+import { readProgramFile } from "./program-files";
+import { description } from "./program-robot";
+import { example } from "./program-text";
+import { Conflict, RunText, Versions } from "./program-versions";
+import {
+  attempt,
+  importText,
+  isDeleted,
+  mayChange,
+  open,
+  read,
+  say,
+  shown,
+  showVersion,
+  stored,
+  timeOf,
+} from "./stored-programs";
+import "./stored-panel.css";
+
+export function StoredPanel({ robotKey }: { robotKey: string }) {
+  const now = shown.value;
+  const back = () => {
+    shown.value = null;
+  };
+  return (
+    <Panel
+      name="stored-panel"
+      title={s("programs")}
+      end={
+        <>
+          {now && now.kind !== "list" && (
+            <button class="quiet" onClick={() => (shown.value = { kind: "list" })}>
+              {s("to_list")}
+            </button>
+          )}
+          <button class="quiet" onClick={back}>
+            {s("back_to_text")}
+          </button>
+        </>
+      }
+    >
+      <div class="stored-body">
+        {now?.kind === "list" && <List robotKey={robotKey} />}
+        {now?.kind === "program" && <Versions key={now.content.program?.id} robotKey={robotKey} {...now} />}
+        {now?.kind === "conflict" && <Conflict robotKey={robotKey} {...now} />}
+        {now?.kind === "run" && <RunText content={now.content} />}
+        {now?.kind === "loading" && <p class="stored-words dim">{s("loading")}</p>}
+      </div>
+    </Panel>
+  );
+}
+
+function List({ robotKey }: { robotKey: string }) {
+  const [deletedToo, setDeletedToo] = useState(false);
+  const [asking, setAsking] = useState("");
+  const input = useRef<HTMLInputElement>(null);
+  const programs = (stored.value?.programs ?? []).filter((each) => deletedToo || !isDeleted(each));
+  const openProgram = (id: string) => void attempt(async () => open(await read(robotKey, { id })));
+  const importFiles = async (files: readonly File[]) => {
+    for (const file of files) {
+      const found = await readProgramFile(file);
+      if ("problem" in found) say(() => s("not_imported", { name: file.name, text: s(found.problem) }), true);
+      else await importText(robotKey, found.name, found.text);
+    }
+  };
+  return (
+    <>
+      <div class="stored-tools">
+        <Toggle on={deletedToo} set={setDeletedToo}>
+          {s("show_deleted")}
+        </Toggle>
+        <button class="action" disabled={!mayChange.value || !stored.value} onClick={() => input.current?.click()}>
+          {s("import")}
+        </button>
+        <input
+          ref={input}
+          class="file-input"
+          type="file"
+          multiple
+          accept={`${FILE_ENDING},.txt,text/plain`}
+          tabIndex={-1}
+          aria-label={s("import")}
+          onChange={(event) => {
+            const files = [...(event.currentTarget.files ?? [])];
+            void importFiles(files).finally(() => input.current && (input.current.value = ""));
+          }}
+        />
+      </div>
+      {programs.length === 0 && <p class="stored-words dim">{s(stored.value ? "none" : "no_store")}</p>}
+      <ul class="stored-list" aria-label={s("programs")}>
+        {programs.map((program) => {
+          const { id, current } = program;
+          const name = current?.name ?? "";
+          const [version, author] = [current?.number ?? 0, current?.author ?? ""];
+          return (
+            <li key={id} data-program={name} aria-current={draft.value?.base?.id === id}>
+              <span class="stored-name">
+                <strong>{name}</strong>
+                <span class="dim small">
+                  {isDeleted(program) && `${s("deleted")} · `}
+                  {s("row", { version, author, time: timeOf(current) })}
+                </span>
+              </span>
+              <button class="action" aria-label={s("versions_of", { name })} onClick={() => showVersion(robotKey, id)}>
+                {s("versions")}
+              </button>
+              <button
+                class="action"
+                aria-label={s("open_named", { name })}
+                disabled={isDeleted(program)}
+                onClick={() => (losesText() ? setAsking(id) : openProgram(id))}
+              >
+                {s("open")}
+              </button>
+              {asking === id && (
+                <p class="stored-ask" role="alert">
+                  <span>{s("loses", { name: draft.value?.name ?? "" })}</span>
+                  <button class="action" onClick={() => setAsking("")}>
+                    {t("cancel")}
+                  </button>
+                  <button class="action primary" onClick={() => openProgram(id)}>
+                    {s("open_anyway")}
+                  </button>
+                </p>
+              )}
+            </li>
+          );
+        })}
+      </ul>
+    </>
+  );
+}
+
+/** Whether the draft is the operator's own work that no version has; the example for beginners is not. */
+function losesText(): boolean {
+  const robot = description.value;
+  return isUnsaved.value && !(robot && draft.value?.text === example(robot, p("example_comment")));
+}
