@@ -154,7 +154,7 @@ def test_an_audit_entry_opens_the_text_that_ran_although_it_was_never_saved(open
     page.get_by_role("button", name=re.compile("Reset stop")).click(timeout=CHECKED_MS)
     page.evaluate("location.hash = '#/events'")
     button(page, "Requests").click()
-    page.locator(".journal-line").filter(has_text="RUN_PROGRAM").first.click()
+    page.locator(".journal-line").filter(has_text="unsaved run", has_not_text="ended").first.click()
     page.locator(".entry-details a").click()
     expect(page.locator(".diff-whole")).to_have_text(WAITS.strip(), timeout=STORED_MS)
     expect(page.locator(".stored-panel h3")).to_contain_text("unsaved run")
