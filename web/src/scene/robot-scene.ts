@@ -8,7 +8,6 @@ import { View_Projection, ViewSchema } from "../gen/robomesh_pb";
 import { floorOf } from "../mesh/clearance";
 import type { Failed } from "./arm";
 import { Arm, loadOrReport, meshUrl } from "./arm";
-import { BackBuffer } from "./back-buffer";
 import { DrawBudget, qualities } from "./draw-budget";
 import { DrawLoop } from "./draw-loop";
 import type { Nearest } from "./lines";
@@ -52,7 +51,6 @@ export class RobotScene {
   private framesShown = false;
   private readonly loop: DrawLoop;
   private readonly budget: DrawBudget;
-  private readonly back: BackBuffer | null;
   private fitted = false;
   private disposed = false;
   private readonly observer: ResizeObserver;
@@ -67,8 +65,6 @@ export class RobotScene {
     this.renderer = makeRenderer(software, canvas);
     this.loop = new DrawLoop(this.renderer, this.draw, this.drawn);
     this.budget = new DrawBudget(qualities(software));
-    this.back = software ? new BackBuffer(this.renderer) : null;
-    if (this.back) this.renderer.setPixelRatio(1); // a buffer's pixels
     this.renderer.shadowMap.enabled = !software;
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
     toneMap(this.renderer);
@@ -282,15 +278,11 @@ export class RobotScene {
     const { pixelRatio } = this.budget.quality;
     this.viewpoint.resize(width / height);
     this.canvas.dataset.pixelRatio = String(pixelRatio);
-    if (this.back) this.back.resize(Math.ceil(width * pixelRatio), Math.ceil(height * pixelRatio));
-    else {
-      this.renderer.setPixelRatio(pixelRatio);
-      this.renderer.setSize(width, height, false);
-    }
+    this.renderer.setPixelRatio(pixelRatio);
+    this.renderer.setSize(width, height, false);
   }
 
   private readonly drawn = (tookMs: number, at: number): void => {
-    this.back?.show();
     this.gap.placeLabel(this.viewpoint.camera, this.canvas.clientWidth, this.canvas.clientHeight);
     countFrame(this.canvas);
     const { quality } = this.budget;
@@ -314,8 +306,7 @@ export class RobotScene {
     if (arms.some(({ player }) => player.moving)) this.loop.wake();
     if (!dirty) return false;
     if (!this.fitted) this.fit();
-    if (this.back) this.back.draw(this.scene, camera);
-    else this.renderer.render(this.scene, camera);
+    this.renderer.render(this.scene, camera);
     return true;
   };
 
@@ -336,7 +327,6 @@ export class RobotScene {
     this.observer.disconnect();
     this.viewpoint.dispose();
     for (const arm of [this.arm, ...this.neighbours]) arm.remove();
-    this.back?.dispose();
     disposeScene(this.scene, this.renderer);
   }
 }
