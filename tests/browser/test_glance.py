@@ -6,6 +6,8 @@ import pytest
 from playwright.sync_api import expect
 
 from protocol_gateway.authority import lease_rules
+from robomesh.keys import WHOLE_SITE
+from tests.browser.rendering import rendering
 from tests.browser.robot_page import ARM, button, take
 
 pytestmark = pytest.mark.browser
@@ -164,3 +166,29 @@ def test_a_robot_that_does_not_exist_is_said_at_once_without_any_control_before(
     assert page.evaluate("[...window.seen]") == [".missing h1"]
     visit(page, ARM)
     expect(page.locator(".panel.control")).to_be_visible()
+
+
+def test_the_last_still_is_shown_until_the_3_d_view_can_draw_and_looks_neither_live_nor_stale(
+    open_page, plant, tmp_path
+):
+    with rendering(plant, tmp_path):
+        plant.session.declare_presence("hall", WHOLE_SITE, "renderer")
+        page = open_page(drawn=True)
+        held, open_gate = [], []
+        page.route("**/mesh/**", lambda route: route.continue_() if open_gate else held.append(route))
+        visit(page, "#/hall/pt600")
+        scene, poster = page.locator(".panel.scene"), page.locator(".poster")
+        expect(poster).to_be_visible()
+        expect(scene).to_contain_text(re.compile(r"Picture of [\d:]+, not live\. Loading the model…"))
+        expect(scene).not_to_have_class(re.compile("is-stale"))
+        expect(page.locator(".scene-stale")).to_have_count(0)
+        for _ in range(600):
+            if held:
+                break
+            page.wait_for_timeout(100)
+        open_gate.append(True)
+        for route in held:
+            route.continue_()
+        expect(page.locator('.canvas-place canvas[data-loaded="true"]')).to_be_visible()
+        expect(poster).to_have_count(0)
+        expect(scene).not_to_have_class(re.compile("is-stale"))

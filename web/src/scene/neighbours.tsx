@@ -29,7 +29,8 @@ export function Neighbours(props: { robotKey: string; cell: string; scene: Robot
 /** One other robot: dimmed; grey when stale. */
 function Neighbour(props: { robotKey: string; description: Description; scene: RobotScene }) {
   const { robotKey, description, scene } = props;
-  const stale = isStale("frames", useFramesAge(robotKey, "frames"));
+  const age = useFramesAge(robotKey, "frames");
+  const stale = age !== undefined && isStale("frames", age);
   const arm = useRef<Arm | null>(null);
   useEffect(() => {
     const made = scene.addNeighbour(robotKey.split("/").slice(1).join("/"), description);

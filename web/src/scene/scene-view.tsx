@@ -18,6 +18,7 @@ import { useFramesAge } from "./frames-age";
 import { ghost, redLinks, toolPath } from "./ghost";
 import type { Nearest } from "./lines";
 import { Neighbours } from "./neighbours";
+import { Poster } from "./poster";
 import type { RobotScene, Stage } from "./robot-scene";
 import { framesTopic } from "./topic-selection";
 
@@ -91,8 +92,11 @@ export function SceneView(props: {
   const replayed = description?.replay !== undefined;
   // A paused replay sends no frames, and they are not stale; its page shows whether it is available.
   const absent = props.arm === "absent" || props.arm === "coming";
-  const stale = props.stale || absent || (!replayed && isStale(topic, framesAge));
-  const age = props.stale ? props.age : framesAge;
+  // Not drawn yet is not stale.
+  const coming = framesAge === undefined;
+  const staleJoints = props.stale && (props.age !== undefined || props.arm !== undefined);
+  const stale = staleJoints || absent || (!replayed && !coming && isStale(topic, framesAge));
+  const age = staleJoints ? props.age : framesAge;
   const rate = useTopic(ReplayStateSchema, `${robotKey}/replay`)?.message.speed || 1;
 
   // A changed description gets a new scene.
@@ -178,7 +182,15 @@ export function SceneView(props: {
     event.preventDefault();
     scene.current?.turn(...turn);
   };
-  const waiting = !description ? t("waiting_description") : !loaded && !problem ? t("loading_model") : "";
+  const waiting = problem
+    ? ""
+    : !description
+      ? t("waiting_description")
+      : !loaded
+        ? t("loading_model")
+        : coming && !replayed && !stale
+          ? t("waiting_frames")
+          : "";
   return (
     <section class={`panel scene ${stale && loaded ? "is-stale" : ""}`} aria-label={t("scene")} data-moment={props.arm}>
       <div class="canvas-place">
@@ -193,6 +205,7 @@ export function SceneView(props: {
         />
         <span class="scene-label" ref={label} hidden />
       </div>
+      {waiting && <Poster robotKey={robotKey} view={chosen.name} why={waiting} />}
       <div class="scene-tools">
         <Choice
           label={t("view")}
@@ -214,14 +227,13 @@ export function SceneView(props: {
       {scene.current && loaded && description?.cell && !replayed && topic === "frames" && (
         <Neighbours robotKey={robotKey} cell={description.cell} scene={scene.current} />
       )}
-      {waiting && <p class="scene-word dim">{waiting}</p>}
       {problem && <p class="scene-word trouble">{problem}</p>}
-      {!props.stale && props.arm === "absent" && (loaded || problem) && (
+      {!staleJoints && props.arm === "absent" && (loaded || problem) && (
         <p class="scene-stale" role="status">
           {r("no_joints_then")}
         </p>
       )}
-      {stale && (props.stale || !absent) && (loaded || problem) && (
+      {stale && (staleJoints || !absent) && (loaded || problem) && (
         <p class="scene-stale" role="status">
           <span class="shape warning" aria-hidden="true" />
           {age === undefined ? t("no_data") : staleText(age)}
