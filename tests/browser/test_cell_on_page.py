@@ -105,7 +105,7 @@ def test_every_monitor_sees_the_line_of_the_program_that_runs_and_that_it_is_don
         file = str(tmp_path / "to-and-fro.robo")
         sent = threads.submit(plant.site.command, "send", "arm", "run", file)
         line = page.locator(".program-line")
-        running = r"to-and-fro: step \d of 3, line 2: move_joints 0 80 -80 0 0; \w+; 00:\d\d of 00:\d\d"
+        running = r"to-and-fro: step \d of 3, line 2: move_joints 0 80 -80 0 0; \w+; 00:\d\d, 00:\d\d left"
         expect(line).to_have_text(re.compile(running), timeout=SLOWLY_MS)
         assert page.evaluate("document.documentElement.scrollWidth") == 360
         expect(line).to_have_text(re.compile("to-and-fro: done"), timeout=SLOWLY_MS)
