@@ -106,7 +106,7 @@ def test_every_page_has_the_same_bar(open_page):
     page.set_viewport_size({"width": 360, "height": 740})
     for path in ("#/wall", ARM):
         visit(page, path)
-        page.locator("header summary[aria-label=Pages]").click()
+        page.locator("header .page-menu summary").click()
         expect(page.locator("header nav a:visible")).to_have_text(NAMES)
         page.keyboard.press("Escape")
         expect(page.locator("header nav a:visible")).to_have_count(0)

@@ -64,5 +64,5 @@ def test_a_flood_of_refusals_is_shown_with_its_count(open_page, plant):
     plant.call(asyncio.wait_for(flood(), 15.0))
     counted = page.locator(".event-list li").filter(has=page.locator(".repeated")).first
     expect(counted).to_contain_text("refused")
-    expect(counted).to_contain_text("mallory OFFER")
+    expect(counted).to_contain_text("mallory: offer control to eve")
     expect(counted.locator(".repeated")).to_have_text(re.compile(r"× \d+"))

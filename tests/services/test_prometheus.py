@@ -144,11 +144,17 @@ def addresses(site) -> dict[str, str]:
 @pytest.mark.processes
 def test_dashboard_and_rules_ask_for_metrics_and_labels_that_the_services_have(site):
     labels: dict[str, set[str]] = {}
-    for address in addresses(site).values():
-        with urllib.request.urlopen(f"http://{address}/metrics", timeout=10.0) as answer:
-            for family in text_string_to_metric_families(answer.read().decode()):
-                for sample in family.samples:
-                    labels.setdefault(sample.name, set()).update(sample.labels)
+
+    def read() -> bool:
+        for address in addresses(site).values():
+            with urllib.request.urlopen(f"http://{address}/metrics", timeout=10.0) as answer:
+                for family in text_string_to_metric_families(answer.read().decode()):
+                    for sample in family.samples:
+                        labels.setdefault(sample.name, set()).update(sample.labels)
+        return "robomesh_pictures_total" in labels
+
+    # A service serves metrics before it has registered all of them; the renderer is the last.
+    wait_until(read)
     for text in (*(query for panel in PANELS for query in queries(panel)), expressions_of_rules()):
         asked = {*METRIC.findall(text)}
         assert asked

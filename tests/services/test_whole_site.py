@@ -350,7 +350,7 @@ def test_ctrl_c_waits_until_what_moves_is_stopped_and_what_is_recorded_is_closed
     robots += "stop_proven = true\n"
     with running_site(tmp_path, robots=robots) as running:
         children = running.children()
-        assert len(children) == 8
+        assert len(children) == 9
         for words in (("speed", "10"), ("trace", "on")):
             assert running.command("send", "arm", *words).returncode == 0
         mover = subprocess.Popen(

@@ -94,7 +94,7 @@ def test_a_save_that_is_answered_late_leaves_the_robot_opened_meanwhile_as_it_is
     # The site does not have it: it must be saved first.
     expect(button(page, "Save and start simulated")).to_have_count(1)
     # A saved draft is no longer listed as unsaved.
-    page.get_by_role("link", name="New").click()
+    page.get_by_role("link", name="New", exact=True).click()
     expect(page.get_by_text("From link files")).to_be_visible()
     expect(page.locator(".start-draft")).to_have_count(0)
 

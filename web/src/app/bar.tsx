@@ -73,13 +73,14 @@ function PageMenu({ current }: { current: Route["page"] }) {
   const menu = useRef<HTMLDetailsElement>(null);
   const close = () => menu.current?.removeAttribute("open");
   useDismissal(menu, close);
+  const name = current !== "robot" && !robotOf(route.value) ? t(current) : "";
   return (
     <details ref={menu} class="page-menu">
-      <summary aria-label={t("pages")}>
+      <summary aria-label={name ? `${t("pages")}: ${name}` : t("pages")}>
         <svg viewBox="0 0 24 24" width="24" height="24" aria-hidden="true">
           <path d="M4 7h16M4 12h16M4 17h16" />
         </svg>
-        {current !== "robot" && !robotOf(route.value) && <strong>{t(current)}</strong>}
+        {name && <strong>{name}</strong>}
       </summary>
       <nav aria-label={t("pages")}>
         <PageLinks current={current} chosen={close} />
