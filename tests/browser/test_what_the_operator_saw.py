@@ -11,7 +11,7 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from playwright.sync_api import expect
 
 from services import recorder
-from tests.browser.robot_page import ARM, button, degrees, fault, ready, serious
+from tests.browser.robot_page import ARM, button, degrees, fault, ready, serious, set_speed
 from tests.browser.test_video_panel import publisher_of, repeated
 from tests.site import wait_until
 
@@ -190,9 +190,6 @@ def test_the_picture_of_a_request_is_opened_from_a_recording(open_page, plant, v
     with repeated(video.publish):
         page.wait_for_selector('.camera canvas[data-drawn="true"]')
         ready(page)
-        homed = video.count
-        # A recording begins with the pictures since the last key frame.
-        wait_until(lambda: video.count > homed + 2 * KEY_FRAME_EACH)
         trace = page.locator(".command-row button[aria-pressed]")
         if trace.get_attribute("aria-pressed") == "true":
             trace.click()
@@ -203,6 +200,9 @@ def test_the_picture_of_a_request_is_opened_from_a_recording(open_page, plant, v
         page.evaluate(READ_AT_PRESS, [BLOCK, BITS])
         trace.click()
         until(plant, lambda recording: not recording.open)
+        ended = video.count
+        wait_until(lambda: video.count > ended + 40)
+        set_speed(page, 90)
         button(page, "Release").click()
     button(page, "Requests").click()
     page.locator(".event-list li").filter(has_text="trace off").first.get_by_role("button").click()
@@ -216,5 +216,5 @@ def test_the_picture_of_a_request_is_opened_from_a_recording(open_page, plant, v
     page.keyboard.press("Escape")
     expect(dialog).to_have_count(0)
     # A picture that no recording has is said to be missing.
-    page.locator(".event-list li").filter(has_text=": Home").first.get_by_role("button").click()
+    page.locator(".event-list li .seen").first.click()
     expect(dialog).to_contain_text("No recording of this site has this picture.")

@@ -49,6 +49,7 @@ export interface HeldLease {
 const TTL_S = 2;
 const SLOW_TTL_S = 4; // a page that is blocked for 5 s has lost control
 const RENEW_INTERVAL_MS = 650;
+const RETRY_MS = 100;
 const SLOW_GAP_MS = 500;
 const SLOW_FOR_MS = 60_000; // after a long gap
 const OPERATOR = "robomesh.operator";
@@ -206,9 +207,10 @@ async function renew(): Promise<void> {
     hold(mine.robotKey, mine.operator, { ...answer, lease: answer.lease || mine.lease }, requestedAt);
   } catch (error) {
     if (heldLease.value?.lease !== mine.lease) return;
-    const slow = requestedAt > mine.endsAt || wasInactive(mine.endsAt - mine.requestedAt);
+    const slow = requestedAt > mine.endsAt + SLOW_GAP_MS || wasInactive(mine.endsAt - mine.requestedAt);
     const silent = error instanceof AskError && error.noAnswer;
-    if (silent && performance.now() < mine.endsAt) renewIn(100);
+    // An attempt after the end would look like a slow browser's.
+    if (silent && performance.now() + RETRY_MS < mine.endsAt) renewIn(RETRY_MS);
     else if (slow) lose(t("lost_slow"), true);
     else if (silent) lose(t("lost_no_answer", { seconds: Math.round((mine.endsAt - mine.requestedAt) / 1000) }));
     else lose(reasonOf(error));
