@@ -68,7 +68,7 @@ function PageLinks({ current, chosen }: { current: Route["page"]; chosen?: () =>
   );
 }
 
-/** The links where the bar has no space for them; beside the button, the name of the current page. */
+/** The links of a narrow bar; next to the button is the name of the current page. */
 function PageMenu({ current }: { current: Route["page"] }) {
   const menu = useRef<HTMLDetailsElement>(null);
   const close = () => menu.current?.removeAttribute("open");

@@ -3,7 +3,7 @@
 import type { Renewal } from "./renewal";
 
 const CHECK_INTERVAL_MS = 300;
-/** The page renews by itself more often than this. */
+/** Longer than the interval of the page's own renewals. */
 const BUSY_MS = 900;
 /** After this, the operator cannot act on this page. */
 const BLOCKED_MS = 2000;

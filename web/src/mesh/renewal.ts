@@ -1,6 +1,6 @@
 // Renewal of the lease by a worker, while this page's own thread is busy, for example with drawing.
 //
-// The worker has a connection of its own. It renews only while this thread has reported within the last 2 s that
+// The worker has a separate connection. It renews only while this thread has reported within the last 2 s that
 // it runs and that the tab is visible: a page that is blocked longer, hidden or closed loses control.
 
 import { LeaseRequest_Action as Action, LeaseRequestSchema } from "../gen/robomesh_pb";

@@ -99,7 +99,7 @@ export function pageReport(robotKey: string): MessageInitShape<typeof PageReport
   };
 }
 
-/** Return the age [s] of the drawn picture; null: not known; undefined: there is none. */
+/** Return the age [s] of the drawn picture; null: not known; undefined: no picture. */
 function pictureAge({ picture }: ShownView, at: number): number | null | undefined {
   if (picture === undefined) return undefined;
   return picture?.newAt == null ? null : Math.max(0, (at - picture.newAt) / 1000);

@@ -1,4 +1,4 @@
-// Closing of what lies over the page: Escape, or a press or the focus elsewhere.
+// Closing of a popup: Escape, or a press or the focus elsewhere.
 
 import type { RefObject } from "preact";
 import { useEffect } from "preact/hooks";

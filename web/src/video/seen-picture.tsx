@@ -47,7 +47,7 @@ function exactMs(time: string): number {
   return Math.floor(Date.parse(time) / 1000) * 1000 + Number(`0.${fraction || 0}`) * 1000;
 }
 
-/** A button that tells what the sender's page showed, and opens the picture; nothing for other senders. */
+/** A button that summarizes the display of the sender's page and opens the picture; absent for other senders. */
 export function SeenPicture({ site, robot, entry }: { site: string; robot: string; entry: AuditEntry }) {
   const [open, setOpen] = useState(false);
   const seen = seenOf(entry);

@@ -78,7 +78,7 @@ export function CollisionsTab() {
   );
 }
 
-/** A summary of the plan, or why there is none yet. */
+/** A summary of the plan, or why it is missing. */
 function PlanState({ rows }: { rows: readonly PairRow[] }) {
   if (planError.value) {
     return (

@@ -30,10 +30,10 @@ export function filesByAddress(
   return found;
 }
 
-/** Return the places of what a moved file may refer to: in its folder, or in folders beside or inside that. */
+/** Return the places of what a moved file may refer to: in its folder, or in its neighbouring folders and subfolders. */
 export function partsBeside(from: string, to: string, paths: readonly string[]): ReadonlyMap<string, string> {
   const [own, ownTo] = [folderOf(from), folderOf(to)];
-  // Without folders, everything lies beside the file.
+  // Without folders, all files are in one folder.
   const [folder, folderTo] = own ? [folderOf(own), folderOf(ownTo)] : ["", ownTo];
   return new Map(
     paths

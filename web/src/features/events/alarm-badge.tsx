@@ -1,4 +1,4 @@
-// The alarm badge of every page: the most urgent unacknowledged alarms, in words; grey while there is none.
+// The alarm badge of every page: the most urgent unacknowledged alarms, in words; grey without alarms.
 
 import { useEffect } from "preact/hooks";
 import { e } from "../../i18n/events";

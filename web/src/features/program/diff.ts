@@ -37,7 +37,7 @@ export function diffRows(oldText: string, newText: string): readonly Row[] {
   return kept;
 }
 
-/** Return rows for a display side by side: removed lines beside the added ones that follow them. */
+/** Return rows for a display side by side: removed lines next to the added ones that follow them. */
 export function sideBySide(rows: readonly Row[]): readonly Pair[] {
   const pairs: Pair[] = [];
   for (const row of rows) {
@@ -53,7 +53,7 @@ export function sideBySide(rows: readonly Row[]): readonly Pair[] {
   return pairs;
 }
 
-/** The end of a text's last line is a line of its own, so that a missing line end shows. */
+/** The end of a text's last line is a separate line, so that a missing line end shows. */
 const linesOf = (text: string): readonly string[] => (text === "" ? [] : text.split("\n"));
 
 function allRows(old: readonly string[], now: readonly string[]): readonly Row[] {

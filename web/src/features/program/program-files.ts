@@ -2,7 +2,7 @@
 
 const LARGEST = 64 * 1024; // the longest text of a program
 
-/** Read a program's file, with the line ends of the page; or say why it is none. */
+/** Read a program's file, with the line ends of the page; or return why it is not a program. */
 export async function readProgramFile(
   file: File,
 ): Promise<{ name: string; text: string } | { problem: "too_large" | "no_text" }> {

@@ -34,7 +34,7 @@ export type Shown =
   | { kind: "list" }
   /** Two versions of one program; `against` null: the draft. */
   | { kind: "program"; content: ProgramContent; against: number | null; old: ProgramContent | null }
-  /** A save was put aside: `mine` beside the current version. */
+  /** A save was put aside: `mine` next to the current version. */
   | { kind: "conflict"; mine: ProgramContent; theirs: ProgramContent }
   | { kind: "run"; content: ProgramContent }
   | { kind: "loading" };
@@ -118,7 +118,7 @@ export async function save(): Promise<void> {
     if (version.change === Change.ASIDE) return await showConflict(now.robotKey, program, version.number);
     const unchanged = base !== null && version.number === base.version;
     say(() => s(unchanged ? "unchanged" : "saved", { version: version.number }));
-    // Typing goes on meanwhile: the base is what was saved.
+    // The user may type meanwhile: the base is the saved text.
     if (draft.value?.robotKey === now.robotKey) setBase(baseOf(program.id, version, now.text));
   });
   saving.value = false;
@@ -133,7 +133,7 @@ async function showConflict(robotKey: string, { id, current }: StoredProgram, mi
   say(noWords);
 }
 
-/** Show a program's version beside the one before it, or beside `against`; 0: the current version. */
+/** Show a program's version with the one before it, or with `against`; 0: the current version. */
 export async function showVersion(robotKey: string, id: string, version = 0, against?: number | null): Promise<void> {
   await attempt(async () => {
     const content = await read(robotKey, { id, version });

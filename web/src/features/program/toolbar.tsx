@@ -1,4 +1,4 @@
-// The toolbar above the text: name, saving, the site's programs, files, undo and redo; and what is saved.
+// The toolbar above the text: name, saving, the site's programs, files, undo and redo; and the saved state.
 
 import { useRef } from "preact/hooks";
 import type { Words } from "../../i18n/program";
@@ -116,7 +116,7 @@ export function Toolbar({ tell }: { tell: (words: Words) => void }) {
   );
 }
 
-/** Where the draft stands to what the site stores. Its height is fixed: nothing below moves. */
+/** The draft compared with the stored program. Its height is fixed: nothing below moves. */
 function StoreLine() {
   const now = draft.value;
   const program = programOfDraft.value;

@@ -13,7 +13,7 @@ export interface Row {
   steps: readonly RecordedEvent[];
 }
 
-/** Return the rows of events, oldest first; a step that was refused, or whose start is not recorded, has its own. */
+/** Return the rows of events, oldest first; a step that was refused, or whose start is not recorded, has a separate row. */
 export function foldSteps(events: readonly RecordedEvent[]): Row[] {
   const rows: { happened: RecordedEvent; steps: RecordedEvent[] }[] = [];
   let run: RecordedEvent[] | null = null;

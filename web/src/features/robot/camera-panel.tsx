@@ -32,7 +32,7 @@ export function CameraPanel(props: {
   description: Description | undefined;
   place: VideoPlace;
   setPlace: (place: VideoPlace) => void;
-  /** Camera of the 3-D view; null: there is none. */
+  /** Camera of the 3-D view; null: no 3-D view. */
   sceneView: () => View | null;
 }) {
   const { robotKey, description } = props;

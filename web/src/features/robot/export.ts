@@ -27,7 +27,7 @@ function dated(name: string): string {
 
 /** Return the displayed picture as PNG.
  *
- * @throws Error if there is none. */
+ * @throws Error without a picture. */
 export async function saveStill(shown: HTMLCanvasElement | HTMLImageElement | null): Promise<Blob> {
   let canvas = shown instanceof HTMLCanvasElement ? shown : null;
   if (shown instanceof HTMLImageElement) {
