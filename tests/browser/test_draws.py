@@ -59,3 +59,24 @@ def test_a_moving_robot_is_drawn_all_the_time(open_page):
     for place in (SCENE, PLOT):
         for _ in range(3):
             expect_drawn_after(page, place, lambda: None)
+
+
+def test_a_coarse_picture_is_drawn_in_full_once_nothing_moves(open_page):
+    page = open_page(ARM)
+    canvas = page.locator('.scene canvas[data-loaded="true"]')
+    expect(canvas).to_be_visible()
+    # A busy page makes every frame slow.
+    page.evaluate(
+        "() => { window.busy = setInterval(() => {"
+        "const end = performance.now() + 150; while (performance.now() < end); }, 160); }"
+    )
+    canvas.focus()
+    for _ in range(100):
+        if canvas.get_attribute("data-pixel-ratio") != "1":
+            break
+        page.keyboard.press("ArrowLeft")
+        page.wait_for_timeout(50)
+    else:
+        raise AssertionError("the picture never became coarse")
+    page.evaluate("() => clearInterval(window.busy)")
+    expect(canvas).to_have_attribute("data-pixel-ratio", "1")

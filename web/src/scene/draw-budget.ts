@@ -44,6 +44,10 @@ export class DrawBudget {
   /** `levels`: the best first, at least one. */
   constructor(private readonly levels: readonly Quality[]) {}
 
+  get best(): Quality {
+    return this.levels[0] as Quality;
+  }
+
   get quality(): Quality {
     return this.levels[this.level] as Quality;
   }
