@@ -84,10 +84,13 @@ function refuse(name: string, error: unknown): void {
   notice("refused", d("file_refused", { name, text: errorText(error) }));
 }
 
+/** Return files of the file dialog, which have no folders. */
+export const chosen = (files: readonly File[]): Dropped[] => files.map((file) => ({ path: file.name, file }));
+
 /** Return every file of a drop, including those in folders. */
 export async function droppedFiles(data: DataTransfer): Promise<Dropped[]> {
   const entries = [...data.items].map((item) => item.webkitGetAsEntry()).filter((entry) => entry !== null);
-  if (entries.length === 0) return [...data.files].map((file) => ({ path: file.name, file }));
+  if (entries.length === 0) return chosen([...data.files]);
   return (await Promise.all(entries.map(filesOf))).flat();
 }
 

@@ -1,8 +1,8 @@
 // Missing files that other files refer to, until they are added or skipped.
 
 import { d } from "../../i18n/define";
-import { continueWithoutMissing, skippedFiles, takeFiles, waitingUrdf } from "./dropped-files";
-import { FileButton } from "./file-button";
+import { FileButton } from "../../ui/file-button";
+import { chosen, continueWithoutMissing, skippedFiles, takeFiles, waitingUrdf } from "./dropped-files";
 import { missingFiles } from "./mesh-files";
 
 export function MissingFiles() {
@@ -30,7 +30,7 @@ export function MissingFiles() {
         <p class="dim small">{d("missing_words")}</p>
       </div>
       <div class="missing-actions">
-        <FileButton label={d("choose_files")} take={(files) => void takeFiles(files)} />
+        <FileButton label={d("choose_files")} multiple take={(files) => void takeFiles(chosen(files))} />
         <button class="quiet" onClick={continueWithout}>
           {d("go_on_without")}
         </button>

@@ -3,11 +3,11 @@
 import { useEffect } from "preact/hooks";
 import { d } from "../../i18n/define";
 import { timeOfDay } from "../../i18n/format";
+import { FileButton } from "../../ui/file-button";
 import { empty } from "./description";
 import { hasStoredDraft, newDrafts, openDraft, restoreDraft } from "./draft";
-import { reading, takeFiles } from "./dropped-files";
+import { chosen, reading, takeFiles } from "./dropped-files";
 import { insertJoint } from "./edits";
-import { FileButton } from "./file-button";
 import { knownRobots, listRobots } from "./save-and-start";
 import { resetSelection } from "./selection";
 
@@ -40,14 +40,14 @@ export function NewRobot() {
           <h2>{d("start_files")}</h2>
           <p class="dim">{d("start_files_words")}</p>
         </div>
-        <FileButton label={d("choose_files")} take={(files) => void takeFiles(files)} />
+        <FileButton label={d("choose_files")} multiple take={(files) => void takeFiles(chosen(files))} />
         {reading.value && <p role="status">{reading.value}</p>}
       </section>
       <div class="start-more">
         <section class="panel" aria-label={d("start_urdf")}>
           <h2>{d("start_urdf")}</h2>
           <p class="dim">{d("start_urdf_words")}</p>
-          <FileButton label={d("choose_files")} take={(files) => void takeFiles(files, true)} />
+          <FileButton label={d("choose_files")} multiple take={(files) => void takeFiles(chosen(files), true)} />
         </section>
         <section class="panel" aria-label={d("start_empty")}>
           <h2>{d("start_empty")}</h2>

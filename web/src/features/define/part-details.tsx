@@ -2,13 +2,13 @@
 
 import { d } from "../../i18n/define";
 import { Choice } from "../../ui/choice";
+import { FileButton } from "../../ui/file-button";
 import type { Body, Description, Joint, Range } from "./description";
 import { angleUnit, jointUnit } from "./description";
 import { draft, editDraft, endUndoStep } from "./draft";
-import { takeShapeFor } from "./dropped-files";
+import { chosen, takeShapeFor } from "./dropped-files";
 import { renameJoint, renameLink, setType } from "./edits";
 import { NumberField, PoseFields, ProblemWords, Section, TextField } from "./fields";
-import { FileButton } from "./file-button";
 import { fileName } from "./kinematic-chain";
 import { shapeOf } from "./mesh-files";
 import { chosenBody, chosenJoint, chosenLinkName, chosenPart } from "./selection";
@@ -155,7 +155,8 @@ function BodyDetails({ body, description }: { body: Body; description: Descripti
           path={`${path}/mesh`}
           label={d("mesh_choose")}
           quiet
-          take={(files) => void takeShapeFor(files, find)}
+          multiple
+          take={(files) => void takeShapeFor(chosen(files), find)}
         />
         {body.mesh && (
           <button

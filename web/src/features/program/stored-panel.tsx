@@ -1,10 +1,11 @@
 // The programs that the site stores, in place of the text: their list, their versions, and differences.
 
-import { useRef, useState } from "preact/hooks";
+import { useState } from "preact/hooks";
 import { p } from "../../i18n/program";
 import { s } from "../../i18n/stored-programs";
 import { t } from "../../i18n/texts";
 import { Toggle } from "../../ui/choice";
+import { FileButton } from "../../ui/file-button";
 import { Panel } from "../../ui/panel";
 import { draft, FILE_ENDING, isUnsaved } from "./draft";
 import { readProgramFile } from "./program-files";
@@ -62,7 +63,6 @@ export function StoredPanel({ robotKey }: { robotKey: string }) {
 function List({ robotKey }: { robotKey: string }) {
   const [deletedToo, setDeletedToo] = useState(false);
   const [asking, setAsking] = useState("");
-  const input = useRef<HTMLInputElement>(null);
   const programs = (stored.value?.programs ?? []).filter((each) => deletedToo || !isDeleted(each));
   const openProgram = (id: string) => void attempt(async () => open(await read(robotKey, { id })));
   const importFiles = async (files: readonly File[]) => {
@@ -78,21 +78,12 @@ function List({ robotKey }: { robotKey: string }) {
         <Toggle on={deletedToo} set={setDeletedToo}>
           {s("show_deleted")}
         </Toggle>
-        <button class="action" disabled={!mayChange.value || !stored.value} onClick={() => input.current?.click()}>
-          {s("import")}
-        </button>
-        <input
-          ref={input}
-          class="file-input"
-          type="file"
+        <FileButton
+          label={s("import")}
+          disabled={!mayChange.value || !stored.value}
           multiple
           accept={`${FILE_ENDING},.txt,text/plain`}
-          tabIndex={-1}
-          aria-label={s("import")}
-          onChange={(event) => {
-            const files = [...(event.currentTarget.files ?? [])];
-            void importFiles(files).finally(() => input.current && (input.current.value = ""));
-          }}
+          take={(files) => void importFiles(files)}
         />
       </div>
       {programs.length === 0 && <p class="stored-words dim">{s(stored.value ? "none" : "no_store")}</p>}

@@ -1,9 +1,9 @@
 // The toolbar above the text: name, saving, the site's programs, files, undo and redo; and the saved state.
 
-import { useRef } from "preact/hooks";
 import type { Words } from "../../i18n/program";
 import { p } from "../../i18n/program";
 import { s } from "../../i18n/stored-programs";
+import { FileButton } from "../../ui/file-button";
 import { canRedo, canUndo, download, draft, FILE_ENDING, isUnsaved, redo, rename, startProgram, undo } from "./draft";
 import { readProgramFile } from "./program-files";
 import { description } from "./program-robot";
@@ -24,7 +24,6 @@ import {
 import "./toolbar.css";
 
 export function Toolbar({ tell }: { tell: (words: Words) => void }) {
-  const input = useRef<HTMLInputElement>(null);
   const now = draft.value;
   const begin = () => {
     if (!description.value) return;
@@ -80,9 +79,12 @@ export function Toolbar({ tell }: { tell: (words: Words) => void }) {
           <button class="action" onClick={begin} disabled={!now || !description.value} title={p("new_hint")}>
             {p("new")}
           </button>
-          <button class="action" disabled={!now} onClick={() => input.current?.click()}>
-            {p("open")}
-          </button>
+          <FileButton
+            label={p("open")}
+            disabled={!now}
+            accept={`${FILE_ENDING},.txt,text/plain`}
+            take={([file]) => file && void openFile(file)}
+          />
           <button
             class="action"
             onClick={() => now && download(now.text, now.name)}
@@ -98,18 +100,6 @@ export function Toolbar({ tell }: { tell: (words: Words) => void }) {
             {p("redo")}
           </button>
         </div>
-        <input
-          ref={input}
-          class="file-input"
-          type="file"
-          accept={`${FILE_ENDING},.txt,text/plain`}
-          tabIndex={-1}
-          aria-label={p("open")}
-          onChange={(event) => {
-            const file = event.currentTarget.files?.[0];
-            if (file) void openFile(file).finally(() => input.current && (input.current.value = ""));
-          }}
-        />
       </div>
       <StoreLine />
     </>
