@@ -10,6 +10,7 @@ import { ask, inOwnName } from "./connection";
 const TIMEOUT_S = 10;
 /** Each check is of the newest target, and the kinematics has other work. */
 const REST_MS = 100;
+const RETRY_MS = 1000;
 const DECIMALS = 6; // of degrees or mm
 
 interface Target {
@@ -51,6 +52,7 @@ async function checkNewest(): Promise<void> {
   let last: Target | null = null;
   while (wanted && wanted !== last) {
     const target: Target = wanted;
+    let restMs = REST_MS;
     last = target;
     try {
       const key = inOwnName(`${target.robotKey}/kinematics/check`);
@@ -67,8 +69,9 @@ async function checkNewest(): Promise<void> {
       // Nothing is known, and the gateway checks the motion itself; a kinematics that starts answers later.
       found.value = [];
       last = null;
+      restMs = RETRY_MS;
     }
-    await new Promise((resolve) => setTimeout(resolve, REST_MS));
+    await new Promise((resolve) => setTimeout(resolve, restMs));
   }
   checking = false;
 }
