@@ -128,6 +128,7 @@ class Plant:
             ):
                 for robot in self.robots:
                     for_gateway.declare_presence("hall", robot, "gateway")
+                    for_kinematics.declare_presence("hall", robot, "kinematics")
                 ready = self.loop.create_future()
                 tasks = [
                     self.loop.create_task(work)

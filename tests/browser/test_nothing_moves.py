@@ -93,6 +93,7 @@ def test_a_press_on_a_control_that_has_just_moved_is_ignored(page):
 @pytest.mark.parametrize(("width", "height"), SIZES)
 def test_an_alarm_moves_no_control(open_page, raised, width, height):
     page = open_page(ARM, width, height, drawn=False)
+    expect(page.locator("[data-joint]")).to_have_count(5)
     raised("kinematics.stop", "the arm is at the fence", severity=Event.CRITICAL)
     band = page.locator(".alarm-band.past")
     expect(band).to_contain_text("the arm is at the fence")

@@ -428,6 +428,8 @@ def test_a_mesh_is_asked_of_the_robot_and_checked_by_its_hash(mesh, page):
             assert asked == ["base"]  # the second came from the console's cache
             assert (await get(address, f"/mesh/s/r/base?sha={'0' * 64}"))[0] == 409
             assert (await get(address, "/mesh/s/R/base"))[0] == 400
+            # Kinematics that starts again: the page asks again after 504, and gives up after 404.
+            assert (await get(address, "/mesh/s/r2/base"))[0] == 504
 
     run(main())
 

@@ -58,8 +58,11 @@ async def mesh_response(request: Request, session: Session, cache: MeshCache) ->
             )
         except RobomeshError as error:
             refused = refused_on_the_mesh(error)
+            # Pages ask again after 503 and 504.
             if isinstance(error, QuotaError):
-                refused.status = 503  # pages retry after 503
+                refused.status = 503
+            elif refused.reason.code == codes.NO_SERVICE.name:  # kinematics that starts again
+                refused.status = 504
             return as_text(refused)
         sha256 = hashlib.sha256(data).hexdigest()
         if wanted and wanted != sha256:

@@ -1,6 +1,6 @@
 // The robot in the bar: a press lists every robot with its state, and typing filters the list.
 
-import { useEffect, useId, useRef, useState } from "preact/hooks";
+import { useEffect, useId, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { t } from "../i18n/texts";
 import { heldLease } from "../mesh/control";
 import { fleetRobots } from "../mesh/known-robots";
@@ -45,7 +45,8 @@ function Robots(props: { robot: RobotName | null; link: (site: string, robot: st
   const [text, setText] = useState("");
   const own = robot && `robomesh/${robot.site}/${robot.robot}`;
   const [chosen, setChosen] = useState(own ?? "");
-  useEffect(() => input.current?.focus(), []);
+  // Before the next key: a space on the button would close the list.
+  useLayoutEffect(() => input.current?.focus(), []);
   const words = text.trim().toLowerCase().split(/\s+/);
   const found = fleetRobots.value.filter((key) => words.every((word) => key.slice(9).toLowerCase().includes(word)));
   const active = found.includes(chosen) ? chosen : (found[0] ?? "");

@@ -1,6 +1,6 @@
 // A form for the account's new password.
 
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { a } from "../i18n/account";
 import type { Me } from "../mesh/account";
 import { me, post } from "../mesh/account";
@@ -17,7 +17,7 @@ export function ChangePassword({ close }: { close: () => void }) {
   const form = useRef<HTMLFormElement>(null);
   // Pass Escape to the sheet, and focus the first field.
   const focusFirst = () => form.current?.querySelector<HTMLInputElement>("input:not([hidden])")?.focus();
-  useEffect(focusFirst, []);
+  useLayoutEffect(focusFirst, []);
   // An outcome belongs to the passwords that were sent.
   const entered = (set: (value: string) => void) => (value: string) => {
     setOutcome(null);

@@ -1,7 +1,7 @@
 // A form for the reason of an action. Not a modal dialog: STOP stays within reach.
 
 import type { ComponentChildren } from "preact";
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { t } from "../i18n/texts";
 
 export function ReasonForm(props: {
@@ -17,7 +17,7 @@ export function ReasonForm(props: {
   const [reason, setReason] = useState("");
   const input = useRef<HTMLInputElement>(null);
   const opener = useRef(document.activeElement);
-  useEffect(() => {
+  useLayoutEffect(() => {
     input.current?.focus();
     return () => opener.current instanceof HTMLElement && opener.current.focus();
   }, []);

@@ -1,6 +1,6 @@
 // The sign-in page: the console's name, how the page reaches it, name and password.
 
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { a, endText } from "../../i18n/account";
 import { reasonText } from "../../i18n/reasons";
 import { switchLanguage, t } from "../../i18n/texts";
@@ -19,7 +19,7 @@ export function SignIn() {
   const [waitUntil, setWaitUntil] = useState(0);
   const left = useSecondsUntil(waitUntil);
   const input = useRef<HTMLInputElement>(null);
-  useEffect(() => input.current?.focus(), []);
+  useLayoutEffect(() => input.current?.focus(), []);
   const how = me.value;
   const send = async () => {
     if (busy || left > 0) return;
