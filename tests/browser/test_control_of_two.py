@@ -98,7 +98,7 @@ def test_taking_over_needs_a_reason_which_the_loser_is_told(open_arm):
     expect(button(bob, "Take over…")).to_be_focused()
     take_over(bob, "bob", "alice", "smoke at the gripper")
     expect(bob.locator(".holder")).to_have_text("You are in control")
-    expect(alice.locator(".control .notice")).to_have_text("Control lost: taken by bob: smoke at the gripper")
+    expect(alice.locator(".control .notice")).to_have_text("Control ended: taken by bob: smoke at the gripper")
     expect(alice.locator(".holder")).to_have_text("bob is in control")
     assert serious(alice) == []
     button(bob, "Release").click()
@@ -159,7 +159,7 @@ def test_the_same_name_in_two_windows_is_in_control_in_one(open_arm):
     expect(button(second, "Ask for control")).to_have_count(0)
     take_over(second, "li", "li", "I sit here now")
     expect(second.locator(".holder")).to_have_text("You are in control")
-    expect(first.locator(".control .notice")).to_have_text("Control lost: taken by li: I sit here now")
+    expect(first.locator(".control .notice")).to_have_text("Control ended: taken by li: I sit here now")
     expect(first.locator(".holder")).to_have_text("You (li) are in control in another window")
     button(second, "Release").click()
 

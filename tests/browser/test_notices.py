@@ -83,10 +83,10 @@ def test_a_loss_is_told_of_until_who_took_control_has_gone(open_page):
     button(bob, "Take over…").click()
     bob.get_by_label("Reason").fill("smoke")
     button(bob, "Take over from alice").click()
-    expect(alice.locator(".control .notice")).to_have_text("Control lost: taken by bob: smoke")
+    expect(alice.locator(".control .notice")).to_have_text("Control ended: taken by bob: smoke")
     button(bob, "Release").click()
     expect(alice.locator(".holder")).to_have_text("Nobody is in control")
-    expect(alice.locator(".control .notice")).not_to_contain_text("Control lost")
+    expect(alice.locator(".control .notice")).not_to_contain_text("Control ended")
 
 
 def test_a_window_that_is_closed_has_not_given_control_back(open_page):
@@ -131,7 +131,7 @@ def test_a_browser_that_is_seen_to_be_slow_keeps_control_and_is_told_when_it_is_
     stand_still(page, 6.5)
     answers["come"] = True
     expect(page.locator(".control .notice")).to_contain_text(
-        "Control lost: this browser was too slow to renew it in time."
+        "Control ended: this browser was too slow to renew it in time."
     )
     expect(other.locator(".holder")).to_have_text("Nobody is in control")
 

@@ -68,7 +68,7 @@ def test_a_gateway_that_answers_no_more_is_told_as_what_it_may_be(site):
         try:
             notice = page.locator(".control .notice.lost")
             expect(notice).to_contain_text(
-                re.compile(r"Control lost: the gateway has not answered for \d s\.")
+                re.compile(r"Control ended: the gateway has not answered for \d s\.")
             )
             expect(notice).to_contain_text("the arm may still be moving")
             expect(button(page, "Home")).to_be_disabled()

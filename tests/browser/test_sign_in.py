@@ -150,7 +150,7 @@ def test_who_becomes_a_monitor_is_told_so_and_so_is_everybody_else(open_tab, acc
     button(page, "Take control").click()
     expect(page.locator(".holder")).to_have_text("You are in control")
     change_account(accounts, "role", "li", role=AccountRole.MONITOR)
-    expect(page.locator(".control .notice")).to_have_text("Control lost: li.hall is a monitor now")
+    expect(page.locator(".control .notice")).to_have_text("Control ended: li.hall is a monitor now")
     expect(page.locator(".event-list")).to_contain_text("control ended: li.hall is a monitor now")
     change_account(accounts, "role", "li", role=AccountRole.OPERATOR)
 

@@ -11,7 +11,7 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from playwright.sync_api import expect
 
 from services import recorder
-from tests.browser.robot_page import ARM, button, degrees, fault, ready, serious, set_speed
+from tests.browser.robot_page import ARM, button, clear_stop, degrees, fault, ready, serious, set_speed
 from tests.browser.test_video_panel import publisher_of, repeated
 from tests.site import wait_until
 
@@ -161,6 +161,24 @@ def test_a_frozen_state_lets_no_motion_start(open_page, plant):
         expect(page.get_by_role("button", name="Stop request")).to_be_enabled()
     expect(button(page, "Home")).to_be_enabled(timeout=60_000)
     button(page, "Release").click()
+
+
+def test_a_drawing_that_stands_still_while_the_arm_moves_lets_no_motion_start(open_page):
+    page = open_page(ARM)
+    expect(page.locator(".canvas-place canvas")).to_have_attribute("data-loaded", "true")
+    ready(page)
+    set_speed(page, 1)
+    button(page, "5").click()
+    page.evaluate("() => { window.requestAnimationFrame = () => 1; }")
+    # At rest the old picture is still right.
+    page.wait_for_timeout(1500)
+    expect(button(page, "waist +5°")).to_be_enabled()
+    button(page, "waist +5°").click()
+    expect(page.locator(".headline .state")).to_have_text("Moving")
+    expect(page.locator(".joints .notice")).to_have_text(re.compile("^No new motion: the 3-D picture is .* old"))
+    expect(button(page, "waist +5°")).to_be_disabled()
+    page.locator("button.stop").click()
+    clear_stop(page)
 
 
 def test_the_audit_log_names_the_picture_that_was_on_the_screen(open_page, plant, video):

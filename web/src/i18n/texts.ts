@@ -303,7 +303,7 @@ const TEXTS = {
   not_taken: ["Control not given: {text}", "未取得控制：{text}"],
   released: ["Control released.", "已释放控制。"],
   released_hidden: ["Control released because this page was hidden.", "页面被隐藏，已释放控制。"],
-  control_lost: ["Control lost: {text}", "失去控制：{text}"],
+  control_lost: ["Control ended: {text}", "控制已结束：{text}"],
   lost_no_answer: [
     "the gateway has not answered for {seconds} s. If it runs, it has ended your control and stopped your motion; if it does not, the arm may still be moving.",
     "网关已 {seconds} 秒无应答。若网关在运行，它已收回控制权并停止您的运动；否则机械臂可能仍在运动。",

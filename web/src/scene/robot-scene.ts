@@ -61,6 +61,9 @@ export class RobotScene {
   private disposed = false;
   private readonly observer: ResizeObserver;
 
+  /** Called when a picture is ready. */
+  onDrawn: () => void = () => undefined;
+
   /** @throws Error if the browser has no WebGL. */
   constructor(
     private readonly canvas: HTMLCanvasElement,
@@ -159,6 +162,12 @@ export class RobotScene {
   placeFrames(payload: Uint8Array, sourceTimeMs: number, arrivedMs: number): void {
     this.arm.placeFrames(payload, sourceTimeMs, arrivedMs);
     if (this.gap.waits) this.loop.wake();
+  }
+
+  /** Source time [ms] of the frames that are drawn; infinite if they equal the newest. */
+  get drawnTime(): number {
+    const { moving, shown } = this.arm.player;
+    return moving ? shown : Number.POSITIVE_INFINITY;
   }
 
   /** Set a replay's rate; see `FramePlayer`. */
@@ -289,6 +298,7 @@ export class RobotScene {
   }
 
   private readonly drawn = (tookMs: number, at: number): void => {
+    this.onDrawn();
     this.gap.placeLabel(this.viewpoint.camera, this.canvas.clientWidth, this.canvas.clientHeight);
     countFrame(this.canvas);
     clearTimeout(this.restTimer);

@@ -8,6 +8,7 @@ import { staleText, timeOfDay } from "../i18n/format";
 import { r } from "../i18n/recordings";
 import { t, viewText } from "../i18n/texts";
 import { distanceText, useClearanceLevel } from "../mesh/clearance";
+import type { Sample } from "../mesh/connection";
 import { watch } from "../mesh/connection";
 import type { MomentState } from "../mesh/replay-moment";
 import { OWN_DRAWING, useShownView } from "../mesh/sight";
@@ -25,6 +26,7 @@ import { framesTopic } from "./topic-selection";
 // Eye of the free camera relative to its target, in multiples of the arm's reach.
 const FREE_EYE = { x: 1.2, y: -1.69, z: 0.72 };
 const NOMINAL_REACH = 1.1; // m, until the description arrives
+const KEPT_SAMPLES = 16; // more than the drawing lags behind
 
 type Drawing = typeof import("./drawing");
 let drawing: Drawing | null = null;
@@ -146,12 +148,19 @@ export function SceneView(props: {
     const made = scene.current;
     if (!made || !description || !forward || !code) return;
     const read = topic === "frames" ? (payload: Uint8Array) => payload : code.framesOf(prefix, description, forward);
-    return watch(`${robotKey}/${topic}`, (sample) => {
-      made.placeFrames(read(sample.payload), sample.sourceTime, sample.arrived);
-      const { sequence, sourceTime, newAt } = sample;
+    const received: Sample[] = [];
+    const report = () => {
+      const newest = received.findLast(({ sourceTime }) => sourceTime <= made.drawnTime);
       // After the loss of its WebGL context, as with a GPU's reset, the canvas shows an old picture.
       const lost = canvas.current?.getContext("webgl2")?.isContextLost() !== false;
-      drawn.picture = lost ? null : { sequence, sourceTime, newAt };
+      if (newest) drawn.picture = lost ? null : newest;
+    };
+    made.onDrawn = report;
+    return watch(`${robotKey}/${topic}`, (sample) => {
+      received.push(sample);
+      if (received.length > KEPT_SAMPLES) received.shift();
+      made.placeFrames(read(sample.payload), sample.sourceTime, sample.arrived);
+      report();
     });
   }, [identity, topic, code]);
   useEffect(() => scene.current?.setStale(stale), [stale, identity, loaded, code]);
