@@ -18,7 +18,7 @@ import os
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from operator import itemgetter
 from pathlib import Path
@@ -226,14 +226,12 @@ def _owner(path: Path) -> str:
 
 
 def _line(state: LatchState, sequence: int, of: str) -> bytes:
-    row: dict[str, Any] = {"of": of, "sequence": sequence, **asdict(state)}
-    if state.stop is not None:
-        # The time of sending is on a monotonic clock, which a restart of the machine resets.
-        stop = asdict(replace(state.stop, sent_s=None))
-        row["stop"] = {
-            name: one_line(value, _LONGEST_TEXT) if isinstance(value, str) else value
-            for name, value in stop.items()
-        }
+    stop = state.stop and {
+        name: one_line(value, _LONGEST_TEXT) if isinstance(value, str) else value
+        for name, value in state.stop.kept().items()
+    }
+    numbers = {"last_stop_id": state.last_stop_id, "reserved": state.reserved}
+    row: dict[str, Any] = {"of": of, "sequence": sequence, "stop": stop, **numbers}
     digest = {_DIGEST: sha256(_json(row)).hexdigest()}
     line = _json(digest | row)
     assert len(line) < SLOT_BYTES

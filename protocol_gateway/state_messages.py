@@ -135,6 +135,7 @@ def controller_state(
                 by=stop.by,
                 reason=stop.reason,
                 sent=stop.sent_s is not None,
+                why=None if stop.why is None else reason_message(stop.why),
             )
         )
     return state

@@ -372,6 +372,12 @@ JOINT_VALUES = Code("joints.values", "{count} joint values, the description has 
 LINK_JUST_ENDED = Code("link.just_ended", "the connection has just ended")
 LINK_BROKE = Code("link.broke", "the connection broke while it was written")
 LINK_CLOGGED = Code("link.clogged", "the controller does not read; connecting again")
+STOP_CONTROL_ENDED = Code("stop.control_ended", "dead-man: {cause}")
+STOP_GATEWAY_KILLED = Code(
+    "stop.gateway_killed",
+    "dead-man: the gateway was killed while {holder} had control, and the robot still moves",
+)
+STOP_LINK_LOST = Code("stop.link_lost", "{holder}'s motion ran, and {detail}")
 STOP_SENT = Code("stop.sent", "stop request {id} is on the controller's socket")
 STOP_NOT_SENT = Code("stop.not_sent", "stop request {id} is latched, but not sent: {cause}")
 STOP_READ_ONLY = Code(

@@ -7,7 +7,7 @@ which holds the state after the older files, so that a start reads only one file
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from protocol_gateway.audit.entry import Entry, Outcome
@@ -151,7 +151,7 @@ def _number(text: str) -> int:
 
 def _text(stop: Stop | None) -> str:
     # The time of sending is on a monotonic clock, which a restart of the machine resets.
-    return "" if stop is None else json.dumps(asdict(replace(stop, sent_s=None)), ensure_ascii=False)
+    return "" if stop is None else json.dumps(stop.kept(), ensure_ascii=False)
 
 
 def _stop(text: str) -> Stop | None:

@@ -29,7 +29,7 @@ far too late.
 
 import hmac
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
@@ -179,13 +179,23 @@ class Lease:
 
 @dataclass(frozen=True, kw_only=True)
 class Stop:
-    """A latched stop; `sent_s`: time at which its unit reached the controller's socket (monotonic)."""
+    """A latched stop.
+
+    Attributes:
+        sent_s: Time at which its unit reached the controller's socket (monotonic).
+        why: The reason with its code, if the gateway stopped the robot; not kept over a restart.
+    """
 
     id: int
     by: str
     reason: str
     since_ns: int
     sent_s: float | None = None
+    why: Reason | None = None
+
+    def kept(self) -> dict[str, Any]:
+        """Return the values that a restart keeps: not the time of sending, whose clock a reboot resets."""
+        return {"id": self.id, "by": self.by, "reason": self.reason, "since_ns": self.since_ns}
 
 
 @dataclass(frozen=True, kw_only=True)

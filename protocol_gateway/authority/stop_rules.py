@@ -3,13 +3,14 @@
 from dataclasses import replace
 
 from protocol_gateway.authority.lease_rules import Authority, Now, Stop
+from robomesh.reasons import Reason
 
 # A burst of dozens of units would fill the send buffer, which closes the connection.
 IN_TRANSIT_S = 0.1
 
 
 def stop(
-    authority: Authority, *, by: str, reason: str, now: Now, number: int | None = None
+    authority: Authority, *, by: str, reason: str | Reason, now: Now, number: int | None = None
 ) -> tuple[Authority, Stop]:
     """Latch a stop under a new number, and drop the motion that it ends.
 
@@ -17,7 +18,13 @@ def stop(
         number: Number above all previous ones; None: the next one.
     """
     number = authority.last_stop_id + 1 if number is None else number
-    latched = Stop(id=number, by=by, reason=reason or "no reason given", since_ns=now.wall_ns)
+    latched = Stop(
+        id=number,
+        by=by,
+        reason=str(reason) or "no reason given",
+        since_ns=now.wall_ns,
+        why=reason if isinstance(reason, Reason) else None,
+    )
     lease = authority.lease
     if lease is not None:
         lease = replace(lease, motion=None)

@@ -39,11 +39,12 @@ class StopRequested:
     """A client, an old client program or the gateway stops the robot.
 
     Attributes:
+        reason: The gateway's has a code.
         page: Values of the audit entry that the sender's page reports.
     """
 
     by: str
-    reason: str
+    reason: str | Reason
     source: str
     page: Mapping[str, str] = field(default_factory=dict)
 

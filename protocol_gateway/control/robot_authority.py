@@ -162,7 +162,7 @@ class RobotAuthority:
         yield effects.AppendLater(entries.stop_entry(stop, result, seen.now))
         return result
 
-    def _stop_by_gateway(self, reason: str, seen: Seen) -> Effects[None]:
+    def _stop_by_gateway(self, reason: Reason, seen: Seen) -> Effects[None]:
         yield from self._stop(events.StopRequested(by=GATEWAY, reason=reason, source=GATEWAY), seen)
 
     def _send_latched_stop(self, seen: Seen) -> Effects[None]:
@@ -247,7 +247,7 @@ class RobotAuthority:
         """Set the state; stop the motion of a lease that has ended, before anything else."""
         self._authority = authority
         if ended is not None and ended.stop:
-            yield from self._stop_by_gateway(f"dead-man: {ended.why}", seen)
+            yield from self._stop_by_gateway(codes.STOP_CONTROL_ENDED(ended.why), seen)
         yield effects.SetTimer(None if authority.lease is None else authority.lease.until_s)
         yield effects.Publish()
         if ended is not None:
@@ -359,13 +359,12 @@ class RobotAuthority:
         self._authority = replace(self._authority, speed_percent=None)
         lease = self._authority.lease
         if lease is not None and lease.motion is not None:
-            yield from self._stop_by_gateway(f"{lease.holder}'s motion ran, and {why}", seen)
+            yield from self._stop_by_gateway(codes.STOP_LINK_LOST(holder=lease.holder, detail=why), seen)
 
     def _motion_observed(self, moving: bool, seen: Seen) -> Effects[None]:
         orphaned_by, self._orphan = self._orphan, ""
         if orphaned_by and moving and self._authority.lease is None:
-            killed = f"the gateway was killed while {orphaned_by} had control, and the robot still moves"
-            yield from self._stop_by_gateway(f"dead-man: {killed}", seen)
+            yield from self._stop_by_gateway(codes.STOP_GATEWAY_KILLED(holder=orphaned_by), seen)
         before = self._authority
         self._authority, uncommanded = motion_owner.observe(
             before,

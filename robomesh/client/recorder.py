@@ -11,7 +11,7 @@ from typing import NamedTuple
 from google.protobuf.message import Message
 
 from robomesh import reason_codes as codes
-from robomesh.errors import QuotaError, RefusedError
+from robomesh.errors import BusyError, NoAnswerError, QuotaError, RefusedError
 from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.recordings.errors import RecordingError
 from robomesh.repeated_requests import ask_repeatedly
@@ -237,7 +237,8 @@ class RecorderFile:
                     self._on_quota(error)
                     await asyncio.sleep(min(error.again_s, _LONGEST_WAIT_S))
 
-        return await ask_repeatedly(self._session, key, ask, _TIMEOUTS_S)
+        again = (NoAnswerError, BusyError)
+        return await ask_repeatedly(self._session, key, ask, _TIMEOUTS_S, repeat_after=again)
 
     def _log_quota(self, error: QuotaError) -> None:
         log.info("%s waits: %s", self.name, error)

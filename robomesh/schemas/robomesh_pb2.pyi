@@ -187,18 +187,20 @@ class LinkCounters(_message.Message):
     def __init__(self, units_received: _Optional[int] = ..., units_malformed: _Optional[int] = ..., units_sent: _Optional[int] = ..., bytes_received: _Optional[int] = ..., bytes_sent: _Optional[int] = ..., records_unknown: _Optional[int] = ..., connections: _Optional[int] = ..., refusals: _Optional[int] = ..., units_lost: _Optional[int] = ..., units_skipped: _Optional[int] = ...) -> None: ...
 
 class StopState(_message.Message):
-    __slots__ = ("id", "since", "by", "reason", "sent")
+    __slots__ = ("id", "since", "by", "reason", "sent", "why")
     ID_FIELD_NUMBER: _ClassVar[int]
     SINCE_FIELD_NUMBER: _ClassVar[int]
     BY_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
     SENT_FIELD_NUMBER: _ClassVar[int]
+    WHY_FIELD_NUMBER: _ClassVar[int]
     id: int
     since: _timestamp_pb2.Timestamp
     by: str
     reason: str
     sent: bool
-    def __init__(self, id: _Optional[int] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., by: _Optional[str] = ..., reason: _Optional[str] = ..., sent: _Optional[bool] = ...) -> None: ...
+    why: Reason
+    def __init__(self, id: _Optional[int] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., by: _Optional[str] = ..., reason: _Optional[str] = ..., sent: _Optional[bool] = ..., why: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
 
 class RawRecord(_message.Message):
     __slots__ = ("timestamp", "type", "items", "data")

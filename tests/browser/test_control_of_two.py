@@ -98,7 +98,9 @@ def test_taking_over_needs_a_reason_which_the_loser_is_told(open_arm):
     expect(button(bob, "Take over…")).to_be_focused()
     take_over(bob, "bob", "alice", "smoke at the gripper")
     expect(bob.locator(".holder")).to_have_text("You are in control")
-    expect(alice.locator(".control .notice")).to_have_text("Control ended: taken by bob: smoke at the gripper")
+    expect(alice.locator(".control .notice")).to_have_text(
+        "Control ended: taken by bob: smoke at the gripper"
+    )
     expect(alice.locator(".holder")).to_have_text("bob is in control")
     assert serious(alice) == []
     button(bob, "Release").click()

@@ -175,7 +175,9 @@ def test_a_drawing_that_stands_still_while_the_arm_moves_lets_no_motion_start(op
     expect(button(page, "waist +5°")).to_be_enabled()
     button(page, "waist +5°").click()
     expect(page.locator(".headline .state")).to_have_text("Moving")
-    expect(page.locator(".joints .notice")).to_have_text(re.compile("^No new motion: the 3-D picture is .* old"))
+    expect(page.locator(".joints .notice")).to_have_text(
+        re.compile("^No new motion: the 3-D picture is .* old")
+    )
     expect(button(page, "waist +5°")).to_be_disabled()
     page.locator("button.stop").click()
     clear_stop(page)

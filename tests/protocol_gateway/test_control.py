@@ -172,6 +172,8 @@ def test_an_ended_session_ends_its_lease_and_stops_its_motion(tmp_path):
             assert bench.control.authority.ended.code == "lease.ended.session"
             assert bench.socket[-1] == b"1#COMMAND*stop@"
             assert bench.control.authority.stop.reason == "dead-man: li's page or program has disconnected"
+            why = bench.control.authority.stop.why
+            assert (why.code, why.causes[0].code) == ("stop.control_ended", "lease.ended.session")
 
     run(main())
 

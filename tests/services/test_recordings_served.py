@@ -17,6 +17,7 @@ from starlette.applications import Starlette
 
 from robomesh import reason_codes as codes
 from robomesh.errors import BrokenAnswerError, BusyError, QuotaError, RefusedError
+from robomesh.keys import WHOLE_SITE
 from robomesh.quotas import DEFAULT_QUOTAS, Quotas
 from robomesh.recordings.errors import RecordingError
 from robomesh.schemas import robomesh_pb2 as schema
@@ -45,6 +46,7 @@ def folder(tmp_path):
 async def served(mesh, folder, quotas=DEFAULT_QUOTAS, **open_now):
     """Run a recorder's request handlers; yield a client session."""
     async with open_session(mesh) as service, open_session(mesh) as client:
+        service.declare_presence("site", WHOLE_SITE, "recorder")
         server = RecordingServer(
             service, "site", folder, open_now=lambda: open_now, flight=lambda: True, quotas=quotas
         )

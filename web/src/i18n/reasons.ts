@@ -554,6 +554,15 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ["link.just_ended", ["the connection has just ended", "连接刚刚断开"]],
   ["link.broke", ["the connection broke while it was written", "写入时连接中断"]],
   ["link.clogged", ["the controller does not read; connecting again", "控制器不读取数据；正在重连"]],
+  ["stop.control_ended", ["dead-man: {cause}", "控制结束，自动停止：{cause}"]],
+  [
+    "stop.gateway_killed",
+    [
+      "dead-man: the gateway was killed while {holder} had control, and the robot still moves",
+      "自动停止：{holder} 控制期间网关异常终止，机器人仍在运动",
+    ],
+  ],
+  ["stop.link_lost", ["{holder}'s motion ran, and {detail}", "{holder} 的运动正在进行时：{detail}"]],
   ["stop.sent", ["stop request {id} is on the controller's socket", "停止 {id} 已发送给控制器"]],
   ["stop.not_sent", ["stop request {id} is latched, but not sent: {cause}", "停止 {id} 已锁定，但未送达：{cause}"]],
   [

@@ -3,6 +3,7 @@
 import type { ControllerState } from "../../gen/robomesh_pb";
 import { ControllerState_Activity as Activity } from "../../gen/robomesh_pb";
 import { stampFull } from "../../i18n/format";
+import { reasonText } from "../../i18n/reasons";
 import { isSaid } from "../../i18n/stop-words";
 import { t } from "../../i18n/texts";
 import type { CommandValues } from "../../mesh/command";
@@ -32,7 +33,7 @@ export function Stopped(props: {
         </strong>
         <p>
           {stop && !stop.sent && `${t("stopped_unsent")} `}
-          {isSaid(stop?.reason) && `${t("stop_reason", { reason: stop.reason })} `}
+          {isSaid(stop?.reason) && `${t("stop_reason", { reason: reasonText(stop.why, stop.reason) })} `}
           {!stop && state.fault && `${state.fault}. `}
           {needs}
         </p>
