@@ -343,9 +343,9 @@ def test_a_urdf_and_files_of_one_name_are_read_in_one_drop_and_unused_ones_are_n
     urdf = SAME_NAMES.format(base=shapes_of("base"), arm=shapes_of("arm")).encode()
     links = [(f"{link}.stl", stl(count)) for link in ("base", "arm") for count in (7, 31)]
     drop(page, ("two.urdf", urdf), *links, ("spare.stl", stl(3)), ("notes.txt", b"by hand"))
-    notices = page.locator(".file-notices, .define")
-    expect(notices.first).to_contain_text("two.urdf read: 4 of its 4 mesh files found.")
-    expect(notices.first).to_contain_text("Not used by this robot: spare.stl, notes.txt.")
+    notices = page.locator(".file-notices")
+    expect(notices).to_contain_text("two.urdf read: 4 of its 4 mesh files found.")
+    expect(notices).to_contain_text("Not used by this robot: spare.stl, notes.txt.")
     expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "2")
     # The finer one is what is seen.
     choose(page, 0)

@@ -42,6 +42,7 @@ const TEXTS = {
   read_one: ["{name} read.", "已读取 {name}。"],
   file_refused: ["{name}: {text}", "{name}：{text}"],
   urdf_twice: ["A URDF starts a robot of its own: choose New first.", "URDF 会开始新的机器人：请先选择“新建”。"],
+  about_files: ["What was found in the files", "文件读取结果"],
   nothing_dropped: ["There is no file in what was dropped.", "拖入内容中没有文件。"],
   none_to_read: ["There is no mesh file, URDF or zip among them.", "其中没有网格文件、URDF 或 zip。"],
   urdf_read: [

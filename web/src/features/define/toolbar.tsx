@@ -139,18 +139,27 @@ export function Outcomes() {
           <Close />
         </div>
       )}
-      {fileNotices.value.map(({ kind, text }) => (
-        <div key={text} class={`outcome ${kind}`} role={kind === "refused" ? "alert" : "status"}>
-          {kind === "refused" && <span class="shape warning" aria-hidden="true" />}
-          <span>{text}</span>
-          <button
-            class="quiet"
-            onClick={() => (fileNotices.value = fileNotices.value.filter((each) => each.text !== text))}
-          >
-            {t("dismiss")}
-          </button>
-        </div>
-      ))}
+      <FileNotices />
+    </div>
+  );
+}
+
+/** What became of dropped files: refusals first, all in one box, so that many leave room for the robot. */
+function FileNotices() {
+  const refused = fileNotices.value.filter(({ kind }) => kind === "refused");
+  const others = fileNotices.value.filter(({ kind }) => kind !== "refused");
+  if (fileNotices.value.length === 0) return null;
+  return (
+    <div class={`outcome ${refused.length ? "refused" : "done"}`} role={refused.length ? "alert" : "status"}>
+      {refused.length > 0 && <span class="shape warning" aria-hidden="true" />}
+      <ul class="file-notices" tabIndex={0} aria-label={d("about_files")}>
+        {[...refused, ...others].map(({ text }) => (
+          <li key={text}>{text}</li>
+        ))}
+      </ul>
+      <button class="quiet" onClick={() => (fileNotices.value = [])}>
+        {t("dismiss")}
+      </button>
     </div>
   );
 }
