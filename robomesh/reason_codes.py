@@ -815,6 +815,9 @@ RECORDING_CHANGED = Code("recording.changed", "{file} changed during the fetch",
 RECORDING_NOT_FOUND = Code(
     "recording.not_found", "no recording '{name}' on the mesh", "there are {recordings}"
 )
+RECORDING_AMBIGUOUS = Code(
+    "recording.ambiguous", "several recordings have the name '{name}'", "name the file: {files}"
+)
 RECORDING_TOO_MANY_VALUES = Code(
     "recording.too_many_values", "{count} values are too many: request at most {most}"
 )
@@ -831,6 +834,48 @@ RECORDING_NO_JOINTS = Code("recording.no_joints", "{file} contains no joint stat
 RECORDING_RANGE = Code("recording.range", "{range}: {file} has {bytes} bytes")
 RECORDING_TOO_MANY = Code(
     "recording.too_many_downloads", "{count} recordings are being sent already", "try again soon"
+)
+RECORDING_TITLE = Code(
+    "recording.title",
+    "'{name}' is not a valid name of a recording",
+    'use 1 to {most} letters, digits, spaces and signs except / \\ : * ? " < > |, without a full stop at '
+    "the begin or end",
+)
+RECORDING_NOTE = Code("recording.note", "the note has {count} characters", "use at most {most}")
+RECORDING_TAG = Code(
+    "recording.tag", "'{tag}' is not a valid tag", "use 1 to {most} letters, digits and signs except commas"
+)
+RECORDING_TAGS = Code("recording.tags", "{count} tags are too many", "use at most {most}")
+RECORDING_REASON = Code("recording.reason", "a recording is deleted only with a reason", "write why")
+RECORDING_CONFLICT = Code(
+    "recording.conflict",
+    "{author} has changed '{name}' meanwhile",
+    "look at its name, note and tags, then try again",
+)
+RECORDING_CHANGES = Code("recording.changes", "'{name}' was already changed {most} times, the most possible")
+RECORDING_LABELS_DAMAGED = Code(
+    "recording.labels_damaged",
+    "name, note and tags of a recording cannot be read ({detail})",
+    "restore the file from a backup",
+)
+RECORDING_DISK = Code(
+    "recording.disk", "the recorder cannot write to its disk, so nothing has changed: {detail}"
+)
+RECORDING_WRITTEN = Code("recording.written", "'{name}' is still being recorded", "stop it first")
+RECORDING_INDEXED = Code("recording.indexed", "'{name}' is being indexed", "try again soon")
+RECORDING_PLAYED = Code(
+    "recording.played", "'{name}' is being played, or another program reads its file", "close it there first"
+)
+RECORDING_FETCHED = Code(
+    "recording.fetched", "{who} is downloading '{name}'", "wait for the end, or try again in {seconds:.0f} s"
+)
+RECORDING_RENAMED = Code("recording.renamed", "{author} renamed recording '{old}' to '{name}'")
+RECORDING_NOTED = Code("recording.noted", "{author} changed the note of recording '{name}'")
+RECORDING_TAGGED = Code("recording.tagged", "{author} tagged recording '{name}': {tags}")
+RECORDING_UNTAGGED = Code("recording.untagged", "{author} removed all tags of recording '{name}'")
+RECORDING_DELETED = Code(
+    "recording.deleted",
+    "{author} deleted recording '{name}' ({reason}): {file}, {bytes} bytes, SHA-256 {sha256}",
 )
 RECORDER_BUSY = Code(
     "recorder.busy", "the recorder is busy: its recordings/{request} is not ready yet; try again"

@@ -1,8 +1,12 @@
 """Untrusted texts for display: on one line, without characters that hide or reorder text."""
 
+import re
+
 # Characters that set the direction of the text around them (Unicode UAX #9, section 2): people may see such a
 # text in another order than a program reads it (CVE-2021-42574).
 DIRECTION = "\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
+# Characters that a file's name has on no system, or not on every one.
+_IN_NO_FILE_NAME = re.compile(r'[/\\:*?"<>|]')
 _SHOWN = {ord(each): f"<U+{ord(each):04X}>" for each in DIRECTION}
 
 
@@ -15,6 +19,18 @@ def one_line(text: str, longest: int = 200) -> str:
     cut = show_direction(text[: longest + 1])
     plain = "".join(c if c.isprintable() else " " for c in cut[: longest + 1])
     return plain if len(plain) <= longest else plain[: longest - 1] + "…"
+
+
+def is_file_title(text: str, longest: int) -> bool:
+    """Return whether a name can become a file's name on any system, and shows as what it is."""
+    return (
+        0 < len(text) <= longest
+        and text.isprintable()
+        and not any(each in DIRECTION for each in text)
+        and not _IN_NO_FILE_NAME.search(text)
+        and not text.startswith(".")
+        and not text.endswith(".")
+    )
 
 
 def show_direction(text: str) -> str:

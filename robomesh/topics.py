@@ -328,7 +328,7 @@ _REQUESTS = (
     ),
     Request(
         name="recordings/list",
-        request=None,
+        request=schema.RecordingListQuery,
         answer=schema.RecordingList,
         priority=Priority.BACKGROUND,
         owners=frozenset({Role.RECORDER}),
@@ -367,6 +367,16 @@ _REQUESTS = (
         priority=Priority.BACKGROUND,
         owners=frozenset({Role.RECORDER}),
         askers=EVERYONE,
+        in_name=True,
+    ),
+    # Below a site's `-`, with the author's name.
+    Request(
+        name="recordings/request/*",
+        request=schema.RecordingRequest,
+        answer=schema.Recording,
+        priority=Priority.BACKGROUND,
+        owners=frozenset({Role.RECORDER}),
+        askers=_COMMANDERS,
         in_name=True,
     ),
     # Below a site's `-`.

@@ -417,6 +417,33 @@ class Mesh:
         """
         return self._loop.run(self._mesh.fetch_recording(recording, out))
 
+    def change_recording(
+        self,
+        recording: str | RecordingInfo,
+        *,
+        name: str | None = None,
+        note: str | None = None,
+        tags: Sequence[str] | None = None,
+    ) -> RecordingInfo:
+        """Set a recording's name, note or tags, and return its description; its file stays as recorded.
+
+        Args:
+            recording: As for `open_recording`; a name must be that of one recording only.
+            name: At most 60 characters, which a file's name may have.
+            note: At most 2000 characters; empty: none.
+            tags: All tags from then on, at most 20.
+        """
+        return self._loop.run(self._mesh.change_recording(recording, name=name, note=note, tags=tags))
+
+    def delete_recording(self, recording: str | RecordingInfo, *, reason: str) -> RecordingInfo:
+        """Delete a recording's file for good, and return its last description.
+
+        Args:
+            recording: As for `change_recording`.
+            reason: Every operator sees it.
+        """
+        return self._loop.run(self._mesh.delete_recording(recording, reason=reason))
+
 
 async def _next_of(pages: AsyncIterator[T]) -> T | None:
     return await anext(pages, None)

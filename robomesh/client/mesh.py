@@ -22,6 +22,8 @@ from robomesh.presence import SILENT
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 
+_Change = schema.RecordingRequest
+
 
 class RobotNotFoundError(RobomeshError):
     """No robot on the mesh has the name, or several have it.
@@ -205,6 +207,62 @@ class AsyncMesh:
         """
         file, _ = await self._recorder_file(recording)
         return (await file.fetch(Path(out))).file
+
+    async def change_recording(
+        self,
+        recording: str | RecordingInfo,
+        *,
+        name: str | None = None,
+        note: str | None = None,
+        tags: Sequence[str] | None = None,
+    ) -> RecordingInfo:
+        """Set a recording's name, note or tags, and return its description; its file stays as recorded.
+
+        Args:
+            recording: As for `open_recording`; a name must be that of one recording only.
+            name: At most 60 characters, which a file's name may have.
+            note: At most 2000 characters; empty: none.
+            tags: All tags from then on, at most 20.
+
+        Raises:
+            RecordingError: If no recording has the name, or several have it.
+            RobomeshError: If its recorder refuses or does not answer; `recording.conflict`: it was changed
+                meanwhile.
+        """
+        file, info = await self._changeable(recording)
+        if name is not None:
+            info = await self._change(file, info, _Change(action=_Change.RENAME, name=name))
+        if note is not None:
+            info = await self._change(file, info, _Change(action=_Change.NOTE, note=note))
+        if tags is not None:
+            info = await self._change(file, info, _Change(action=_Change.TAG, tags=tags))
+        return info
+
+    async def delete_recording(self, recording: str | RecordingInfo, *, reason: str) -> RecordingInfo:
+        """Delete a recording's file for good, and return its last description.
+
+        Args:
+            recording: As for `change_recording`.
+            reason: Every operator sees it.
+
+        Raises:
+            RecordingError: If no recording has the name, or several have it.
+            RobomeshError: If its recorder refuses, as while it is in use, or does not answer.
+        """
+        file, info = await self._changeable(recording)
+        return await self._change(file, info, _Change(action=_Change.DELETE, reason=reason))
+
+    async def _changeable(self, recording: str | RecordingInfo) -> tuple[RecorderFile, RecordingInfo]:
+        if isinstance(recording, str):
+            recording = await find_recording(self.session, recording, only=True)
+        file, _ = await self._recorder_file(recording)
+        return file, recording
+
+    async def _change(
+        self, file: RecorderFile, info: RecordingInfo, request: schema.RecordingRequest
+    ) -> RecordingInfo:
+        request.based_on = info.message.changes
+        return recording_info(await file.change(request), info.recorder_site)
 
     async def _recorder_file(self, recording: str | RecordingInfo) -> tuple[RecorderFile, str]:
         if isinstance(recording, str):

@@ -13,6 +13,7 @@ from google.protobuf.message import Message
 from robomesh import reason_codes as codes
 from robomesh.errors import BusyError, NoAnswerError, QuotaError, RefusedError
 from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.recordings.changes import write_changes
 from robomesh.recordings.errors import RecordingError
 from robomesh.repeated_requests import ask_repeatedly
 from robomesh.schemas import robomesh_pb2 as schema
@@ -86,6 +87,21 @@ class RecorderFile:
             RobomeshError: If the recorder refuses or does not answer.
         """
         answer = await self._ask("info", schema.RecordingQuery(file=self.name))
+        assert isinstance(answer, schema.Recording)
+        return answer
+
+    async def change(self, request: schema.RecordingRequest, author: str = "") -> schema.Recording:
+        """Rename, note, tag or delete the recording, and return its description.
+
+        Args:
+            request: Its `file` is set.
+            author: Name for the change; empty: that of the other requests.
+
+        Raises:
+            RobomeshError: If the recorder refuses or does not answer; a refused change changed nothing.
+        """
+        request.file = self.name
+        answer = await self._ask(f"request/{author or self._asker}", request)
         assert isinstance(answer, schema.Recording)
         return answer
 
@@ -182,7 +198,8 @@ class RecorderFile:
     async def fetch(self, out: Path, *, on_progress: Callable[[float], None] = lambda share: None) -> Fetched:
         """Copy the file; resume an earlier fetch of the same version.
 
-        If the file changes meanwhile, as when a closed recording gets its index, copy the new version.
+        If the file changes meanwhile, as when a closed recording gets its index, copy the new version. A
+        recording's changes (name, note, tags) are written beside it, `*.changes.json`.
 
         Args:
             out: Path of the copy, or a folder.
@@ -201,6 +218,13 @@ class RecorderFile:
         out = out / self.name if await asyncio.to_thread(out.is_dir) else out
         if out.exists() and not out.is_file():  # the copy would replace it
             raise RecordingError(f"{out} is not a file: choose another path for the copy")
+        fetched = await self._fetch_newest(out, on_progress)
+        with contextlib.suppress(RefusedError):  # a damaged file is copied without them
+            if history := (await self.describe()).history:
+                await asyncio.to_thread(write_changes, out, history)
+        return fetched
+
+    async def _fetch_newest(self, out: Path, on_progress: Callable[[float], None]) -> Fetched:
         for _ in range(_VERSIONS - 1):
             with contextlib.suppress(RecordingError):
                 return await self._fetch_version(out, on_progress)

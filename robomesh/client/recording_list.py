@@ -57,6 +57,9 @@ class RecordingInfo:
         problem: Why it is incomplete, for people; empty: it is complete.
         recovered: Its recorder was killed, and the file was completed afterwards.
         part: Part of a split recording, from 1; 0: it was not split.
+        note: Note of its operators, of several lines.
+        tags: Tags of its operators.
+        deleted: It was deleted; only its description is left.
         topics: Recorded topics by their channels' names.
         merged_from: The recordings of a file that was merged; empty: it is one recording.
         message: The description as the recorder sends it.
@@ -74,6 +77,9 @@ class RecordingInfo:
     problem: str
     recovered: bool
     part: int
+    note: str
+    tags: tuple[str, ...]
+    deleted: bool
     topics: tuple[RecordedTopic, ...]
     merged_from: "tuple[RecordingInfo, ...]"
     message: schema.Recording = field(repr=False, compare=False)
@@ -107,6 +113,9 @@ def recording_info(message: schema.Recording, recorder_site: str = "") -> Record
         problem=message.problem,
         recovered=message.recovered,
         part=message.part,
+        note=message.note,
+        tags=tuple(message.tags),
+        deleted=message.deleted,
         topics=tuple(topics),
         merged_from=tuple(map(recording_info, message.merged_from)),
         message=message,
@@ -118,18 +127,24 @@ def _log_silent(site: str, error: RobomeshError) -> None:
 
 
 async def list_recordings(
-    session: Session, *, on_silent: Callable[[str, RobomeshError], None] = _log_silent
+    session: Session,
+    *,
+    deleted: bool = False,
+    on_silent: Callable[[str, RobomeshError], None] = _log_silent,
 ) -> list[RecordingInfo]:
     """Return the recordings of every site, newest first, without those of recorders that do not answer.
 
     Args:
+        deleted: Deleted recordings too.
         on_silent: Called with the site of a recorder that does not answer.
 
     Raises:
         RobomeshError: If no recorder answers.
     """
     sites = sorted({key.site for key in await session.present() if key.service == "recorder"})
-    answers = await asyncio.gather(*(_of_site(session, site) for site in sites), return_exceptions=True)
+    answers = await asyncio.gather(
+        *(_of_site(session, site, deleted) for site in sites), return_exceptions=True
+    )
     found: list[RecordingInfo] = []
     for site, answer in zip(sites, answers, strict=True):
         if isinstance(answer, schema.RecordingList):
@@ -143,9 +158,9 @@ async def list_recordings(
     return sorted(found, key=lambda each: each.start_ns, reverse=True)
 
 
-async def _of_site(session: Session, site: str) -> schema.RecordingList:
+async def _of_site(session: Session, site: str, deleted: bool) -> schema.RecordingList:
     key = robot_key(site, WHOLE_SITE, "recordings/list")
-    answer = await session.ask(key, timeout_s=_TIMEOUT_S)
+    answer = await session.ask(key, schema.RecordingListQuery(deleted=deleted), timeout_s=_TIMEOUT_S)
     assert isinstance(answer, schema.RecordingList)
     return answer
 
@@ -155,24 +170,33 @@ async def find_recording(
     what: str,
     *,
     closed: bool = False,
+    only: bool = False,
     on_silent: Callable[[str, RobomeshError], None] = _log_silent,
 ) -> RecordingInfo:
     """Return the newest recording that `[SITE/]NAME` or `[SITE/]FILE` names.
 
     Args:
         closed: Skip recordings that are still being written.
+        only: Refuse a name that several recordings have.
         on_silent: As for `list_recordings`.
 
     Raises:
-        RecordingError: If no recording has the name; the text lists the newest ones.
+        RecordingError: If no recording has the name; the text lists the newest ones. If several have it, and
+            `only`.
         RobomeshError: If no recorder answers.
     """
     site, _, name = what.rpartition("/")
     recordings = await list_recordings(session, on_silent=on_silent)
-    for each in recordings:
-        matches = name in (each.name, each.file) and site in ("", each.recorder_site)
-        if matches and not (closed and each.open):
-            return each
+    found = [
+        each
+        for each in recordings
+        if name in (each.name, each.file) and site in ("", each.recorder_site) and not (closed and each.open)
+    ]
+    if only and len(found) > 1:
+        files = ", ".join(f"{each.recorder_site}/{each.file}" for each in found[:_MOST_NAMED])
+        raise RecordingError(codes.RECORDING_AMBIGUOUS(name=what, files=files))
+    if found:
+        return found[0]
     names = list(dict.fromkeys(f"{each.recorder_site}/{each.name or each.file}" for each in recordings))
     there = ", ".join(names[:_MOST_NAMED]) + (", ..." if len(names) > _MOST_NAMED else "")
     raise RecordingError(codes.RECORDING_NOT_FOUND(name=what, recordings=there or "none"))

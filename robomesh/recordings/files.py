@@ -1,7 +1,7 @@
 """Description of a recording from its file."""
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
@@ -14,6 +14,7 @@ from robomesh import reason_codes as codes
 from robomesh.keys import parse_key
 from robomesh.messages import reason_message
 from robomesh.reasons import Reason
+from robomesh.recordings.changes import DamagedChangesError, read_changes, set_labels
 from robomesh.recordings.channel_names import is_recorders, robot_channels
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.layout import layout_of
@@ -21,6 +22,7 @@ from robomesh.recordings.metadata import OneRecording, lost_in
 from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.records import number_in
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.schemas.robomesh_pb2 import RecordingChange
 
 # Recordings of a merged file that are listed: another program may have written more.
 _MOST_LISTED = 1000
@@ -39,6 +41,16 @@ def describe_file(path: Path) -> schema.Recording:
         raise RecordingError(codes.RECORDING_FILE(file=path, detail=detail)) from None
     recording = schema.Recording()
     recording.CopyFrom(_described(path, found.st_ino, found.st_size, found.st_mtime_ns))
+    with contextlib.suppress(DamagedChangesError):  # the recording itself can be read
+        set_labels(recording, read_changes(path), history=True)
+    return recording
+
+
+def describe_deleted(path: Path, changes: Sequence[RecordingChange]) -> schema.Recording:
+    """Describe a recording of which only its changes are left."""
+    recording = schema.Recording(robot=path.parent.name, file=path.name, start=_timestamp(_begun_ns(path)))
+    recording.deleted, recording.bytes = True, changes[-1].bytes
+    set_labels(recording, changes, history=True)
     return recording
 
 
@@ -46,6 +58,8 @@ def describe_unreadable(path: Path, *, robot: str, problem: Reason) -> schema.Re
     """Describe a file that cannot be read, by its name."""
     name = path.stem.partition("Z_")[2] or path.stem
     recording = schema.Recording(robot=robot, name=name, file=path.name, start=_timestamp(_begun_ns(path)))
+    with contextlib.suppress(DamagedChangesError):
+        set_labels(recording, read_changes(path))
     set_problem(recording, problem)
     return recording
 

@@ -10,13 +10,18 @@ from robomesh.recordings.errors import RecordingError
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.:+-]*")
 
 
+def is_file_name(name: str) -> bool:
+    """Return whether a recording can have this file name; it leads to no other folder."""
+    return bool(_NAME.fullmatch(name)) and name.endswith(SUFFIX)
+
+
 def find_file(folder: Path, name: str) -> Path:
     """Return the file with a name, in the folder or in a robot's folder below it.
 
     Raises:
         RecordingError: If there is none, or the name could lead outside the folder.
     """
-    if not _NAME.fullmatch(name) or not name.endswith(SUFFIX):
+    if not is_file_name(name):
         raise RecordingError(codes.RECORDING_UNKNOWN(name=name))
     for path in (folder / name, *sorted(folder.glob(f"*/{name}"))):
         if path.is_file() and path.resolve().is_relative_to(folder.resolve()):

@@ -1,5 +1,7 @@
 """Reading of a file's messages by topic and time, without reading the rest."""
 
+import contextlib
+import fcntl
 import heapq
 import os
 import struct
@@ -60,6 +62,9 @@ class RecordingFile:
             self._stream: IO[bytes] = path.open("rb")
         except OSError as error:
             raise RecordingError(codes.RECORDING_FILE(file=path.name, detail=error.strerror)) from None
+        with contextlib.suppress(OSError):  # being written, or a disk without locks
+            # No recorder deletes a recording that is being read.
+            fcntl.flock(self._stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
         self._unpacked: tuple[Block, bytes] | None = None
 
     def __enter__(self) -> Self:

@@ -1055,7 +1055,7 @@ class RecorderRequest(_message.Message):
     def __init__(self, action: _Optional[_Union[RecorderRequest.Action, str]] = ..., name: _Optional[str] = ..., views: _Optional[_Iterable[str]] = ...) -> None: ...
 
 class Recording(_message.Message):
-    __slots__ = ("site", "robot", "name", "file", "start", "duration", "bytes", "open", "topics", "started_by", "problem", "audit_head", "cause", "part", "attachments", "recovered", "indexing", "problem_reason", "merged_from")
+    __slots__ = ("site", "robot", "name", "file", "start", "duration", "bytes", "open", "topics", "started_by", "problem", "audit_head", "cause", "part", "attachments", "recovered", "indexing", "problem_reason", "merged_from", "note", "tags", "changes", "history", "deleted")
     class TopicCount(_message.Message):
         __slots__ = ("topic", "messages", "lost")
         TOPIC_FIELD_NUMBER: _ClassVar[int]
@@ -1084,6 +1084,11 @@ class Recording(_message.Message):
     INDEXING_FIELD_NUMBER: _ClassVar[int]
     PROBLEM_REASON_FIELD_NUMBER: _ClassVar[int]
     MERGED_FROM_FIELD_NUMBER: _ClassVar[int]
+    NOTE_FIELD_NUMBER: _ClassVar[int]
+    TAGS_FIELD_NUMBER: _ClassVar[int]
+    CHANGES_FIELD_NUMBER: _ClassVar[int]
+    HISTORY_FIELD_NUMBER: _ClassVar[int]
+    DELETED_FIELD_NUMBER: _ClassVar[int]
     site: str
     robot: str
     name: str
@@ -1103,7 +1108,84 @@ class Recording(_message.Message):
     indexing: float
     problem_reason: Reason
     merged_from: _containers.RepeatedCompositeFieldContainer[Recording]
-    def __init__(self, site: _Optional[str] = ..., robot: _Optional[str] = ..., name: _Optional[str] = ..., file: _Optional[str] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., duration: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., bytes: _Optional[int] = ..., open: _Optional[bool] = ..., topics: _Optional[_Iterable[_Union[Recording.TopicCount, _Mapping]]] = ..., started_by: _Optional[str] = ..., problem: _Optional[str] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., cause: _Optional[str] = ..., part: _Optional[int] = ..., attachments: _Optional[_Iterable[str]] = ..., recovered: _Optional[bool] = ..., indexing: _Optional[float] = ..., problem_reason: _Optional[_Union[Reason, _Mapping]] = ..., merged_from: _Optional[_Iterable[_Union[Recording, _Mapping]]] = ...) -> None: ...
+    note: str
+    tags: _containers.RepeatedScalarFieldContainer[str]
+    changes: int
+    history: _containers.RepeatedCompositeFieldContainer[RecordingChange]
+    deleted: bool
+    def __init__(self, site: _Optional[str] = ..., robot: _Optional[str] = ..., name: _Optional[str] = ..., file: _Optional[str] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., duration: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., bytes: _Optional[int] = ..., open: _Optional[bool] = ..., topics: _Optional[_Iterable[_Union[Recording.TopicCount, _Mapping]]] = ..., started_by: _Optional[str] = ..., problem: _Optional[str] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., cause: _Optional[str] = ..., part: _Optional[int] = ..., attachments: _Optional[_Iterable[str]] = ..., recovered: _Optional[bool] = ..., indexing: _Optional[float] = ..., problem_reason: _Optional[_Union[Reason, _Mapping]] = ..., merged_from: _Optional[_Iterable[_Union[Recording, _Mapping]]] = ..., note: _Optional[str] = ..., tags: _Optional[_Iterable[str]] = ..., changes: _Optional[int] = ..., history: _Optional[_Iterable[_Union[RecordingChange, _Mapping]]] = ..., deleted: _Optional[bool] = ...) -> None: ...
+
+class RecordingChange(_message.Message):
+    __slots__ = ("number", "change", "timestamp", "author", "name", "note", "tags", "reason", "sha256", "bytes")
+    class Change(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        CHANGE_UNSPECIFIED: _ClassVar[RecordingChange.Change]
+        RENAMED: _ClassVar[RecordingChange.Change]
+        NOTED: _ClassVar[RecordingChange.Change]
+        TAGGED: _ClassVar[RecordingChange.Change]
+        DELETED: _ClassVar[RecordingChange.Change]
+    CHANGE_UNSPECIFIED: RecordingChange.Change
+    RENAMED: RecordingChange.Change
+    NOTED: RecordingChange.Change
+    TAGGED: RecordingChange.Change
+    DELETED: RecordingChange.Change
+    NUMBER_FIELD_NUMBER: _ClassVar[int]
+    CHANGE_FIELD_NUMBER: _ClassVar[int]
+    TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
+    AUTHOR_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    NOTE_FIELD_NUMBER: _ClassVar[int]
+    TAGS_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    SHA256_FIELD_NUMBER: _ClassVar[int]
+    BYTES_FIELD_NUMBER: _ClassVar[int]
+    number: int
+    change: RecordingChange.Change
+    timestamp: _timestamp_pb2.Timestamp
+    author: str
+    name: str
+    note: str
+    tags: _containers.RepeatedScalarFieldContainer[str]
+    reason: str
+    sha256: str
+    bytes: int
+    def __init__(self, number: _Optional[int] = ..., change: _Optional[_Union[RecordingChange.Change, str]] = ..., timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., author: _Optional[str] = ..., name: _Optional[str] = ..., note: _Optional[str] = ..., tags: _Optional[_Iterable[str]] = ..., reason: _Optional[str] = ..., sha256: _Optional[str] = ..., bytes: _Optional[int] = ...) -> None: ...
+
+class RecordingRequest(_message.Message):
+    __slots__ = ("action", "file", "based_on", "name", "note", "tags", "reason")
+    class Action(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        ACTION_UNSPECIFIED: _ClassVar[RecordingRequest.Action]
+        RENAME: _ClassVar[RecordingRequest.Action]
+        NOTE: _ClassVar[RecordingRequest.Action]
+        TAG: _ClassVar[RecordingRequest.Action]
+        DELETE: _ClassVar[RecordingRequest.Action]
+    ACTION_UNSPECIFIED: RecordingRequest.Action
+    RENAME: RecordingRequest.Action
+    NOTE: RecordingRequest.Action
+    TAG: RecordingRequest.Action
+    DELETE: RecordingRequest.Action
+    ACTION_FIELD_NUMBER: _ClassVar[int]
+    FILE_FIELD_NUMBER: _ClassVar[int]
+    BASED_ON_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    NOTE_FIELD_NUMBER: _ClassVar[int]
+    TAGS_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    action: RecordingRequest.Action
+    file: str
+    based_on: int
+    name: str
+    note: str
+    tags: _containers.RepeatedScalarFieldContainer[str]
+    reason: str
+    def __init__(self, action: _Optional[_Union[RecordingRequest.Action, str]] = ..., file: _Optional[str] = ..., based_on: _Optional[int] = ..., name: _Optional[str] = ..., note: _Optional[str] = ..., tags: _Optional[_Iterable[str]] = ..., reason: _Optional[str] = ...) -> None: ...
+
+class RecordingListQuery(_message.Message):
+    __slots__ = ("deleted",)
+    DELETED_FIELD_NUMBER: _ClassVar[int]
+    deleted: bool
+    def __init__(self, deleted: _Optional[bool] = ...) -> None: ...
 
 class RecordingList(_message.Message):
     __slots__ = ("recordings", "free_bytes", "flight")

@@ -62,7 +62,9 @@ COMMANDS = {
     "programs": Row(
         "programs", "Programs stored at a site: list, show, save, restore, diff, export, import."
     ),
-    "recordings": Row("recordings.app", "Recordings: list, inspect, play, export, fetch."),
+    "recordings": Row(
+        "recordings.app", "Recordings: list, inspect, play, export, fetch, rename, tag, delete."
+    ),
     "audit": Row("audit", "The gateway's audit log."),
     "alarms": Row("alarms", "Alarms: list, acknowledge, shelve."),
     "keys": Row("keys", "A site's certificates: who may take part, in which role."),

@@ -1,7 +1,8 @@
 """Answers to requests about recordings, read from the files in a separate process."""
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -10,9 +11,16 @@ from typing import Any
 from google.protobuf.message import Message
 
 from robomesh import reason_codes as codes
+from robomesh.recordings.changes import (
+    CHANGES,
+    DamagedChangesError,
+    is_deleted,
+    read_changes,
+    recording_path,
+)
 from robomesh.recordings.channel_names import SUFFIX
 from robomesh.recordings.errors import RecordingError
-from robomesh.recordings.files import describe_file, describe_unreadable
+from robomesh.recordings.files import describe_deleted, describe_file, describe_unreadable
 from robomesh.recordings.folder import find_file
 from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.series import MOST_POINTS, POINTS, SeriesReader, known_values
@@ -46,7 +54,7 @@ class Answers:
             RecordingError: If it cannot be answered; the text is for the client.
         """
         answers: dict[str, tuple[Callable[[Any], Message], Any]] = {
-            "list": (self.list, schema.RecordingQuery),
+            "list": (self.list, schema.RecordingListQuery),
             "info": (self.info, schema.RecordingQuery),
             "range": (self.range, schema.RangeRequest),
             "series": (self.series, schema.SeriesRequest),
@@ -55,7 +63,7 @@ class Answers:
         answer, request = answers[question.name]
         return answer(request.FromString(question.request)).SerializeToString()
 
-    def list(self, _: schema.RecordingQuery) -> schema.RecordingList:
+    def list(self, query: schema.RecordingListQuery) -> schema.RecordingList:
         """List every recording, newest first; an unreadable file has its problem as text."""
         recordings = schema.RecordingList()
         paths = [*self._folder.glob(f"*/*{SUFFIX}"), *self._folder.glob(f"*{SUFFIX}")]
@@ -65,9 +73,21 @@ class Answers:
             except RecordingError as error:
                 robot = path.parent.name if path.parent != self._folder else ""
                 recordings.recordings.append(describe_unreadable(path, robot=robot, problem=error.reason))
+        for recording in recordings.recordings:
+            del recording.history[:]
+        if query.deleted:
+            recordings.recordings.extend(self._deleted())
         if self._folder.is_dir():
             recordings.free_bytes = shutil.disk_usage(self._folder).free
         return recordings
+
+    def _deleted(self) -> Iterator[schema.Recording]:
+        for path in (*self._folder.glob(f"*/*{CHANGES}"), *self._folder.glob(f"*{CHANGES}")):
+            recording = recording_path(path)
+            with suppress(DamagedChangesError):
+                changes = read_changes(recording)
+                if is_deleted(changes) and not recording.exists():
+                    yield describe_deleted(recording, changes)
 
     def info(self, request: schema.RecordingQuery) -> schema.Recording:
         """Describe one recording."""

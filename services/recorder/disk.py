@@ -137,11 +137,15 @@ class Disk:
         """
         capture.give_up()
         with self._repairing, contextlib.suppress(OSError, ValueError):
-            (self.folder / _RESERVE).unlink(missing_ok=True)
+            self.free_reserve()
             if capture.path.stat().st_size < len(records.MAGIC):
                 capture.path.unlink()
             else:
                 close_in_place(capture.path, missed)
+
+    def free_reserve(self) -> None:
+        """Delete the reserve file; `check_space` makes it again once there is room."""
+        (self.folder / _RESERVE).unlink(missing_ok=True)
 
     def check_space(self) -> None:
         """Measure the free space, and create the reserve file if there is room."""

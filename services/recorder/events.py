@@ -1,9 +1,12 @@
 """Events of the recorder, for a robot or for the whole site."""
 
 import logging
+from collections.abc import Mapping
 
 from robomesh.keys import WHOLE_SITE
+from robomesh.messages import reason_message
 from robomesh.publisher import Publisher
+from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 from services.recorder.disk import Disk, RecordingLevel
@@ -41,11 +44,29 @@ class EventReporter:
         self, robot: str, severity: schema.Event.Severity, code: str, text: str, **values: str
     ) -> None:
         """Log and publish an event of a robot, or of the whole site (`-`)."""
-        log.log(_LEVEL.get(severity, logging.ERROR), "%s: %s", robot, text)
-        event = schema.Event(severity=severity, code=code, text=text, source="recorder", values=values)
+        self._publish(
+            robot, schema.Event(severity=severity, code=code, text=text, source="recorder", values=values)
+        )
+
+    def _publish(self, robot: str, event: schema.Event) -> None:
+        log.log(_LEVEL.get(event.severity, logging.ERROR), "%s: %s", robot, event.text)
         event.timestamp.GetCurrentTime()
         self.declare(robot)
         self._publishers[robot].put(event)
+
+    def report_reason(
+        self, robot: str, severity: schema.Event.Severity, reason: Reason, values: Mapping[str, str]
+    ) -> None:
+        """Log and publish an event with a reason, which the page shows in its language."""
+        event = schema.Event(
+            severity=severity,
+            code=reason.code,
+            text=reason.text,
+            source="recorder",
+            values={**reason.values, **values},
+            reason=reason_message(reason),
+        )
+        self._publish(robot, event)
 
     def report_state(
         self, code: str, severity: schema.Event.Severity, text: str, over: str, *, robot: str = WHOLE_SITE

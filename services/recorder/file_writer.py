@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from robomesh.header import Header
 from robomesh.recordings.capture import Capture
+from robomesh.recordings.changes import set_labels
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.topics import TOPICS, Topic
 from robomesh.wall_clock import WallClock
@@ -31,6 +32,8 @@ class Part:
         self.dropped: Counter[str] = Counter()
         # Publications that were never received, by key; set from the subscriptions.
         self.lost: Counter[str] = Counter()
+        # Name, note and tags that people have given it meanwhile.
+        self.labels: schema.RecordingChange | None = None
         self._disk, self._on_publication = disk, on_publication
         # The wall clock may be set during a recording: times within a file follow the monotonic clock.
         self._begun_ns = begun_ns
@@ -89,4 +92,6 @@ class Part:
         missed = self.missed
         for key in sorted(capture.counts.keys() | missed.keys()):
             recording.topics.add(topic=key, messages=capture.counts[key], lost=missed[key])
+        if self.labels is not None:
+            set_labels(recording, [self.labels])
         return recording

@@ -12,7 +12,9 @@ from pathlib import Path
 from robomesh import reason_codes as codes
 from robomesh.errors import MessageError, RefusedError
 from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.reasons import Reason
 from robomesh.recordings.capture import Capture
+from robomesh.recordings.changes import set_labels
 from robomesh.recordings.channel_names import INDEXING, ROBOT_DESCRIPTION, SUFFIX
 from robomesh.recordings.errors import RecordingsError
 from robomesh.recordings.recover import State
@@ -21,6 +23,7 @@ from robomesh.server import Request
 from robomesh.session import Session
 from services.recorder.attachments import DescriptionCache, picture, self_contained_urdf
 from services.recorder.captures import Files, RobotRecorder
+from services.recorder.changes import Changes
 from services.recorder.disk import Disk, error_text
 from services.recorder.events import EventReporter, report_disk
 from services.recorder.file_writer import Part
@@ -30,6 +33,7 @@ from services.recorder.orphans import left_state, lock_folder
 from services.recorder.serving import RecordingServer
 from services.recorder.settings import Settings
 from services.recorder.subscriptions import Subscriptions
+from services.recorder.uses import Uses
 
 log = logging.getLogger(__name__)
 
@@ -197,6 +201,7 @@ class _Recorder:
         self.finisher = Finisher()
         self.events = EventReporter(session, settings.site)
         self.descriptions = DescriptionCache(session, settings.site, self._on_known)
+        self._uses = Uses()
         self._serving = RecordingServer(
             session,
             settings.site,
@@ -204,7 +209,16 @@ class _Recorder:
             open_now=self._open_now,
             flight=self._flight_runs,
             quotas=settings.quotas,
+            uses=self._uses,
         )
+        self._changes = Changes(
+            settings.folder,
+            describe=self._serving.describe,
+            is_used=self._use_of,
+            free_reserve=self.disk.free_reserve,
+            report=self.events.report_reason,
+        )
+        session.answer(settings.site, WHOLE_SITE, "recordings/request/*", self._change)
         self._folder_lock: int | None = None
         # Captures that a disk error ended, by file: the files do not contain the reason.
         self._ended: dict[str, schema.Recording] = {}
@@ -279,6 +293,10 @@ class _Recorder:
         while (lock := await asyncio.to_thread(lock_folder, self.settings.folder)) is None:
             await asyncio.sleep(_LOCK_RETRY_S)
         self._folder_lock = lock
+        try:
+            await asyncio.to_thread(self._changes.recover)
+        except OSError as error:
+            log.error("%s: %s", self.settings.folder, error)
         for path in self.settings.folder.glob(f"*/*{INDEXING}"):
             if path.with_suffix(SUFFIX).name not in self.finisher.progress:
                 path.unlink()  # left by a killed indexer; the recording itself is complete
@@ -349,6 +367,35 @@ class _Recorder:
         with self.subscriptions.lock:
             for each in robots:
                 self.subscriptions.robot(each).refresh()
+
+    async def _change(self, request: Request) -> schema.Recording:
+        recording = await self._changes.change(request)
+        if (ended := self._ended.get(recording.file)) is not None:
+            set_labels(ended, recording.history)
+        for robot in self._robots.values():
+            part = robot.captures.part
+            if part is not None and part.capture.path.name == recording.file and recording.history:
+                part.labels = recording.history[-1]
+                robot.publish()
+        return recording
+
+    def _use_of(self, file: str, name: str) -> Reason | None:
+        """Return the reason why a recording must not be deleted now; called on another thread."""
+        if file in self._open_files:
+            return codes.RECORDING_WRITTEN(name=name)
+        if file in self.finisher.progress:
+            return codes.RECORDING_INDEXED(name=name)
+        return self._uses.of(file, name)
+
+    @property
+    def _open_files(self) -> set[str]:
+        found = set()
+        for robot in tuple(self._robots.values()):
+            if (part := robot.captures.part) is not None:
+                found.add(part.capture.path.name)
+            if robot.flight is not None and robot.flight.saving is not None:
+                found.add(robot.flight.saving.name)
+        return found
 
     def _on_known(self, name: str) -> None:
         if (robot := self._robots.get(name)) is not None:

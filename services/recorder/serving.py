@@ -7,7 +7,7 @@ from pathlib import Path
 from google.protobuf.message import Message
 
 from robomesh import reason_codes as codes
-from robomesh.errors import BusyError, RefusedError
+from robomesh.errors import BusyError, QuotaError, RefusedError
 from robomesh.keys import WHOLE_SITE
 from robomesh.quotas import DEFAULT_QUOTAS, Quota, Quotas
 from robomesh.recordings.errors import RecordingError
@@ -17,6 +17,7 @@ from robomesh.session import Session
 from robomesh.worker import Worker, WorkerError
 from services.recorder.answers import Question
 from services.recorder.settings import MIB
+from services.recorder.uses import Uses
 
 _MODULE = "services.recorder.reader"
 _NICE = 5
@@ -38,6 +39,7 @@ class RecordingServer:
     Args:
         open_now: Returns the open captures by file name.
         flight: Returns whether the flight recorder is running.
+        uses: Notes the clients that read a recording.
         quotas: Quotas of each client.
     """
 
@@ -50,8 +52,10 @@ class RecordingServer:
         open_now: Callable[[], dict[str, schema.Recording]],
         flight: Callable[[], bool],
         quotas: Quotas = DEFAULT_QUOTAS,
+        uses: Uses | None = None,
     ) -> None:
         self._open_now, self._flight = open_now, flight
+        self._uses = Uses() if uses is None else uses
         self._fast_worker, self._series_worker = (Worker(_MODULE, folder, nice=_NICE) for _ in range(2))
         self._tasks: dict[tuple[str, bytes], asyncio.Task[bytes]] = {}
         self._mebibytes = Quota("recordings_mib", a_minute=quotas.recordings_mib_a_minute)
@@ -81,16 +85,28 @@ class RecordingServer:
         }
 
         async def answer(request: Request) -> Message:
-            assert request.message is not None
-            self._mebibytes.check(request.asker)
-            answer = await self._ask(name, request.message)
-            self._mebibytes.count(request.asker, len(answer) / MIB)
-            return schemas[name].FromString(answer)
+            message, asker = request.message, request.asker
+            assert message is not None
+            try:
+                self._mebibytes.check(asker)
+            except QuotaError as error:
+                self._uses.note_wait(name, asker, getattr(message, "file", ""), error.again_s)
+                raise
+            data = await self._ask(name, message)
+            self._mebibytes.count(asker, len(data) / MIB)
+            answer = schemas[name].FromString(data)
+            if isinstance(message, schema.PieceRequest) and isinstance(answer, schema.Piece):
+                self._uses.note_piece(asker, message, answer)
+            elif isinstance(message, schema.RangeRequest) and isinstance(answer, schema.RecordedMessages):
+                self._uses.note_range(asker, message, answer)
+            return answer
 
         return answer
 
     async def _list(self, request: Request) -> schema.RecordingList:
-        answer = await self._ask_in_time("list", schema.RecordingQuery(), request.within_s)
+        query = request.message
+        assert isinstance(query, schema.RecordingListQuery)
+        answer = await self._ask_in_time("list", query, request.within_s)
         listed = schema.RecordingList.FromString(answer)
         open_now = self._open_now()
         known = {recording.file for recording in listed.recordings}
@@ -100,11 +116,20 @@ class RecordingServer:
         return schema.RecordingList(recordings=rows, free_bytes=listed.free_bytes, flight=self._flight())
 
     async def _info(self, request: Request) -> schema.Recording:
-        query = request.message
-        assert isinstance(query, schema.RecordingQuery)
-        if (open_now := self._open_now().get(query.file)) is not None:
+        assert isinstance(request.message, schema.RecordingQuery)
+        return await self.describe(request.message.file, request.within_s)
+
+    async def describe(self, file: str, within_s: float | None = None) -> schema.Recording:
+        """Describe a recording.
+
+        Raises:
+            BusyError: If reading it takes too long.
+            RefusedError: If it cannot be read.
+        """
+        if (open_now := self._open_now().get(file)) is not None:
             return open_now
-        return schema.Recording.FromString(await self._ask_in_time("info", query, request.within_s))
+        query = schema.RecordingQuery(file=file)
+        return schema.Recording.FromString(await self._ask_in_time("info", query, within_s))
 
     async def _ask_in_time(self, name: str, query: Message, within_s: float | None) -> bytes:
         """Return the worker's answer, before the client's timeout.

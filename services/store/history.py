@@ -6,7 +6,6 @@ program's name, its text and whether it is deleted.
 """
 
 import hashlib
-import re
 import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -16,14 +15,12 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.schemas.robomesh_pb2 import ProgramRequest, ProgramVersion, StoredProgram
-from robomesh.texts import DIRECTION, one_line
+from robomesh.texts import is_file_title, one_line
 from robots.programs import MOST_BYTES
 
 MOST_VERSIONS = 1000
 LONGEST_NAME = 60
 _LONGEST_REASON = 500
-# A name becomes a file's name on any system.
-_IN_NO_FILE_NAME = re.compile(r'[/\\:*?"<>|]')
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,14 +75,7 @@ def check_name(name: str) -> str:
         RefusedError: If it could not name a file, or shows as another name than it is.
     """
     normal = unicodedata.normalize("NFC", name).strip()
-    if (
-        not 0 < len(normal) <= LONGEST_NAME
-        or not normal.isprintable()
-        or any(each in DIRECTION for each in normal)
-        or _IN_NO_FILE_NAME.search(normal)
-        or normal.startswith(".")
-        or normal.endswith(".")
-    ):
+    if not is_file_title(normal, LONGEST_NAME):
         raise RefusedError(codes.PROGRAMS_NAME(name=one_line(name, LONGEST_NAME), most=LONGEST_NAME))
     return normal
 

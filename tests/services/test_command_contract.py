@@ -42,6 +42,10 @@ CONTRACT = {
     "recordings list": ("--json",),
     "recordings info": ("--json",),
     "recordings recover": (),
+    **dict.fromkeys(
+        (f"recordings {each}" for each in ("rename", "note", "tag", "delete")),
+        ("--connect", "--operator", "--json"),
+    ),
     "recordings export": (),
     "recordings play": (),
     **dict.fromkeys(

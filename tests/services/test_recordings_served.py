@@ -355,7 +355,7 @@ def test_an_empty_file_is_listed_by_its_file_name_with_a_problem(tmp_path):
     (tmp_path / "arm").mkdir()
     empty = tmp_path / "arm" / "2026-11-21T20-55-01.500000Z_full.mcap"
     empty.touch()
-    (row,) = Answers(tmp_path).list(schema.RecordingQuery()).recordings
+    (row,) = Answers(tmp_path).list(schema.RecordingListQuery()).recordings
     assert (row.robot, row.name, row.start.ToJsonString()) == ("arm", "full", "2026-11-21T20:55:01.500Z")
     assert "is empty" in row.problem
 

@@ -34,6 +34,7 @@ IN_NAME = (
     "kinematics/check/*",
     "views/*",
     "video/*/keyframe/*",
+    "recordings/request/*",
     "recordings/range/*",
     "recordings/series/*",
     "recordings/piece/*",

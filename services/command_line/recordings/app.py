@@ -8,9 +8,13 @@ import typer
 from robomesh.endpoints import DEFAULT_ROUTER
 from services.command_line.options import Connect, Json, command_group
 
-app = command_group("recordings", "Recordings: list, inspect, play, export, fetch.")
+app = command_group("recordings", "Recordings: list, inspect, play, export, fetch, rename, tag, delete.")
 
 _File = Annotated[Path, typer.Argument(metavar="FILE.mcap")]
+_Named = Annotated[
+    str, typer.Argument(metavar="[SITE/]NAME", help="A name or file from `list`; not that of several.")
+]
+_Operator = Annotated[str, typer.Option(help="The author's name; else yours.")]
 _Recording = Annotated[
     str,
     typer.Argument(metavar="FILE.mcap|[SITE/]NAME", help="A file of this machine, or a name from `list`."),
@@ -18,11 +22,16 @@ _Recording = Annotated[
 
 
 @app.command("list")
-def list_(connect: Connect = DEFAULT_ROUTER, as_json: Json = False) -> None:
+def list_(
+    deleted: Annotated[bool, typer.Option("--deleted", help="Deleted recordings too.")] = False,
+    tag: Annotated[list[str] | None, typer.Option(metavar="TAG", help="Only with this tag.")] = None,
+    connect: Connect = DEFAULT_ROUTER,
+    as_json: Json = False,
+) -> None:
     """List the recordings of every site, newest first."""
     from services.command_line.recordings import listing
 
-    listing.list_all(connect, as_json)
+    listing.list_all(connect, deleted=deleted, tags=tag or (), as_json=as_json)
 
 
 @app.command()
@@ -31,6 +40,63 @@ def info(what: _Recording, connect: Connect = DEFAULT_ROUTER, as_json: Json = Fa
     from services.command_line.recordings import listing
 
     listing.info(what, connect, as_json)
+
+
+@app.command()
+def rename(
+    what: _Named,
+    new: Annotated[str, typer.Argument(metavar="NEW")],
+    connect: Connect = DEFAULT_ROUTER,
+    operator: _Operator = "",
+    as_json: Json = False,
+) -> None:
+    """Rename a recording; its file keeps its name and its bytes."""
+    from services.command_line.recordings import changing
+
+    changing.rename(what, new, connect, operator, as_json)
+
+
+@app.command()
+def note(
+    what: _Named,
+    text: Annotated[str, typer.Argument(metavar="TEXT", help='The note; "" removes it.')],
+    connect: Connect = DEFAULT_ROUTER,
+    operator: _Operator = "",
+    as_json: Json = False,
+) -> None:
+    """Write a note about a recording, in place of an earlier one."""
+    from services.command_line.recordings import changing
+
+    changing.note(what, text, connect, operator, as_json)
+
+
+@app.command()
+def tag(
+    what: _Named,
+    tags: Annotated[list[str], typer.Argument(metavar="TAG...")],
+    remove: Annotated[bool, typer.Option("--remove", help="Remove these tags.")] = False,
+    connect: Connect = DEFAULT_ROUTER,
+    operator: _Operator = "",
+    as_json: Json = False,
+) -> None:
+    """Add tags to a recording, or remove them."""
+    from services.command_line.recordings import changing
+
+    changing.tag(what, tags, connect, operator, remove=remove, as_json=as_json)
+
+
+@app.command()
+def delete(
+    what: _Named,
+    reason: Annotated[str, typer.Option(help="The reason, which every operator sees.")],
+    connect: Connect = DEFAULT_ROUTER,
+    operator: _Operator = "",
+    as_json: Json = False,
+) -> None:
+    """Delete a recording's file for good; who, when, why and its SHA-256 are kept."""
+    from services.command_line.recordings import changing
+
+    changing.delete(what, reason, connect, operator, as_json)
 
 
 @app.command()

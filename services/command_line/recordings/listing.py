@@ -1,12 +1,14 @@
 """`robomesh recordings list` and `info`: the recordings of all sites, and the content of one."""
 
+import json
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Collection
 from contextlib import asynccontextmanager
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from robomesh import reason_codes as codes
 from robomesh.client.recorder import RecorderFile
 from robomesh.client.recording_list import (
     RecordingInfo,
@@ -15,21 +17,26 @@ from robomesh.client.recording_list import (
     list_recordings,
 )
 from robomesh.errors import RobomeshError, SessionError
+from robomesh.messages import to_json
 from robomesh.recordings.errors import RecordingError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
+from robomesh.texts import for_terminal
 from services.command_line import discovery
 from services.command_line.recordings.errors import ExportError
 
+_Change = schema.RecordingChange
 
-def list_all(router: str, as_json: bool) -> None:
-    """Print every recording of every site."""
+
+def list_all(router: str, *, deleted: bool, tags: Collection[str], as_json: bool) -> None:
+    """Print every recording of every site that has all the tags."""
+    wanted = {each.casefold() for each in tags}
 
     async def main() -> list[RecordingInfo]:
         async with discovery.attached(router) as session:
-            return await list_recordings(session, on_silent=_report_silent)
+            return await list_recordings(session, deleted=deleted, on_silent=_report_silent)
 
-    recordings = discovery.run(main())
+    recordings = [each for each in discovery.run(main()) if wanted <= {tag.casefold() for tag in each.tags}]
     for each in recordings:
         each.message.site = each.site
         if as_json:
@@ -50,8 +57,8 @@ def _print_table(recordings: list[schema.Recording]) -> None:
                 f"{each.duration.ToNanoseconds() * 1e-9:.1f} s",
                 f"{each.bytes / 1e6:.1f} MB",
                 _robot(each),
-                (each.name or each.file) + (f" part {each.part}" if each.part else ""),
-                _state(each),
+                for_terminal(each.name or each.file) + (f" part {each.part}" if each.part else ""),
+                "; ".join(filter(None, (_state(each), for_terminal(", ".join(each.tags))))),
             )
         )
     whole, length, size, robot, name, _ = (max(map(len, column)) for column in zip(*rows, strict=True))
@@ -68,18 +75,22 @@ def _print_table(recordings: list[schema.Recording]) -> None:
     print("robomesh recordings info NAME shows the content of one")
 
 
-async def found(session: Session, what: str, *, closed: bool = False) -> RecordingInfo:
+async def found(session: Session, what: str, *, closed: bool = False, only: bool = False) -> RecordingInfo:
     """Return the newest recording that `[SITE/]NAME` or `[SITE/]FILE` names.
 
     Args:
         closed: Skip recordings that are still being written.
+        only: Refuse a name that several recordings have.
 
     Raises:
         ExportError: If no recording has the name.
+        RecordingError: If several have it, and `only`.
     """
     try:
-        return await find_recording(session, what, closed=closed, on_silent=_report_silent)
-    except RecordingError:
+        return await find_recording(session, what, closed=closed, only=only, on_silent=_report_silent)
+    except RecordingError as error:
+        if error.code == codes.RECORDING_AMBIGUOUS.name:
+            raise
         raise ExportError(
             f"no recording {what!r}, neither a file of this machine nor in robomesh recordings list"
         ) from None
@@ -125,11 +136,17 @@ def show(recording: schema.Recording, as_json: bool) -> None:
     state = _state(recording)
     part = f" part {recording.part}" if recording.part else ""
     print(
-        f"{recording.name or recording.file}{part}  {_robot(recording)}  "
+        for_terminal(f"{recording.name or recording.file}{part}  ") + f"{_robot(recording)}  "
         f"{_start(recording):%Y-%m-%d %H:%M:%S}, {values['duration_s']:.1f} s, {recording.bytes / 1e6:.2f} MB"
         + (f"  ({state})" if state else "")
     )
     print(f"    file: {recording.file}")
+    if recording.tags:
+        print(for_terminal(f"    tags: {', '.join(recording.tags)}"))
+    for line in recording.note.splitlines():
+        print(for_terminal(f"    note: {line}"))
+    for change in recording.history:
+        print(for_terminal(f"    {_change_line(change)}"))
     if recording.HasField("audit_head"):
         print(f"    audit log: entry {values['audit_head']['number']}, {values['audit_head']['hash']}")
     for each in recording.merged_from:
@@ -143,7 +160,24 @@ def show(recording: schema.Recording, as_json: bool) -> None:
         print(f"    {topic.topic}: {topic.messages}{_rate(topic, values['duration_s'])}{lost}")
 
 
+def _change_line(change: schema.RecordingChange) -> str:
+    at = datetime.fromtimestamp(change.timestamp.ToNanoseconds() * 1e-9).astimezone()
+    words = f"{at:%Y-%m-%d %H:%M:%S}  {change.author} "
+    match change.change:
+        case _Change.RENAMED:
+            return f"{words}renamed it to {change.name}"
+        case _Change.NOTED:
+            return f"{words}changed the note"
+        case _Change.TAGGED:
+            return f"{words}changed the tags: {', '.join(change.tags) or 'none'}"
+        case _:
+            return f"{words}deleted it: {change.reason} ({change.bytes} bytes, SHA-256 {change.sha256})"
+
+
 def _state(recording: schema.Recording) -> str:
+    if recording.deleted:
+        newest = recording.history[-1] if recording.history else schema.RecordingChange()
+        return for_terminal(f"deleted by {newest.author}: {newest.reason}")
     if recording.open:
         return "recording now"
     if recording.merged_from:
@@ -210,6 +244,12 @@ def _source_values(recording: schema.Recording) -> dict[str, Any]:
     }
 
 
+def _change_values(change: schema.RecordingChange) -> dict[str, Any]:
+    """Return a change as JSON values; its time is seconds since the Unix epoch."""
+    values: dict[str, Any] = json.loads(to_json(change))
+    return {**values, "timestamp": change.timestamp.ToNanoseconds() * 1e-9}
+
+
 def _values(recording: schema.Recording) -> dict[str, Any]:
     return {
         "name": recording.name,
@@ -223,6 +263,10 @@ def _values(recording: schema.Recording) -> dict[str, Any]:
         "problem": recording.problem,
         "cause": recording.cause,
         "part": recording.part,
+        "note": recording.note,
+        "tags": list(recording.tags),
+        "deleted": recording.deleted,
+        "changes": [_change_values(each) for each in recording.history],
         "recovered": recording.recovered,
         "merged_from": [_source_values(each) for each in recording.merged_from],
         "attachments": list(recording.attachments),

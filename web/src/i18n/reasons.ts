@@ -1321,6 +1321,10 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ["no recording '{name}' on the mesh: there are {recordings}", "网络上没有录制“{name}”：现有 {recordings}"],
   ],
   [
+    "recording.ambiguous",
+    ["several recordings have the name '{name}': name the file: {files}", "多个录制名为“{name}”：请指定文件：{files}"],
+  ],
+  [
     "recording.too_many_values",
     ["{count} values are too many: request at most {most}", "{count} 个数值过多：最多请求 {most} 个"],
   ],
@@ -1344,6 +1348,75 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   [
     "recording.too_many_downloads",
     ["{count} recordings are being sent already: try again soon", "已有 {count} 个录制正在发送：请稍后重试"],
+  ],
+  [
+    "recording.title",
+    [
+      "'{name}' is not a valid name of a recording: use 1 to {most} letters, digits, spaces and signs except / \\ : * ? \" < > |, without a full stop at the begin or end",
+      '“{name}”不是有效的录制名称：请使用 1 至 {most} 个字母、数字、空格或符号，不能含 / \\ : * ? " < > |，且首尾不能是句点',
+    ],
+  ],
+  ["recording.note", ["the note has {count} characters: use at most {most}", "备注有 {count} 个字符：最多 {most} 个"]],
+  [
+    "recording.tag",
+    [
+      "'{tag}' is not a valid tag: use 1 to {most} letters, digits and signs except commas",
+      "“{tag}”不是有效的标签：请使用 1 至 {most} 个字母、数字或符号，不能含逗号",
+    ],
+  ],
+  ["recording.tags", ["{count} tags are too many: use at most {most}", "{count} 个标签过多：最多 {most} 个"]],
+  ["recording.reason", ["a recording is deleted only with a reason: write why", "删除录制必须说明原因：请填写"]],
+  [
+    "recording.conflict",
+    [
+      "{author} has changed '{name}' meanwhile: look at its name, note and tags, then try again",
+      "{author} 在此期间更改了“{name}”：请查看其名称、备注和标签后再试",
+    ],
+  ],
+  [
+    "recording.changes",
+    ["'{name}' was already changed {most} times, the most possible", "“{name}”已更改 {most} 次，达到上限"],
+  ],
+  [
+    "recording.labels_damaged",
+    [
+      "name, note and tags of a recording cannot be read ({detail}): restore the file from a backup",
+      "无法读取某个录制的名称、备注和标签（{detail}）：请从备份恢复该文件",
+    ],
+  ],
+  [
+    "recording.disk",
+    [
+      "the recorder cannot write to its disk, so nothing has changed: {detail}",
+      "录制服务无法写入磁盘，因此未作任何更改：{detail}",
+    ],
+  ],
+  ["recording.written", ["'{name}' is still being recorded: stop it first", "“{name}”仍在录制：请先停止"]],
+  ["recording.indexed", ["'{name}' is being indexed: try again soon", "“{name}”正在建立索引：请稍后再试"]],
+  [
+    "recording.played",
+    [
+      "'{name}' is being played, or another program reads its file: close it there first",
+      "“{name}”正在播放，或有其他程序正在读取其文件：请先在那里关闭",
+    ],
+  ],
+  [
+    "recording.fetched",
+    [
+      "{who} is downloading '{name}': wait for the end, or try again in {seconds} s",
+      "{who} 正在下载“{name}”：请等待完成，或 {seconds} 秒后再试",
+    ],
+  ],
+  ["recording.renamed", ["{author} renamed recording '{old}' to '{name}'", "{author} 将录制“{old}”重命名为“{name}”"]],
+  ["recording.noted", ["{author} changed the note of recording '{name}'", "{author} 更改了录制“{name}”的备注"]],
+  ["recording.tagged", ["{author} tagged recording '{name}': {tags}", "{author} 为录制“{name}”设置标签：{tags}"]],
+  ["recording.untagged", ["{author} removed all tags of recording '{name}'", "{author} 删除了录制“{name}”的所有标签"]],
+  [
+    "recording.deleted",
+    [
+      "{author} deleted recording '{name}' ({reason}): {file}, {bytes} bytes, SHA-256 {sha256}",
+      "{author} 删除了录制“{name}”（{reason}）：{file}，{bytes} 字节，SHA-256 {sha256}",
+    ],
   ],
   [
     "recorder.busy",
