@@ -815,6 +815,12 @@ RECORDING_CHANGED = Code("recording.changed", "{file} changed during the fetch",
 RECORDING_NOT_FOUND = Code(
     "recording.not_found", "no recording '{name}' on the mesh", "there are {recordings}"
 )
+RECORDING_SPAN = Code(
+    "recording.span",
+    "the part of {file} is not within its {seconds:.3f} s",
+    "choose a begin and an end, in seconds since its start",
+)
+RECORDING_ZIP = Code("recording.zip", "{count} recordings for one ZIP", "name 1 to {most}")
 RECORDING_AMBIGUOUS = Code(
     "recording.ambiguous", "several recordings have the name '{name}'", "name the file: {files}"
 )

@@ -4,8 +4,11 @@ import asyncio
 import csv
 import io
 import os
+import shutil
 import signal
+import subprocess
 import time
+import zipfile
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -19,7 +22,9 @@ from robomesh import reason_codes as codes
 from robomesh.errors import BrokenAnswerError, BusyError, QuotaError, RefusedError
 from robomesh.keys import WHOLE_SITE
 from robomesh.quotas import DEFAULT_QUOTAS, Quotas
+from robomesh.recordings.changes import write_changes
 from robomesh.recordings.errors import RecordingError
+from robomesh.recordings.files import describe_file
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
 from services.console.http.recordings import Recordings
@@ -244,6 +249,58 @@ def test_a_file_can_be_fetched_whole_in_ranges_and_resumed(http, folder):
     assert (beyond.status_code, beyond.headers["content-range"]) == (416, f"bytes */{len(whole)}")
     reason = read_refusal(beyond.headers, beyond.content)
     assert (reason.code, reason.values["bytes"]) == ("recording.range", str(len(whole)))
+
+
+def test_several_recordings_are_one_zip_that_other_programs_read(http, folder, tmp_path):
+    paths = [folder / "arm" / "trial.mcap", write_recording(folder / "arm" / "other.mcap")]
+    change = schema.RecordingChange(number=1, change=1, name="renamed", author="li")
+    write_changes(paths[1], [change])
+    answer = http.get("/recordings.zip?" + "&".join(f"recording=site/{path.name}" for path in paths))
+    assert answer.status_code == 200
+    saved = tmp_path / "saved.zip"
+    saved.write_bytes(answer.content)
+    with zipfile.ZipFile(saved) as archive:
+        assert archive.testzip() is None
+        assert archive.namelist() == ["trial.mcap", "other.mcap", "other.changes.json"]
+        for path in paths:
+            assert archive.read(path.name) == path.read_bytes()
+            assert archive.getinfo(path.name).compress_type == zipfile.ZIP_STORED
+        archive.extractall(tmp_path / "out")
+    assert describe_file(tmp_path / "out" / "other.mcap").name == "renamed"
+    if unzip := shutil.which("unzip"):
+        subprocess.run([unzip, "-tq", str(saved)], check=True)
+
+
+@pytest.mark.parametrize(
+    ("query", "status", "code"),
+    [
+        ("", 400, "recording.zip"),
+        ("&".join(f"recording=site/{each}.mcap" for each in range(101)), 400, "recording.zip"),
+        ("recording=site/trial.mcap&recording=site/gone.mcap", 404, "recording.unknown"),
+        ("recording=**/trial.mcap", 400, None),
+        ("recording=trial.mcap", 400, None),
+    ],
+)
+def test_a_zip_of_no_recordings_is_refused(query, status, code, http):
+    answer = http.get(f"/recordings.zip?{query}")
+    assert answer.status_code == status
+    assert code in (None, read_refusal(answer.headers, answer.content).code)
+
+
+def test_a_part_of_the_table_is_the_rows_of_that_time(http, folder):
+    url = "/recordings/site/trial.mcap/values.csv"
+    rows = list(csv.reader(io.StringIO(http.get(url).text)))
+    times = [float(row[3]) for row in rows[1:]]
+    # The range counts receive times, a little after the published ones.
+    begin, end = times[len(times) // 4] - 2e-4, times[len(times) // 2] + 2e-4
+    answer = http.get(f"{url}?from={begin}&to={end}")
+    assert answer.status_code == 200
+    part = list(csv.reader(io.StringIO(answer.text)))
+    assert part == [rows[0], *(row for row in rows[1:] if begin <= float(row[3]) <= end)]
+    for invalid in ("from=x", "from=-1", "from=2&to=1", "from=1e9", "from=nan", "to=-1"):
+        refused_part = http.get(f"{url}?{invalid}")
+        assert refused_part.status_code == 400
+        assert read_refusal(refused_part.headers, refused_part.content).code == "recording.span"
 
 
 def test_values_of_several_robots_are_not_one_table(http, folder):

@@ -2,7 +2,8 @@
 
     /recordings/<site>/<file>                  the file; Range, If-Range and HEAD are supported
     /recordings/<site>/<file>/thumbnail.jpg
-    /recordings/<site>/<file>/values.csv       joints and tool, one row for each state
+    /recordings/<site>/<file>/values.csv       joints and tool, one row for each state; ?from=S&to=S: a part
+    /recordings.zip?recording=<site>/<file>    a ZIP of all the files that are named so
 
 Only one piece is in memory at a time, however large the file.
 """
@@ -10,9 +11,10 @@ Only one piece is in memory at a time, however large the file.
 import csv
 import io
 import logging
+import math
 import re
-from collections.abc import AsyncIterator, Callable
-from typing import TypeVar
+from collections.abc import AsyncIterator, Callable, Mapping
+from typing import NamedTuple, TypeVar
 from urllib.parse import quote
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
@@ -25,7 +27,7 @@ from starlette.types import Scope
 from robomesh import reason_codes as codes
 from robomesh.client.recorder import RangeMessage, RecorderFile
 from robomesh.errors import RobomeshError
-from robomesh.recordings.channel_names import robot_channels
+from robomesh.recordings.channel_names import SUFFIX, robot_channels
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.table import Table, is_due, table_of
 from robomesh.schemas import robomesh_pb2 as schema
@@ -37,6 +39,7 @@ from services.console.http.error_responses import (
     refused_on_the_mesh,
     with_error_responses,
 )
+from services.console.http.recordings_zip import ZipEntry, zip_of
 from services.console.http.streaming import Streamed
 
 log = logging.getLogger(__name__)
@@ -44,9 +47,42 @@ log = logging.getLogger(__name__)
 AnyMessage = TypeVar("AnyMessage", bound=Message)
 
 _MOST_DOWNLOADS = 8
+_MOST_IN_ZIP = 100
 _READS_WITHIN_S = 60.0
 _SENT_BYTES = 1 << 17
 _RANGE = re.compile(r"bytes=(\d{0,19})-(\d{0,19})")
+
+
+class Span(NamedTuple):
+    """A part of a recording, by receive times [ns since the Unix epoch], both included; None: its ends.
+
+    `suffix` belongs to the name of an exported file.
+    """
+
+    start_ns: int | None = None
+    end_ns: int | None = None
+    suffix: str = ""
+
+
+def span_of(info: schema.Recording, values: Mapping[str, str]) -> Span:
+    """Return the part between `from` and `to`, seconds since the recording's start.
+
+    Raises:
+        RefusedRequest: If they are no times of the recording.
+    """
+    if not values.get("from") and not values.get("to"):
+        return Span()
+    first, last_s = info.start.ToNanoseconds(), info.duration.ToNanoseconds() * 1e-9
+    try:
+        begin_s, end_s = float(values.get("from") or 0.0), float(values.get("to") or last_s)
+    except ValueError:
+        begin_s = end_s = math.nan
+    # A little after the end: callers round.
+    if not 0.0 <= begin_s <= end_s or begin_s > last_s:
+        raise RefusedRequest(400, codes.RECORDING_SPAN(file=info.file, seconds=last_s))
+    end_s = min(end_s, last_s)
+    end_ns = first + round(end_s * 1e9) if end_s < last_s else first + info.duration.ToNanoseconds()
+    return Span(first + round(begin_s * 1e9), end_ns, f"_{begin_s:g}-{end_s:g}s")
 
 
 class Recordings:
@@ -63,6 +99,7 @@ class Recordings:
     def routes(self) -> list[Route]:
         """Return the routes of files, thumbnails and values."""
         return [
+            Route("/recordings.zip", _answered(self.zip), methods=["GET"]),
             Route("/recordings/{site}/{file}", _answered(self.file), methods=["GET"]),
             Route("/recordings/{site}/{file}/thumbnail.jpg", _answered(self.thumbnail), methods=["GET"]),
             Route("/recordings/{site}/{file}/values.csv", _answered(self.values), methods=["GET"]),
@@ -102,6 +139,27 @@ class Recordings:
         # If the file changes, breaking off is the only way to report it: the status has been sent already.
         return self._streamed(file.pieces(begin, end, version=first.version), headers, status)
 
+    async def zip(self, request: Request) -> Response:
+        """Send several files as one ZIP, uncompressed, with their changes beside them."""
+        names = list(dict.fromkeys(request.query_params.getlist("recording")))
+        if not 0 < len(names) <= _MOST_IN_ZIP:
+            raise RefusedRequest(400, codes.RECORDING_ZIP(count=len(names), most=_MOST_IN_ZIP))
+        asker, entries = self._asker(request.scope), []
+        for each in names:
+            site, _, name = each.partition("/")
+            file = RecorderFile(self._session, site, name, asker=asker)
+            info = await file.describe()
+            if info.open:
+                raise RefusedRequest(409, codes.RECORDING_WRITTEN(name=info.name))
+            entries.append(ZipEntry(site, file, info, await file.piece()))
+        headers = {
+            "Cache-Control": "no-store",
+            # Not application/zip, which would be compressed again.
+            "Content-Type": "application/octet-stream",
+            "Content-Disposition": 'attachment; filename="recordings.zip"',
+        }
+        return self._streamed(zip_of(entries), headers, 200)
+
     async def thumbnail(self, request: Request) -> Response:
         """Send a picture from the recording."""
         piece = await self._file(request).piece(attachment="thumbnail.jpg", length=4 << 20)
@@ -112,9 +170,10 @@ class Recordings:
         return Response(piece.data, media_type="image/jpeg", headers=headers)
 
     async def values(self, request: Request) -> Response:
-        """Send joints and tool as CSV, one row for each state."""
+        """Send joints and tool as CSV, one row for each state; `from` and `to` limit the time."""
         file = self._file(request)
         info = await file.describe()
+        span = span_of(info, request.query_params)
         messages = {each.topic: each.messages for each in info.topics if each.messages}
         try:
             topics = robot_channels(messages, file.name)
@@ -122,13 +181,13 @@ class Recordings:
             raise RefusedRequest(409, error.reason) from None
         if "joints" not in topics:
             raise RefusedRequest(404, codes.RECORDING_NO_JOINTS(file=file.name))
-        saved = quote(file.name.removesuffix(".mcap") + ".csv")
+        saved = quote(file.name.removesuffix(SUFFIX) + span.suffix + ".csv")
         headers = {
             "Cache-Control": "no-cache",
             "Content-Type": "text/csv; charset=utf-8",
             "Content-Disposition": f"attachment; filename*=UTF-8''{saved}",
         }
-        return self._streamed(_lines(file, topics, info.start.ToNanoseconds()), headers, 200)
+        return self._streamed(_lines(file, topics, info.start.ToNanoseconds(), span), headers, 200)
 
     def _streamed(self, content: AsyncIterator[bytes], headers: dict[str, str], status: int) -> Response:
         if self._downloads >= _MOST_DOWNLOADS:
@@ -145,17 +204,19 @@ class Recordings:
         return RecorderFile(self._session, site, name, asker=self._asker(request.scope))
 
 
-async def _lines(file: RecorderFile, topics: dict[str, str], start_ns: int) -> AsyncIterator[bytes]:
+async def _lines(
+    file: RecorderFile, topics: dict[str, str], start_ns: int, span: Span
+) -> AsyncIterator[bytes]:
     description: schema.Description | None = None
     if "description" in topics:
-        async for message in _messages(file, topics["description"]):
+        async for message in _messages(file, topics["description"], Span()):
             description = _decoded(schema.Description, message.data) or description
-    tools = _messages(file, topics["kinematics"]) if "kinematics" in topics else None
+    tools = _messages(file, topics["kinematics"], span) if "kinematics" in topics else None
     tool = None if tools is None else await anext(tools, None)
     table: Table | None = None
     text = io.StringIO()
     writer = csv.writer(text)
-    async for message in _messages(file, topics["joints"]):
+    async for message in _messages(file, topics["joints"], span):
         state = _decoded(JointStates, message.data)
         if state is None:
             continue
@@ -174,8 +235,8 @@ async def _lines(file: RecorderFile, topics: dict[str, str], start_ns: int) -> A
     yield text.getvalue().encode()
 
 
-async def _messages(file: RecorderFile, topic: str) -> AsyncIterator[RangeMessage]:
-    async for page in file.pages(topic):
+async def _messages(file: RecorderFile, topic: str, span: Span) -> AsyncIterator[RangeMessage]:
+    async for page in file.pages(topic, start_ns=span.start_ns, end_ns=span.end_ns):
         for message in page.messages:
             yield message
 

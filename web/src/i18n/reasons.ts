@@ -1321,6 +1321,17 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ["no recording '{name}' on the mesh: there are {recordings}", "网络上没有录制“{name}”：现有 {recordings}"],
   ],
   [
+    "recording.span",
+    [
+      "the part of {file} is not within its {seconds} s: choose a begin and an end, in seconds since its start",
+      "{file} 的所选部分不在其 {seconds} 秒之内：请选择自起点起的开始与结束秒数",
+    ],
+  ],
+  [
+    "recording.zip",
+    ["{count} recordings for one ZIP: name 1 to {most}", "一个 ZIP 有 {count} 个录制：应为 1 至 {most} 个"],
+  ],
+  [
     "recording.ambiguous",
     ["several recordings have the name '{name}': name the file: {files}", "多个录制名为“{name}”：请指定文件：{files}"],
   ],

@@ -19,16 +19,26 @@ import {
   startMs,
 } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
+import { reasonOf } from "../../mesh/control";
+import { Action, askRecorder } from "../../mesh/recorder";
+import { NoticeLine } from "../../ui/notice-line";
 import type { RecordingName } from "../../ui/route";
 import { recordingsLink } from "../../ui/route";
 import { Silhouette } from "../../ui/silhouette";
+import { rowKey } from "./bulk-download";
+import { mayChange } from "./recording-changes";
+import { RecordingEditor } from "./recording-editor";
 import type { Row } from "./recordings-of-sites";
+import { refreshSite } from "./recordings-of-sites";
 
 export function RecordingCard(props: {
   row: Row;
   sited: boolean;
   first: Signal<(RecordingName & { name: string }) | null>;
+  /** Keys of the rows that are chosen for a download. */
+  chosen: Signal<ReadonlySet<string>>;
 }) {
+  const [editing, setEditing] = useState(false);
   const { recording, site } = props.row;
   const { file, open } = recording;
   const name = recording.name || file;
@@ -44,6 +54,7 @@ export function RecordingCard(props: {
       <Thumbnail site={site} recording={recording} />
       <div class="recording-body">
         <div class="recording-title">
+          {!open && <Choose row={props.row} name={name} chosen={props.chosen} />}
           <strong title={file}>{name}</strong>
           {open && (
             <span class="tag recording-now">
@@ -67,6 +78,16 @@ export function RecordingCard(props: {
           <span class="figure">{r("messages", { count: count(messagesOf(recording)) })}</span>
           <span>{startedText(recording)}</span>
         </p>
+        {recording.tags.length > 0 && (
+          <p class="recording-tags">
+            {recording.tags.map((each) => (
+              <span key={each} class="tag">
+                {each}
+              </span>
+            ))}
+          </p>
+        )}
+        {recording.note && <p class="recording-note">{recording.note}</p>}
         {recording.cause && <p class="recording-words">{r("cause", { text: recording.cause })}</p>}
         {(lost || recording.problem || empty) && (
           <p class="recording-words state warning">
@@ -78,6 +99,7 @@ export function RecordingCard(props: {
         )}
       </div>
       <div class="recording-does">
+        {open && mayChange.value && !isOfFlight(recording) && <Stop row={props.row} name={name} />}
         {!empty && (
           <>
             <a
@@ -100,8 +122,60 @@ export function RecordingCard(props: {
         )}
         <Download {...mine} name={name} kind="MCAP" hint={r("download_mcap_hint")} />
         {!empty && <Download {...mine} name={name} kind="CSV" hint={r("download_csv_hint")} rest="/values.csv" />}
+        {mayChange.value && !(open && isOfFlight(recording)) && (
+          <button
+            class="action"
+            aria-expanded={editing}
+            aria-label={r("edit_of", { name })}
+            onClick={() => setEditing(!editing)}
+          >
+            {r("edit")}
+          </button>
+        )}
       </div>
+      {editing && <RecordingEditor row={props.row} close={() => setEditing(false)} />}
     </li>
+  );
+}
+
+const isOfFlight = (recording: Recording): boolean => recording.startedBy === "flight";
+
+function Choose({ row, name, chosen }: { row: Row; name: string; chosen: Signal<ReadonlySet<string>> }) {
+  const key = rowKey(row);
+  const toggle = () => {
+    const next = new Set(chosen.value);
+    if (!next.delete(key)) next.add(key);
+    chosen.value = next;
+  };
+  return (
+    <label class="recording-choose" title={r("choose_hint")}>
+      <input type="checkbox" checked={chosen.value.has(key)} aria-label={r("choose_of", { name })} onChange={toggle} />
+    </label>
+  );
+}
+
+/** Stops the recording, as the button of its robot does. */
+function Stop({ row, name }: { row: Row; name: string }) {
+  const [busy, setBusy] = useState(false);
+  const [problem, setProblem] = useState("");
+  const stop = async () => {
+    setBusy(true);
+    setProblem("");
+    try {
+      await askRecorder(`robomesh/${row.site}/${row.recording.robot}`, Action.TRACE_OFF);
+      refreshSite(row.site);
+    } catch (error) {
+      setProblem(r("record_refused", { text: reasonOf(error) }));
+    }
+    setBusy(false);
+  };
+  return (
+    <>
+      <button class="action" disabled={busy} aria-label={r("stop_of", { name })} onClick={() => void stop()}>
+        {r("stop_recording")}
+      </button>
+      {problem && <NoticeLine notice={{ kind: "refused", text: problem }} />}
+    </>
   );
 }
 

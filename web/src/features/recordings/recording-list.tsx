@@ -10,6 +10,7 @@ import { fleetRobots } from "../../mesh/known-robots";
 import { Action, askRecorder } from "../../mesh/recorder";
 import { NoticeLine } from "../../ui/notice-line";
 import type { RecordingName } from "../../ui/route";
+import { BulkDownload, rowKey } from "./bulk-download";
 import { RecordingCard } from "./recording-card";
 import type { Row, SiteAnswer } from "./recordings-of-sites";
 import { useRecordings } from "./recordings-of-sites";
@@ -23,6 +24,8 @@ const FULL_BYTES = 2_000_000; // with less space nothing can be written
 const EVERY = "";
 
 const search = signal("");
+const tag = signal(EVERY);
+const chosen = signal<ReadonlySet<string>>(new Set());
 const robot = signal(EVERY);
 const span = signal<Span>("any_time");
 /** The first of two to compare; null: none is chosen. */
@@ -31,6 +34,7 @@ const first = signal<(RecordingName & { name: string }) | null>(null);
 export function RecordingList() {
   const { rows, sites, waiting } = useRecordings();
   const robots = [...new Set(rows.flatMap(({ recording }) => robotsOf(recording)))].sort();
+  const tags = [...new Set(rows.flatMap(({ recording }) => recording.tags))].sort();
   const shown = rows.filter(isWanted);
   useEffect(() => () => void (first.value = null), []);
   return (
@@ -56,6 +60,18 @@ export function RecordingList() {
               <option key={name}>{name}</option>
             ))}
           </select>
+          {(tags.length > 0 || tag.value !== EVERY) && (
+            <select
+              aria-label={r("tag")}
+              value={tag.value}
+              onChange={(event) => (tag.value = event.currentTarget.value)}
+            >
+              <option value={EVERY}>{r("every_tag")}</option>
+              {[...new Set([...tags, tag.value])].filter(Boolean).map((name) => (
+                <option key={name}>{name}</option>
+              ))}
+            </select>
+          )}
           <select
             aria-label={r("time")}
             value={span.value}
@@ -80,12 +96,13 @@ export function RecordingList() {
           </button>
         </p>
       )}
+      <BulkDownload rows={rows} shown={shown} chosen={chosen} />
       {waiting && rows.length === 0 ? (
         <Skeleton />
       ) : (
         <ol class="recording-list" aria-label={r("recordings")}>
           {shown.map((row) => (
-            <RecordingCard key={`${row.site}/${row.recording.file}`} row={row} sited={sites.size > 1} first={first} />
+            <RecordingCard key={rowKey(row)} row={row} sited={sites.size > 1} first={first} chosen={chosen} />
           ))}
         </ol>
       )}
@@ -96,8 +113,18 @@ export function RecordingList() {
 
 function isWanted({ recording }: Row): boolean {
   const searchText = search.value.trim().toLowerCase();
-  const words = [...robotsOf(recording), recording.name, recording.file, recording.cause].join(" ").toLowerCase();
+  const words = [
+    ...robotsOf(recording),
+    recording.name,
+    recording.file,
+    recording.cause,
+    recording.note,
+    ...recording.tags,
+  ]
+    .join(" ")
+    .toLowerCase();
   return (
+    (tag.value === EVERY || recording.tags.includes(tag.value)) &&
     (robot.value === EVERY || robotsOf(recording).includes(robot.value)) &&
     Date.now() - startMs(recording) <= SPANS[span.value] &&
     words.includes(searchText)

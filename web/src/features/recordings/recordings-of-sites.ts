@@ -45,6 +45,11 @@ async function requestList(site: string): Promise<void> {
   answers.value = new Map(answers.value).set(site, now);
 }
 
+/** Request a site's list again, after a change of its recordings. */
+export function refreshSite(site: string): void {
+  void requestList(site);
+}
+
 /** A recording in the list with its site: file names are unique only within a site. */
 export interface Row {
   site: string;
@@ -80,6 +85,9 @@ export function useRecordings(): RecordingsOfSites {
   }
   for (const latest of live.values()) {
     const [, site = ""] = latest.key.split("/");
+    // A name that was just changed is in the list before the next heartbeat.
+    const listed = rows.get(`${site}/${latest.message.file}`)?.recording;
+    if (listed && listed.changes > latest.message.changes && listed.open) continue;
     if (latest.message.open && !isStale("recording", ageOf(latest))) {
       rows.set(`${site}/${latest.message.file}`, { site, recording: latest.message });
     }

@@ -1,0 +1,102 @@
+// A form for a recording's name, note and tags, and for its deletion.
+
+import { useState } from "preact/hooks";
+import { r } from "../../i18n/recordings";
+import { reasonOf } from "../../mesh/control";
+import { NoticeLine } from "../../ui/notice-line";
+import { ReasonForm } from "../../ui/reason-form";
+import { deleteRecording, saveLabels } from "./recording-changes";
+import type { Row } from "./recordings-of-sites";
+
+const LONGEST_NAME = 60;
+const LONGEST_NOTE = 2000;
+
+export function RecordingEditor({ row, close }: { row: Row; close: () => void }) {
+  // The form changes what its author saw, also if a colleague is faster: the recorder refuses that.
+  const [seen] = useState(row);
+  const [name, setName] = useState(seen.recording.name);
+  const [note, setNote] = useState(seen.recording.note);
+  const [tags, setTags] = useState(seen.recording.tags.join(", "));
+  const [busy, setBusy] = useState(false);
+  const [problem, setProblem] = useState("");
+  const [deleting, setDeleting] = useState(false);
+  const title = seen.recording.name || seen.recording.file;
+  const attempt = async (work: Promise<void>) => {
+    setBusy(true);
+    setProblem("");
+    try {
+      await work;
+      close();
+    } catch (error) {
+      setProblem(r("not_changed", { text: reasonOf(error) }));
+    }
+    setBusy(false);
+  };
+  const save = () => {
+    const list = tags
+      .split(/[,，]/)
+      .map((each) => each.trim())
+      .filter(Boolean);
+    void attempt(saveLabels(seen, { name: name.trim(), note: note.trim(), tags: list }));
+  };
+  return (
+    <div class="recording-editor">
+      <form
+        aria-label={r("edit_of", { name: title })}
+        onKeyDown={(event) => event.key === "Escape" && close()}
+        onSubmit={(event) => {
+          event.preventDefault();
+          save();
+        }}
+      >
+        <label>
+          <span class="dim small">{r("name")}</span>
+          <input
+            type="text"
+            value={name}
+            maxLength={LONGEST_NAME}
+            autocomplete="off"
+            onInput={(event) => setName(event.currentTarget.value)}
+          />
+        </label>
+        <label>
+          <span class="dim small">{r("tags_hint")}</span>
+          <input type="text" value={tags} autocomplete="off" onInput={(event) => setTags(event.currentTarget.value)} />
+        </label>
+        <label class="editor-note">
+          <span class="dim small">{r("note")}</span>
+          <textarea
+            rows={3}
+            value={note}
+            maxLength={LONGEST_NOTE}
+            onInput={(event) => setNote(event.currentTarget.value)}
+          />
+        </label>
+        <div class="editor-row">
+          <button type="submit" class="action primary" disabled={busy || !name.trim()}>
+            {r("save")}
+          </button>
+          <button type="button" class="action" disabled={busy} onClick={close}>
+            {r("cancel")}
+          </button>
+          {!seen.recording.open && (
+            <button type="button" class="action editor-delete" disabled={busy} onClick={() => setDeleting(true)}>
+              {r("delete")}
+            </button>
+          )}
+        </div>
+      </form>
+      {deleting && (
+        <ReasonForm
+          title={r("delete_of", { name: title })}
+          text={r("delete_words", { name: title })}
+          does={r("delete_now")}
+          required
+          close={() => setDeleting(false)}
+          done={(reason) => void attempt(deleteRecording(seen, reason))}
+        />
+      )}
+      {problem && <NoticeLine notice={{ kind: "refused", text: problem }} />}
+    </div>
+  );
+}
