@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from robomesh.client.commands import CommandResult, StopResult
     from robomesh.client.control import AsyncArm
     from robomesh.client.mesh import AsyncMesh, RobotNotFoundError, Service
+    from robomesh.client.notes import Note
     from robomesh.client.recorded_values import RecordedJoints, RecordedValues
     from robomesh.client.recording import AsyncRecording, RecordedSample
     from robomesh.client.recording_list import RecordedTopic, RecordingInfo
@@ -44,6 +45,7 @@ _MODULES = {
     "client.commands": ("CommandResult", "StopResult"),
     "client.control": ("AsyncArm",),
     "client.mesh": ("AsyncMesh", "RobotNotFoundError", "Service"),
+    "client.notes": ("Note",),
     "client.recorded_values": ("RecordedJoints", "RecordedValues"),
     "client.recording": ("AsyncRecording", "RecordedSample"),
     "client.recording_list": ("RecordedTopic", "RecordingInfo"),
@@ -87,6 +89,7 @@ __all__ = [
     "MessageError",
     "MotionError",
     "NoAnswerError",
+    "Note",
     "QuotaError",
     "RecordedJoints",
     "RecordedSample",

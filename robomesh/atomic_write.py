@@ -40,10 +40,11 @@ def open_atomically(path: Path, *, mode: int = 0o600, fsync: bool = True) -> Ite
         temporary.unlink(missing_ok=True)
         raise
     if fsync:
-        _fsync_folder(path.parent)
+        fsync_folder(path.parent)
 
 
-def _fsync_folder(folder: Path) -> None:
+def fsync_folder(folder: Path) -> None:
+    """Block until the disk has the names in a folder."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
     try:
         os.fsync(descriptor)

@@ -33,6 +33,7 @@ class Quotas:
         checks_a_minute: Program checks at one kinematics service.
         recordings_mib_a_minute: Answers from one recorder [MiB]: files, messages, values.
         program_saves_a_minute: Changes of stored programs.
+        notes_a_minute: Notes that are written or withdrawn.
     """
 
     views: int = 16
@@ -41,6 +42,7 @@ class Quotas:
     checks_a_minute: float = 120.0
     recordings_mib_a_minute: float = 4096.0
     program_saves_a_minute: float = 120.0
+    notes_a_minute: float = 60.0
 
 
 DEFAULT_QUOTAS = Quotas()

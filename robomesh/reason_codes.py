@@ -117,6 +117,10 @@ PAGE_TOO_MANY = Code(
 )
 CONSOLE_NO_RIGHT = Code("page.console_no_right", "the console may not send {request}")
 NEEDS_OPERATOR = Code("page.needs_operator", "{account} is a {role}: {what} needs an operator")
+NEEDS_ADMINISTRATOR = Code(
+    "page.needs_administrator",
+    "only the account of an administrator may do this, and this console has no accounts",
+)
 PASSWORD_AGAIN = Code(
     "page.password_again",
     "commands are locked because this page was not used for a while",
@@ -557,6 +561,31 @@ PROGRAMS_DAMAGED = Code(
 )
 PROGRAMS_RUN_LOST = Code(
     "programs.run_lost", "the text of program '{name}', which ran, is not kept: {detail}"
+)
+NOTE_WRITTEN = Code("note.written", "{author} noted: {text}")
+NOTE_WITHDRAWN = Code("note.withdrawn", "{by} withdrew the note of {author}: {text}")
+NOTES_TEXT = Code("notes.text", "a note has 1 to {most} characters", "this one has {count}")
+NOTES_ID = Code("notes.id", "'{id}' cannot be the id of a note", "use 8 to 64 letters, digits and '-'")
+NOTES_ID_TAKEN = Code("notes.id_taken", "{robot} already has another note {id}", "choose another id")
+NOTES_RANGE = Code("notes.range", "the note ends {seconds:.1f} s before it begins", "swap its times")
+NOTES_FUTURE = Code(
+    "notes.future",
+    "the note is on a time {seconds:.0f} s in the future",
+    "choose a past time, or check the clocks of both machines",
+)
+NOTES_UNKNOWN = Code("notes.unknown", "{robot} has no note {id}", "list its notes")
+NOTES_AUTHOR = Code(
+    "notes.author", "{author} wrote this note, so only {author} or an administrator may withdraw it"
+)
+NOTES_FULL = Code(
+    "notes.full",
+    "the site's notes already take {most_mib:g} MiB, all that [programs] notes_mib allows",
+    "raise it in the site file",
+)
+NOTES_DAMAGED = Code(
+    "notes.damaged",
+    "{count} lines of {file} cannot be read as notes",
+    "they stay in the file; restore it from a backup and restart the store",
 )
 PROGRAM_MOVED = Code("program.moved", "the robot has moved since its program was checked")
 PROGRAM_HOLD = Code("program.hold", "HOLD arrived during its check: not started")

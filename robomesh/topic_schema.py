@@ -89,6 +89,7 @@ class Request:
         both_links: Sent over both links of a session in parallel, in case one loses or delays it. The owner
             handles it once.
         in_name: The last chunk is the caller's name; the router checks it against the certificate.
+        administrators: A console sends it only for an administrator's account.
     """
 
     name: str
@@ -102,3 +103,4 @@ class Request:
     own_link: str = ""
     both_links: bool = False
     in_name: bool = False
+    administrators: bool = False

@@ -426,6 +426,36 @@ _REQUESTS = (
         owners=_STORE,
         askers=EVERYONE,
     ),
+    # Below a site's `-`, with the author's name.
+    Request(
+        name="notes/request/*",
+        request=schema.NoteRequest,
+        answer=schema.Event,
+        priority=Priority.INTERACTIVE_LOW,
+        owners=_STORE,
+        askers=_COMMANDERS,
+        in_name=True,
+    ),
+    # Below a site's `-`, with an administrator's name: withdraws the note of another author.
+    Request(
+        name="notes/withdraw/*",
+        request=schema.NoteRequest,
+        answer=schema.Event,
+        priority=Priority.INTERACTIVE_LOW,
+        owners=_STORE,
+        askers=frozenset({Role.CONSOLE}),
+        in_name=True,
+        administrators=True,
+    ),
+    # Below a site's `-`.
+    Request(
+        name="notes/read",
+        request=schema.NoteQuery,
+        answer=schema.EventList,
+        priority=Priority.DATA,
+        owners=_STORE,
+        askers=EVERYONE,
+    ),
     # Below replay-<id>.
     Request(
         name="replay/request",

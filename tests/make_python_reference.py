@@ -27,7 +27,7 @@ _SECTIONS = {
     "Connections": ("connect", "connect_async", "Service"),
     "Robots and control": ("Robot", "Arm", "CommandResult", "StopResult"),
     "Kinematics": ("CheckResult", "Violation", "InverseResult"),
-    "Streams": ("Stream", "JointState", "Sample", "Event", "Alarm"),
+    "Streams": ("Stream", "JointState", "Sample", "Event", "Alarm", "Note"),
     "Recordings": (
         "open_recording",
         "Recording",

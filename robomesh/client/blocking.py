@@ -6,6 +6,7 @@ All calls may be used from several threads; each stream and each arm from one th
 import contextlib
 import time
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterable, Iterator, Mapping, Sequence
+from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal, Self, TypeVar
 
@@ -13,6 +14,7 @@ from robomesh.client.commands import CommandResult, Progress, StopResult
 from robomesh.client.control import AsyncArm
 from robomesh.client.event_loop import EventLoopThread
 from robomesh.client.mesh import AsyncMesh, Service
+from robomesh.client.notes import Note
 from robomesh.client.recorded_values import RecordedJoints, RecordedValues
 from robomesh.client.recording import AsyncRecording, RecordedSample
 from robomesh.client.recording_list import RecordingInfo
@@ -195,6 +197,31 @@ class Robot:
             NoAnswerError: If no gateway answered: the robot may still move.
         """
         return self._loop.run(self._robot.stop(reason))
+
+    def note(
+        self, text: str, begin: datetime | None = None, end: datetime | None = None, *, author: str = ""
+    ) -> Note:
+        """Write a note on a time of this robot; every page shows it, and running recordings contain it.
+
+        Args:
+            text: 1 to 500 characters.
+            begin: The moment, or the range's begin; by default now. Without a zone: local time.
+            end: The range's end.
+            author: An operator's name; empty: the certificate's, or this program's id.
+
+        Raises:
+            RefusedError: If the text or a time is not possible, or the site has no space for it.
+            NoAnswerError: If the site's store does not answer: the note is not kept.
+        """
+        return self._loop.run(self._robot.note(text, begin, end, author=author))
+
+    def withdraw_note(self, note: str, *, author: str = "") -> Note:
+        """Withdraw a note of the same author by its id; the note stays in the record, marked as withdrawn."""
+        return self._loop.run(self._robot.withdraw_note(note, author=author))
+
+    def notes(self, since: datetime | None = None, until: datetime | None = None) -> list[Note]:
+        """Return the notes on a part of this robot's time, the newest 10,000, in its order."""
+        return self._loop.run(self._robot.notes(since, until))
 
     def forward(self, positions: Sequence[float]) -> Mapping[str, Matrix]:
         """Return the placement of every link and named frame: 4 x 4, to the base frame [m].

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from math import radians
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -14,6 +15,7 @@ from google.protobuf.message import Message
 from robomesh import reason_codes as codes
 from robomesh.client.commands import StopResult, numbers, program_text, request_stop
 from robomesh.client.control import AsyncArm
+from robomesh.client.notes import Note, read_notes, withdraw_note, write_note
 from robomesh.client.samples import (
     ROTARY,
     Event,
@@ -197,6 +199,44 @@ class AsyncRobot:
             NoAnswerError: If no gateway answered: the robot may still move.
         """
         return await request_stop(self._session, self.site, self.name, self._session.own_name, reason)
+
+    async def note(
+        self, text: str, begin: datetime | None = None, end: datetime | None = None, *, author: str = ""
+    ) -> Note:
+        """Write a note on a time of this robot; every page shows it, and running recordings contain it.
+
+        Args:
+            text: 1 to 500 characters.
+            begin: The moment, or the range's begin; by default now. Without a zone: local time.
+            end: The range's end.
+            author: An operator's name; empty: the certificate's, or this program's id.
+
+        Raises:
+            RefusedError: If the text or a time is not possible, or the site has no space for it.
+            NoAnswerError: If the site's store does not answer: the note is not kept.
+        """
+        place = self.site, self.name
+        return await write_note(self._session, place, text, begin=begin, end=end, author=author)
+
+    async def withdraw_note(self, note: str, *, author: str = "") -> Note:
+        """Withdraw a note of the same author by its id; the note stays in the record, marked as withdrawn.
+
+        Raises:
+            RefusedError: If there is no such note, or it has another author.
+            NoAnswerError: If the site's store does not answer.
+        """
+        return await withdraw_note(self._session, (self.site, self.name), note, author=author)
+
+    async def notes(self, since: datetime | None = None, until: datetime | None = None) -> list[Note]:
+        """Return the notes on a part of this robot's time, the newest 10,000, in its order.
+
+        Args:
+            since, until: Limits of the part; a range that reaches into it counts.
+
+        Raises:
+            NoAnswerError: If the site's store does not answer.
+        """
+        return await read_notes(self._session, (self.site, self.name), since=since, until=until)
 
     async def forward(self, positions: Sequence[float]) -> Mapping[str, Matrix]:
         """Return the placement of every link and named frame: 4 x 4, to the base frame [m].

@@ -596,7 +596,7 @@ class AuditQuery(_message.Message):
     def __init__(self, operator: _Optional[str] = ..., request: _Optional[str] = ..., outcome: _Optional[_Union[AuditEntry.Outcome, str]] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., until: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., most: _Optional[int] = ...) -> None: ...
 
 class Event(_message.Message):
-    __slots__ = ("timestamp", "severity", "code", "text", "source", "values", "reason")
+    __slots__ = ("timestamp", "severity", "code", "text", "source", "values", "reason", "note")
     class Severity(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         SEVERITY_UNSPECIFIED: _ClassVar[Event.Severity]
@@ -625,6 +625,7 @@ class Event(_message.Message):
     SOURCE_FIELD_NUMBER: _ClassVar[int]
     VALUES_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
+    NOTE_FIELD_NUMBER: _ClassVar[int]
     timestamp: _timestamp_pb2.Timestamp
     severity: Event.Severity
     code: str
@@ -632,13 +633,64 @@ class Event(_message.Message):
     source: str
     values: _containers.ScalarMap[str, str]
     reason: Reason
-    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., severity: _Optional[_Union[Event.Severity, str]] = ..., code: _Optional[str] = ..., text: _Optional[str] = ..., source: _Optional[str] = ..., values: _Optional[_Mapping[str, str]] = ..., reason: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
+    note: Note
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., severity: _Optional[_Union[Event.Severity, str]] = ..., code: _Optional[str] = ..., text: _Optional[str] = ..., source: _Optional[str] = ..., values: _Optional[_Mapping[str, str]] = ..., reason: _Optional[_Union[Reason, _Mapping]] = ..., note: _Optional[_Union[Note, _Mapping]] = ...) -> None: ...
 
 class EventList(_message.Message):
     __slots__ = ("events",)
     EVENTS_FIELD_NUMBER: _ClassVar[int]
     events: _containers.RepeatedCompositeFieldContainer[Event]
     def __init__(self, events: _Optional[_Iterable[_Union[Event, _Mapping]]] = ...) -> None: ...
+
+class Note(_message.Message):
+    __slots__ = ("id", "begin", "end", "author", "text")
+    ID_FIELD_NUMBER: _ClassVar[int]
+    BEGIN_FIELD_NUMBER: _ClassVar[int]
+    END_FIELD_NUMBER: _ClassVar[int]
+    AUTHOR_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    id: str
+    begin: _timestamp_pb2.Timestamp
+    end: _timestamp_pb2.Timestamp
+    author: str
+    text: str
+    def __init__(self, id: _Optional[str] = ..., begin: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., end: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., author: _Optional[str] = ..., text: _Optional[str] = ...) -> None: ...
+
+class NoteRequest(_message.Message):
+    __slots__ = ("action", "robot", "id", "text", "begin", "end")
+    class Action(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        ACTION_UNSPECIFIED: _ClassVar[NoteRequest.Action]
+        WRITE: _ClassVar[NoteRequest.Action]
+        WITHDRAW: _ClassVar[NoteRequest.Action]
+    ACTION_UNSPECIFIED: NoteRequest.Action
+    WRITE: NoteRequest.Action
+    WITHDRAW: NoteRequest.Action
+    ACTION_FIELD_NUMBER: _ClassVar[int]
+    ROBOT_FIELD_NUMBER: _ClassVar[int]
+    ID_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    BEGIN_FIELD_NUMBER: _ClassVar[int]
+    END_FIELD_NUMBER: _ClassVar[int]
+    action: NoteRequest.Action
+    robot: str
+    id: str
+    text: str
+    begin: _timestamp_pb2.Timestamp
+    end: _timestamp_pb2.Timestamp
+    def __init__(self, action: _Optional[_Union[NoteRequest.Action, str]] = ..., robot: _Optional[str] = ..., id: _Optional[str] = ..., text: _Optional[str] = ..., begin: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., end: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+
+class NoteQuery(_message.Message):
+    __slots__ = ("robot", "since", "until", "most")
+    ROBOT_FIELD_NUMBER: _ClassVar[int]
+    SINCE_FIELD_NUMBER: _ClassVar[int]
+    UNTIL_FIELD_NUMBER: _ClassVar[int]
+    MOST_FIELD_NUMBER: _ClassVar[int]
+    robot: str
+    since: _timestamp_pb2.Timestamp
+    until: _timestamp_pb2.Timestamp
+    most: int
+    def __init__(self, robot: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., until: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., most: _Optional[int] = ...) -> None: ...
 
 class Description(_message.Message):
     __slots__ = ("name", "title", "provenance", "robot_toml", "urdf", "joints", "links", "frames", "views", "constraints", "base_to_site", "cell", "simulated", "fixtures", "warning_distance", "stop_distance", "replay", "stale_after_s", "title_zh", "provenance_zh", "floor")

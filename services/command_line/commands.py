@@ -62,6 +62,7 @@ COMMANDS = {
     "programs": Row(
         "programs", "Programs stored at a site: list, show, save, restore, diff, export, import."
     ),
+    "note": Row("note", "Write a note on a robot's time, list its notes, or withdraw one."),
     "recordings": Row(
         "recordings.app", "Recordings: list, inspect, play, export, fetch, rename, tag, delete."
     ),

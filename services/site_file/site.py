@@ -81,18 +81,20 @@ class Watch(BaseModel):
 
 
 class Programs(BaseModel):
-    """Programs that the site stores.
+    """Programs and notes that the site stores.
 
     Attributes:
-        folder: Folder of the programs.
+        folder: Folder of the programs and notes.
         most_mib: Quota of all saved versions [MiB].
         runs_mib: Space for programs that ran without being saved; the oldest make room [MiB].
+        notes_mib: Quota of all notes; none is ever removed [MiB].
     """
 
     model_config = PART_CONFIG
     folder: Path = Path("programs")
     most_mib: Annotated[float, Field(ge=1, le=4096)] = 64
     runs_mib: Annotated[float, Field(ge=1, le=4096)] = 16
+    notes_mib: Annotated[float, Field(ge=1, le=256)] = 16
 
 
 class Site(RoutedSite):

@@ -1,4 +1,4 @@
-"""The store service: answers requests for programs, publishes their lists, and keeps what ran."""
+"""The store service: answers requests for programs and notes, publishes them, and keeps what ran."""
 
 import asyncio
 import contextlib
@@ -6,14 +6,15 @@ import fcntl
 import logging
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 from robomesh import reason_codes as codes
 from robomesh.errors import MessageError, RefusedError
 from robomesh.keys import ROOT, WHOLE_SITE, check_name, is_replay
 from robomesh.messages import reason_message
-from robomesh.publisher import Publisher
+from robomesh.publisher import LIST_LENGTH, Publisher
 from robomesh.quotas import Quota
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
@@ -21,6 +22,7 @@ from robomesh.server import Request
 from robomesh.session import Session
 from robomesh.topics import check_operator
 from services.errors import ServiceError
+from services.store.notes import NoteBook
 from services.store.programs import ProgramStore
 from services.store.settings import Settings
 
@@ -38,7 +40,7 @@ class FolderInUseError(ServiceError):
 
 
 async def serve(session: Session, settings: Settings) -> None:
-    """Serve a site's programs until cancelled.
+    """Serve a site's programs and notes until cancelled.
 
     Raises:
         FolderInUseError: If another store uses the folder.
@@ -48,20 +50,24 @@ async def serve(session: Session, settings: Settings) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     store = ProgramStore(folder, most_bytes=settings.most_bytes, most_run_bytes=settings.most_run_bytes)
     with await _locked(folder):
-        await _Service(session, settings, store).run()
+        notes = NoteBook(folder, most_bytes=settings.most_note_bytes)
+        await _Service(session, settings, store, notes).run()
 
 
 class _Service:
     """One run of the service."""
 
-    def __init__(self, session: Session, settings: Settings, store: ProgramStore) -> None:
-        self._session, self._settings, self._store = session, settings, store
+    def __init__(self, session: Session, settings: Settings, store: ProgramStore, notes: NoteBook) -> None:
+        self._session, self._settings, self._store, self._notes = session, settings, store, notes
         self._saves = Quota("program_saves", a_minute=settings.quotas.program_saves_a_minute)
+        self._note_quota = Quota("notes", a_minute=settings.quotas.notes_a_minute)
         self._one_at_a_time = asyncio.Lock()
         self._lists: dict[str, Publisher] = {}
         self._events: dict[str, Publisher] = {}
         session.measure("programs", "Stored programs, without deleted ones", lambda: store.count)
         session.measure("programs_bytes", "Size of all saved versions", lambda: store.saved_bytes)
+        session.measure("notes", "Notes, with withdrawn ones", lambda: notes.count)
+        session.measure("notes_bytes", "Size of all notes", lambda: notes.bytes)
 
     async def run(self) -> None:
         """Run until cancelled."""
@@ -72,6 +78,9 @@ class _Service:
         site = self._settings.site
         self._session.answer(site, WHOLE_SITE, "programs/request/*", self._change)
         self._session.answer(site, WHOLE_SITE, "programs/read", self._read)
+        self._session.answer(site, WHOLE_SITE, "notes/request/*", self._note)
+        self._session.answer(site, WHOLE_SITE, "notes/withdraw/*", self._withdraw)
+        self._session.answer(site, WHOLE_SITE, "notes/read", self._read_notes)
         async with asyncio.TaskGroup() as group:
             group.create_task(self._keep_runs())
             group.create_task(self._find_robots())
@@ -88,6 +97,13 @@ class _Service:
             self._store.add_robot(robot)
             self._lists[robot] = self._session.declare_publisher(self._settings.site, robot, "programs")
             self._lists[robot].put(self._store.programs(robot))
+            # In advance, so that the first note is not delayed; a restart keeps the notes in the history.
+            events = self._events_of(robot)
+            damaged = self._notes.open(robot)
+            for event in self._notes.newest(robot, LIST_LENGTH):
+                events.remember(event, source_time_ns=event.timestamp.ToNanoseconds())
+            if damaged is not None:
+                self._report(robot, _S.ERROR, damaged)
 
     async def _change(self, request: Request) -> schema.ProgramAnswer:
         """Save, rename, delete or restore a program; reply after the change is on disk.
@@ -115,6 +131,51 @@ class _Service:
         async with self._one_at_a_time:
             return await asyncio.to_thread(self._store.read, asked)
 
+    async def _note(self, request: Request) -> schema.Event:
+        """Write a note, or withdraw a note of the same author; reply after the change is on disk.
+
+        Raises:
+            QuotaError: If the author writes too often.
+            RefusedError: If the request is not possible.
+        """
+        asked = request.message
+        assert isinstance(asked, schema.NoteRequest)
+        match asked.action:
+            case schema.NoteRequest.WRITE:
+                return await self._noted(request, asked, self._notes.write)
+            case schema.NoteRequest.WITHDRAW:
+                return await self._noted(request, asked, self._notes.withdraw)
+            case _:
+                raise RefusedError(codes.INVALID(codes.OTHER(detail="the request has no action")))
+
+    async def _withdraw(self, request: Request) -> schema.Event:
+        """Withdraw a note of any author; see `_note`."""
+        asked = request.message
+        assert isinstance(asked, schema.NoteRequest)
+        return await self._noted(request, asked, partial(self._notes.withdraw, administrator=True))
+
+    async def _noted(
+        self,
+        request: Request,
+        asked: schema.NoteRequest,
+        change: Callable[[schema.NoteRequest, str, int], tuple[schema.Event, bool]],
+    ) -> schema.Event:
+        author = check_operator(request.chunk)
+        self._note_quota.check(author, 1.0)
+        self._note_quota.count(author, 1.0)
+        async with self._one_at_a_time:
+            event, is_new = await asyncio.to_thread(change, asked, author, time.time_ns())
+            if is_new:
+                self._events_of(asked.robot).put(event)
+                log.info("%s: %s", asked.robot, event.text)
+        return event
+
+    async def _read_notes(self, request: Request) -> schema.EventList:
+        asked = request.message
+        assert isinstance(asked, schema.NoteQuery)
+        async with self._one_at_a_time:
+            return await asyncio.to_thread(self._notes.read, asked)
+
     async def _keep_runs(self) -> None:
         key = f"{ROOT}/{self._settings.site}/*/program/source"
         async for sample in self._session.subscribe(key, newest=_MOST_SOURCES):
@@ -135,6 +196,12 @@ class _Service:
                 lost = codes.PROGRAMS_RUN_LOST(name=source.name, detail=error)
                 self._report(robot, _S.WARNING, lost)
 
+    def _events_of(self, robot: str) -> Publisher:
+        if robot not in self._events:
+            site = self._settings.site
+            self._events[robot] = self._session.declare_publisher(site, robot, "events/store")
+        return self._events[robot]
+
     def _report(self, robot: str, severity: schema.Event.Severity, reason: Reason, **values: str) -> None:
         event = schema.Event(
             severity=severity,
@@ -145,10 +212,7 @@ class _Service:
             reason=reason_message(reason),
         )
         event.timestamp.GetCurrentTime()
-        if robot not in self._events:
-            site = self._settings.site
-            self._events[robot] = self._session.declare_publisher(site, robot, "events/store")
-        self._events[robot].put(event)
+        self._events_of(robot).put(event)
         log.log(logging.INFO if severity == _S.INFO else logging.WARNING, "%s: %s", robot, reason.text)
 
 

@@ -54,6 +54,7 @@ CONTRACT = {
     ),
     "programs diff": ("--connect",),
     "programs export": ("--force",),
+    "note": ("--from", "--to", "--withdraw", "--json"),
     "audit verify": ("--head", "--json"),
     "keys init": (),
     "doctor": ("--security", "--json"),

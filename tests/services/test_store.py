@@ -24,15 +24,15 @@ Version, Request = schema.ProgramVersion, schema.ProgramRequest
 
 
 @asynccontextmanager
-async def stored(mesh, folder, **values):
+async def stored(mesh, folder, *, site="s", **values):
     """Run a store; yield a page's session."""
-    settings = Settings(site="s", robots=("arm",), folder=folder, **values)
-    served = Served(service="store", present_for=(("s", "-"),))
+    settings = Settings(site=site, robots=("arm",), folder=folder, **values)
+    served = Served(service="store", present_for=((site, "-"),))
     async with open_session(mesh) as own, present(own, served), open_session(mesh) as page:
         task = asyncio.create_task(serve(own, settings))
         try:
             async with asyncio.timeout(30.0):
-                while await page.last("robomesh/s/arm/programs") is None:
+                while await page.last(f"robomesh/{site}/arm/programs") is None:
                     assert not task.done(), task.exception()
             yield page
         finally:

@@ -162,6 +162,7 @@ def _store(site: "Site", _: Options) -> Any:
         folder=part.folder,
         most_bytes=round(part.most_mib * MIB),
         most_run_bytes=round(part.runs_mib * MIB),
+        most_note_bytes=round(part.notes_mib * MIB),
         quotas=site.quotas.settings,
     )
 

@@ -8,7 +8,7 @@ from robomesh.errors import KeyNameError, RefusedError, UnknownTopicError
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import StopRequest
 from robomesh.topics import Role
-from services.console.accounts.file import Account
+from services.console.accounts.file import Account, AccountRole
 from services.console.accounts.sessions import SignedIn
 
 PASSWORD_AGAIN = codes.PASSWORD_AGAIN()
@@ -51,6 +51,8 @@ def check_right(row: topics.Request, key: keys.Key, user: SignedIn, site: str) -
     if user.ended:
         raise RefusedError(codes.SIGNED_OUT())
     account, everybody = user.account, Role.MONITOR in row.askers
+    if row.administrators and account.role is not AccountRole.ADMIN:
+        raise RefusedError(codes.ACCOUNT_NOT_ADMIN(account=account.name))
     if not everybody and not account.may_command:
         what = row.name.removesuffix("/*")
         raise RefusedError(lacks_right(account, what))

@@ -281,6 +281,8 @@ class Browser:
         """
         if self.user is not None:
             check_right(row, key, self.user, self._site)
+        elif row.administrators:
+            raise RefusedError(codes.NEEDS_ADMINISTRATOR())
         elif self.own_name:
             check_own_name(row, key, self.own_name)
         return in_own_name(row, ask.payload, self.own_name) if self.own_name else ask.payload

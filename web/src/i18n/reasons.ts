@@ -805,6 +805,63 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "{author} 已在此期间更改程序“{name}”：现为版本 {version}：请先查看该版本，再重试",
     ],
   ],
+  ["note.written", ["{author} noted: {text}", "{author} 的备注：{text}"]],
+  ["note.withdrawn", ["{by} withdrew the note of {author}: {text}", "{by} 撤回了 {author} 的备注：{text}"]],
+  [
+    "notes.text",
+    ["a note has 1 to {most} characters: this one has {count}", "备注须为 1 至 {most} 个字符：此备注有 {count} 个"],
+  ],
+  [
+    "notes.id",
+    [
+      "'{id}' cannot be the id of a note: use 8 to 64 letters, digits and '-'",
+      "“{id}”不能用作备注的编号：请用 8 至 64 个字母、数字和“-”",
+    ],
+  ],
+  [
+    "notes.id_taken",
+    ["{robot} already has another note {id}: choose another id", "{robot} 已有另一条备注 {id}：请换一个编号"],
+  ],
+  [
+    "notes.range",
+    ["the note ends {seconds} s before it begins: swap its times", "备注的结束比开始早 {seconds} 秒：请对调两个时间"],
+  ],
+  [
+    "notes.future",
+    [
+      "the note is on a time {seconds} s in the future: choose a past time, or check the clocks of both machines",
+      "备注的时间在 {seconds} 秒之后：请选择过去的时间，或检查两台机器的时钟",
+    ],
+  ],
+  ["notes.unknown", ["{robot} has no note {id}: list its notes", "{robot} 没有备注 {id}：请查看其备注"]],
+  [
+    "notes.author",
+    [
+      "{author} wrote this note, so only {author} or an administrator may withdraw it",
+      "此备注由 {author} 所写，只有 {author} 或管理员可以撤回",
+    ],
+  ],
+  [
+    "notes.full",
+    [
+      "the site's notes already take {most_mib} MiB, all that [programs] notes_mib allows: raise it in the site file",
+      "站点的备注已占用 {most_mib} MiB，达到 [programs] notes_mib 的上限：请在站点文件中调高",
+    ],
+  ],
+  [
+    "notes.damaged",
+    [
+      "{count} lines of {file} cannot be read as notes: they stay in the file; restore it from a backup and restart the store",
+      "{file} 中有 {count} 行不是可读的备注：它们保留在文件中；请从备份恢复并重启存储服务",
+    ],
+  ],
+  [
+    "page.needs_administrator",
+    [
+      "only the account of an administrator may do this, and this console has no accounts",
+      "只有管理员账户可以这样做，而此控制台没有账户",
+    ],
+  ],
   ["programs.reason", ["a program is deleted only with a reason: write why", "删除程序必须说明原因：请填写"]],
   [
     "programs.not_text",
