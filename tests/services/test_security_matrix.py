@@ -31,6 +31,8 @@ IN_NAME = (
     "command/*",
     "alarms/request/*",
     "programs/request/*",
+    "notes/request/*",
+    "notes/withdraw/*",
     "kinematics/check/*",
     "views/*",
     "video/*/keyframe/*",

@@ -1,11 +1,13 @@
 // Events in Chinese by code: a sentence with their values, or the alarm that ended; and the reason. In English the
 // event's own text is shown.
 
-import type { Event } from "../gen/robomesh_pb";
+import type { Timestamp } from "@bufbuild/protobuf/wkt";
+import { timestampMs } from "@bufbuild/protobuf/wkt";
+import type { Event, Note } from "../gen/robomesh_pb";
 import { Event_Severity as Severity } from "../gen/robomesh_pb";
 import { alarmTitle } from "./alarm-text";
 import { isolated } from "./foreign-text";
-import { stampTime } from "./format";
+import { dateOf, stampTime, timeOfDay } from "./format";
 import { reasonText } from "./reasons";
 import { isSaid, operatorText } from "./stop-words";
 import { language, t } from "./texts";
@@ -45,6 +47,9 @@ const CHINESE: Record<string, string> = {
   "alarm.shelved": "{by} 将报警 {id} 搁置 {minutes} 分钟：{reason}",
   "alarm.unshelved": "{by} 取消搁置报警 {id}。",
 };
+
+// A note on an earlier time names it.
+const AT_ONCE_MS = 2000;
 
 // Values that are words of a program.
 const VALUES: Record<string, string> = {
@@ -107,11 +112,25 @@ export function eventText(event: Event): string {
       const text = t(values.sent === "True" ? "event_stop" : "event_stop_unsent", { by: operatorText(by), time });
       return isSaid(reason) ? `${text} ${t("stop_reason", { reason })}` : text;
     }
+    case "note.written": {
+      if (!event.note) break;
+      const { author, text } = event.note;
+      const time = noteTime(event.note, event.timestamp);
+      return t(time ? "event_note_on" : "event_note", { author: isolated(author), text, time });
+    }
     case "stop.sent":
       return t("event_stop_sent");
     case "stop.reset":
       return t("event_stop_reset");
-    default:
-      return eventInChinese(event) ?? event.text;
   }
+  return eventInChinese(event) ?? event.text;
+}
+
+/** Return the time that a note is on; empty: the one at which it was written. */
+function noteTime({ begin, end }: Note, written: Timestamp | undefined): string {
+  const [from, at] = [begin, written].map((stamp) => (stamp ? timestampMs(stamp) : 0)) as [number, number];
+  if (!end && Math.abs(at - from) < AT_ONCE_MS) return "";
+  const isToday = new Date(from).toDateString() === new Date(at).toDateString();
+  const first = isToday ? timeOfDay(from) : `${dateOf(from)} ${timeOfDay(from)}`;
+  return end ? `${first} – ${timeOfDay(timestampMs(end))}` : first;
 }

@@ -80,6 +80,13 @@ export function timeOfDay(ms: number): string {
   return new Date(ms).toLocaleTimeString("en-GB", { hour12: false });
 }
 
+/** Return the local date: 2026-11-21. */
+export function dateOf(ms: number): string {
+  const date = new Date(ms);
+  const pad = (value: number) => String(value).padStart(2, "0");
+  return [date.getFullYear(), pad(date.getMonth() + 1), pad(date.getDate())].join("-");
+}
+
 /** Return local date, time and zone, for tooltips. */
 export function fullTime(ms: number): string {
   return new Date(ms).toLocaleString("en-GB", { timeZoneName: "short" });

@@ -2,7 +2,7 @@
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Recording } from "../gen/robomesh_pb";
-import { count, fixed } from "./format";
+import { count, dateOf, fixed, timeOfDay } from "./format";
 import { r } from "./recordings";
 
 const UNITS = ["B", "kB", "MB", "GB", "TB"];
@@ -26,10 +26,7 @@ export function durationS({ duration }: Recording): number {
 /** Format a local date and time: 2026-11-21 14:03:09. */
 export function dateText(ms: number): string {
   if (!ms) return "–";
-  const date = new Date(ms);
-  const pad = (value: number) => String(value).padStart(2, "0");
-  const day = [date.getFullYear(), pad(date.getMonth() + 1), pad(date.getDate())].join("-");
-  return `${day} ${date.toLocaleTimeString("en-GB", { hour12: false })}`;
+  return `${dateOf(ms)} ${timeOfDay(ms)}`;
 }
 
 /** Format a time within a recording: 00:03.25, 1:02:03.00. */

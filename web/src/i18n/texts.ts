@@ -456,6 +456,8 @@ const TEXTS = {
     "{by} 于 {time} 请求停止，未送达控制器，可送达时立即发送。",
   ],
   an_unnamed_operator: ["An operator without a name", "未命名的操作员"],
+  event_note: ["{author} noted: {text}", "{author} 的备注：{text}"],
+  event_note_on: ["{author} noted on {time}: {text}", "{author} 关于 {time} 的备注：{text}"],
   event_stop_sent: ["The stop was sent when the link came back.", "连接恢复后已发送停止。"],
   event_stop_reset: ["The stop was reset.", "停止已复位。"],
   no_events: ["Nothing has happened yet.", "暂无事件。"],

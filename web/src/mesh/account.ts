@@ -31,6 +31,8 @@ export const endedBy = signal("");
 export const mustSignIn = computed(() => !!me.value?.accounts && !me.value.account);
 /** Whether the account's role never permits control. */
 export const isMonitor = computed(() => me.value?.role === "monitor");
+/** Whether the account is an administrator's. */
+export const isAdministrator = computed(() => me.value?.role === "admin");
 export const commandSuspended = computed(() => !!hello.value?.account && !hello.value.mayCommand && !isMonitor.value);
 
 let connects: () => void = () => undefined;

@@ -74,14 +74,17 @@ function takeEvents(sample: Sample): void {
   const received = sample.live
     ? [fromBinary(EventSchema, sample.payload)]
     : fromBinary(EventListSchema, sample.payload).events;
-  const [, site = "", robot = ""] = sample.key.split("/");
-  events.take(
-    received.map((event) => {
-      const ms = event.timestamp ? timestampMs(event.timestamp) : 0;
-      const nanos = event.timestamp?.nanos ?? 0;
-      return { id: `${sample.key} ${ms} ${nanos} ${event.code} ${event.text}`, ms, site, robot, event };
-    }),
-  );
+  events.take(eventEntries(sample.key, received));
+}
+
+/** Return the events of one topic. */
+export function eventEntries(key: string, received: readonly Event[]): EventEntry[] {
+  const [, site = "", robot = ""] = key.split("/");
+  return received.map((event) => {
+    const ms = event.timestamp ? timestampMs(event.timestamp) : 0;
+    const nanos = event.timestamp?.nanos ?? 0;
+    return { id: `${key} ${ms} ${nanos} ${event.code} ${event.text}`, ms, site, robot, event };
+  });
 }
 
 function takeAudit(sample: Sample): void {

@@ -1,15 +1,20 @@
 // Events and audit entries of all robots and services, newest first, with filters.
 
 import { useEffect, useState } from "preact/hooks";
+import type { Note } from "../../gen/robomesh_pb";
 import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "../../gen/robomesh_pb";
 import { alarmTitle } from "../../i18n/alarm-text";
 import { entrySentence, entryText } from "../../i18n/audit-text";
 import { eventText } from "../../i18n/event-text";
 import { e } from "../../i18n/events";
 import { count, stampFull } from "../../i18n/format";
+import { n } from "../../i18n/notes";
 import { t } from "../../i18n/texts";
 import type { Notice } from "../../mesh/control";
+import { reasonOf } from "../../mesh/control";
 import { fleetRobots } from "../../mesh/known-robots";
+import { mayWithdraw, readNotes, WRITTEN, withdrawNote, withdrawnIds } from "../../mesh/notes";
+import { Withdrawable } from "../../panels/note-form";
 import { Choice, Toggle } from "../../ui/choice";
 import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
 import { NoticeLine } from "../../ui/notice-line";
@@ -19,10 +24,11 @@ import { SeenPicture } from "../../video/seen-picture";
 import { Filters, SiteSelect } from "./alarm-panel";
 import { MAX_ROBOTS, searchAuditLogs } from "./audit-log-search";
 import type { AuditLine, EventEntry } from "./entries";
-import { audits, events, MAX_ENTRIES, useEntries } from "./entries";
+import { audits, eventEntries, events, MAX_ENTRIES, useEntries } from "./entries";
 import { VirtualList } from "./virtual-list";
 
-const KINDS = ["events", "requests"] as const;
+const KINDS = ["events", "notes", "requests"] as const;
+const KIND_TEXTS = { events: "journal_events", notes: "journal_notes", requests: "journal_requests" } as const;
 const LEAST = { any_severity: Severity.DEBUG, from_warning: Severity.WARNING, from_error: Severity.ERROR } as const;
 const SINCE_S = { any_time: Number.POSITIVE_INFINITY, last_hour: 3600, last_day: 86_400 } as const;
 const WHAT = { any_outcome: null, outcome_refused: Outcome.REFUSED, outcome_failed: Outcome.FAILED } as const;
@@ -44,9 +50,10 @@ export function Journal() {
   useEffect(() => {
     setPausedEntries(null);
     setOpen(null);
+    setNotice(null);
   }, [kind]);
 
-  const newest: readonly Entry[] = kind === "events" ? events.newest.value : audits.newest.value;
+  const newest: readonly Entry[] = kind === "requests" ? audits.newest.value : events.newest.value;
   const all = pausedEntries ?? newest;
   const searchText = text.trim().toLowerCase();
   const from = Date.now() - SINCE_S[since] * 1000;
@@ -55,23 +62,52 @@ export function Journal() {
       entry.ms >= from &&
       (!site || entry.site === site) &&
       (!robot || entry.robot === robot) &&
+      (kind !== "notes" || isNote(entry)) &&
       ("event" in entry
-        ? entry.event.severity >= LEAST[least]
+        ? kind === "notes" || entry.event.severity >= LEAST[least]
         : WHAT[outcome] === null || entry.audit.outcome === WHAT[outcome]) &&
       (!searchText || wordsOf(entry).toLowerCase().includes(searchText)),
   );
+  const withdrawn = withdrawnIds(events.newest.value.map(({ event }) => event));
+  const isWithdrawn = (entry: Entry) =>
+    "event" in entry && entry.event.code === WRITTEN && withdrawn.has(entry.event.note?.id ?? "");
   const robots = fleetRobots.value.filter((key) => !site || key.split("/")[1] === site);
   const sites = [
     ...new Set([...fleetRobots.value.map((key) => key.split("/")[1] ?? ""), ...all.map((entry) => entry.site)]),
   ];
   const names = [...new Set(robots.map((key) => key.split("/")[2] ?? ""))].sort();
 
-  const search = async () => {
+  const chosenRobots = (): readonly string[] | null => {
     const keys = robots.filter((key) => !robot || key.split("/")[2] === robot);
-    if (keys.length > MAX_ROBOTS) {
-      setNotice({ kind: "refused", text: e("older_many", { count: keys.length, most: MAX_ROBOTS }) });
-      return;
-    }
+    if (keys.length <= MAX_ROBOTS) return keys;
+    setNotice({ kind: "refused", text: e("older_many", { count: keys.length, most: MAX_ROBOTS }) });
+    return null;
+  };
+  const readOlderNotes = async () => {
+    const keys = chosenRobots();
+    if (!keys) return;
+    setNotice({ kind: "busy", text: n("older_busy", { count: keys.length }) });
+    const part = Number.isFinite(from) ? { since: from } : {};
+    const answers = await Promise.allSettled(keys.map((key) => readNotes(key, part)));
+    const failed = answers.flatMap((answer, i) =>
+      answer.status === "rejected"
+        ? [n("older_failed", { robot: (keys[i] ?? "").replace("robomesh/", ""), text: reasonOf(answer.reason) })]
+        : [],
+    );
+    const found = answers.map((answer) => (answer.status === "fulfilled" ? answer.value : []));
+    found.forEach((some, i) => {
+      events.take(eventEntries(`${keys[i] ?? ""}/events/store`, some));
+    });
+    events.settle();
+    const count = found.flat().filter(({ code }) => code === WRITTEN).length;
+    setNotice({
+      kind: failed.length ? "refused" : "done",
+      text: [n("older_done", { count }), ...failed].join(" "),
+    });
+  };
+  const search = async () => {
+    const keys = chosenRobots();
+    if (!keys) return;
     setNotice({ kind: "busy", text: e("older_busy", { count: keys.length }) });
     const found = await searchAuditLogs(keys, SINCE_S[since]);
     audits.take(found.entries);
@@ -89,7 +125,7 @@ export function Journal() {
           label={e("journal")}
           values={KINDS}
           chosen={kind}
-          text={(each) => e(each === "events" ? "journal_events" : "journal_requests")}
+          text={(each) => e(KIND_TEXTS[each])}
           choose={setKind}
         />
         <span class="panel-end">
@@ -102,9 +138,9 @@ export function Journal() {
       <Filters>
         {kind === "events" ? (
           <Select label={e("severity")} value={least} values={keysOf(LEAST)} text={e} choose={setLeast} />
-        ) : (
+        ) : kind === "requests" ? (
           <Select label={e("outcome")} value={outcome} values={keysOf(WHAT)} text={outcomeText} choose={setOutcome} />
-        )}
+        ) : null}
         <Select label={e("time")} value={since} values={keysOf(SINCE_S)} text={e} choose={setSince} />
         <SiteSelect site={site} sites={sites} choose={(name) => (setSite(name), setRobot(""))} />
         <Select
@@ -121,13 +157,18 @@ export function Journal() {
           value={text}
           onInput={(event) => setText(event.currentTarget.value)}
         />
+        {kind === "notes" && (
+          <button class="action list-end" onClick={() => void readOlderNotes()}>
+            {n("older")}
+          </button>
+        )}
         {kind === "requests" && (
           <button class="action list-end" title={e("older_hint")} onClick={() => void search()}>
             {e("older")}
           </button>
         )}
       </Filters>
-      {notice && kind === "requests" && <NoticeLine notice={notice} />}
+      {notice && kind !== "events" && <NoticeLine notice={notice} />}
       {listed.length === 0 ? (
         <p class="empty">{e(all.length ? "no_entries_match" : "no_entries")}</p>
       ) : (
@@ -135,13 +176,25 @@ export function Journal() {
           label={e("journal")}
           items={listed}
           lineHeight={lineHeight}
-          line={(entry) => <Line key={entry.id} entry={entry} open={entry.id === open?.id} choose={setOpen} />}
+          line={(entry) => (
+            <Line
+              key={entry.id}
+              entry={entry}
+              open={entry.id === open?.id}
+              withdrawn={isWithdrawn(entry)}
+              choose={setOpen}
+            />
+          )}
         />
       )}
-      {open && <Details entry={open} close={() => setOpen(null)} />}
+      {open && <Details key={open.id} entry={open} withdrawn={isWithdrawn(open)} close={() => setOpen(null)} />}
       {all.length >= MAX_ENTRIES && <p class="footnote dim">{e("oldest_left_out", { count: count(MAX_ENTRIES) })}</p>}
     </section>
   );
+}
+
+function isNote(entry: Entry): boolean {
+  return "event" in entry && entry.event.note !== undefined;
 }
 
 function keysOf<T extends object>(table: T): (keyof T & string)[] {
@@ -161,13 +214,18 @@ function wordsOf(entry: Entry): string {
   return `${entry.site}/${entry.robot} ${operator} ${source} ${request} ${text} ${entryText(entry.audit)}`;
 }
 
-function Line({ entry, open, choose }: { entry: Entry; open: boolean; choose: (entry: Entry) => void }) {
+function Line(props: { entry: Entry; open: boolean; withdrawn: boolean; choose: (entry: Entry) => void }) {
+  const { entry, open, choose } = props;
   const stamp = "event" in entry ? entry.event.timestamp : entry.audit.timestamp;
   return (
     <button class="journal-line" aria-expanded={open} onClick={() => choose(entry)}>
       <time title={stampFull(stamp)}>{dayTime(entry.ms)}</time>
       <span class="journal-of">{entry.robot === "-" ? entry.site : `${entry.site}/${entry.robot}`}</span>
-      <span class="journal-text">{"event" in entry ? <EventWords entry={entry} /> : <AuditWords entry={entry} />}</span>
+      <span class="journal-text">
+        <Withdrawable withdrawn={props.withdrawn}>
+          {"event" in entry ? <EventWords entry={entry} /> : <AuditWords entry={entry} />}
+        </Withdrawable>
+      </span>
     </button>
   );
 }
@@ -197,7 +255,7 @@ function AuditWords({ entry: { audit } }: { entry: AuditLine }) {
 }
 
 /** All of one entry, below the list, because a line is cut off. */
-function Details({ entry, close }: { entry: Entry; close: () => void }) {
+function Details({ entry, withdrawn, close }: { entry: Entry; withdrawn: boolean; close: () => void }) {
   const event = "event" in entry ? entry.event : null;
   const audit = "audit" in entry ? entry.audit : null;
   const original = event?.text ?? audit?.text ?? "";
@@ -229,7 +287,24 @@ function Details({ entry, close }: { entry: Entry; close: () => void }) {
       <button class="quiet" onClick={close}>
         {e("close")}
       </button>
+      {event?.code === WRITTEN && event.note && !withdrawn && mayWithdraw(event.note) && (
+        <Withdraw robotKey={`robomesh/${entry.site}/${entry.robot}`} note={event.note} />
+      )}
     </div>
+  );
+}
+
+/** A button that withdraws a note; the list then shows it struck through. */
+function Withdraw({ robotKey, note }: { robotKey: string; note: Note }) {
+  const [problem, setProblem] = useState("");
+  const withdraw = () => withdrawNote(robotKey, note).catch((error: unknown) => setProblem(reasonOf(error)));
+  return (
+    <>
+      <button class="quiet destructive" title={n("withdraw_hint")} onClick={() => void withdraw()}>
+        {n("withdraw")}
+      </button>
+      {problem && <NoticeLine notice={{ kind: "refused", text: problem }} />}
+    </>
   );
 }
 

@@ -6,9 +6,13 @@ import { useComputed, useSignal } from "@preact/signals";
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { eventText } from "../../i18n/event-text";
 import { count, fullTime } from "../../i18n/format";
+import { n } from "../../i18n/notes";
 import { momentText } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
 import { t } from "../../i18n/texts";
+import { WRITTEN } from "../../mesh/notes";
+import { NoteForm, Withdrawable } from "../../panels/note-form";
+import { Choice } from "../../ui/choice";
 import { SEVERITIES } from "../../ui/event-mark";
 import { Panel } from "../../ui/panel";
 import { foldSteps } from "./fold-steps";
@@ -23,6 +27,14 @@ function severityOf({ event }: RecordedEvent): [string, string] {
   return [t(word), level];
 }
 
+/** Return an event's sentence; a note's row has the time that it is on. */
+function wordsOf({ event, at, until }: RecordedEvent): string {
+  if (event.code !== WRITTEN || !event.note) return eventText(event);
+  const { author, text } = event.note;
+  if (until === undefined) return t("event_note", { author, text });
+  return t("event_note_on", { author, text, time: n("from_to", { from: momentText(at), to: momentText(until) }) });
+}
+
 /** At an end of the line, align the label inwards. */
 function sideOf(share: number): string {
   return share < 0.15 ? "early" : share > 0.85 ? "late" : "";
@@ -32,25 +44,38 @@ export function EventMarks(props: { events: readonly RecordedEvent[]; duration: 
   const { duration } = props;
   const shown = foldSteps(props.events)
     .map(({ happened }) => happened)
+    .filter(({ withdrawn }) => !withdrawn)
     .sort((first, second) => second.event.severity - first.event.severity)
     .slice(0, MOST_MARKS)
     .sort((first, second) => first.at - second.at);
   return (
     <div class="event-marks">
       {duration > 0 &&
+        props.events.map(({ at, until, withdrawn }, i) =>
+          until === undefined || withdrawn ? null : (
+            <span
+              key={i}
+              class="note-range"
+              aria-hidden="true"
+              style={{ left: `${(100 * at) / duration}%`, width: `${(100 * Math.max(0, until - at)) / duration}%` }}
+            />
+          ),
+        )}
+      {duration > 0 &&
         shown.map((happened, i) => {
           const [word, level] = severityOf(happened);
-          const text = `${momentText(happened.at)} ${word}: ${eventText(happened.event)}`;
+          const isNote = happened.event.code === WRITTEN;
+          const text = `${momentText(happened.at)} ${isNote ? n("note") : word}: ${wordsOf(happened)}`;
           return (
             <button
               key={i}
               class={`event-mark ${sideOf(happened.at / duration)}`}
               style={{ left: `${(100 * Math.min(duration, Math.max(0, happened.at))) / duration}%` }}
               data-text={text}
-              aria-label={r("go_to_event", { time: momentText(happened.at), text: eventText(happened.event) })}
+              aria-label={r("go_to_event", { time: momentText(happened.at), text: wordsOf(happened) })}
               onClick={() => props.seek(happened.at)}
             >
-              <span class={`shape ${level}`} aria-hidden="true" />
+              <span class={isNote ? "note-shape" : `shape ${level}`} aria-hidden="true" />
             </button>
           );
         })}
@@ -63,7 +88,12 @@ export function EventList(props: {
   asked: RequestState<{ list: readonly RecordedEvent[]; cut: boolean }>;
   moment: ReadonlySignal<number>;
   seek: (to: number) => void;
+  /** The recorded robot, for notes; null: they cannot be written. */
+  robotKey: string | null;
+  /** Start of the recording [ms since the Unix epoch]. */
+  startMs: number;
 }) {
+  const [noting, setNoting] = useState(false);
   const { value, problem } = props.asked;
   const list = value?.list ?? NONE;
   const rows = useMemo(() => foldSteps(list), [list]);
@@ -88,7 +118,28 @@ export function EventList(props: {
     return times.value.findLastIndex((at) => at <= moment);
   }).value;
   return (
-    <Panel name="events" title={r("events")} end={rows.length > 0 && <span class="dim">{count(rows.length)}</span>}>
+    <Panel
+      name="events"
+      title={r("events")}
+      end={
+        <>
+          {rows.length > 0 && <span class="dim">{count(rows.length)}</span>}
+          {props.robotKey && (
+            <button class="quiet" aria-expanded={noting} title={n("note_hint")} onClick={() => setNoting(!noting)}>
+              {n("note")}
+            </button>
+          )}
+        </>
+      }
+    >
+      {noting && props.robotKey && (
+        <NoteAtMoment
+          robotKey={props.robotKey}
+          moment={props.moment}
+          startMs={props.startMs}
+          close={() => setNoting(false)}
+        />
+      )}
       <ol class="event-list recorded-events" tabIndex={0} aria-label={r("events")}>
         {!value && !problem && <li class="skeleton">{"\u00a0"}</li>}
         {problem && <li class="state warning">{r("events_refused", { text: problem })}</li>}
@@ -110,6 +161,33 @@ export function EventList(props: {
   );
 }
 
+const ON = ["moment", "range"] as const;
+
+/** A note on the player's position, or on the range from the position at which "range" was chosen. */
+function NoteAtMoment(props: { robotKey: string; moment: ReadonlySignal<number>; startMs: number; close: () => void }) {
+  const [from, setFrom] = useState<number | null>(null);
+  const at = props.moment.value;
+  const time = (seconds: number) => props.startMs + seconds * 1000;
+  const on = () =>
+    from === null ? { begin: time(at) } : { begin: time(Math.min(from, at)), end: time(Math.max(from, at)) };
+  return (
+    <NoteForm robotKey={props.robotKey} on={on} close={props.close}>
+      <Choice
+        label={n("on")}
+        values={ON}
+        chosen={from === null ? "moment" : "range"}
+        text={n}
+        choose={(each) => setFrom(each === "range" ? props.moment.peek() : null)}
+      />
+      <span class="figure small">
+        {from === null
+          ? momentText(at)
+          : n("from_to", { from: momentText(Math.min(from, at)), to: momentText(Math.max(from, at)) })}
+      </span>
+    </NoteForm>
+  );
+}
+
 function EventButton({ happened, seek }: { happened: RecordedEvent; seek: (to: number) => void }) {
   const [word, level] = severityOf(happened);
   const { event, at } = happened;
@@ -126,7 +204,8 @@ function EventButton({ happened, seek }: { happened: RecordedEvent; seek: (to: n
             {word}
           </span>
         )}
-        {eventText(event)}
+        <Withdrawable withdrawn={happened.withdrawn ?? false}>{wordsOf(happened)}</Withdrawable>
+        {happened.beside && <span class="dim small"> {n("beside")}</span>}
       </span>
     </button>
   );

@@ -20,7 +20,7 @@ import { EventList } from "./event-marks";
 import { useOpenReplay, usePosition, useSynchronised } from "./open-replay";
 import { PlaybackControls } from "./playback-controls";
 import { Plots } from "./plots";
-import { useFirstFrameTime, useInfo, useRecordedEvents } from "./recorder-requests";
+import { robotKeyOf, useEventsWithNotes, useFirstFrameTime, useInfo } from "./recorder-requests";
 import { ReplayVideo } from "./replay-video";
 import { useSecondGhost } from "./second-ghost";
 import "./player.css";
@@ -39,8 +39,8 @@ export function Player({ first, second }: { first: RecordingName; second: Record
   const { replay } = openReplay;
   useSynchronised(replay, other.replay, shift);
   const moment = usePosition(replay);
-  const recordedEvents = useRecordedEvents(first, info.value);
-  const secondEvents = useRecordedEvents(second, secondInfo.value);
+  const recordedEvents = useEventsWithNotes(first, info.value);
+  const secondEvents = useEventsWithNotes(second, secondInfo.value);
   const key = replay?.robotKey ?? NO_ROBOT;
   const description = useTopic(DescriptionSchema, `${key}/description`)?.message;
   const firstS = useFirstFrameTime(first, info.value);
@@ -108,7 +108,13 @@ export function Player({ first, second }: { first: RecordingName; second: Record
         {other.replay && <SecondVideo replay={other.replay} arm={otherArm} info={secondInfo.value} />}
       </div>
       <div class="player-side">
-        <EventList asked={recordedEvents} moment={moment} seek={replay?.seek ?? noSeek} />
+        <EventList
+          asked={recordedEvents}
+          moment={moment}
+          seek={replay?.seek ?? noSeek}
+          robotKey={robotKeyOf(first, info.value)}
+          startMs={info.value ? startMs(info.value) : 0}
+        />
         <Contents
           name={first}
           info={info.value}

@@ -2,7 +2,7 @@
 
 import { create, fromBinary } from "@bufbuild/protobuf";
 import { timestampFromMs, timestampMs } from "@bufbuild/protobuf/wkt";
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useMemo, useState } from "preact/hooks";
 import type { AuditEntry, Event, Recording, SeriesAnswer, SeriesAnswer_Series } from "../../gen/robomesh_pb";
 import {
   AuditEntrySchema,
@@ -17,10 +17,11 @@ import {
   Event_Severity as Severity,
 } from "../../gen/robomesh_pb";
 import { entryText } from "../../i18n/audit-text";
-import { startMs, topicOf } from "../../i18n/recording-format";
+import { durationS, startMs, topicOf } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
-import { AskError, ask, inOwnName, lostAt } from "../../mesh/connection";
+import { AskError, ask, inOwnName, lostAt, watch } from "../../mesh/connection";
 import { reasonOf } from "../../mesh/control";
+import { readNotes, timeOfNote, WRITTEN, withdrawnIds } from "../../mesh/notes";
 import type { RecordingName } from "../../ui/route";
 
 const TIMEOUT_S = 20;
@@ -61,14 +62,87 @@ export function useInfo(name: RecordingName | null): RequestState<Recording> {
   );
 }
 
-/** An event with its time [s from the recording's start]. */
+/** An event with its time [s from the recording's start]; a note's is that which it is on. */
 export interface RecordedEvent {
   at: number;
   event: Event;
+  /** The end of a note's range. */
+  until?: number;
+  /** A note that is not in the file. */
+  beside?: boolean;
+  withdrawn?: boolean;
 }
 
+/** Return the robot of a recording, whose notes are shown; null: none, or several. */
+export function robotKeyOf(name: RecordingName | null, info: Recording | null): string | null {
+  if (!info?.robot || !name) return null;
+  return `robomesh/${info.site || name.site}/${info.robot}`;
+}
+
+/** Return the events of a recording, and the notes of its robot on that time that are not in the file. */
+export function useEventsWithNotes(
+  name: RecordingName | null,
+  info: Recording | null,
+): RequestState<{ list: readonly RecordedEvent[]; cut: boolean }> {
+  const recorded = useRecordedEvents(name, info);
+  const robotKey = robotKeyOf(name, info);
+  const [notes, setNotes] = useState<readonly Event[]>([]);
+  const connected = lostAt.value === null;
+  useEffect(() => {
+    if (!robotKey || !info || !connected) return;
+    let wanted = true;
+    const add = (some: readonly Event[]) => wanted && setNotes((before) => [...before, ...some]);
+    setNotes([]);
+    // New notes as they come; the older ones from the store, of which old sites have none.
+    const stop = watch(`${robotKey}/events/store`, ({ live, payload }) => {
+      if (live) add([fromBinary(EventSchema, payload)]);
+    });
+    readNotes(robotKey, { since: startMs(info), until: startMs(info) + durationS(info) * 1000 }).then(add, () => {});
+    return () => {
+      wanted = false;
+      stop();
+    };
+  }, [robotKey, info, connected]);
+  const value = useMemo(
+    () => recorded.value && info && { ...recorded.value, list: withNotes(recorded.value.list, notes, info) },
+    [recorded.value, notes, info],
+  );
+  return { value, problem: recorded.problem };
+}
+
+/** Return events with the notes on a recording's time, each at the time that it is on. */
+function withNotes(list: readonly RecordedEvent[], notes: readonly Event[], info: Recording): RecordedEvent[] {
+  const [start, duration] = [startMs(info), durationS(info)];
+  const inFile = new Set(list.map(({ event }) => noteKey(event)));
+  const withdrawn = withdrawnIds([...list.map(({ event }) => event), ...notes]);
+  const place = (happened: RecordedEvent): RecordedEvent => {
+    const { note, code } = happened.event;
+    if (!note || code !== WRITTEN) return happened;
+    const { begin, end } = timeOfNote(note);
+    const at = (begin - start) / 1000;
+    return {
+      ...happened,
+      at: Math.max(0, at),
+      ...(end !== undefined && { until: Math.min(duration, (end - start) / 1000) }),
+      withdrawn: withdrawn.has(note.id),
+    };
+  };
+  const beside = new Map(
+    notes
+      .filter((event) => event.note && event.code === WRITTEN && !inFile.has(noteKey(event)))
+      .map((event) => [noteKey(event), place({ at: 0, event, beside: true })]),
+  );
+  const onIt = [...beside.values()].filter(({ event, at, until }) => {
+    const { begin } = event.note ? timeOfNote(event.note) : { begin: 0 };
+    return at <= duration && (begin >= start || (until ?? -1) >= 0);
+  });
+  return [...list.map(place), ...onIt].sort((first, second) => first.at - second.at);
+}
+
+const noteKey = ({ code, note }: Event): string => `${code} ${note?.id ?? ""}`;
+
 /** Return the events of a recording, oldest first, of every service, and the audited requests. */
-export function useRecordedEvents(
+function useRecordedEvents(
   name: RecordingName | null,
   info: Recording | null,
 ): RequestState<{ list: readonly RecordedEvent[]; cut: boolean }> {

@@ -1,0 +1,95 @@
+// A form for a note on a robot's time.
+
+import type { ComponentChildren } from "preact";
+import { useEffect, useRef, useState } from "preact/hooks";
+import { n } from "../i18n/notes";
+import { t } from "../i18n/texts";
+import { asker, mayAct } from "../mesh/alarms";
+import { hello } from "../mesh/connection";
+import type { Notice } from "../mesh/control";
+import { operator, reasonOf, setOperator } from "../mesh/control";
+import type { NoteTime } from "../mesh/notes";
+import { LONGEST_TEXT, writeNote } from "../mesh/notes";
+import { NoticeLine } from "../ui/notice-line";
+import "./note-form.css";
+
+export function NoteForm(props: {
+  /** The recorded robot's key, not a replay's. */
+  robotKey: string;
+  /** Return the time that the note is on; null: the present. */
+  on: () => NoteTime | null;
+  /** A choice of that time. */
+  children: ComponentChildren;
+  close: () => void;
+}) {
+  const [text, setText] = useState("");
+  const [notice, setNotice] = useState<Notice | null>(null);
+  const input = useRef<HTMLInputElement>(null);
+  useEffect(() => input.current?.focus(), []);
+  const busy = notice?.kind === "busy";
+  const cannot = !mayAct.value ? n("monitor") : !asker.value ? n("name_needed") : "";
+  const save = async () => {
+    setNotice({ kind: "busy", text: n("saving") });
+    try {
+      await writeNote(props.robotKey, text.trim(), props.on());
+      props.close();
+    } catch (error) {
+      setNotice({ kind: "refused", text: n("not_saved", { text: reasonOf(error) }) });
+    }
+  };
+  return (
+    <form
+      class="note-form"
+      aria-label={n("note")}
+      onKeyDown={(event) => event.key === "Escape" && props.close()}
+      onSubmit={(event) => {
+        event.preventDefault();
+        if (!busy && !cannot && text.trim()) void save();
+      }}
+    >
+      <input
+        ref={input}
+        type="text"
+        autocomplete="off"
+        maxLength={LONGEST_TEXT}
+        aria-label={n("text")}
+        placeholder={n("note_hint")}
+        value={text}
+        onInput={(event) => setText(event.currentTarget.value)}
+      />
+      {props.children}
+      {!hello.value?.operator && (
+        <input
+          type="text"
+          name="operator"
+          autocomplete="username"
+          spellcheck={false}
+          maxLength={40}
+          placeholder={t("operator")}
+          aria-label={t("operator")}
+          value={operator.value}
+          onInput={(event) => setOperator(event.currentTarget.value)}
+        />
+      )}
+      <div class="note-row">
+        <NoticeLine notice={notice} idle={cannot} />
+        <button type="button" class="action" onClick={props.close}>
+          {t("cancel")}
+        </button>
+        <button type="submit" class="action primary" disabled={busy || cannot !== "" || !text.trim()}>
+          {n("save")}
+        </button>
+      </div>
+    </form>
+  );
+}
+
+/** A text that was withdrawn is struck through, and says so. */
+export function Withdrawable({ withdrawn, children }: { withdrawn: boolean; children: ComponentChildren }) {
+  if (!withdrawn) return <>{children}</>;
+  return (
+    <>
+      <s>{children}</s> <span class="dim">({n("withdrawn")})</span>
+    </>
+  );
+}
