@@ -4,6 +4,7 @@ import { inLanguage } from "./texts";
 
 const TEXTS = {
   note: ["Note", "备注"],
+  open: ["Note…", "备注…"],
   note_hint: ["Write a note on this robot's time, for everybody.", "为此机器人的时间写备注，供所有人查看。"],
   text: ["Text", "内容"],
   on: ["On", "时间"],

@@ -1,4 +1,4 @@
-// Buttons that choose one of several values, or switch one thing on and off.
+// Buttons that choose one of several values, or switch one thing on and off; in a form they do not submit it.
 
 import type { ComponentChildren } from "preact";
 
@@ -13,7 +13,7 @@ export function Choice<Value extends string>(props: {
   return (
     <div class="choice" role="group" aria-label={props.label}>
       {props.values.map((value) => (
-        <button key={value} aria-pressed={value === props.chosen} onClick={() => props.choose(value)}>
+        <button key={value} type="button" aria-pressed={value === props.chosen} onClick={() => props.choose(value)}>
           {props.text(value)}
         </button>
       ))}
@@ -23,7 +23,7 @@ export function Choice<Value extends string>(props: {
 
 export function Toggle(props: { on: boolean; set: (on: boolean) => void; children: ComponentChildren }) {
   return (
-    <button class="toggle" aria-pressed={props.on} onClick={() => props.set(!props.on)}>
+    <button type="button" class="toggle" aria-pressed={props.on} onClick={() => props.set(!props.on)}>
       {props.children}
     </button>
   );

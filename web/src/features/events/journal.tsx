@@ -23,12 +23,18 @@ import { Select } from "../../ui/select";
 import { SeenPicture } from "../../video/seen-picture";
 import { Filters, SiteSelect } from "./alarm-panel";
 import { MAX_ROBOTS, searchAuditLogs } from "./audit-log-search";
+import { DayView } from "./day-view";
 import type { AuditLine, EventEntry } from "./entries";
 import { audits, eventEntries, events, MAX_ENTRIES, useEntries } from "./entries";
 import { VirtualList } from "./virtual-list";
 
-const KINDS = ["events", "notes", "requests"] as const;
-const KIND_TEXTS = { events: "journal_events", notes: "journal_notes", requests: "journal_requests" } as const;
+const KINDS = ["events", "notes", "requests", "day"] as const;
+const KIND_TEXTS = {
+  events: "journal_events",
+  notes: "journal_notes",
+  requests: "journal_requests",
+  day: "journal_day",
+} as const;
 const LEAST = { any_severity: Severity.DEBUG, from_warning: Severity.WARNING, from_error: Severity.ERROR } as const;
 const SINCE_S = { any_time: Number.POSITIVE_INFINITY, last_hour: 3600, last_day: 86_400 } as const;
 const WHAT = { any_outcome: null, outcome_refused: Outcome.REFUSED, outcome_failed: Outcome.FAILED } as const;
@@ -75,6 +81,8 @@ export function Journal() {
   const sites = [
     ...new Set([...fleetRobots.value.map((key) => key.split("/")[1] ?? ""), ...all.map((entry) => entry.site)]),
   ];
+  // Of a day there is one robot at a time.
+  const dayKey = robots.find((key) => key.split("/")[2] === robot) ?? robots[0];
   const names = [...new Set(robots.map((key) => key.split("/")[2] ?? ""))].sort();
 
   const chosenRobots = (): readonly string[] | null => {
@@ -129,10 +137,14 @@ export function Journal() {
           choose={setKind}
         />
         <span class="panel-end">
-          <span class="dim small">{e("shown_of", { shown: count(listed.length), all: count(all.length) })}</span>
-          <Toggle on={pausedEntries !== null} set={(on) => setPausedEntries(on ? newest : null)}>
-            {pausedEntries ? e("go_on", { count: Math.max(0, newest.length - pausedEntries.length) }) : e("pause")}
-          </Toggle>
+          {kind !== "day" && (
+            <span class="dim small">{e("shown_of", { shown: count(listed.length), all: count(all.length) })}</span>
+          )}
+          {kind !== "day" && (
+            <Toggle on={pausedEntries !== null} set={(on) => setPausedEntries(on ? newest : null)}>
+              {pausedEntries ? e("go_on", { count: Math.max(0, newest.length - pausedEntries.length) }) : e("pause")}
+            </Toggle>
+          )}
         </span>
       </div>
       <Filters>
@@ -141,22 +153,26 @@ export function Journal() {
         ) : kind === "requests" ? (
           <Select label={e("outcome")} value={outcome} values={keysOf(WHAT)} text={outcomeText} choose={setOutcome} />
         ) : null}
-        <Select label={e("time")} value={since} values={keysOf(SINCE_S)} text={e} choose={setSince} />
+        {kind !== "day" && (
+          <Select label={e("time")} value={since} values={keysOf(SINCE_S)} text={e} choose={setSince} />
+        )}
         <SiteSelect site={site} sites={sites} choose={(name) => (setSite(name), setRobot(""))} />
         <Select
           label={e("robot")}
-          value={robot}
-          values={["", "-", ...names]}
+          value={kind === "day" ? (dayKey?.split("/")[2] ?? "") : robot}
+          values={kind === "day" ? names : ["", "-", ...names]}
           text={(name) => (name === "-" ? e("whole_site") : name || e("every_robot"))}
           choose={setRobot}
         />
-        <input
-          type="search"
-          placeholder={e("search")}
-          aria-label={`${e("search")}, ${e("journal")}`}
-          value={text}
-          onInput={(event) => setText(event.currentTarget.value)}
-        />
+        {kind !== "day" && (
+          <input
+            type="search"
+            placeholder={e("search")}
+            aria-label={`${e("search")}, ${e("journal")}`}
+            value={text}
+            onInput={(event) => setText(event.currentTarget.value)}
+          />
+        )}
         {kind === "notes" && (
           <button class="action list-end" onClick={() => void readOlderNotes()}>
             {n("older")}
@@ -168,8 +184,14 @@ export function Journal() {
           </button>
         )}
       </Filters>
-      {notice && kind !== "events" && <NoticeLine notice={notice} />}
-      {listed.length === 0 ? (
+      {notice && (kind === "notes" || kind === "requests") && <NoticeLine notice={notice} />}
+      {kind === "day" ? (
+        dayKey ? (
+          <DayView key={dayKey} robotKey={dayKey} events={events.newest.value} />
+        ) : (
+          <p class="empty">{e("no_entries")}</p>
+        )
+      ) : listed.length === 0 ? (
         <p class="empty">{e(all.length ? "no_entries_match" : "no_entries")}</p>
       ) : (
         <VirtualList
@@ -188,7 +210,9 @@ export function Journal() {
         />
       )}
       {open && <Details key={open.id} entry={open} withdrawn={isWithdrawn(open)} close={() => setOpen(null)} />}
-      {all.length >= MAX_ENTRIES && <p class="footnote dim">{e("oldest_left_out", { count: count(MAX_ENTRIES) })}</p>}
+      {kind !== "day" && all.length >= MAX_ENTRIES && (
+        <p class="footnote dim">{e("oldest_left_out", { count: count(MAX_ENTRIES) })}</p>
+      )}
     </section>
   );
 }

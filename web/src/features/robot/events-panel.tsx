@@ -5,14 +5,12 @@ import type { AuditEntry, ControllerState, Description_Joint, Event } from "../.
 import { entrySentence } from "../../i18n/audit-text";
 import { eventText } from "../../i18n/event-text";
 import { count, stampFull, stampTime } from "../../i18n/format";
-import { n } from "../../i18n/notes";
 import { t } from "../../i18n/texts";
 import { useMotionTimes } from "../../mesh/motion-times";
-import type { NoteTime } from "../../mesh/notes";
 import { WRITTEN, withdrawnIds } from "../../mesh/notes";
 import type { Latest } from "../../mesh/topics";
 import { useAudit } from "../../mesh/topics";
-import { NoteForm, Withdrawable } from "../../panels/note-form";
+import { Withdrawable } from "../../panels/note-form";
 import { Choice } from "../../ui/choice";
 import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
 import { Panel } from "../../ui/panel";
@@ -20,8 +18,6 @@ import { SeenPicture } from "../../video/seen-picture";
 import { LinkFacts } from "./link-facts";
 
 const SHOWN = ["events", "requests", "link"] as const;
-const BEFORE_S = { now: 0, last_10: 10, last_60: 60 } as const;
-const NOTED = Object.keys(BEFORE_S) as (keyof typeof BEFORE_S)[];
 
 export function EventsPanel(props: {
   robotKey: string;
@@ -31,8 +27,6 @@ export function EventsPanel(props: {
 }) {
   const { robotKey, events } = props;
   const [shown, setShown] = useState<(typeof SHOWN)[number]>("events");
-  const [noting, setNoting] = useState(false);
-  const [noted, setNoted] = useState<keyof typeof BEFORE_S>("now");
   const audit = useAudit(robotKey);
   const withdrawn = withdrawnIds(events);
   const times = useMotionTimes(audit, props.controller?.message);
@@ -41,20 +35,8 @@ export function EventsPanel(props: {
     <Panel
       name="events"
       title={t(shown)}
-      end={
-        <>
-          <Choice label={t("events")} values={SHOWN} chosen={shown} text={(each) => t(each)} choose={setShown} />
-          <button class="quiet" aria-expanded={noting} title={n("note_hint")} onClick={() => setNoting(!noting)}>
-            {n("note")}
-          </button>
-        </>
-      }
+      end={<Choice label={t("events")} values={SHOWN} chosen={shown} text={(each) => t(each)} choose={setShown} />}
     >
-      {noting && (
-        <NoteForm robotKey={robotKey} on={() => timeBefore(noted)} close={() => setNoting(false)}>
-          <Choice label={n("on")} values={NOTED} chosen={noted} text={n} choose={setNoted} />
-        </NoteForm>
-      )}
       {shown === "link" ? (
         <LinkFacts controller={props.controller} />
       ) : (
@@ -77,12 +59,6 @@ export function EventsPanel(props: {
       )}
     </Panel>
   );
-}
-
-/** Return the range of the last seconds; null: now. */
-function timeBefore(chosen: keyof typeof BEFORE_S): NoteTime | null {
-  const end = Date.now();
-  return chosen === "now" ? null : { begin: end - BEFORE_S[chosen] * 1000, end };
 }
 
 function EventLine({ event, withdrawn }: { event: Event; withdrawn: boolean }) {

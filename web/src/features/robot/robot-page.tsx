@@ -43,6 +43,7 @@ import { EventsPanel } from "./events-panel";
 import { JointHistory } from "./joint-history";
 import { JointsPanel } from "./joints-panel";
 import { ClockHint, TopicChoice } from "./low-bandwidth";
+import { NoteButton, NotePanel } from "./note-panel";
 import { isShown, ProgramLine } from "./program-line";
 import { RecordButton, RecordPanel } from "./record-panel";
 
@@ -100,6 +101,7 @@ export function RobotPage({ site, robot }: RobotName) {
           {isShown(program, events) && program.message.outcome === Outcome.ENDED && <ProgramLine latest={program} />}
           <ControlRequests robotKey={key} holder={holder} lease={lease?.message} />
           <RecordPanel robotKey={key} description={description?.message} />
+          <NotePanel robotKey={key} />
         </Messages>
         <div class="side">
           <ControlPanel
@@ -195,6 +197,7 @@ function Headline(props: {
           {t("program")}
         </a>
         <RecordButton robotKey={`robomesh/${props.site}/${props.name}`} />
+        <NoteButton />
         <TopicChoice robotKey={`robomesh/${props.site}/${props.name}`} />
         {/* A program replaces less important facts, so that nothing below moves. */}
         {runs || (
