@@ -12,7 +12,7 @@ from playwright.sync_api import expect
 from robomesh.errors import RefusedError
 from robomesh.keys import WHOLE_SITE
 from robomesh.schemas import robomesh_pb2 as schema
-from services import player, recorder
+from services import player, recorder, store
 from tests.browser.robot_page import button, serious
 
 pytestmark = pytest.mark.browser
@@ -289,3 +289,81 @@ def test_the_steps_of_a_run_are_folded_under_it(open_page, recorded):
     expect(rows.nth(1)).to_contain_text("li asked move absolute")
     run.click()
     expect(rows).to_have_count(4)
+
+
+@pytest.fixture(scope="module")
+def noted(plant, tmp_path_factory):
+    """Run a store of the plant: notes can be written."""
+    folder = tmp_path_factory.mktemp("programs")
+
+    async def start():
+        settings = store.Settings(site="hall", robots=("pt600",), folder=folder)
+        task = plant.loop.create_task(store.serve(plant.session, settings))
+        async with asyncio.timeout(40):
+            while await plant.session.last(f"{ROBOT}/programs") is None:
+                await asyncio.sleep(0.05)
+        return task
+
+    async def end(task):
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    task = plant.call(start())
+    yield
+    plant.call(end(task))
+
+
+def test_a_note_of_one_page_is_seen_and_withdrawn_on_another(noted, plant, open_page):
+    mine, other = open_page("#/hall/pt600", drawn=False), open_page("#/events", drawn=False)
+    button(other, "Notes").click()
+    controls = mine.locator(".control button, .joints button, .stop")
+    before = controls.evaluate_all("all => all.map((each) => each.getBoundingClientRect().toJSON())")
+    button(mine, "Note…").click()
+    form = mine.get_by_role("form", name="Note")
+    assert controls.evaluate_all("all => all.map((each) => each.getBoundingClientRect().toJSON())") == before
+    form.get_by_label("Your name").fill("li")
+    form.get_by_label("Text").fill("gripper slips")
+    button(form, "Last minute").click()
+    button(form, "Save note").click()
+    line = other.locator(".journal-line", has_text="gripper slips")
+    expect(line).to_contain_text(re.compile(r"li noted on [\d:]+ – [\d:]+: gripper slips"))
+    expect(form).to_have_count(0)
+    line.click()
+    expect(other.locator(".entry-details")).to_contain_text("gripper slips")
+    expect(button(other, "Withdraw this note")).to_have_count(0)  # another author's
+    mine.goto(f"{plant.address}/#/events")
+    button(mine, "Notes").click()
+    mine.locator(".journal-line", has_text="gripper slips").click()
+    button(mine, "Withdraw this note").click()
+    for page in (mine, other):
+        expect(page.locator(".journal-line s")).to_contain_text("gripper slips")
+    button(other, "Day").click()
+    other.get_by_label("Robot", exact=True).select_option("pt600")
+    expect(other.locator(".day-hours s")).to_contain_text("gripper slips")
+    expect(other.locator(".day-gaps")).to_contain_text("This day is not complete")
+
+
+def test_a_note_on_a_recording_is_beside_it_and_its_file_is_unchanged(noted, recorded, plant, open_page):
+    before = plant.call(ask_info(plant, recorded))
+    page = open_page(f"#/recordings/hall/{recorded}")
+    events = page.get_by_role("region", name="Events")
+    button(events, "Note").click()
+    form = page.get_by_role("form", name="Note")
+    form.get_by_label("Your name").fill("wang")
+    form.get_by_label("Text").fill("starts late")
+    button(form, "From here to the position").click()
+    page.get_by_label("Moment", exact=True).fill("1.5")  # it plays, so the range grows
+    button(form, "Save note").click()
+    expect(events).to_contain_text("starts late")
+    expect(events).to_contain_text("Not in the file")
+    expect(page.locator(".note-range")).to_have_count(1)
+    again = open_page(f"#/recordings/hall/{recorded}", drawn=False)
+    expect(again.get_by_role("region", name="Events")).to_contain_text("starts late")
+    assert plant.call(ask_info(plant, recorded)) == before
+
+
+async def ask_info(plant, file):
+    """Return the size of a recording and its number of messages of each topic."""
+    query = schema.RecordingQuery(file=file)
+    info = await plant.session.ask(f"robomesh/hall/{WHOLE_SITE}/recordings/info", query, timeout_s=15.0)
+    return info.bytes, [(each.topic, each.messages) for each in info.topics]
