@@ -3,7 +3,7 @@
 import { useEffect, useState } from "preact/hooks";
 import type { DayTextName } from "../../i18n/day";
 import { d, lastedText } from "../../i18n/day";
-import { count, dateOf, fullTime, timeOfDay } from "../../i18n/format";
+import { count, DASH, dateOf, fullTime, timeOfDay } from "../../i18n/format";
 import { lostAt } from "../../mesh/connection";
 import type { DayLine, Totals } from "./day";
 import { exported, linesOf, spanOfDay, totalsOf, wordsOf } from "./day";
@@ -105,7 +105,7 @@ function Sentences(props: { robotKey: string; date: string; answers: DayAnswers;
     const totals = totalsOf(sources);
     const head = [
       `${name}  ${props.date}  ${Intl.DateTimeFormat().resolvedOptions().timeZone}`,
-      ...TOTALS.map((each) => `${d(each)}: ${lastedText(totals[each])}`),
+      ...TOTALS.map((each) => `${d(each)}: ${totalText(each, totals, props.answers, sources.eventsFrom)}`),
       ...missing(props.answers, sources.eventsFrom),
     ];
     const text = exported(linesOf(sources), head, timeOfDay, csv);
@@ -146,7 +146,7 @@ function Hours({
         {TOTALS.map((name) => (
           <div key={name} title={name === "unknown" ? d("unknown_hint") : undefined}>
             <dt class="dim small">{d(name)}</dt>
-            <dd class="figure">{lastedText(totals[name])}</dd>
+            <dd class="figure">{totalText(name, totals, answers, sources.eventsFrom)}</dd>
           </div>
         ))}
       </dl>
@@ -184,6 +184,12 @@ function Sentence({ line }: { line: DayLine }) {
       </span>
     </li>
   );
+}
+
+/** Return a total; a dash if its source is missing, because nothing was counted. */
+function totalText(name: keyof Totals, totals: Totals, { problems }: DayAnswers, eventsFrom: number | null): string {
+  const missing = name === "offline" ? eventsFrom === null : name !== "unknown" && problems.audit !== "";
+  return missing ? DASH : lastedText(totals[name]);
 }
 
 /** Return in sentences what is not known of the day. */
