@@ -462,6 +462,16 @@ POINT_TWICE = Code("program.point_twice", "point '{name}' is already defined in 
 POINT_NEAR = Code("program.point_near", "{word}: there is no point '{name}'; did you mean '{near}'?")
 POINT_UNKNOWN = Code("program.point_unknown", "{word}: there is no point '{name}'; there are {names}")
 POINT_NONE = Code("program.point_none", "{word}: there is no point '{name}'; none is defined")
+FRAME_FORM = Code(
+    "program.frame_form",
+    "'move_line_by' needs the frame of its numbers, not {given}",
+    "write 'move_line_by tool X Y Z ROLL PITCH YAW', or base or site instead of tool",
+)
+LINE_ROLL = Code(
+    "program.line_roll",
+    "lines leave the roll about the tool's axis free with five joints",
+    "move a joint instead",
+)
 TRACE_FORM = Code("program.trace_form", "'trace' takes on or off, not {given}")
 REPEAT_NOT_CLOSED = Code("program.repeat_not_closed", "'repeat' has no 'end'")
 REPEAT_NOT_WHOLE = Code("program.repeat_not_whole", "'repeat' takes a whole number, not {given}")

@@ -8,26 +8,29 @@ import numpy as np
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.collision import Arm
-from robots.inverse import InverseSolver, natural_task, solve
+from robots.inverse import InverseSolver, Task, natural_task, solve
+from robots.inverse.tasks import tool_misses
 from robots.joints import FloatArray
 from robots.model import tool_placement
-from robots.programs.lines import UnreachableError, follow_line, line_to
+from robots.programs.lines import BENT_DEG, UnreachableError, follow_line, line_to, nearest_axis
 from robots.programs.statements import (
     Home,
     JointTarget,
     MoveJoints,
     MoveLine,
+    MoveLineBy,
     PoseTarget,
     Program,
     Repeat,
     Speed,
     Statement,
+    StepFrame,
     Target,
     ToolSpeed,
     Trace,
     Wait,
 )
-from robots.programs.steps import LINE_DEG, Plan, Step, StepKind, Violation, ViolationKind
+from robots.programs.steps import LINE_DEG, LINE_M, Plan, Step, StepKind, Violation, ViolationKind
 from robots.programs.text import MOST_STEPS
 
 # Positions are rounded to 1e-9 rad and m, so that a repeat returns to bit-identical positions.
@@ -96,6 +99,9 @@ class _Planner:
                 case MoveLine(line, target):
                     for positions in self._line(line, self._pose(target)):
                         self._move(line, positions, along_line=True)
+                case MoveLineBy(line, frame, offset):
+                    for positions in self._line(line, self._moved(line, frame, offset)):
+                        self._move(line, positions, along_line=True)
                 case Speed(line, percent):
                     self._speed_set = True
                     self._add(Step(line=line, kind=StepKind.SPEED, percent=percent))
@@ -140,6 +146,39 @@ class _Planner:
         if isinstance(target, PoseTarget):
             return target.tool_to_base
         return tool_placement(self._arm.model, target.positions)
+
+    def _moved(self, line: int, frame: StepFrame, offset: FloatArray) -> FloatArray:
+        """Return the tool's pose (4, 4) moved by an offset from where it is; it turns about its origin."""
+        tool = tool_placement(self._arm.model, self._at)
+        match frame:
+            case StepFrame.TOOL:
+                axes = tool[:3, :3]
+            case StepFrame.BASE:
+                axes = np.eye(3)
+            case StepFrame.SITE:
+                axes = self._arm.base_to_site[:3, :3].T
+        moved = tool.copy()
+        moved[:3, 3] += axes @ offset[:3, 3]
+        turn = axes @ offset[:3, :3] @ axes.T
+        moved[:3, :3] = turn @ tool[:3, :3]
+        if self._task is not Task.POSITION_AND_AXIS_5D:
+            return moved
+        if np.allclose(turn, np.eye(3)):
+            return self._with_nearest_axis(line, moved)
+        if np.allclose(turn @ tool[:3, 2], tool[:3, 2]):
+            raise self._unreachable(line, codes.LINE_ROLL(), tool[:3, 3])
+        return moved
+
+    def _with_nearest_axis(self, line: int, pose: FloatArray) -> FloatArray:
+        """Return a pose with its axis as a five-joint arm can reach it there, if it need not turn far."""
+        model = self._arm.model
+        reached = tool_placement(model, nearest_axis(model, pose, self._at))
+        away, off = tool_misses(reached, pose, self._task)
+        if away > LINE_M / 100 or off > radians(BENT_DEG):
+            return pose  # for which the solver gives the reason
+        if off > radians(LINE_DEG):
+            self.bent[line] = max(off, self.bent.get(line, 0.0))
+        return reached
 
     def _line(self, number: int, end: FloatArray) -> Sequence[FloatArray]:
         assert self._solver is not None

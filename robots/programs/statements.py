@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import TypeAlias
 
 from robots.joints import FloatArray
@@ -49,6 +50,27 @@ class MoveLine:
     target: Target
 
 
+class StepFrame(StrEnum):
+    """The frame whose axes a `MoveLineBy` names."""
+
+    TOOL = "tool"
+    BASE = "base"
+    SITE = "site"
+
+
+@dataclass(frozen=True, eq=False)
+class MoveLineBy:
+    """Move by an offset, with the tool on a straight line, rotating uniformly about its origin.
+
+    Attributes:
+        offset: (4, 4) translation [m] and rotation along and about the frame's axes.
+    """
+
+    line: int
+    frame: StepFrame
+    offset: FloatArray
+
+
 @dataclass(frozen=True)
 class Speed:
     """Set the speed to a percentage of the joints' maximum speeds, 1 to 100."""
@@ -90,7 +112,7 @@ class Repeat:
     body: tuple["Statement", ...]
 
 
-Statement: TypeAlias = Home | MoveJoints | MoveLine | Speed | ToolSpeed | Wait | Trace | Repeat
+Statement: TypeAlias = Home | MoveJoints | MoveLine | MoveLineBy | Speed | ToolSpeed | Wait | Trace | Repeat
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@
     statement  = "home"
                | "move_joints" target          straight line in joint space
                | "move_line" target            straight line of the tool
+               | "move_line_by" frame 6*number   straight line of the tool, from where it is
                | "speed" number                percent of the joints' maximum speeds, 1 to 100
                | "tool_speed" number           mm/s: asserted limit for the following moves
                | "wait" number                 seconds
@@ -15,6 +16,7 @@
                | n*number                      of move_joints: degrees, mm of a prismatic joint
                | 6*number                      of move_line: x y z in mm, roll pitch yaw in degrees,
                                                the tool in the base frame
+    frame      = "tool" | "base" | "site"        whose axes x y z in mm, roll pitch yaw in degrees name
     name       = a-z *( a-z | 0-9 | "_" | "-" )
 
 Words are separated by blanks. Roll, pitch and yaw rotate about the fixed x, y and z axes, in this order.
@@ -38,11 +40,13 @@ from robots.programs.statements import (
     JointTarget,
     MoveJoints,
     MoveLine,
+    MoveLineBy,
     PoseTarget,
     Program,
     Repeat,
     Speed,
     Statement,
+    StepFrame,
     Target,
     ToolSpeed,
     Trace,
@@ -56,7 +60,10 @@ MOST_DEPTH = 20
 _MOST_PROBLEMS = 100
 _LONGEST_NAME = 64
 
-_STATEMENTS = ("home", "move_joints", "move_line", "point", "speed", "tool_speed", "wait", "trace", "repeat")
+_STATEMENTS = (
+    *("home", "move_joints", "move_line", "move_line_by", "point"),
+    *("speed", "tool_speed", "wait", "trace", "repeat"),
+)
 _NAME = re.compile(r"[a-z][a-z0-9_-]*")
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 # Beyond any arm. A larger number is a typing error, and sums of such numbers may overflow.
@@ -179,6 +186,10 @@ class _Parser:
                 if target is None:
                     return None
                 return MoveJoints(line, target) if word == "move_joints" else MoveLine(line, target)
+            case "move_line_by":
+                if not rest or rest[0] not in tuple(StepFrame):
+                    raise _LineError(codes.FRAME_FORM(given=_given(rest[:1])))
+                return MoveLineBy(line, StepFrame(rest[0]), _pose_target(word, rest[1:]).tool_to_base)
             case "speed":
                 return Speed(line, _one_number(word, rest, 1.0, 100.0, "percent"))
             case "tool_speed":

@@ -10,6 +10,7 @@ from robots.programs.statements import (
     JointTarget,
     MoveJoints,
     MoveLine,
+    MoveLineBy,
     Program,
     Repeat,
     Speed,
@@ -56,6 +57,8 @@ def _written(statements: Sequence[Statement], joints: Joints, indent: str) -> It
                 yield f"{indent}move_joints {_target(statement.target, joints)}"
             case MoveLine():
                 yield f"{indent}move_line {_target(statement.target, joints)}"
+            case MoveLineBy():
+                yield f"{indent}move_line_by {statement.frame} {pose_words(statement.offset)}"
             case Speed():
                 yield f"{indent}speed {number(statement.percent)}"
             case ToolSpeed():

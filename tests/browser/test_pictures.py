@@ -73,7 +73,7 @@ def test_the_page_shows_the_arm_moving_in_3d_and_as_video(open_page, rendered):
     take(page)
     # A move has just begun, so that it is still going on when the picture is taken; nothing is late.
     slow, fast = (
-        "() => { const speed = Number.parseFloat(document.querySelectorAll('.tool dd')[6].textContent);"
+        "() => { const speed = Number.parseFloat(document.querySelectorAll('.tool .number')[6].textContent);"
         f" return speed {than} && !document.querySelector('.age, .scene-stale') }}"
         for than in ("< 5", "> 50")
     )

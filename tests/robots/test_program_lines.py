@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from trimesh.transformations import euler_matrix, rotation_from_matrix
 
 from robomesh import reason_codes as codes
 from robots.collision import build_cell
@@ -103,3 +104,41 @@ def test_program_without_a_speed_begins_with_100_percent() -> None:
         (StepKind.SPEED, 20.0),
         (StepKind.HOME, None),
     ]
+
+
+@pytest.mark.parametrize("frame", ["tool", "base", "site"])
+def test_a_step_moves_and_turns_the_tool_along_the_axes_of_its_frame(frame: str) -> None:
+    """Expected poses by trimesh's transformations."""
+    base_to_site = euler_matrix(*np.radians([20, -10, 135]))
+    arm = build_cell(cell_of({"puma560": ("puma560", base_to_site)})).arms["puma560"]
+    text = f"move_joints 0 -30 150 0 50 0\nmove_line_by {frame} 10 -20 30 5 -4 3\n"
+    plan = plan_program(parse_program(text, arm.joints), arm, SOLVERS["puma560"], arm.joints.home.copy())
+    assert not plan.violations
+    before, after = (
+        tool_placement(arm.model, [step for step in plan.steps if step.line == line][-1].target)
+        for line in (1, 2)
+    )
+    axes = {"tool": before[:3, :3], "base": np.eye(3), "site": base_to_site[:3, :3].T}[frame]
+    assert after[:3, 3] == pytest.approx(before[:3, 3] + axes @ [0.010, -0.020, 0.030], abs=1e-6)
+    offset = euler_matrix(*np.radians([5, -4, 3]))[:3, :3]
+    off = np.eye(4)
+    off[:3, :3] = (axes @ offset @ axes.T @ before[:3, :3]).T @ after[:3, :3]
+    assert abs(rotation_from_matrix(off)[0]) < 1e-5
+
+
+def test_five_joints_move_by_a_step_and_turn_only_as_they_can() -> None:
+    there = "move_joints 30 80 -80 20 0\nmove_line_by base "
+    plan = planned("pt600", f"{there} 0 60 0 0 0 0\n")
+    assert not plan.violations
+    before, after = (
+        tool_placement(ARMS["pt600"].model, [step for step in plan.steps if step.line == line][-1].target)
+        for line in (1, 2)
+    )
+    assert after[:3, 3] - before[:3, 3] == pytest.approx([0, 0.06, 0], abs=1e-5)
+    assert plan.notes[0].code == codes.CHECK_NOTE_BENT(angle_deg=1, lines="2").code
+    above = "move_line 400 0 300 180 0 0\nmove_line_by tool "
+    assert not planned("pt600", f"{above} 0 0 10 0 5 0\n").violations
+    for turn, why in (("5 0 0", "not this orientation"), ("0 0 10", "leave the roll")):
+        (violation,) = planned("pt600", f"{above} 0 0 0 {turn}\n").violations
+        assert (violation.kind, violation.line) == (ViolationKind.UNREACHABLE, 2)
+        assert why in violation.text

@@ -16,11 +16,13 @@ from robots.programs.statements import (
     JointTarget,
     MoveJoints,
     MoveLine,
+    MoveLineBy,
     PoseTarget,
     Program,
     Repeat,
     Speed,
     Statement,
+    StepFrame,
     Target,
     ToolSpeed,
     Trace,
@@ -48,6 +50,13 @@ TABLE: tuple[tuple[str, tuple[Statement, ...]], ...] = (
     ("move_joints 10 20 30 0 -5.5\n", (MoveJoints(3, JointTarget(ABOVE.positions)),)),
     ("move_line 400 0 300.25 180 0 90\n", (MoveLine(3, PoseTarget(PART.tool_to_base)),)),
     (
+        "move_line_by tool 0 0 -50 0 0 0\nmove_line_by site 10 0 0 0 0 90\n",
+        (
+            MoveLineBy(3, StepFrame.TOOL, pose_of(0.0, 0.0, -50.0, 0.0, 0.0, 0.0)),
+            MoveLineBy(4, StepFrame.SITE, pose_of(10.0, 0.0, 0.0, 0.0, 0.0, 90.0)),
+        ),
+    ),
+    (
         "repeat 3\n  home\n  repeat 2\n    wait 1\n  end\nend\n",
         (Repeat(3, 3, (Home(4), Repeat(5, 2, (Wait(6, 1.0),)))),),
     ),
@@ -62,6 +71,8 @@ def comparable(statement: Statement) -> tuple[object, ...]:
         target = statement.target
         values = target.positions if isinstance(target, JointTarget) else target.tool_to_base
         return (type(statement), statement.line, target.name, *np.round(values, 9).ravel().tolist())
+    if isinstance(statement, MoveLineBy):
+        return (statement.line, statement.frame, *np.round(statement.offset, 9).ravel().tolist())
     return (statement,)
 
 
@@ -85,7 +96,8 @@ WRONG = (
         "jump",
         codes.STATEMENT_UNKNOWN(
             word="jump",
-            names="home, move_joints, move_line, point, speed, tool_speed, wait, trace, repeat, end",
+            names="home, move_joints, move_line, move_line_by, point, "
+            "speed, tool_speed, wait, trace, repeat, end",
         ),
     ),
     ("speed 300", codes.NUMBER_OUTSIDE(word="speed", given="300", least=1, most=100, unit="percent")),
@@ -97,6 +109,12 @@ WRONG = (
     ("tool_speed 0", codes.NUMBER_OUTSIDE(word="tool_speed", given="0", least=1, most=10_000, unit="mm/s")),
     ("trace maybe", codes.TRACE_FORM(given="'maybe'")),
     ("trace", codes.TRACE_FORM(given="nothing")),
+    ("move_line_by", codes.FRAME_FORM(given="nothing")),
+    ("move_line_by 1 2 3 4 5 6", codes.FRAME_FORM(given="'1'")),
+    (
+        "move_line_by tool 1 2 3",
+        codes.POSE_NUMBERS(word="move_line_by", count=6, names="x y z roll pitch yaw", given=3),
+    ),
     ("point home = joints 1 2 3 4 5", codes.POINT_RESERVED(name="home")),
     ("point end = pose 1 2 3 4 5 6", codes.POINT_RESERVED(name="end")),
     ("home now", codes.NO_ARGUMENT(word="home", given="now")),

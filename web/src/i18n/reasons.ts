@@ -691,6 +691,20 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     "program.point_none",
     ["{word}: there is no point '{name}'; none is defined", "{word}：没有点“{name}”；尚未定义任何点"],
   ],
+  [
+    "program.frame_form",
+    [
+      "'move_line_by' needs the frame of its numbers, not {given}: write 'move_line_by tool X Y Z ROLL PITCH YAW', or base or site instead of tool",
+      "“move_line_by”须写明坐标系，而不是 {given}：请写“move_line_by tool X Y Z ROLL PITCH YAW”，坐标系可为 tool、base 或 site",
+    ],
+  ],
+  [
+    "program.line_roll",
+    [
+      "lines leave the roll about the tool's axis free with five joints: move a joint instead",
+      "五关节机械臂的直线运动不约束工具绕自身轴线的转角：请改为移动关节",
+    ],
+  ],
   ["program.trace_form", ["'trace' takes on or off, not {given}", "“trace”须为 on 或 off，而不是 {given}"]],
   ["program.repeat_not_closed", ["'repeat' has no 'end'", "“repeat”没有“end”"]],
   ["program.repeat_not_whole", ["'repeat' takes a whole number, not {given}", "“repeat”须为整数，而不是 {given}"]],

@@ -230,6 +230,15 @@ const TEXTS = {
   steps_dropped: ["Steps that waited and are not sent: {count}.", "等待中未发送的步数：{count}。"],
   step_not_there: ["{joint} did not arrive where its step leads.", "{joint} 未到达该步的目标。"],
   joint_hint_take: ["Take control to move the joints.", "取得控制权后可移动关节。"],
+  step_frame: ["Axes of the steps", "步进坐标系"],
+  frame_tool: ["Tool", "工具"],
+  frame_base: ["Base", "基座"],
+  frame_site: ["Site", "站点"],
+  tool_step_hint: [
+    "Each press is a straight line of the tool, at most {percent} % and {speed} mm/s.",
+    "每按一次，工具走一段直线，最高 {percent} % 及 {speed} mm/s。",
+  ],
+  tool_step_checked: ["{what}: the gateway checks the way…", "{what}：网关正在检查路径…"],
   enter_sends: ["Not sent yet: Enter sends {value}, Escape takes it back.", "尚未发送：回车发送 {value}，Esc 取消。"],
 
   control: ["Control", "控制"],

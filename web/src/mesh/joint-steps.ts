@@ -1,42 +1,30 @@
-// Steps of single joints by the ± buttons: one for each press, in order, none lost or repeated.
-//
-// The controller adds a step to the position at which it reads it. The next step is therefore sent when the
-// arm rests at the last target: two quick presses of 1° make 2°, not less.
+// Steps of single joints. The controller adds a step to the position at which it reads it.
 
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useEffect } from "preact/hooks";
 import type { Description_Joint } from "../gen/robomesh_pb";
 import { jointText, jointTitle } from "../i18n/format";
 import { t } from "../i18n/texts";
 import { Command, command } from "./command";
 import type { Notice } from "./control";
+import type { StepQueue } from "./step-queue";
+import { useStepQueue } from "./step-queue";
 
-const MOST_WAITING = 10;
 const ARRIVED = 0.1; // of the step
 const STILL_MS = 150;
 const STUCK_MS = 2500;
 
-interface Step {
+interface JointStep {
   index: number;
   offset: number; // rad or m
 }
-interface Going extends Step {
+interface Sent {
   target: number;
   what: string;
-  accepted: boolean;
   /** The warning of the gateway's check. */
-  warning?: string;
+  warning: string | undefined;
 }
 
-export interface Steps {
-  press: (index: number, offset: number) => void;
-  waiting: number;
-  /** A step is being carried out: its motion does not block the next. */
-  going: boolean;
-  /** The last refused step, until the next press. */
-  refused: Step | null;
-}
-
-export function useSteps(props: {
+export function useJointSteps(props: {
   robotKey: string;
   joints: readonly Description_Joint[];
   current: readonly (number | undefined)[];
@@ -44,82 +32,43 @@ export function useSteps(props: {
   /** The controller does not report whether it moves. */
   resting: boolean;
   tell: (notice: Notice) => void;
-}): Steps {
+}): StepQueue<JointStep, Sent> {
   const { joints, current, enabled, resting, tell } = props;
-  const [waiting, setWaiting] = useState<readonly Step[]>([]);
-  const [going, setGoing] = useState<Going | null>(null);
-  const [refused, setRefused] = useState<Step | null>(null);
-
-  const count = useRef(0);
-  count.current = waiting.length;
-  /** Drop the waiting steps after a failed one: they assumed that it reached its target. */
-  const drop = (text: string) => {
-    const dropped = count.current ? ` ${t("steps_dropped", { count: count.current })}` : "";
-    tell({ kind: "refused", text: text + dropped });
-    setWaiting([]);
-    setGoing(null);
+  const send = async ({ index, offset }: JointStep, told: (notice: Notice) => void): Promise<Sent | null> => {
+    const at = current[index];
+    const joint = joints[index];
+    if (!joint || at === undefined) return null;
+    const what = `${jointTitle(joint)} ${offset > 0 ? "+" : ""}${jointText(joint, offset)}`;
+    const jointPositions = joints.map((_, i) => (i === index ? offset : 0));
+    let warning: string | undefined;
+    const accepted = await command(props.robotKey, Command.MOVE_RELATIVE, what, { jointPositions }, (notice) => {
+      warning = notice.warning ?? warning;
+      told(notice);
+    });
+    return accepted ? { target: at + offset, what, warning } : null;
   };
-  const position = going ? current[going.index] : undefined;
-  const off = going && position !== undefined ? (going.target - position) / Math.abs(going.offset) : null;
+  const steps = useStepQueue({ enabled, tell, send });
+  const { step, sent } = steps.going ?? { step: null, sent: null };
+  const position = step ? current[step.index] : undefined;
+  const off = sent && position !== undefined ? (sent.target - position) / Math.abs(step.offset) : null;
   const arrived = off !== null && Math.abs(off) <= ARRIVED && resting;
-
-  const start = async (step: Step) => {
-    const at = current[step.index];
-    const joint = joints[step.index];
-    if (!joint || at === undefined) return;
-    const what = `${jointTitle(joint)} ${step.offset > 0 ? "+" : ""}${jointText(joint, step.offset)}`;
-    const mine = { ...step, target: at + step.offset, what, accepted: false };
-    setGoing(mine);
-    const jointPositions = joints.map((_, i) => (i === step.index ? step.offset : 0));
-    let warned = {};
-    const refuse = (notice: Notice) => {
-      if (notice.warning) warned = { warning: notice.warning };
-      if (notice.kind !== "refused") return tell(notice);
-      setRefused(step);
-      drop(notice.text);
-    };
-    if (await command(props.robotKey, Command.MOVE_RELATIVE, what, { jointPositions }, refuse)) {
-      setGoing((now) => (now === mine ? { ...mine, ...warned, accepted: true } : now));
-    }
-  };
-
-  useEffect(() => {
-    const [next, ...rest] = waiting;
-    if (going || !next) return;
-    setWaiting(rest);
-    void start(next);
-  }, [going, waiting]);
 
   // Each advance by a twentieth of the step restarts the timeout.
   useEffect(() => {
-    if (!going?.accepted) return;
-    const moved = joints[going.index];
-    const joint = moved ? jointTitle(moved) : "";
+    if (!sent) return;
+    const moved = joints[step.index];
     const done = () => {
-      setGoing(null);
+      steps.done();
       tell({
         kind: "done",
-        text: t("motion_done", { what: going.what }),
-        ...(going.warning && { warning: going.warning }),
+        text: t("motion_done", { what: sent.what }),
+        ...(sent.warning && { warning: sent.warning }),
       });
     };
     const timer = arrived
       ? setTimeout(done, STILL_MS)
-      : setTimeout(() => drop(t("step_not_there", { joint })), STUCK_MS);
+      : setTimeout(() => steps.fail(t("step_not_there", { joint: moved ? jointTitle(moved) : "" })), STUCK_MS);
     return () => clearTimeout(timer);
-  }, [going, arrived, off === null ? null : Math.round(off * 20)]);
-
-  useEffect(() => {
-    if (enabled) return;
-    setWaiting([]);
-    setGoing(null);
-    setRefused(null);
-  }, [enabled]);
-
-  const press = (index: number, offset: number) => {
-    setRefused(null);
-    if (waiting.length < MOST_WAITING) setWaiting((steps) => [...steps, { index, offset }]);
-    else tell({ kind: "refused", text: t("steps_many", { count: MOST_WAITING }) });
-  };
-  return { press, waiting: waiting.length, going: going !== null, refused };
+  }, [sent, arrived, off === null ? null : Math.round(off * 20)]);
+  return steps;
 }

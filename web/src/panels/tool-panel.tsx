@@ -1,5 +1,6 @@
 // The tool's position and speed, and the arm's distances to its limits.
 
+import type { ComponentChildren } from "preact";
 import type { Description, KinematicState } from "../gen/robomesh_pb";
 import { fixed, rollPitchYaw, toDegrees } from "../i18n/format";
 import { t } from "../i18n/texts";
@@ -10,11 +11,23 @@ import { Age } from "../ui/state";
 import { Unit } from "../ui/unit";
 import { JointLimitsPanel } from "./joint-limits-panel";
 
+export const POSE_AXES = ["x", "y", "z", "roll", "pitch", "yaw"] as const;
+export type Axis = (typeof POSE_AXES)[number];
+
+/** What moves the tool, for the operator in control. */
+export interface ToolSteps {
+  choices: ComponentChildren;
+  button: (axis: Axis, sign: 1 | -1) => ComponentChildren;
+  notice: ComponentChildren;
+}
+
 export function ToolPanel(props: {
   robotKey: string;
   kinematics: Latest<KinematicState> | undefined;
   description: Description | undefined;
+  steps?: ToolSteps;
 }) {
+  const { steps } = props;
   const state = props.kinematics?.message;
   const age = ageOf(props.kinematics);
   const stale = isStale("kinematics", age);
@@ -27,18 +40,27 @@ export function ToolPanel(props: {
     <Panel
       name="tool"
       title={t("tool")}
-      end={props.kinematics ? <Age stale={stale} age={age} /> : <span class="dim">{t("no_data")}</span>}
+      end={
+        <>
+          {props.kinematics ? <Age stale={stale} age={age} /> : <span class="dim">{t("no_data")}</span>}
+          {steps?.choices}
+        </>
+      }
     >
-      <dl class={`numbers ${stale && state ? "stale" : ""}`}>
-        {(["x", "y", "z"] as const).map((axis, i) => (
-          <NumberRow key={axis} label={axis} text={fixed(millimetres(at[i]), 1)} unit="mm" />
-        ))}
-        {(["roll", "pitch", "yaw"] as const).map((axis, i) => (
-          <NumberRow key={axis} label={t(axis)} text={fixed(angles[i], 2)} unit="°" />
+      <dl class={`numbers ${steps ? "stepped" : ""} ${stale && state ? "stale" : ""}`}>
+        {POSE_AXES.map((axis, i) => (
+          <NumberRow
+            key={axis}
+            label={i < 3 ? axis : t(axis as "roll" | "pitch" | "yaw")}
+            text={i < 3 ? fixed(millimetres(at[i]), 1) : fixed(angles[i - 3], 2)}
+            unit={i < 3 ? "mm" : "°"}
+            {...(steps && { minus: steps.button(axis, -1), plus: steps.button(axis, 1) })}
+          />
         ))}
         <NumberRow label={t("tool_speed")} text={fixed(speed, 1)} unit="mm/s" />
         <NumberRow label={t("manipulability")} text={fixed(state?.manipulability, 4)} unit="" />
       </dl>
+      {steps?.notice}
       <JointLimitsPanel robotKey={props.robotKey} state={state} description={props.description} stale={stale} />
     </Panel>
   );
@@ -48,13 +70,23 @@ function millimetres(metres: number | undefined): number | undefined {
   return metres === undefined ? undefined : metres * 1000;
 }
 
-function NumberRow(props: { label: string; text: string; unit: string }) {
+function NumberRow(props: {
+  label: string;
+  text: string;
+  unit: string;
+  minus?: ComponentChildren;
+  plus?: ComponentChildren;
+}) {
   return (
     <div>
       <dt title={props.label}>{props.label}</dt>
       <dd>
-        {props.text}
-        <Unit of={props.unit} />
+        {props.minus}
+        <span class="number">
+          {props.text}
+          <Unit of={props.unit} />
+        </span>
+        {props.plus}
       </dd>
     </div>
   );

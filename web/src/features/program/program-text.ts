@@ -18,7 +18,9 @@ export type Move = "move_joints" | "move_line";
 const POINT = /^\s*point\s+(\S+)\s*=\s*(joints|pose)\b([^#]*)/;
 const NAME = /^[a-z][a-z0-9_-]*$/;
 const MOVES_TO = /^(\s*(?:move_joints|move_line)\s+)(\S+)/;
-const KEYWORDS = new Set("point home speed tool_speed move_joints move_line wait trace repeat end".split(" "));
+const KEYWORDS = new Set(
+  "point home speed tool_speed move_joints move_line move_line_by wait trace repeat end".split(" "),
+);
 const SMALL = Math.PI / 6;
 
 export const isName = (text: string): boolean => NAME.test(text);

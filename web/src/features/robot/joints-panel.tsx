@@ -11,7 +11,7 @@ import { Command, command } from "../../mesh/command";
 import { reachable } from "../../mesh/connection";
 import type { Notice } from "../../mesh/control";
 import { controlNotice, holds } from "../../mesh/control";
-import { useSteps } from "../../mesh/joint-steps";
+import { useJointSteps } from "../../mesh/joint-steps";
 import type { Motion } from "../../mesh/notice-expiry";
 import { useNoticeExpiry } from "../../mesh/notice-expiry";
 import { whyNoNewMotion, whyNoTarget } from "../../mesh/robot-state";
@@ -25,6 +25,7 @@ import { JointValue } from "../../ui/joint-value";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
 import { Age } from "../../ui/state";
+import { StepButton } from "../../ui/step-button";
 
 const REACHED = 0.002; // rad or m: half of what the page displays
 const ABANDONED_MS = 1500;
@@ -109,9 +110,16 @@ export function JointsPanel(props: {
   };
   const [size, setSize] = useState<(typeof STEPS)[number]>("1");
   const unmoved = !MOVES.has(props.controller?.activity ?? Activity.ACTIVITY_UNKNOWN);
-  const steps = useSteps({ robotKey, joints: rows, current, enabled: keepsTargets, resting: unmoved, tell: setNotice });
+  const steps = useJointSteps({
+    robotKey,
+    joints: rows,
+    current,
+    enabled: keepsTargets,
+    resting: unmoved,
+    tell: setNotice,
+  });
   // The start of a step would be unknown during another motion.
-  const canStep = enabled && (unmoved || steps.going);
+  const canStep = enabled && (unmoved || steps.going !== null);
   const units = [...new Set(rows.map((joint) => jointUnit(joint).unit))].join(" / ");
 
   const set = preview && rows[preview.index];
@@ -164,7 +172,7 @@ export function JointsPanel(props: {
                 })}
                 sign={sign}
                 enabled={canStep}
-                press={() => steps.press(index, (sign * Number(size)) / factor)}
+                press={() => steps.press({ index, offset: (sign * Number(size)) / factor })}
               />
             );
           return (
@@ -217,23 +225,6 @@ export function JointsPanel(props: {
         idle={idle}
       />
     </Panel>
-  );
-}
-
-/** A button that steps once a press, without repeat. Space does not press it: Space requests a stop. */
-function StepButton(props: { name: string; sign: 1 | -1; enabled: boolean; press: () => void }) {
-  return (
-    <button
-      class="step"
-      data-moves
-      aria-label={props.name}
-      title={props.name}
-      disabled={!props.enabled}
-      onClick={props.press}
-      onKeyDown={(event) => event.repeat && event.preventDefault()}
-    >
-      {props.sign > 0 ? "+" : "−"}
-    </button>
   );
 }
 

@@ -30,7 +30,6 @@ import { ControlRequests } from "../../panels/control/who-controls";
 import { Messages } from "../../panels/messages";
 import { RobotAlarm } from "../../panels/robot-alarm";
 import { NoRobot, useRobotSearch } from "../../panels/robot-not-found";
-import { ToolPanel } from "../../panels/tool-panel";
 import type { Stage } from "../../scene/robot-scene";
 import { SceneView } from "../../scene/scene-view";
 import { jointsTopic } from "../../scene/topic-selection";
@@ -46,6 +45,7 @@ import { ClockHint, TopicChoice } from "./low-bandwidth";
 import { NoteButton, NotePanel } from "./note-panel";
 import { isShown, ProgramLine } from "./program-line";
 import { RecordButton, RecordPanel } from "./record-panel";
+import { RobotTool } from "./robot-tool";
 
 /** The page of a live robot; a replay has its own page, without commands. */
 export function RobotPage({ site, robot }: RobotName) {
@@ -122,7 +122,13 @@ export function RobotPage({ site, robot }: RobotName) {
             stale={stale}
             age={joints ? age : undefined}
           />
-          <ToolPanel robotKey={key} kinematics={kinematics} description={description?.message} />
+          <RobotTool
+            robotKey={key}
+            kinematics={kinematics}
+            description={description?.message}
+            controller={state}
+            program={program?.message}
+          />
           <EventsPanel
             robotKey={key}
             events={events}

@@ -1,0 +1,147 @@
+// The tool of a live robot, with steps on straight lines along and about the axes of a frame.
+//
+// A step is a program of one line, so the gateway plans and checks its whole way.
+
+import { useEffect, useState } from "preact/hooks";
+import type { ControllerState, Description, KinematicState, ProgramState } from "../../gen/robomesh_pb";
+import { ProgramState_Outcome as Outcome } from "../../gen/robomesh_pb";
+import { reasonText } from "../../i18n/reasons";
+import { t } from "../../i18n/texts";
+import { Command, command } from "../../mesh/command";
+import { reachable } from "../../mesh/connection";
+import type { Notice } from "../../mesh/control";
+import { holds, ms } from "../../mesh/control";
+import { whyNoNewMotion, whyNoTarget } from "../../mesh/robot-state";
+import { whyFrozen } from "../../mesh/sight";
+import { useStepQueue } from "../../mesh/step-queue";
+import type { Latest } from "../../mesh/topics";
+import { now } from "../../mesh/topics";
+import type { Axis } from "../../panels/tool-panel";
+import { POSE_AXES, ToolPanel } from "../../panels/tool-panel";
+import { Choice } from "../../ui/choice";
+import { NoticeLine } from "../../ui/notice-line";
+import { StepButton } from "../../ui/step-button";
+
+const FRAMES = ["tool", "base", "site"] as const;
+const STEPS = ["1", "5", "20"] as const; // mm or degrees
+const MOST_SPEED_PERCENT = 25;
+const MOST_TOOL_SPEED = 250; // mm/s
+const NOT_STARTED_MS = 5000;
+
+interface ToolStep {
+  axis: Axis;
+  frame: (typeof FRAMES)[number];
+  amount: number; // mm or degrees
+}
+interface Sent {
+  what: string;
+  /** When the program before it started. */
+  before: number;
+  warning: string | undefined;
+}
+
+export function RobotTool(props: {
+  robotKey: string;
+  kinematics: Latest<KinematicState> | undefined;
+  description: Description | undefined;
+  controller: ControllerState | undefined;
+  program: ProgramState | undefined;
+}) {
+  const { robotKey, controller, program } = props;
+  const [frame, setFrame] = useState<(typeof FRAMES)[number]>("tool");
+  const [size, setSize] = useState<(typeof STEPS)[number]>("5");
+  const [notice, setNotice] = useState<Notice | null>(null);
+  const mine = holds(robotKey);
+  const whyNone = reachable.value ? whyNoTarget(controller) || whyFrozen(robotKey, now.value) : t("no_connection");
+  const queue = useStepQueue<ToolStep, Sent>({
+    enabled: mine && !whyNone,
+    tell: setNotice,
+    send: async (step, tell) => {
+      const what = nameOf(step);
+      const before = ms(program?.since);
+      let warning: string | undefined;
+      const values = { program: programOf(step, controller?.speedPercent), programName: what };
+      const accepted = await command(robotKey, Command.RUN_PROGRAM, what, values, (told) => {
+        warning = told.warning ?? warning;
+        tell(told.kind === "busy" ? { ...told, text: t("tool_step_checked", { what }) } : told);
+      });
+      return accepted ? { what, before, warning } : null;
+    },
+  });
+  useEffect(() => {
+    if (!mine) setNotice(null);
+  }, [mine]);
+
+  const sent = queue.going?.sent;
+  const begun = sent && program && ms(program.since) !== sent.before;
+  const outcome = begun ? program.outcome : Outcome.OUTCOME_UNSPECIFIED;
+  useEffect(() => {
+    if (!sent || outcome === Outcome.RUNNING) return;
+    if (outcome === Outcome.DONE) {
+      queue.done();
+      const warned = sent.warning ? { warning: sent.warning } : {};
+      setNotice({ kind: "done", text: t("motion_done", { what: sent.what }), ...warned });
+    } else if (outcome === Outcome.ENDED) {
+      queue.fail(`${t("motion_ended", { what: sent.what })}. ${reasonText(program?.reason, program?.text)}`);
+    } else {
+      const timer = setTimeout(() => queue.fail(t("motion_ended", { what: sent.what })), NOT_STARTED_MS);
+      return () => clearTimeout(timer);
+    }
+  }, [sent, outcome]);
+
+  const why = whyNone || (queue.going ? "" : whyNoNewMotion(controller));
+  const enabled = mine && !why;
+  const idle = queue.waiting
+    ? t("steps_wait", { count: queue.waiting })
+    : why || t("tool_step_hint", { percent: MOST_SPEED_PERCENT, speed: MOST_TOOL_SPEED });
+  const step = (axis: Axis, sign: 1 | -1) => {
+    const wanted = { axis, frame, amount: sign * Number(size) };
+    return <StepButton name={nameOf(wanted)} sign={sign} enabled={enabled} press={() => queue.press(wanted)} />;
+  };
+  const steps = {
+    choices: (
+      <>
+        <Choice
+          label={t("step_frame")}
+          values={FRAMES}
+          chosen={frame}
+          text={(each) => t(`frame_${each}`)}
+          choose={setFrame}
+        />
+        <Choice label={t("step")} values={STEPS} chosen={size} text={(each) => each} choose={setSize} />
+      </>
+    ),
+    button: step,
+    notice: <NoticeLine notice={queue.waiting && notice?.kind !== "refused" ? null : notice} idle={idle} />,
+  };
+  return (
+    <ToolPanel
+      robotKey={robotKey}
+      kinematics={props.kinematics}
+      description={props.description}
+      {...(mine && { steps })}
+    />
+  );
+}
+
+function axisText(axis: ToolStep["axis"]): string {
+  return isTurn(axis) ? t(axis) : axis.toUpperCase();
+}
+
+function isTurn(axis: ToolStep["axis"]): axis is "roll" | "pitch" | "yaw" {
+  return axis !== "x" && axis !== "y" && axis !== "z";
+}
+
+/** Return the step in words, which is the program's name in the audit log: "Tool X +5 mm". */
+function nameOf({ axis, frame, amount }: ToolStep): string {
+  const size = `${Math.abs(amount)}${isTurn(axis) ? "°" : "\u202fmm"}`;
+  return `${t(`frame_${frame}`)} ${axisText(axis)} ${amount > 0 ? "+" : "−"}${size}`;
+}
+
+/** Return the step as a program: slow, and with the operator's speed after it. */
+function programOf({ axis, frame, amount }: ToolStep, speedPercent: number | undefined): string {
+  const speed = Math.min(MOST_SPEED_PERCENT, speedPercent ?? MOST_SPEED_PERCENT);
+  const offset = POSE_AXES.map((each) => (each === axis ? amount : 0)).join(" ");
+  const after = speedPercent && speedPercent !== speed ? `speed ${speedPercent}\n` : "";
+  return `speed ${speed}\ntool_speed ${MOST_TOOL_SPEED}\nmove_line_by ${frame} ${offset}\n${after}`;
+}
