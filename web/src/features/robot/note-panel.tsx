@@ -17,7 +17,7 @@ const shown = signal(false);
 export function NoteButton() {
   return (
     <button
-      class="record-button"
+      class="note-button"
       aria-expanded={shown.value}
       title={n("note_hint")}
       onClick={() => (shown.value = !shown.value)}
