@@ -3,15 +3,17 @@
 import asyncio
 import gc
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import AsyncExitStack
 
+from protocol_gateway.cell_changes import CellChanges, CellsOfGateway
 from protocol_gateway.checking.cell_occupancy import CellOccupancy
-from protocol_gateway.checking.checker import make_checkers
+from protocol_gateway.checking.checker import Checker, make_checkers
 from protocol_gateway.checking.policy import Policy
 from protocol_gateway.link.metrics import measure_links
 from protocol_gateway.robot import Robot
 from protocol_gateway.settings import RobotSettings, Settings, check
+from robomesh.quotas import Quota
 from robomesh.session import Session
 
 __all__ = ["RobotSettings", "Settings", "serve"]
@@ -55,6 +57,9 @@ async def serve(session: Session, settings: Settings) -> None:
         by_name = {robot.name: each for robot, each in zip(settings.robots, robots, strict=True)}
         measure_links(session, {name: each.link for name, each in by_name.items()})
         _measure_robots(session, by_name)
+        content = CellsOfGateway(
+            session, settings.site, _cells(session, settings, by_name, cells, (checkers, planners))
+        )
         # A collection over all permanent objects would pause every robot for 20 ms.
         gc.collect()
         gc.freeze()
@@ -64,6 +69,36 @@ async def serve(session: Session, settings: Settings) -> None:
                 tasks.create_task(checker.run())
             for robot in robots:
                 tasks.create_task(robot.run())
+            tasks.create_task(content.run())
+
+
+def _cells(
+    session: Session,
+    settings: Settings,
+    robots: Mapping[str, Robot],
+    occupancies: Mapping[frozenset[str], CellOccupancy],
+    checkers: Sequence[Mapping[str, Checker]],
+) -> dict[str, CellChanges]:
+    """Return the content of each robot's cell, one for all of its robots; empty without a file of cells."""
+    if settings.cell_file is None:
+        return {}
+    changes = settings.quotas.cell_changes_a_minute
+    quota = Quota("cell_changes", a_minute=changes)
+    found: dict[str, CellChanges] = {}
+    for names, occupancy in occupancies.items():
+        own = {name: robots[name] for name in sorted(names & robots.keys())}
+        cell = CellChanges(
+            session,
+            settings.site,
+            robots=own,
+            elsewhere=names - robots.keys(),
+            file=settings.cell_file,
+            occupancy=occupancy,
+            checkers={checker for each in checkers for name in own for checker in [each[name]]},
+            quota=quota,
+        )
+        found |= dict.fromkeys(own, cell)
+    return found
 
 
 def _measure_robots(session: Session, robots: Mapping[str, Robot]) -> None:

@@ -210,6 +210,29 @@ class Robot:
         """True if joint positions were received that are not stale."""
         return self._telemetry.positions(time.monotonic()) is not None
 
+    @property
+    def use(self) -> Reason | None:
+        """Why the cell must not change now: the robot is controlled or moves, or may move; None: it rests."""
+        name, authority, controller = self._settings.name, self._control.authority, self._controller()
+        if authority.lease is not None:
+            return codes.CELL_CONTROLLED(robot=name, holder=authority.lease.holder)
+        if controller.positions is None or controller.positions_stale or authority.moving is None:
+            return codes.CELL_UNKNOWN(robot=name)
+        moves = authority.moving or authority.motion is not None or self._control.program is not None
+        if moves or controller.status.activity in (Activity.MOVING, Activity.HOMING, Activity.HOLDING):
+            return codes.CELL_MOVES(robot=name)
+        return None
+
+    @property
+    def audit_trail(self) -> AuditTrail:
+        """Writer of the robot's audit log."""
+        return self._audit_trail
+
+    @property
+    def journal(self) -> Journal:
+        """Reporter of the robot's events."""
+        return self._journal
+
     async def listen(self) -> None:
         """Listen for old client programs, if the site file allows them.
 

@@ -1,8 +1,9 @@
 """Settings of a gateway and its robots, and their validation."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.legacy.settings import LegacySettings
 from robomesh.keys import check_name
+from robomesh.quotas import DEFAULT_QUOTAS, Quotas
+from robomesh.reasons import Reason
+from robomesh.schemas import robomesh_pb2 as schema
 from robots.cells import CellDescription, CellRobot
 
 _KNOWN_UNKNOWNS = frozenset({"mode", "homed"})
@@ -60,6 +64,53 @@ class RobotSettings:
         )
 
 
+class CellFile(Protocol):
+    """The place where the content of cells is kept. Its methods may block.
+
+    `CellFile` in `services/site_file/cell_file.py` describes each.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name of the file; empty: there is none."""
+
+    def cell(self, robot: str) -> str:
+        """Return the name of a robot's cell."""
+
+    def members(self, robot: str) -> list[schema.CellMember]:
+        """Return the settings of the robots of a robot's cell."""
+
+    def meshes(self) -> list[str]:
+        """Return the mesh files that fixtures may use."""
+
+    def content(self, robot: str) -> schema.CellContent:
+        """Return the content of a robot's cell."""
+
+    def previous(self, robot: str) -> schema.CellContent | None:
+        """Return the content before the last change."""
+
+    def problem(self, robot: str) -> Reason | None:
+        """Return why the content cannot be changed."""
+
+    def normal(self, robot: str, content: schema.CellContent) -> schema.CellContent:
+        """Return a content with the values that would be saved; raise RefusedError."""
+
+    def changes(self, before: schema.CellContent, after: schema.CellContent) -> list[schema.CellChange]:
+        """Return what differs between two contents."""
+
+    def summary(self, changes: Sequence[schema.CellChange]) -> str:
+        """Return changes as one text."""
+
+    def describe(self, robot: str, content: schema.CellContent) -> tuple[str, CellDescription]:
+        """Return a content's version, and what motions are checked against; raise RefusedError."""
+
+    def save(self, robot: str, content: schema.CellContent) -> None:
+        """Save the content of a robot's cell, atomically; raise RefusedError."""
+
+    def restore(self) -> None:
+        """Undo the last `save`; raise RefusedError."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """A gateway of one site.
@@ -67,12 +118,16 @@ class Settings:
     Attributes:
         audit_folder: Holds <site>/<robot>.jsonl, the audit logs.
         audit_rotate_bytes: Size at which a log's live file becomes an older part.
+        cell_file: Keeps the content of the robots' cells; None: it cannot be shown and changed.
+        quotas: Limits for each client.
     """
 
     site: str
     robots: tuple[RobotSettings, ...]
     audit_folder: Path
     audit_rotate_bytes: int = ROTATE_BYTES
+    cell_file: CellFile | None = None
+    quotas: Quotas = DEFAULT_QUOTAS
 
 
 def check(settings: Settings) -> None:

@@ -34,6 +34,7 @@ class Quotas:
         recordings_mib_a_minute: Answers from one recorder [MiB]: files, messages, values.
         program_saves_a_minute: Changes of stored programs.
         notes_a_minute: Notes that are written or withdrawn.
+        cell_changes_a_minute: Changes of cells at one gateway, and trials of changes.
     """
 
     views: int = 16
@@ -43,6 +44,7 @@ class Quotas:
     recordings_mib_a_minute: float = 4096.0
     program_saves_a_minute: float = 120.0
     notes_a_minute: float = 60.0
+    cell_changes_a_minute: float = 60.0
 
 
 DEFAULT_QUOTAS = Quotas()

@@ -121,6 +121,7 @@ NEEDS_ADMINISTRATOR = Code(
     "page.needs_administrator",
     "only the account of an administrator may do this, and this console has no accounts",
 )
+NEEDS_ENGINEER = Code("page.needs_engineer", "{account} is a {role}: {what} needs an engineer")
 PASSWORD_AGAIN = Code(
     "page.password_again",
     "commands are locked because this page was not used for a while",
@@ -513,6 +514,97 @@ LINE_BENT = Code(
 PROGRAM_START_OUTSIDE = Code("program.start_outside", "at the start: {cause}")
 PROGRAM_LINE = Code("program.line", "line {line}: {cause}")
 PROGRAM_TOO_LONG = Code("program.too_long", "a program has at most {kib} KiB")
+CELL_CHANGES = Code(
+    "cell.changes",
+    "{operator} is changing the cell of {robot}: no control and no motion until it is done",
+    "try again in a moment",
+)
+CELL_DISAGREES = Code(
+    "cell.disagrees",
+    "the kinematics service shows {robot} in another cell than the one that motions are checked against",
+    "wait until it follows, or restart it",
+)
+CELL_NOT_FOLLOWED = Code(
+    "cell.not_followed", "the kinematics service cannot show the cell of {robot}: {cause}", "correct that"
+)
+CELL_CONTROLLED = Code(
+    "cell.controlled",
+    "{holder} has control of {robot}",
+    "the cell can be changed when control is released",
+)
+CELL_MOVES = Code("cell.moves", "{robot} moves", "wait until every robot of the cell rests, or stop it")
+CELL_UNKNOWN = Code(
+    "cell.unknown",
+    "it is not known whether {robot} rests, because its controller reports no position",
+    "connect its controller first",
+)
+CELL_OUTDATED = Code(
+    "cell.outdated", "the cell of {robot} has changed meanwhile", "load it again and repeat the change"
+)
+CELL_SAME = Code("cell.same", "nothing would change in the cell of {robot}")
+CELL_NO_FILE = Code(
+    "cell.no_file",
+    "the gateway of {robot} runs without a site file in which a change could be saved",
+    "write one and start the site with it",
+)
+CELL_NO_CELL = Code(
+    "cell.no_cell",
+    "{robot} has no cell, so it can have no fixture",
+    "give it a `cell` in the site file and restart the site's services",
+)
+CELL_OTHER_GATEWAY = Code(
+    "cell.other_gateway",
+    "{robot} is of the same cell and has another gateway",
+    "one gateway must serve all robots of a cell that is changed",
+)
+CELL_READ_ONLY = Code(
+    "cell.read_only",
+    "the gateway may not write {file} or its folder",
+    "mount the folder writable, or change the file by hand and restart the site's services",
+)
+CELL_FILE_CHANGED = Code(
+    "cell.file_changed",
+    "{file} was changed on disk after the gateway read it",
+    "restart the site's services, then repeat the change",
+)
+CELL_FILE_FORM = Code(
+    "cell.file_form",
+    "{file} writes this part in a form that cannot be changed without touching other lines",
+    "write fixtures as [[fixture]] and robots as [[robot]] tables, or change the file by hand",
+)
+CELL_DISK = Code("cell.disk", "{file} cannot be written, so nothing has changed: {detail}")
+CELL_FIXTURE = Code("cell.fixture", "fixture '{name}': {detail}")
+CELL_CONTENT = Code("cell.content", "{detail}")
+CELL_TOO_MANY = Code(
+    "cell.too_many",
+    "{count} {what}: a request may have {most}",
+    "write more of them into the site file",
+)
+CELL_MESH = Code(
+    "cell.mesh",
+    "fixture '{name}': the site file names no mesh '{file}'",
+    "a new mesh file is named in the site file first",
+)
+CELL_NO_KINEMATICS = Code(
+    "cell.no_kinematics",
+    "the kinematics service of {robot} does not take the change, so nothing has changed: {cause}",
+)
+CELL_CHECK_FAILED = Code(
+    "cell.check_failed", "the change cannot be checked against, so nothing has changed: {cause}"
+)
+CELL_TAKEN_BACK = Code(
+    "cell.taken_back",
+    "the change was taken back: the kinematics service of {robot} did not show it within {seconds:g} s",
+    "look whether that service runs, then try again",
+)
+CELL_STUCK = Code(
+    "cell.stuck",
+    "the change failed ({cause}), and the old cell could not be restored: {detail}",
+    "restart the gateway and the kinematics service of {robot}",
+)
+CELL_CHANGED = Code("cell.changed", "{operator} changed the cell of {robot}: {summary}")
+CELL_ACCEPTED = Code("cell.accepted", "{summary}")
+CELL_NOT_CHANGED = Code("cell.not_changed", "the cell was not changed: {cause}")
 PROGRAMS_NAME = Code(
     "programs.name",
     "'{name}' is not a valid name of a program",

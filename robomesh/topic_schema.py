@@ -42,11 +42,12 @@ class Role(Enum):
     STORE = "store"
     ROS2 = "ros2"
     OPERATOR = "operator"
+    ENGINEER = "engineer"
     MONITOR = "monitor"
 
 
 EVERYONE = frozenset(Role)
-PEOPLE = frozenset({Role.OPERATOR, Role.MONITOR})
+PEOPLE = frozenset({Role.OPERATOR, Role.ENGINEER, Role.MONITOR})
 SERVICES = EVERYONE - PEOPLE
 
 

@@ -42,7 +42,9 @@ _GATEWAY = frozenset({Role.GATEWAY})
 _GATEWAY_OR_REPLAY = frozenset({Role.GATEWAY, Role.PLAYER})
 _KINEMATICS_OR_REPLAY = frozenset({Role.KINEMATICS, Role.PLAYER})
 _STORE = frozenset({Role.STORE})
-_COMMANDERS = frozenset({Role.OPERATOR, Role.CONSOLE})
+_COMMANDERS = frozenset({Role.OPERATOR, Role.ENGINEER, Role.CONSOLE})
+# Who may place fixtures is not everyone who may move a robot.
+_CELL_EDITORS = frozenset({Role.ENGINEER, Role.CONSOLE})
 
 
 _TOPICS = (
@@ -144,6 +146,20 @@ _TOPICS = (
         schema=schema.Description,
         priority=Priority.DATA,
         publishers=_KINEMATICS_OR_REPLAY,
+    ),
+    Topic(
+        name="cell",
+        schema=schema.CellState,
+        recorded=False,  # `description` has what the cell contains
+        priority=Priority.DATA,
+        publishers=_GATEWAY,
+    ),
+    Topic(
+        name="cell/shown",
+        schema=schema.CellShown,
+        recorded=False,
+        priority=Priority.INTERACTIVE_LOW,
+        publishers=frozenset({Role.KINEMATICS}),
     ),
     Topic(
         name="programs",
@@ -258,6 +274,24 @@ _REQUESTS = (
         priority=Priority.BACKGROUND,
         owners=_GATEWAY,
         askers=EVERYONE,
+    ),
+    # With the engineer's name.
+    Request(
+        name="cell/request/*",
+        request=schema.CellRequest,
+        answer=schema.CellAnswer,
+        priority=Priority.DATA,
+        owners=_GATEWAY,
+        askers=_CELL_EDITORS,
+        in_name=True,
+    ),
+    Request(
+        name="cell/prepare",
+        request=schema.CellPreparation,
+        answer=schema.CellPrepared,
+        priority=Priority.DATA,
+        owners=frozenset({Role.KINEMATICS}),
+        askers=_GATEWAY,
     ),
     Request(
         name="simulator/fault",

@@ -74,18 +74,19 @@ def _new_text(values: Mapping[str, Any]) -> str:
 
 def _lines(table: Mapping[str, Any]) -> Iterable[str]:
     for key, value in table.items():
-        line = f"{_key(key)} = {_inline(value)}"
+        line = f"{_key(key)} = {inline_text(value)}"
         if len(line) > _LONGEST_LINE and isinstance(value, list):
-            line = f"{_key(key)} = [\n" + "".join(f"  {_inline(each)},\n" for each in value) + "]"
+            line = f"{_key(key)} = [\n" + "".join(f"  {inline_text(each)},\n" for each in value) + "]"
         yield line
 
 
-def _inline(value: Any) -> str:
+def inline_text(value: Any) -> str:
+    """Return a value in TOML, a table in one line."""
     if isinstance(value, dict):
-        inside = ", ".join(f"{_key(key)} = {_inline(each)}" for key, each in value.items())
+        inside = ", ".join(f"{_key(key)} = {inline_text(each)}" for key, each in value.items())
         return f"{{ {inside} }}" if inside else "{}"
     if isinstance(value, list):
-        return f"[{', '.join(map(_inline, value))}]"
+        return f"[{', '.join(map(inline_text, value))}]"
     return str(tomlkit.item(value).as_string())
 
 

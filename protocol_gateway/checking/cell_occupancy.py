@@ -27,10 +27,13 @@ class CellOccupancy:
     Attributes:
         motion_lock: Held from a motion's check until its unit is on the controller's socket. One motion at a
             time is admitted, so the other robots are still where the check assumed them when it begins.
+        closed: Reason why no robot of the cell may be controlled or moved now: what stands in the cell
+            changes; None: they may.
     """
 
     def __init__(self) -> None:
         self.motion_lock = asyncio.Lock()
+        self.closed: Reason | None = None
         self._robots: dict[str, Callable[[], Occupancy]] = {}
 
     def add(self, name: str, occupancy: Callable[[], Occupancy]) -> None:

@@ -6,7 +6,14 @@ import logging
 import time
 from collections.abc import Collection, Mapping
 
-from protocol_gateway.checking.worker_messages import Checked, CheckMotion, CheckProgram, Prepare, Prepared
+from protocol_gateway.checking.worker_messages import (
+    Checked,
+    CheckMotion,
+    CheckProgram,
+    Prepare,
+    Prepared,
+    ReplaceCells,
+)
 from protocol_gateway.errors import CheckError
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
@@ -24,6 +31,7 @@ _HANG_TIMEOUT_S = 10.0
 _PREPARE_TIMEOUT_S = 60.0
 _RESTART_S = 5.0
 _PENDING_POLL_S = 1.0
+_REPLACE_POLL_S = 0.02
 # Most processes for cells of several robots; beyond that, cells share processes.
 MOST_PROCESSES = 8
 _STARTING = codes.CHECK_STARTING()
@@ -45,12 +53,15 @@ class Checker:
         self._start_requested = asyncio.Event()
         if start_now:
             self._start_requested.set()
-        self._worker = Worker("protocol_gateway.checking.worker", dict(cells))
+        # Also the settings of each process that is started later.
+        self._cells = dict(cells)
+        self._worker = Worker("protocol_gateway.checking.worker", self._cells)
         self._problems: dict[str, Reason | None] = dict.fromkeys(cells, _STARTING)
         self._lock = asyncio.Lock()
         self._failed: Reason | None = None
         self._process: int | None = None
         self._pending: tuple[str, ...] = ()
+        self._replaced = asyncio.Event()
 
     @property
     def pid(self) -> int | None:
@@ -78,7 +89,10 @@ class Checker:
                     with contextlib.suppress(WorkerError):
                         await self._prepare()
                 waits_s = 0.1 if not self._pending else _PENDING_POLL_S
-                await asyncio.sleep(waits_s if self._process is not None else _RESTART_S)
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(waits_s if self._process is not None else _RESTART_S):
+                        await self._replaced.wait()
+                self._replaced.clear()
         finally:
             await self._worker.close()
 
@@ -116,6 +130,38 @@ class Checker:
         if answer.problem is not None and not answer.pending:
             log.warning("%s: its motions cannot be checked: %s", robot, answer.problem)
         return answer
+
+    async def replace(self, cells: Mapping[str, CellDescription]) -> None:
+        """Check against other cells from now on; return when motions can be checked as before.
+
+        Args:
+            cells: New cell of some of its robots, by the robot's name.
+
+        Raises:
+            CheckError: If they cannot; then the new cells hold all the same.
+        """
+        new = {robot: cell for robot, cell in cells.items() if robot in self._cells}
+        could = [robot for robot in new if self._problems[robot] is None]
+        self._cells.update(new)
+        if not self._start_requested.is_set():
+            return
+        try:
+            await self._worker.ask(ReplaceCells(new), timeout_s=_PREPARE_TIMEOUT_S)
+        except WorkerError as error:
+            raise CheckError(error.reason) from None
+        # Not before, because an answer about the old cells may have been on its way.
+        self._problems |= dict.fromkeys(new, _STARTING)
+        self._pending = (*self._pending, *(robot for robot in new if robot not in self._pending))
+        self._replaced.set()
+        try:
+            async with asyncio.timeout(_PREPARE_TIMEOUT_S):
+                while any(self._problems[robot] == _STARTING for robot in could):
+                    await asyncio.sleep(_REPLACE_POLL_S)
+        except TimeoutError:
+            raise CheckError(_STARTING) from None
+        for robot in could:
+            if (problem := self._problems[robot]) is not None:
+                raise CheckError(problem)
 
     async def motion(self, question: CheckMotion) -> Checked:
         """Check a motion.

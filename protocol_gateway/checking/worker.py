@@ -13,6 +13,7 @@ from protocol_gateway.checking.worker_messages import (
     Positions,
     Prepare,
     Prepared,
+    ReplaceCells,
 )
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
@@ -40,7 +41,11 @@ def begin(cells: Cells) -> Callable[[Any], Any]:
             ready[names] = cell
         return ready[names]
 
-    def answer(question: Prepare | CheckMotion | CheckProgram) -> Prepared | Checked:
+    def answer(question: ReplaceCells | Prepare | CheckMotion | CheckProgram) -> Prepared | Checked | None:
+        if isinstance(question, ReplaceCells):
+            cells.update(question.cells)
+            ready.clear()
+            return None
         cell = cell_of(question.robot)
         match question:
             case Prepare(robot):

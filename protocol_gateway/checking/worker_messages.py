@@ -10,6 +10,16 @@ from robots.programs.steps import Step
 Positions: TypeAlias = tuple[float, ...]
 
 
+Cells: TypeAlias = dict[str, CellDescription]
+
+
+@dataclass(frozen=True)
+class ReplaceCells:
+    """Request to answer from other cells from now on, by robot; the answer is None."""
+
+    cells: Cells
+
+
 @dataclass(frozen=True)
 class Prepare:
     """Request to prepare a robot's cell, with the shapes of everything in it."""
@@ -73,6 +83,3 @@ class Checked:
     readable: bool = True
     steps: tuple[Step, ...] = ()
     durations_s: tuple[float, ...] = ()
-
-
-Cells: TypeAlias = dict[str, CellDescription]

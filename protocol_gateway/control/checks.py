@@ -66,6 +66,11 @@ class Checks:
         cell_occupancy.add(name, self.occupancy)
 
     @property
+    def cell_closed(self) -> Reason | None:
+        """Reason why no robot of the cell may be controlled or moved now; None: they may."""
+        return self._cell_occupancy.closed
+
+    @property
     def problem(self) -> Reason | None:
         """Reason why motions cannot be checked now; None: they can, or need not."""
         return None if self.policy is Policy.OFF else self._checker.problem(self._name)

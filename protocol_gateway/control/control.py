@@ -270,6 +270,7 @@ class Control:
             now=read_clocks(),
             controller=self._ports.controller(),
             latch_problem=self._ports.latch.problem,
+            cell_closed=None if self._checks is None else self._checks.cell_closed,
         )
 
     def _send(self, effect: effects.Send) -> Reason | None:

@@ -32,11 +32,13 @@ class Seen:
 
     Attributes:
         latch_problem: Reason why a restart would lose a stop now; None: it would not.
+        cell_closed: Reason why no robot of the cell may be controlled or moved now; None: they may.
     """
 
     now: Now
     controller: Controller
     latch_problem: Reason | None = None
+    cell_closed: Reason | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

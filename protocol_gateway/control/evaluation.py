@@ -87,6 +87,7 @@ def refusal_of(
             or deadline_refusal(request, seen.now)
             or stop_refusal(authority, request)
             or _latch_refusal(request, seen)
+            or _cell_refusal(request, seen)
             or (None if command.step else _program_refusal(request, program))
             or controller_refusal(request, authority, controller, seen, joints)
         )
@@ -139,6 +140,12 @@ def _latch_refusal(request: CommandRequest, seen: Seen) -> Answer | None:
     if seen.latch_problem is None or request.command not in MOTION_COMMANDS:
         return None
     return not_sent(codes.COMMAND_NOT_LATCHED(seen.latch_problem))
+
+
+def _cell_refusal(request: CommandRequest, seen: Seen) -> Answer | None:
+    if seen.cell_closed is None or request.command not in MOTION_COMMANDS:
+        return None
+    return not_sent(seen.cell_closed)
 
 
 def _program_refusal(request: CommandRequest, program: RunningProgram | None) -> Answer | None:

@@ -225,6 +225,8 @@ class RobotAuthority:
         read_only = seen.controller.read_only
         if read_only is not None and event.request.action in (_A.ACQUIRE, _A.TAKE):
             return lease_rules.LeaseOutcome(self._authority, refused(codes.ROBOT_READ_ONLY(read_only)))
+        if seen.cell_closed is not None and event.request.action in (_A.ACQUIRE, _A.TAKE):
+            return lease_rules.LeaseOutcome(self._authority, refused(seen.cell_closed))
         return lease_rules.request_lease(
             self._authority, event.request, operator=event.operator, now=seen.now, secret=event.secret
         )

@@ -693,7 +693,7 @@ class NoteQuery(_message.Message):
     def __init__(self, robot: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., until: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., most: _Optional[int] = ...) -> None: ...
 
 class Description(_message.Message):
-    __slots__ = ("name", "title", "provenance", "robot_toml", "urdf", "joints", "links", "frames", "views", "constraints", "base_to_site", "cell", "simulated", "fixtures", "warning_distance", "stop_distance", "replay", "stale_after_s", "title_zh", "provenance_zh", "floor")
+    __slots__ = ("name", "title", "provenance", "robot_toml", "urdf", "joints", "links", "frames", "views", "constraints", "base_to_site", "cell", "simulated", "fixtures", "warning_distance", "stop_distance", "replay", "stale_after_s", "title_zh", "provenance_zh", "floor", "cell_version")
     class Floor(_message.Message):
         __slots__ = ("height", "warning_distance", "stop_distance")
         HEIGHT_FIELD_NUMBER: _ClassVar[int]
@@ -812,6 +812,7 @@ class Description(_message.Message):
     TITLE_ZH_FIELD_NUMBER: _ClassVar[int]
     PROVENANCE_ZH_FIELD_NUMBER: _ClassVar[int]
     FLOOR_FIELD_NUMBER: _ClassVar[int]
+    CELL_VERSION_FIELD_NUMBER: _ClassVar[int]
     name: str
     title: str
     provenance: str
@@ -833,7 +834,8 @@ class Description(_message.Message):
     title_zh: str
     provenance_zh: str
     floor: Description.Floor
-    def __init__(self, name: _Optional[str] = ..., title: _Optional[str] = ..., provenance: _Optional[str] = ..., robot_toml: _Optional[str] = ..., urdf: _Optional[str] = ..., joints: _Optional[_Iterable[_Union[Description.Joint, _Mapping]]] = ..., links: _Optional[_Iterable[_Union[Description.Link, _Mapping]]] = ..., frames: _Optional[_Iterable[_Union[Description.NamedFrame, _Mapping]]] = ..., views: _Optional[_Iterable[_Union[View, _Mapping]]] = ..., constraints: _Optional[_Iterable[_Union[Description.Constraint, _Mapping]]] = ..., base_to_site: _Optional[_Iterable[float]] = ..., cell: _Optional[str] = ..., simulated: _Optional[bool] = ..., fixtures: _Optional[_Iterable[_Union[Description.Fixture, _Mapping]]] = ..., warning_distance: _Optional[float] = ..., stop_distance: _Optional[float] = ..., replay: _Optional[_Union[Description.Replay, _Mapping]] = ..., stale_after_s: _Optional[float] = ..., title_zh: _Optional[str] = ..., provenance_zh: _Optional[str] = ..., floor: _Optional[_Union[Description.Floor, _Mapping]] = ...) -> None: ...
+    cell_version: str
+    def __init__(self, name: _Optional[str] = ..., title: _Optional[str] = ..., provenance: _Optional[str] = ..., robot_toml: _Optional[str] = ..., urdf: _Optional[str] = ..., joints: _Optional[_Iterable[_Union[Description.Joint, _Mapping]]] = ..., links: _Optional[_Iterable[_Union[Description.Link, _Mapping]]] = ..., frames: _Optional[_Iterable[_Union[Description.NamedFrame, _Mapping]]] = ..., views: _Optional[_Iterable[_Union[View, _Mapping]]] = ..., constraints: _Optional[_Iterable[_Union[Description.Constraint, _Mapping]]] = ..., base_to_site: _Optional[_Iterable[float]] = ..., cell: _Optional[str] = ..., simulated: _Optional[bool] = ..., fixtures: _Optional[_Iterable[_Union[Description.Fixture, _Mapping]]] = ..., warning_distance: _Optional[float] = ..., stop_distance: _Optional[float] = ..., replay: _Optional[_Union[Description.Replay, _Mapping]] = ..., stale_after_s: _Optional[float] = ..., title_zh: _Optional[str] = ..., provenance_zh: _Optional[str] = ..., floor: _Optional[_Union[Description.Floor, _Mapping]] = ..., cell_version: _Optional[str] = ...) -> None: ...
 
 class View(_message.Message):
     __slots__ = ("name", "eye", "target", "up", "projection", "mount", "field_of_view", "height")
@@ -1775,6 +1777,180 @@ class ProgramContent(_message.Message):
     version: ProgramVersion
     text: str
     def __init__(self, program: _Optional[_Union[StoredProgram, _Mapping]] = ..., versions: _Optional[_Iterable[_Union[ProgramVersion, _Mapping]]] = ..., version: _Optional[_Union[ProgramVersion, _Mapping]] = ..., text: _Optional[str] = ...) -> None: ...
+
+class CellContent(_message.Message):
+    __slots__ = ("fixtures", "floor")
+    FIXTURES_FIELD_NUMBER: _ClassVar[int]
+    FLOOR_FIELD_NUMBER: _ClassVar[int]
+    fixtures: _containers.RepeatedCompositeFieldContainer[CellFixture]
+    floor: CellFloor
+    def __init__(self, fixtures: _Optional[_Iterable[_Union[CellFixture, _Mapping]]] = ..., floor: _Optional[_Union[CellFloor, _Mapping]] = ...) -> None: ...
+
+class CellFixture(_message.Message):
+    __slots__ = ("name", "box", "cylinder", "sphere", "mesh", "xyz", "rpy", "color", "exact", "ignore")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    BOX_FIELD_NUMBER: _ClassVar[int]
+    CYLINDER_FIELD_NUMBER: _ClassVar[int]
+    SPHERE_FIELD_NUMBER: _ClassVar[int]
+    MESH_FIELD_NUMBER: _ClassVar[int]
+    XYZ_FIELD_NUMBER: _ClassVar[int]
+    RPY_FIELD_NUMBER: _ClassVar[int]
+    COLOR_FIELD_NUMBER: _ClassVar[int]
+    EXACT_FIELD_NUMBER: _ClassVar[int]
+    IGNORE_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    box: Vector3
+    cylinder: CellCylinder
+    sphere: float
+    mesh: CellMesh
+    xyz: Vector3
+    rpy: Vector3
+    color: str
+    exact: bool
+    ignore: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, name: _Optional[str] = ..., box: _Optional[_Union[Vector3, _Mapping]] = ..., cylinder: _Optional[_Union[CellCylinder, _Mapping]] = ..., sphere: _Optional[float] = ..., mesh: _Optional[_Union[CellMesh, _Mapping]] = ..., xyz: _Optional[_Union[Vector3, _Mapping]] = ..., rpy: _Optional[_Union[Vector3, _Mapping]] = ..., color: _Optional[str] = ..., exact: _Optional[bool] = ..., ignore: _Optional[_Iterable[str]] = ...) -> None: ...
+
+class CellCylinder(_message.Message):
+    __slots__ = ("radius", "height")
+    RADIUS_FIELD_NUMBER: _ClassVar[int]
+    HEIGHT_FIELD_NUMBER: _ClassVar[int]
+    radius: float
+    height: float
+    def __init__(self, radius: _Optional[float] = ..., height: _Optional[float] = ...) -> None: ...
+
+class CellMesh(_message.Message):
+    __slots__ = ("file", "scale")
+    FILE_FIELD_NUMBER: _ClassVar[int]
+    SCALE_FIELD_NUMBER: _ClassVar[int]
+    file: str
+    scale: float
+    def __init__(self, file: _Optional[str] = ..., scale: _Optional[float] = ...) -> None: ...
+
+class CellFloor(_message.Message):
+    __slots__ = ("none", "height", "warning_distance", "stop_distance")
+    NONE_FIELD_NUMBER: _ClassVar[int]
+    HEIGHT_FIELD_NUMBER: _ClassVar[int]
+    WARNING_DISTANCE_FIELD_NUMBER: _ClassVar[int]
+    STOP_DISTANCE_FIELD_NUMBER: _ClassVar[int]
+    none: bool
+    height: float
+    warning_distance: float
+    stop_distance: float
+    def __init__(self, none: _Optional[bool] = ..., height: _Optional[float] = ..., warning_distance: _Optional[float] = ..., stop_distance: _Optional[float] = ...) -> None: ...
+
+class CellState(_message.Message):
+    __slots__ = ("timestamp", "cell", "version", "content", "changing", "problem", "previous", "meshes", "robots", "file")
+    TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
+    CELL_FIELD_NUMBER: _ClassVar[int]
+    VERSION_FIELD_NUMBER: _ClassVar[int]
+    CONTENT_FIELD_NUMBER: _ClassVar[int]
+    CHANGING_FIELD_NUMBER: _ClassVar[int]
+    PROBLEM_FIELD_NUMBER: _ClassVar[int]
+    PREVIOUS_FIELD_NUMBER: _ClassVar[int]
+    MESHES_FIELD_NUMBER: _ClassVar[int]
+    ROBOTS_FIELD_NUMBER: _ClassVar[int]
+    FILE_FIELD_NUMBER: _ClassVar[int]
+    timestamp: _timestamp_pb2.Timestamp
+    cell: str
+    version: str
+    content: CellContent
+    changing: bool
+    problem: Reason
+    previous: CellContent
+    meshes: _containers.RepeatedScalarFieldContainer[str]
+    robots: _containers.RepeatedCompositeFieldContainer[CellMember]
+    file: str
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., cell: _Optional[str] = ..., version: _Optional[str] = ..., content: _Optional[_Union[CellContent, _Mapping]] = ..., changing: _Optional[bool] = ..., problem: _Optional[_Union[Reason, _Mapping]] = ..., previous: _Optional[_Union[CellContent, _Mapping]] = ..., meshes: _Optional[_Iterable[str]] = ..., robots: _Optional[_Iterable[_Union[CellMember, _Mapping]]] = ..., file: _Optional[str] = ...) -> None: ...
+
+class CellMember(_message.Message):
+    __slots__ = ("name", "model", "xyz", "rpy", "controller", "protocol", "check", "warning_distance", "stop_distance", "stop_proven")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MODEL_FIELD_NUMBER: _ClassVar[int]
+    XYZ_FIELD_NUMBER: _ClassVar[int]
+    RPY_FIELD_NUMBER: _ClassVar[int]
+    CONTROLLER_FIELD_NUMBER: _ClassVar[int]
+    PROTOCOL_FIELD_NUMBER: _ClassVar[int]
+    CHECK_FIELD_NUMBER: _ClassVar[int]
+    WARNING_DISTANCE_FIELD_NUMBER: _ClassVar[int]
+    STOP_DISTANCE_FIELD_NUMBER: _ClassVar[int]
+    STOP_PROVEN_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    model: str
+    xyz: Vector3
+    rpy: Vector3
+    controller: str
+    protocol: str
+    check: str
+    warning_distance: float
+    stop_distance: float
+    stop_proven: bool
+    def __init__(self, name: _Optional[str] = ..., model: _Optional[str] = ..., xyz: _Optional[_Union[Vector3, _Mapping]] = ..., rpy: _Optional[_Union[Vector3, _Mapping]] = ..., controller: _Optional[str] = ..., protocol: _Optional[str] = ..., check: _Optional[str] = ..., warning_distance: _Optional[float] = ..., stop_distance: _Optional[float] = ..., stop_proven: _Optional[bool] = ...) -> None: ...
+
+class CellRequest(_message.Message):
+    __slots__ = ("based_on", "content", "dry_run", "reason")
+    BASED_ON_FIELD_NUMBER: _ClassVar[int]
+    CONTENT_FIELD_NUMBER: _ClassVar[int]
+    DRY_RUN_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    based_on: str
+    content: CellContent
+    dry_run: bool
+    reason: str
+    def __init__(self, based_on: _Optional[str] = ..., content: _Optional[_Union[CellContent, _Mapping]] = ..., dry_run: _Optional[bool] = ..., reason: _Optional[str] = ...) -> None: ...
+
+class CellAnswer(_message.Message):
+    __slots__ = ("version", "changes")
+    VERSION_FIELD_NUMBER: _ClassVar[int]
+    CHANGES_FIELD_NUMBER: _ClassVar[int]
+    version: str
+    changes: _containers.RepeatedCompositeFieldContainer[CellChange]
+    def __init__(self, version: _Optional[str] = ..., changes: _Optional[_Iterable[_Union[CellChange, _Mapping]]] = ...) -> None: ...
+
+class CellChange(_message.Message):
+    __slots__ = ("kind", "fixture", "key", "before", "after")
+    class Kind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        KIND_UNSPECIFIED: _ClassVar[CellChange.Kind]
+        CHANGED: _ClassVar[CellChange.Kind]
+        ADDED: _ClassVar[CellChange.Kind]
+        REMOVED: _ClassVar[CellChange.Kind]
+    KIND_UNSPECIFIED: CellChange.Kind
+    CHANGED: CellChange.Kind
+    ADDED: CellChange.Kind
+    REMOVED: CellChange.Kind
+    KIND_FIELD_NUMBER: _ClassVar[int]
+    FIXTURE_FIELD_NUMBER: _ClassVar[int]
+    KEY_FIELD_NUMBER: _ClassVar[int]
+    BEFORE_FIELD_NUMBER: _ClassVar[int]
+    AFTER_FIELD_NUMBER: _ClassVar[int]
+    kind: CellChange.Kind
+    fixture: str
+    key: str
+    before: str
+    after: str
+    def __init__(self, kind: _Optional[_Union[CellChange.Kind, str]] = ..., fixture: _Optional[str] = ..., key: _Optional[str] = ..., before: _Optional[str] = ..., after: _Optional[str] = ...) -> None: ...
+
+class CellPreparation(_message.Message):
+    __slots__ = ("version", "content")
+    VERSION_FIELD_NUMBER: _ClassVar[int]
+    CONTENT_FIELD_NUMBER: _ClassVar[int]
+    version: str
+    content: CellContent
+    def __init__(self, version: _Optional[str] = ..., content: _Optional[_Union[CellContent, _Mapping]] = ...) -> None: ...
+
+class CellPrepared(_message.Message):
+    __slots__ = ("version",)
+    VERSION_FIELD_NUMBER: _ClassVar[int]
+    version: str
+    def __init__(self, version: _Optional[str] = ...) -> None: ...
+
+class CellShown(_message.Message):
+    __slots__ = ("version", "problem")
+    VERSION_FIELD_NUMBER: _ClassVar[int]
+    PROBLEM_FIELD_NUMBER: _ClassVar[int]
+    version: str
+    problem: Reason
+    def __init__(self, version: _Optional[str] = ..., problem: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
 
 class ToPage(_message.Message):
     __slots__ = ("sample", "answer", "presence", "hello")

@@ -30,7 +30,7 @@ _Name = Annotated[str, typer.Argument(metavar="NAME", help="Lower-case letters, 
 def add(
     where: Where,
     name: _Name,
-    role: Annotated[str, typer.Option(help="monitor, operator, admin")] = "monitor",
+    role: Annotated[str, typer.Option(help="monitor, operator, engineer, admin")] = "monitor",
 ) -> None:
     """Add an account; asks for the password, or reads a line of standard input."""
     path, site = accounts_file(where)
@@ -70,7 +70,7 @@ def passwd(where: Where, name: _Name) -> None:
 def role(
     where: Where,
     name: _Name,
-    role: Annotated[str, typer.Argument(metavar="ROLE", help="monitor, operator, admin")],
+    role: Annotated[str, typer.Argument(metavar="ROLE", help="monitor, operator, engineer, admin")],
 ) -> None:
     """Change an account's role, effective immediately."""
     path, _ = accounts_file(where)

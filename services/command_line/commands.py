@@ -63,6 +63,7 @@ COMMANDS = {
         "programs", "Programs stored at a site: list, show, save, restore, diff, export, import."
     ),
     "note": Row("note", "Write a note on a robot's time, list its notes, or withdraw one."),
+    "cell": Row("cell", "Fixtures and the floor of a robot's cell: show, set, move, undo."),
     "recordings": Row(
         "recordings.app", "Recordings: list, inspect, play, export, fetch, rename, tag, delete."
     ),

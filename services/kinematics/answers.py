@@ -1,6 +1,7 @@
 """Request handlers of one arm: meshes and forward in-process, inverse and check in worker processes."""
 
-from collections.abc import Mapping, Sequence
+import contextlib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,12 +13,13 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
 from robomesh.session import Session
 from robomesh.worker import Worker, WorkerError
+from robots.cells import CellDescription
 from robots.errors import RobotError, reason_of
 from robots.joints import FloatArray
 from robots.model import RobotModel
 from services.kinematics.cell_state import CellState
 from services.kinematics.states import forward_answer
-from services.kinematics.worker_messages import CheckQuestion, InverseQuestion, Question
+from services.kinematics.worker_messages import CheckQuestion, InverseQuestion, Question, ReplaceCells
 
 _INVERSE_S = 5.0
 _CHECK_S = 30.0
@@ -28,10 +30,21 @@ class Workers:
     """One worker process for inverse requests and one for checks.
 
     Separate, so that the inverse requests of an operator who is typing never wait for a program's check.
+
+    Attributes:
+        cells: Settings of both, by robot; a process that starts later gets the newest ones.
     """
 
     inverse: Worker
     check: Worker
+    cells: dict[str, CellDescription]
+
+    async def replace_cells(self, cells: Mapping[str, CellDescription]) -> None:
+        """Answer checks from other cells from now on, by robot; inverse requests do not use them."""
+        self.cells.update(cells)
+        if self.check.pid is not None:
+            with contextlib.suppress(WorkerError):  # the next process begins with the new cells
+                await self.check.ask(ReplaceCells(dict(cells)), timeout_s=None)
 
     async def close(self) -> None:
         """Stop both worker processes."""
@@ -45,7 +58,7 @@ def answer_robot_requests(
     robot: str,
     *,
     model: RobotModel,
-    meshes: Mapping[str, bytes],
+    meshes: Callable[[], Mapping[str, bytes]],
     cell_state: CellState,
     workers: Workers,
     checks: Quota,
@@ -53,16 +66,17 @@ def answer_robot_requests(
     """Register the request handlers of an arm.
 
     Args:
-        meshes: GLB bytes by the last chunk of their key.
+        meshes: Returns GLB bytes by the last chunk of their key.
         cell_state: Positions of the arms of its cell.
         checks: Check quota of each client, over all arms because one process serves them.
     """
 
     async def answer_mesh(request: Request) -> bytes:
-        if request.chunk not in meshes:
-            available = ", ".join(meshes) or "none"
+        glbs = meshes()
+        if request.chunk not in glbs:
+            available = ", ".join(glbs) or "none"
             raise RefusedError(codes.MESH_UNKNOWN(name=request.chunk, robot=robot, meshes=available))
-        return meshes[request.chunk]
+        return glbs[request.chunk]
 
     async def answer_forward(request: Request) -> schema.ForwardAnswer:
         message = request.message

@@ -75,10 +75,10 @@ class CellState:
         return known, tuple(unknown)
 
     def proximity(self, cell: Cell, robot: str, positions: FloatArray) -> Proximity:
-        """Return an arm's clearances; they are computed again only after a robot of the cell has moved."""
+        """Return an arm's clearances; they are computed again only after a robot or the cell has changed."""
         arm = self._arms[robot]
         others, unknown = self.others(robot)
-        key = positions.tobytes(), *((name, other.tobytes()) for name, other in others.items()), unknown
+        key = cell, positions.tobytes(), *((name, other.tobytes()) for name, other in others.items()), unknown
         if arm.cached is None or arm.cached[0] != key:
             was_close = arm.cached is not None and bool(arm.cached[1].close)
             outside, close = _outside(cell, robot, positions, others, was_close=was_close)

@@ -76,9 +76,18 @@ def describe(
 
 
 def add_surroundings(
-    message: schema.Description, robot: CellRobot, cell: CellDescription, fixtures: Sequence[FixtureMesh]
+    message: schema.Description,
+    robot: CellRobot,
+    cell: CellDescription,
+    fixtures: Sequence[FixtureMesh],
+    version: str = "",
 ) -> None:
-    """Add the fixtures, the floor and the clearance distances of a robot's cell."""
+    """Add the fixtures, the floor and the clearance distances of a robot's cell.
+
+    Args:
+        version: The gateway's version of them.
+    """
+    message.cell_version = version
     for each in fixtures:
         color = each.fixture.color
         message.fixtures.add(

@@ -10,7 +10,6 @@ from robomesh.quotas import Quota
 from robomesh.session import Session
 from robomesh.worker import Worker
 from robots.cells import CellDescription
-from robots.collision import Cell, build_cell
 from robots.description import load
 from robots.glb import link_meshes, main_colors
 from robots.model import build_model
@@ -18,9 +17,10 @@ from robots.singularity import reach_of
 from robots.urdf.write import to_urdf
 from services.kinematics.answers import Workers, answer_robot_requests
 from services.kinematics.cell_state import CellState
-from services.kinematics.descriptions import FixtureMesh, add_surroundings, describe, fixture_meshes
+from services.kinematics.descriptions import add_surroundings, describe
 from services.kinematics.publisher import FollowedArm, follow
 from services.kinematics.settings import RobotSettings, Settings
+from services.kinematics.shown_cell import ShownCell, first_content, follow_gateway
 
 log = logging.getLogger(__name__)
 
@@ -36,14 +36,20 @@ async def serve(session: Session, settings: Settings) -> None:
         RobotError: If a description or a mesh is invalid.
     """
     cells = tuple({id(robot.cell_description): robot.cell_description for robot in settings.robots}.values())
-    workers = Workers(Worker(_WORKER, cells, nice=_NICE), Worker(_WORKER, cells, nice=_NICE))
+    of_robots = {robot.name: cell for cell in cells for robot in cell.robots}
+    workers = Workers(
+        Worker(_WORKER, of_robots, nice=_NICE), Worker(_WORKER, of_robots, nice=_NICE), of_robots
+    )
+    shown: dict[str, ShownCell] = {}
     quotas = settings.quotas
     checks = Quota("checks", at_once=quotas.checks, a_minute=quotas.checks_a_minute)
     try:
         async with asyncio.TaskGroup() as group:
             for cell in cells:
                 robots = [robot for robot in settings.robots if robot.cell_description is cell]
-                group.create_task(_serve_cell(session, settings.site, cell, robots, workers, checks))
+                group.create_task(_serve_cell(session, settings, cell, robots, workers, checks, shown))
+            if settings.cell_content is not None:
+                group.create_task(follow_gateway(session, settings.site, shown))
     finally:
         gc.unfreeze()
         await workers.close()
@@ -51,24 +57,23 @@ async def serve(session: Session, settings: Settings) -> None:
 
 async def _serve_cell(
     session: Session,
-    site: str,
+    settings: Settings,
     cell: CellDescription,
     robots: Sequence[RobotSettings],
     workers: Workers,
     checks: Quota,
+    shown: dict[str, ShownCell],
 ) -> None:
     cell_state = CellState({robot.name: robot.stale_after_s for robot in robots}, time.monotonic)
-    fixtures = await asyncio.to_thread(fixture_meshes, cell)
+    first = await asyncio.to_thread(first_content, cell, settings.cell_content)
+    shown_cell = ShownCell(first, settings.cell_content, workers)
     async with asyncio.TaskGroup() as group:
-        # Building hulls takes seconds; descriptions and frames do not wait for it.
-        built = group.create_task(asyncio.to_thread(build_cell, cell))
+        group.create_task(shown_cell.build())
         for robot in robots:
             group.create_task(
-                _serve_robot(session, site, robot, cell_state, built, fixtures, workers, checks)
+                _serve_robot(session, settings.site, robot, cell_state, shown_cell, workers, checks)
             )
-        await built
-        # Hulls live as long as the service; without this each full garbage collection would take 0.2 s.
-        gc.freeze()
+            shown[robot.name] = shown_cell
 
 
 async def _serve_robot(
@@ -76,8 +81,7 @@ async def _serve_robot(
     site: str,
     settings: RobotSettings,
     cell_state: CellState,
-    built: asyncio.Task[Cell],
-    fixtures: Sequence[FixtureMesh],
+    shown: ShownCell,
     workers: Workers,
     checks: Quota,
 ) -> None:
@@ -90,22 +94,28 @@ async def _serve_robot(
         site,
         robot.name,
         model=model,
-        meshes=meshes | {each.name: each.glb for each in fixtures},
+        meshes=lambda: meshes | shown.now.meshes,
         cell_state=cell_state,
         workers=workers,
         checks=checks,
     )
-    message = describe(
-        description,
-        urdf=to_urdf(description, colors=main_colors(meshes)),
-        meshes=meshes,
-        base_to_site=robot.base_to_site,
-        cell=settings.cell,
-        simulated=settings.simulated,
-    )
-    add_surroundings(message, robot, settings.cell_description, fixtures)
-    message.stale_after_s = settings.stale_after_s
-    session.declare_publisher(site, robot.name, "description").put(message)
+    urdf = to_urdf(description, colors=main_colors(meshes))
+    publisher = session.declare_publisher(site, robot.name, "description")
+
+    def publish_description() -> None:
+        message = describe(
+            description,
+            urdf=urdf,
+            meshes=meshes,
+            base_to_site=robot.base_to_site,
+            cell=settings.cell,
+            simulated=settings.simulated,
+        )
+        add_surroundings(message, robot, shown.now.description, shown.now.fixtures, shown.now.version)
+        message.stale_after_s = settings.stale_after_s
+        publisher.put(message)
+
+    shown.serve(session, site, robot.name, publish_description)
     log.info("%s/%s: %s, %d joints", site, robot.name, description.title, len(model.joints))
     arm = FollowedArm(
         site=site,
@@ -113,6 +123,5 @@ async def _serve_robot(
         model=model,
         reach=reach_of(description),
         base_to_site=robot.base_to_site,
-        fixtures={each.fixture.name: each.fixture.fixture_to_site for each in fixtures},
     )
-    await follow(session, arm, cell_state, built)
+    await follow(session, arm, cell_state, shown)

@@ -1,6 +1,5 @@
 """Publishers of `frames`, `kinematics` and `events/kinematics`, driven by incoming joint states only."""
 
-import asyncio
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -26,6 +25,7 @@ from services.kinematics.conditions import (
     singularity_conditions,
 )
 from services.kinematics.floor import floor_event
+from services.kinematics.shown_cell import ShownCell
 from services.kinematics.states import (
     add_proximity,
     frames_message,
@@ -55,7 +55,6 @@ class FollowedArm:
     Attributes:
         reach: Result of `robots.singularity.reach_of` [m].
         base_to_site: (4, 4) placement of the base in the site's frame.
-        fixtures: (4, 4) placements of its cell's fixtures in the site's frame, by name.
     """
 
     site: str
@@ -63,7 +62,6 @@ class FollowedArm:
     model: RobotModel
     reach: float
     base_to_site: FloatArray
-    fixtures: dict[str, FloatArray]
 
     @property
     def path(self) -> str:
@@ -71,14 +69,12 @@ class FollowedArm:
         return f"{self.site}/{self.name}"
 
 
-async def follow(
-    session: Session, arm: FollowedArm, cell_state: CellState, built: asyncio.Task[Cell]
-) -> None:
+async def follow(session: Session, arm: FollowedArm, cell_state: CellState, shown: ShownCell) -> None:
     """Publish an arm's frames, kinematic state and events, until cancelled.
 
     Args:
         cell_state: State of its cell; receives each state that is processed.
-        built: Task that builds the cell's hulls; until it is done no clearance is published.
+        shown: Content of its cell; until its hulls are built no clearance is published.
     """
     frames = session.declare_publisher(arm.site, arm.name, "frames")
     kinematics = session.declare_publisher(arm.site, arm.name, "kinematics")
@@ -88,10 +84,12 @@ async def follow(
     alarms = Alarms()
     before: tuple[int, FloatArray] | None = None
     mismatch_log = _MismatchLog(arm)
-    floor_reported = False
+    floor_reported: Cell | None = None
+    placed: object = None
     async for sample in session.subscribe(robot_key(arm.site, arm.name, "joints")):
         time_ns, dated_by = sample.header.source_time_ns, sample.header.publisher
         frames_due, kinematics_due = frames_limit.due(time_ns), kinematics_limit.due(time_ns)
+        now = shown.now
         if not (frames_due or kinematics_due):
             continue
         try:
@@ -112,8 +110,9 @@ async def follow(
                 prefix=arm.path,
                 base_to_site=arm.base_to_site,
                 timestamp=message.timestamp,
-                fixtures=arm.fixtures if fixtures_limit.due(time_ns) else {},
+                fixtures=now.placements if fixtures_limit.due(time_ns) or placed is not now.fixtures else {},
             )
+            placed = now.fixtures
             if not sample.live:
                 # A last value: answer late joiners with it. Published, it would look live.
                 frames.remember(transforms, source_time_ns=time_ns)
@@ -125,13 +124,13 @@ async def follow(
         if velocities is None:
             velocities = _difference(before, time_ns, positions)
         before = time_ns, positions
-        state, proximity = _state(arm, cell_state, built, positions, velocities, message.timestamp)
+        state, proximity = _state(arm, cell_state, now.built, positions, velocities, message.timestamp)
         kinematics.put(state, source_time_ns=time_ns, dated_by=dated_by)
-        found = alarms.judge(_conditions(arm, built, positions, state, proximity), sample.received)
-        if built.done() and not floor_reported:
-            floor_reported = True
+        found = alarms.judge(_conditions(arm, now.built, positions, state, proximity), sample.received)
+        if now.built is not None and floor_reported is not now.built:
+            floor_reported = now.built
             poses = {"at home": arm.model.joints.home, "where it is now": positions}
-            if (below_floor := floor_event(built.result(), arm.name, poses)) is not None:
+            if (below_floor := floor_event(now.built, arm.name, poses)) is not None:
                 found.append(below_floor)
         for event in found:
             event.timestamp.CopyFrom(message.timestamp)
@@ -142,23 +141,23 @@ async def follow(
 def _state(
     arm: FollowedArm,
     cell_state: CellState,
-    built: asyncio.Task[Cell],
+    built: Cell | None,
     positions: FloatArray,
     velocities: FloatArray | None,
     timestamp: Timestamp,
 ) -> tuple[schema.KinematicState, Proximity | None]:
     """Return the `kinematics` message and the clearances; the latter are None until the hulls are built."""
     state = kinematic_state(arm.model, positions, velocities, reach=arm.reach, timestamp=timestamp)
-    if not built.done():
+    if built is None:
         return state, None
-    proximity = cell_state.proximity(built.result(), arm.name, positions)
+    proximity = cell_state.proximity(built, arm.name, positions)
     add_proximity(state, proximity, site=arm.site)
     return state, proximity
 
 
 def _conditions(
     arm: FollowedArm,
-    built: asyncio.Task[Cell],
+    built: Cell | None,
     positions: FloatArray,
     state: schema.KinematicState,
     proximity: Proximity | None,
@@ -166,9 +165,9 @@ def _conditions(
     """Yield the alarm conditions of a state."""
     yield from limit_conditions(arm.model.joints, positions)
     yield from singularity_conditions(state.singularity_margin)
-    if proximity is not None:
+    if proximity is not None and built is not None:
         yield from own_conditions(proximity.own)
-        yield from outside_conditions(proximity.close, partial(distances, built.result()))
+        yield from outside_conditions(proximity.close, partial(distances, built))
         yield from missing_conditions(proximity.not_counted)
 
 

@@ -13,12 +13,16 @@ from robots.description import load
 from robots.inverse import InverseSolver, build_solver
 from services.kinematics.check import check_answer
 from services.kinematics.inverse import inverse_answer
-from services.kinematics.worker_messages import InverseQuestion, Question
+from services.kinematics.worker_messages import InverseQuestion, Question, ReplaceCells
 
 
-def begin(cells: tuple[CellDescription, ...]) -> Callable[[Question], bytes]:
-    """Return the function that answers questions about the robots of these cells; it loads them on demand."""
-    cell_of = {robot.name: cell for cell in cells for robot in cell.robots}
+def begin(cells: dict[str, CellDescription]) -> Callable[[Question], bytes]:
+    """Return the function that answers questions about robots; it loads their cells on demand.
+
+    Args:
+        cells: By robot.
+    """
+    cell_of = dict(cells)
     ready: dict[tuple[CellDescription, bool], Cell] = {}
 
     def built(robot: str, exact: bool) -> Cell:
@@ -37,6 +41,10 @@ def begin(cells: tuple[CellDescription, ...]) -> Callable[[Question], bytes]:
         return build_solver(load(described.model, confined=described.confined))
 
     def answer(question: Question) -> bytes:
+        if isinstance(question, ReplaceCells):
+            cell_of.update(question.cells)
+            ready.clear()
+            return b""
         if isinstance(question, InverseQuestion):
             pose = schema.InverseRequest.FromString(question.request)
             return inverse_answer(solver(question.robot), pose).SerializeToString()

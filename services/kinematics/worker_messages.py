@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from robots.cells import CellDescription
 from robots.joints import FloatArray
 
 
@@ -29,4 +30,15 @@ class CheckQuestion:
     others: Mapping[str, FloatArray]
 
 
-Question = InverseQuestion | CheckQuestion
+@dataclass(frozen=True, eq=False)
+class ReplaceCells:
+    """A request to answer from other cells from now on; the answer is empty.
+
+    Attributes:
+        cells: By robot.
+    """
+
+    cells: Mapping[str, CellDescription]
+
+
+Question = InverseQuestion | CheckQuestion | ReplaceCells

@@ -21,6 +21,7 @@ class Quotas(BaseModel):
     recordings_mib_a_minute: Annotated[float, Field(ge=16, le=1 << 20)] = DEFAULT.recordings_mib_a_minute
     program_saves_a_minute: Annotated[float, Field(ge=1, le=60_000)] = DEFAULT.program_saves_a_minute
     notes_a_minute: Annotated[float, Field(ge=1, le=60_000)] = DEFAULT.notes_a_minute
+    cell_changes_a_minute: Annotated[float, Field(ge=1, le=60_000)] = DEFAULT.cell_changes_a_minute
 
     @property
     def settings(self) -> QuotaSettings:

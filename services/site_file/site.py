@@ -213,7 +213,7 @@ def load(path: Path | None) -> Site:
         if len(found) > _MAX_PROBLEMS:
             sentences.append(f"{path}: and {len(found) - _MAX_PROBLEMS} more problems")
         raise SiteFileError("\n".join(sentences)) from None
-    site = _resolve_paths(site, path.parent)
+    site = resolve_site(site, path.parent)
     # Report before the start what no service could run with.
     try:
         _check_reach(site)
@@ -282,7 +282,8 @@ def _unseen_problem(robots: tuple[Robot, ...], unseen: Mapping[str, str]) -> str
     return None
 
 
-def _resolve_paths(site: Site, folder: Path) -> Site:
+def resolve_site(site: Site, folder: Path) -> Site:
+    """Return the site with paths relative to a folder."""
     robots = tuple(
         robot.model_copy(update={"model": str(folder / robot.model)})
         if robot.model.endswith((".toml", ".urdf")) and not Path(robot.model).is_absolute()

@@ -62,7 +62,7 @@ ROW = 'name = "li"\nrole = "operator"\nhash = "$argon2id$x"\ncreated = 2026-11-2
         (f"[[account]]\n{ROW}[[account]]\n{ROW}", "two accounts are named 'li'"),
         ("[[account]]\n" + ROW.replace('"li"', '"li.shanghai"'), "account name 'li.shanghai' is invalid"),
         ("[[account]]\n" + ROW.replace('"li"', '"' + "x" * 33 + '"'), "use at most 32 "),
-        ("[[account]]\n" + ROW.replace("operator", "king"), "there are monitor, operator, admin"),
+        ("[[account]]\n" + ROW.replace("operator", "king"), "there are monitor, operator, engineer, admin"),
         ("[[account]]\n" + ROW.replace("$argon2id$x", "secret in clear"), "should be argon2id"),
         ("[[account]]\n" + ROW.replace("2026-11-21T08:00:00Z", '"today"'), "a time with its zone"),
         ("[[account]]\n" + ROW + "disabled = 1\n", "true or false"),
@@ -332,7 +332,7 @@ def test_accounts_are_kept_from_the_command_line_with_passwords_from_standard_in
         (("add", site, "wang"), "shanghai2026\n", "easy to guess"),
         (("add", site, "wang"), "", "no password on standard input"),
         (("add", site, "Wang Li"), PASSWORD, "is invalid"),
-        (("add", site, "wang", "--role", "king"), PASSWORD, "there are monitor, operator, admin"),
+        (("add", site, "wang", "--role", "king"), PASSWORD, "there are monitor, operator, engineer, admin"),
         (("passwd", site, "wang"), PASSWORD, "no account 'wang'"),
         (("list", tmp_path / "nowhere.toml"), "", "no such file"),
     ):

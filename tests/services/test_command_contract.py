@@ -55,6 +55,8 @@ CONTRACT = {
     "programs diff": ("--connect",),
     "programs export": ("--force",),
     "note": ("--from", "--to", "--withdraw", "--json"),
+    "cell show": ("--json",),
+    **dict.fromkeys((f"cell {each}" for each in ("set", "move", "undo")), ("--yes", "--dry-run", "--json")),
     "audit verify": ("--head", "--json"),
     "keys init": (),
     "doctor": ("--security", "--json"),

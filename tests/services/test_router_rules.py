@@ -255,7 +255,7 @@ def test_a_missing_right_is_reported_before_the_request_is_sent(tmp_path):
             ):
                 with pytest.raises(NoRightError) as error:
                     await mo.ask(robot_key(SITE, "arm", "command/mo.here"))
-                asked = {"act": "ask", "topic": "command/mo.here", "roles": "console, operator"}
+                asked = {"act": "ask", "topic": "command/mo.here", "roles": "console, engineer, operator"}
                 assert error.value.reason == codes.NO_RIGHT(
                     codes.RIGHT_ROLE(name="mo.here", role="monitor", **asked)
                 )

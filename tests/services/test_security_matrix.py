@@ -30,6 +30,7 @@ IN_NAME = (
     "lease/request/*",
     "command/*",
     "alarms/request/*",
+    "cell/request/*",
     "programs/request/*",
     "notes/request/*",
     "notes/withdraw/*",
@@ -62,7 +63,7 @@ class Party:
 def people() -> dict[str, Role]:
     named = {f"{role.value}.{SITE}": role for role in SERVICES}
     named["started.here"] = Role.GATEWAY
-    return named | {"li.here": Role.OPERATOR, "wang.here": Role.OPERATOR, "mo.here": Role.MONITOR}
+    return named | {"li.here": Role.OPERATOR, "wang.here": Role.ENGINEER, "mo.here": Role.MONITOR}
 
 
 def one_link(endpoint: str, tls: Tls) -> zenoh.Config:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from services.site_file.cell_file import CellFile
     from services.site_file.site import Site
 
 
@@ -84,10 +85,19 @@ def _gateway(site: "Site", options: Options) -> Any:
         robots=robots,
         audit_folder=site.audit.folder,
         audit_rotate_bytes=round(site.audit.rotate_mib * 2**20),
+        cell_file=_cell_file(site, options),
+        quotas=site.quotas.settings,
     )
 
 
-def _kinematics(site: "Site", _: Options) -> Any:
+def _cell_file(site: "Site", options: Options) -> "CellFile":
+    """Return the cells of the site file; a robot that was started from the page is not in it."""
+    from services.site_file.cell_file import CellFile
+
+    return CellFile(None if options.started else options.site_file, site)
+
+
+def _kinematics(site: "Site", options: Options) -> Any:
     from services.kinematics import RobotSettings, Settings
     from services.site_file.cells import cells_of
 
@@ -102,7 +112,12 @@ def _kinematics(site: "Site", _: Options) -> Any:
         )
         for robot in site.robot
     )
-    return Settings(site=site.site, robots=robots, quotas=site.quotas.settings)
+    return Settings(
+        site=site.site,
+        robots=robots,
+        quotas=site.quotas.settings,
+        cell_content=_cell_file(site, options),
+    )
 
 
 def _console(site: "Site", options: Options) -> Any:

@@ -44,6 +44,7 @@ class AccountRole(Enum):
 
     MONITOR = "monitor"
     OPERATOR = "operator"
+    ENGINEER = "engineer"
     ADMIN = "admin"
 
 
@@ -65,6 +66,11 @@ class Account:
     def may_command(self) -> bool:
         """True if its role may request control, and change what is recorded or defined."""
         return self.role is not AccountRole.MONITOR
+
+    @property
+    def may_change_cells(self) -> bool:
+        """True if its role may change what stands in a cell."""
+        return self.role in (AccountRole.ENGINEER, AccountRole.ADMIN)
 
 
 Accounts = Mapping[str, Account]

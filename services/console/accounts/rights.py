@@ -20,7 +20,9 @@ def operator_name(account: str, site: str) -> str:
 
 
 def lacks_right(account: Account, what: str) -> Reason:
-    """Return why a monitor account may not send a request."""
+    """Return why a monitor account may not send a request, or an operator not an engineer's."""
+    if account.may_command:
+        return codes.NEEDS_ENGINEER(account=account.name, role=account.role.value, what=what)
     return codes.NEEDS_OPERATOR(account=account.name, role=account.role.value, what=what)
 
 
@@ -53,7 +55,8 @@ def check_right(row: topics.Request, key: keys.Key, user: SignedIn, site: str) -
     account, everybody = user.account, Role.MONITOR in row.askers
     if row.administrators and account.role is not AccountRole.ADMIN:
         raise RefusedError(codes.ACCOUNT_NOT_ADMIN(account=account.name))
-    if not everybody and not account.may_command:
+    may = account.may_command if Role.OPERATOR in row.askers else account.may_change_cells
+    if not everybody and not may:
         what = row.name.removesuffix("/*")
         raise RefusedError(lacks_right(account, what))
     check_own_name(row, key, operator_name(account.name, site), user=account.name)

@@ -47,6 +47,7 @@ const TEXTS = {
   menu: ["Account: {account}, {role}", "账户：{account}，{role}"],
   role_monitor: ["monitor", "监视"],
   role_operator: ["operator", "操作员"],
+  role_engineer: ["engineer", "工程师"],
   role_admin: ["administrator", "管理员"],
   may_watch: ["Watches: asks for no control. Stop requests work.", "仅监视：不能请求控制权，可请求停止。"],
   may_command: ["May ask for control, as {operator}.", "可请求控制权，操作名 {operator}。"],

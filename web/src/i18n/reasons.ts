@@ -196,6 +196,10 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ["{account} is a {role}: {what} needs an operator", "{account} 的角色是 {role}：{what} 需要操作员"],
   ],
   [
+    "page.needs_engineer",
+    ["{account} is a {role}: {what} needs an engineer", "{account} 的角色是 {role}：{what} 需要工程师"],
+  ],
+  [
     "page.password_again",
     [
       "commands are locked because this page was not used for a while: enter your password again",
@@ -935,6 +939,152 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "{author} 删除了程序“{name}”（{reason}）；可以恢复",
     ],
   ],
+  [
+    "cell.changes",
+    [
+      "{operator} is changing the cell of {robot}: no control and no motion until it is done: try again in a moment",
+      "{operator} 正在更改 {robot} 所在的单元，完成之前不能控制也不能运动：请稍后再试",
+    ],
+  ],
+  [
+    "cell.disagrees",
+    [
+      "the kinematics service shows {robot} in another cell than the one that motions are checked against: wait until it follows, or restart it",
+      "运动学服务所显示的 {robot} 的单元与运动检查所用的单元不同：请等待其同步，或重启该服务",
+    ],
+  ],
+  [
+    "cell.not_followed",
+    [
+      "the kinematics service cannot show the cell of {robot}: {cause}: correct that",
+      "运动学服务无法显示 {robot} 的单元：{cause}：请予以纠正",
+    ],
+  ],
+  [
+    "cell.controlled",
+    [
+      "{holder} has control of {robot}: the cell can be changed when control is released",
+      "{holder} 正在控制 {robot}：释放控制权后才能更改单元",
+    ],
+  ],
+  [
+    "cell.moves",
+    [
+      "{robot} moves: wait until every robot of the cell rests, or stop it",
+      "{robot} 正在运动：请等待单元内所有机器人静止，或将其停止",
+    ],
+  ],
+  [
+    "cell.unknown",
+    [
+      "it is not known whether {robot} rests, because its controller reports no position: connect its controller first",
+      "{robot} 的控制器没有报告位置，无法确定它是否静止：请先连接其控制器",
+    ],
+  ],
+  [
+    "cell.outdated",
+    [
+      "the cell of {robot} has changed meanwhile: load it again and repeat the change",
+      "{robot} 的单元在此期间已被更改：请重新载入后再更改",
+    ],
+  ],
+  ["cell.same", ["nothing would change in the cell of {robot}", "{robot} 的单元没有任何变化"]],
+  [
+    "cell.no_file",
+    [
+      "the gateway of {robot} runs without a site file in which a change could be saved: write one and start the site with it",
+      "{robot} 的网关没有可以保存更改的站点文件：请编写一个站点文件并用它启动站点",
+    ],
+  ],
+  [
+    "cell.no_cell",
+    [
+      "{robot} has no cell, so it can have no fixture: give it a `cell` in the site file and restart the site's services",
+      "{robot} 不属于任何单元，因此不能有固定物：请在站点文件中为它设置 `cell`，然后重启站点服务",
+    ],
+  ],
+  [
+    "cell.other_gateway",
+    [
+      "{robot} is of the same cell and has another gateway: one gateway must serve all robots of a cell that is changed",
+      "{robot} 属于同一单元，但由另一个网关服务：要更改的单元内所有机器人必须由同一个网关服务",
+    ],
+  ],
+  [
+    "cell.read_only",
+    [
+      "the gateway may not write {file} or its folder: mount the folder writable, or change the file by hand and restart the site's services",
+      "网关不能写入 {file} 或其文件夹：请将文件夹挂载为可写，或手动修改文件后重启站点服务",
+    ],
+  ],
+  [
+    "cell.file_changed",
+    [
+      "{file} was changed on disk after the gateway read it: restart the site's services, then repeat the change",
+      "网关读取 {file} 之后，该文件在磁盘上已被修改：请重启站点服务，然后重新更改",
+    ],
+  ],
+  [
+    "cell.file_form",
+    [
+      "{file} writes this part in a form that cannot be changed without touching other lines: write fixtures as [[fixture]] and robots as [[robot]] tables, or change the file by hand",
+      "{file} 中这一部分的写法使得更改必然触及其他行：请将固定物写成 [[fixture]] 表、将机器人写成 [[robot]] 表，或手动修改文件",
+    ],
+  ],
+  [
+    "cell.disk",
+    ["{file} cannot be written, so nothing has changed: {detail}", "{file} 无法写入，没有任何更改：{detail}"],
+  ],
+  ["cell.fixture", ["fixture '{name}': {detail}", "固定物“{name}”：{detail}"]],
+  ["cell.content", ["{detail}", "{detail}"]],
+  [
+    "cell.too_many",
+    [
+      "{count} {what}: a request may have {most}: write more of them into the site file",
+      "{count} {what}：一个请求最多 {most} 个：其余请写入站点文件",
+    ],
+  ],
+  [
+    "cell.mesh",
+    [
+      "fixture '{name}': the site file names no mesh '{file}': a new mesh file is named in the site file first",
+      "固定物“{name}”：站点文件中没有网格“{file}”：新的网格文件须先写入站点文件",
+    ],
+  ],
+  [
+    "cell.no_kinematics",
+    [
+      "the kinematics service of {robot} does not take the change, so nothing has changed: {cause}",
+      "{robot} 的运动学服务不接受更改，没有任何更改：{cause}",
+    ],
+  ],
+  [
+    "cell.check_failed",
+    [
+      "the change cannot be checked against, so nothing has changed: {cause}",
+      "无法按更改后的单元进行检查，没有任何更改：{cause}",
+    ],
+  ],
+  [
+    "cell.taken_back",
+    [
+      "the change was taken back: the kinematics service of {robot} did not show it within {seconds} s: look whether that service runs, then try again",
+      "更改已撤回：{robot} 的运动学服务未在 {seconds} 秒内显示它：请检查该服务是否在运行，然后再试",
+    ],
+  ],
+  [
+    "cell.stuck",
+    [
+      "the change failed ({cause}), and the old cell could not be restored: {detail}: restart the gateway and the kinematics service of {robot}",
+      "更改失败（{cause}），且无法恢复旧单元：{detail}：请重启 {robot} 的网关和运动学服务",
+    ],
+  ],
+  [
+    "cell.changed",
+    ["{operator} changed the cell of {robot}: {summary}", "{operator} 更改了 {robot} 的单元：{summary}"],
+  ],
+  ["cell.accepted", ["{summary}", "{summary}"]],
+  ["cell.not_changed", ["the cell was not changed: {cause}", "单元未更改：{cause}"]],
   [
     "programs.damaged",
     [

@@ -84,6 +84,7 @@ export const SETTINGS_TEXTS = {
   account: ["Account", "账户"],
   role: ["Role", "角色"],
   role_operator: ["operator", "操作员"],
+  role_engineer: ["engineer", "工程师"],
   role_monitor: ["monitor", "监视者"],
   role_admin: ["administrator", "管理员"],
   created: ["Created", "创建"],

@@ -13,7 +13,7 @@ export interface Me {
   insecure: boolean;
   /** Empty: not signed in. */
   account: string;
-  role: "" | "monitor" | "operator" | "admin";
+  role: "" | "monitor" | "operator" | "engineer" | "admin";
   operator: string;
   may_command: boolean;
   /** The right to command is suspended until the password is given again. */

@@ -103,7 +103,9 @@ export function SceneView(props: {
 
   // A changed description gets a new scene.
   const identity = useMemo(
-    () => description && JSON.stringify([description.links, description.fixtures, description.baseToSite]),
+    () =>
+      description &&
+      JSON.stringify([description.links, description.fixtures, description.floor, description.baseToSite]),
     [description],
   );
   // The joints are shown first.

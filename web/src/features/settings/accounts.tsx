@@ -9,8 +9,8 @@ import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
 import { Select } from "../../ui/select";
 
-type Role = "monitor" | "operator" | "admin";
-const ROLES: readonly Role[] = ["monitor", "operator", "admin"];
+type Role = "monitor" | "operator" | "engineer" | "admin";
+const ROLES: readonly Role[] = ["monitor", "operator", "engineer", "admin"];
 
 interface Account {
   name: string;
