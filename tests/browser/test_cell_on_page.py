@@ -81,6 +81,32 @@ def test_what_stands_around_an_arm_is_in_its_picture_with_the_line_to_what_is_ne
     assert serious(page) == []
 
 
+def test_a_fixture_is_moved_with_numbers_after_a_confirmation_and_moved_back(open_page, plant):
+    page = open_page("#/cell/test/arm", drawn=False)
+    file = plant.site.folder / "site.toml"
+    before = file.read_text()
+    page.get_by_role("button", name="post").click()
+    place = page.get_by_role("group", name="Position in the site's frame")
+    place.get_by_label("x").fill("320")
+    page.get_by_role("button", name="Review change…").click()
+    form = page.get_by_role("form", name="Change this cell?")
+    expect(form).to_contain_text("post: xyz [300, 250, 450] → [320, 250, 450]", timeout=SLOWLY_MS)
+    assert file.read_text() == before
+    assert serious(page) == []
+    form.get_by_role("button", name="Change cell").click()
+    said = page.get_by_role("region", name="Fixtures and floor").get_by_role("status")
+    expect(said).to_contain_text("Changed: post", timeout=SLOWLY_MS)
+    assert file.read_text() == before.replace("[300.0, 250.0, 450.0]", "[320.0, 250.0, 450.0]")
+    assert newest(plant, "description").fixtures[0].fixture_to_site[3] == pytest.approx(0.32)
+    page.get_by_role("button", name="Undo last change…").click()
+    form.get_by_role("button", name="Change cell").click(timeout=SLOWLY_MS)
+    expect(said).to_contain_text("→ [300, 250, 450]", timeout=SLOWLY_MS)
+    expect(page.get_by_role("button", name="post")).to_contain_text("300, 250, 450 mm")
+    expect(place.get_by_label("x")).to_have_value("300", timeout=SLOWLY_MS)
+    assert file.read_text() == before
+    expect(page.get_by_text("They change with a restart of the site's services.")).to_be_visible()
+
+
 def test_a_clearance_that_grows_short_turns_amber_with_its_number_and_an_event_says_so(open_page, plant):
     page = open_page(PAGE, drawn=False)
     row = page.locator('[data-margin="clearance"]')

@@ -56,6 +56,7 @@ const ReplayRobotPage = onDemand(
   async () => (await import("../features/recordings/replay-robot-page")).ReplayRobotPage,
 );
 const ProgramPage = onDemand(async () => (await import("../features/program/program-page")).ProgramPage);
+const CellPage = onDemand(async () => (await import("../features/cell/cell-page")).CellPage);
 const DefinePage = onDemand(async () => (await import("../features/define/define-page")).DefinePage);
 const WallPage = onDemand(async () => (await import("../features/wall/wall-page")).WallPage);
 const RecordingsPage = onDemand(async () => (await import("../features/recordings/recordings-page")).RecordingsPage);
@@ -116,6 +117,8 @@ function Page({ route, robotKey }: { route: Route; robotKey: string }) {
       );
     case "program":
       return <ProgramPage shown={route.robot} sha256={route.sha256} />;
+    case "cell":
+      return <CellPage key={robotKey} {...route.robot} />;
     case "define":
       return <DefinePage name={route.name} />;
     case "wall":

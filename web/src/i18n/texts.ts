@@ -11,6 +11,7 @@ const TEXTS = {
   replay: ["replay", "回放"],
   define: ["New robot", "新建机器人"],
   program: ["Program", "编程"],
+  cell: ["Cell", "单元"],
   settings: ["Settings", "设置"],
   pages: ["Pages", "页面"],
   skip: ["Skip to the page", "跳到页面内容"],

@@ -22,6 +22,8 @@ export type Route =
   | { page: "robot"; robot: RobotName }
   /** `#/program/<site>/<robot>`, then a text's SHA-256; null: `#/program`, which offers a choice of robots. */
   | { page: "program"; robot: RobotName | null; sha256: string }
+  /** `#/cell/<site>/<robot>`: the fixtures and the floor around a robot. */
+  | { page: "cell"; robot: RobotName }
   /** `#/define/<name>`; "": a new robot. */
   | { page: "define"; name: string }
   /** `#/recordings`, the list; then `/<site>/<file>` for one recording or two to compare. */
@@ -51,6 +53,10 @@ function readRoute(): Route {
       return robot && isReplay(robot.robot)
         ? { page: "robot", robot }
         : { page: "program", robot, sha256: rest[2] ?? "" };
+    }
+    case "cell": {
+      const robot = readRobot(rest);
+      return robot ? { page: isReplay(robot.robot) ? "robot" : "cell", robot } : { page: "fleet" };
     }
     default: {
       const robot = readRobot([first, ...rest]);
@@ -95,9 +101,9 @@ addEventListener("hashchange", () => {
   route.value = readRoute();
 });
 
-/** Return the robot that a route shows, on its own page or its program's. */
+/** Return the robot that a route shows, on its own page, its program's or its cell's. */
 export function robotOf(shown: Route): RobotName | null {
-  return shown.page === "robot" || shown.page === "program" ? shown.robot : null;
+  return shown.page === "robot" || shown.page === "program" || shown.page === "cell" ? shown.robot : null;
 }
 
 export function robotLink(site: string, robot: string): string {
@@ -107,6 +113,11 @@ export function robotLink(site: string, robot: string): string {
 /** Link to a robot's program; to the text of one that ran, by its SHA-256. */
 export function programLink(site: string, robot: string, ...sha256: readonly string[]): string {
   return link("program", site, robot, ...sha256);
+}
+
+/** Link to what stands around a robot. */
+export function cellLink(site: string, robot: string): string {
+  return link("cell", site, robot);
 }
 
 /** Link to the list, to one recording, or to two to compare. */

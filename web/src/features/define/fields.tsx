@@ -3,6 +3,7 @@
 import type { ComponentChildren } from "preact";
 import { useId, useState } from "preact/hooks";
 import { d } from "../../i18n/define";
+import { numberText, readNumber } from "../../ui/number-text";
 import { invalidNumbers, problemsAt, setInvalidNumber } from "./checks";
 import type { Pose, Triple } from "./description";
 import { endUndoStep } from "./draft";
@@ -13,17 +14,6 @@ interface Place {
   label: string;
   /** Show the label to screen readers only: a column's head or the row shows it. */
   quiet?: boolean;
-}
-
-/** Format a number with its own digits and a true minus sign. */
-export function numberText(value: number): string {
-  return String(Math.round(value * 1e6) / 1e6).replace("-", "−");
-}
-
-/** Parse a whole text as a number; null: invalid. A comma is ambiguous, so it is invalid. */
-export function readNumber(text: string): number | null {
-  const plain = text.trim().replace("−", "-");
-  return /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(plain) && Number.isFinite(Number(plain)) ? Number(plain) : null;
 }
 
 /** A number with its unit. Arrow keys step it; invalid text stays, marked, until it is corrected or Escape. */

@@ -2,12 +2,13 @@
 
 import { Matrix4 } from "three";
 import { d } from "../../i18n/define";
+import { numberText } from "../../ui/number-text";
 import { Unit } from "../../ui/unit";
 import { checkError, checked, checking } from "./checks";
 import type { Joint, Units } from "./description";
 import { jointUnit } from "./description";
 import { draft, editDraft } from "./draft";
-import { NumberField, numberText } from "./fields";
+import { NumberField } from "./fields";
 import { poseOf } from "./placements";
 import { positionOf, sliderPositions } from "./selection";
 

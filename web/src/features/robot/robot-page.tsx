@@ -33,7 +33,7 @@ import { NoRobot, useRobotSearch } from "../../panels/robot-not-found";
 import type { Stage } from "../../scene/robot-scene";
 import { SceneView } from "../../scene/scene-view";
 import { jointsTopic } from "../../scene/topic-selection";
-import { programLink } from "../../ui/route";
+import { cellLink, programLink } from "../../ui/route";
 import { State } from "../../ui/state";
 import { Tag } from "../../ui/tag";
 import type { VideoPlace } from "./camera-panel";
@@ -201,6 +201,9 @@ function Headline(props: {
       <div class="about-robot">
         <a class="page-link" href={programLink(props.site, props.name)}>
           {t("program")}
+        </a>
+        <a class="page-link" href={cellLink(props.site, props.name)}>
+          {t("cell")}
         </a>
         <RecordButton robotKey={`robomesh/${props.site}/${props.name}`} />
         <NoteButton />
