@@ -951,6 +951,22 @@ RECORDING_SPAN = Code(
     "the part of {file} is not within its {seconds:.3f} s",
     "choose a begin and an end, in seconds since its start",
 )
+RECORDING_VIDEO_LONG = Code(
+    "recording.video_long",
+    "the part is longer than {most:g} min",
+    "choose a shorter one, or use robomesh recordings export",
+)
+RECORDING_VIDEO_SPACE = Code(
+    "recording.video_space",
+    "the console's machine has no {mib:.0f} MiB free for the video",
+    "make room there",
+)
+RECORDING_VIDEO_BUSY = Code(
+    "recording.video_busy", "{count} videos are being made or wait already", "try again later"
+)
+RECORDING_VIDEO_GONE = Code(
+    "recording.video_gone", "no such video: it is kept for {minutes:g} min", "render it again"
+)
 RECORDING_ZIP = Code("recording.zip", "{count} recordings for one ZIP", "name 1 to {most}")
 RECORDING_AMBIGUOUS = Code(
     "recording.ambiguous", "several recordings have the name '{name}'", "name the file: {files}"

@@ -43,6 +43,7 @@ from services.console.http.layouts import layout_response
 from services.console.http.listener import listening
 from services.console.http.meshes import MeshCache, mesh_response
 from services.console.http.pictures import MJPEG, Pictures
+from services.console.http.recorded_video import RecordedVideo
 from services.console.http.recordings import Recordings
 from services.console.http.uvicorn_server import (
     follow_certificate,
@@ -148,6 +149,7 @@ class Hub:
         self.meshes = MeshCache()
         self.subscriptions = SharedSubscriptions(session)
         self.views = Views(session)
+        self.recorded_video = RecordedVideo(session, self.asker)
         self.pictures = Pictures(self.subscriptions, self.views, session, self.asker)
         self._alive: set[PresenceKey] = set()
         # After a start or a lost link, tokens arrive one by one.
@@ -188,6 +190,7 @@ class Hub:
             self.auth.close()
         if self.define is not None:
             await self.define.close()
+        await self.recorded_video.close()
 
     async def browse(self, websocket: WebSocket) -> None:
         """Serve one browser's WebSocket."""
@@ -333,6 +336,7 @@ def application(hub: Hub) -> ASGIApp:
         Route("/layout/{site}/{robot}.json", layout, methods=["GET"]),
         *viewing,
         *Recordings(hub.session, hub.asker).routes(),
+        *hub.recorded_video.routes(),
         *([] if hub.define is None else [hub.define.routes()]),
         Mount("/", PageFiles(directory=hub.settings.page, html=True)),
     ]

@@ -1,7 +1,7 @@
 """Video of a recording, rendered from its joints: any view, size and rate."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -44,8 +44,18 @@ class Rendering:
     samples: int
 
 
-def write_rendered(file: RecordingFile, span: Span, target: Path, rendering: Rendering) -> tuple[int, float]:
+def write_rendered(
+    file: RecordingFile,
+    span: Span,
+    target: Path,
+    rendering: Rendering,
+    *,
+    on_progress: Callable[[float], None] = lambda share: None,
+) -> tuple[int, float]:
     """Render and write the video; return pictures and seconds.
+
+    Args:
+        on_progress: Called with the rendered share, from 0 to 1; a terminal shows a bar too.
 
     Raises:
         ExportError: If the recording has no description, or a mesh is missing.
@@ -79,6 +89,7 @@ def write_rendered(file: RecordingFile, span: Span, target: Path, rendering: Ren
                 packet = encoder.encode(drawn.picture, key_frame=number % key_each == 0)
                 stream.write(mp4.add(packet.data, time_ns, usual_s=1 / rendering.fps))
                 report(span.share(time_ns))
+                on_progress(span.share(time_ns))
     finally:
         studio.close()
     return mp4.pictures, mp4.duration_s

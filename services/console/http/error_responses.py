@@ -65,6 +65,11 @@ def refused_on_the_mesh(error: RobomeshError) -> RefusedRequest:
             return RefusedRequest(400, codes.INVALID(codes.OTHER(detail=error)))
 
 
+def refused_error(error: Exception) -> RefusedRequest | None:
+    """Return the refusal for an error of the mesh; None for another error."""
+    return refused_on_the_mesh(error) if isinstance(error, RobomeshError) else None
+
+
 def with_error_responses(
     handler: Handler, form: Form, refused: Callable[[Exception], RefusedRequest | None] = lambda _: None
 ) -> Handler:

@@ -11,10 +11,9 @@ Only one piece is in memory at a time, however large the file.
 import csv
 import io
 import logging
-import math
 import re
-from collections.abc import AsyncIterator, Callable, Mapping
-from typing import NamedTuple, TypeVar
+from collections.abc import AsyncIterator, Callable
+from typing import TypeVar
 from urllib.parse import quote
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
@@ -26,7 +25,6 @@ from starlette.types import Scope
 
 from robomesh import reason_codes as codes
 from robomesh.client.recorder import RangeMessage, RecorderFile
-from robomesh.errors import RobomeshError
 from robomesh.recordings.channel_names import SUFFIX, robot_channels
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.table import Table, is_due, table_of
@@ -36,9 +34,10 @@ from services.console.errors import RefusedRequest
 from services.console.http.error_responses import (
     Handler,
     as_text,
-    refused_on_the_mesh,
+    refused_error,
     with_error_responses,
 )
+from services.console.http.recording_span import Span, span_of
 from services.console.http.recordings_zip import ZipEntry, zip_of
 from services.console.http.streaming import Streamed
 
@@ -51,38 +50,6 @@ _MOST_IN_ZIP = 100
 _READS_WITHIN_S = 60.0
 _SENT_BYTES = 1 << 17
 _RANGE = re.compile(r"bytes=(\d{0,19})-(\d{0,19})")
-
-
-class Span(NamedTuple):
-    """A part of a recording, by receive times [ns since the Unix epoch], both included; None: its ends.
-
-    `suffix` belongs to the name of an exported file.
-    """
-
-    start_ns: int | None = None
-    end_ns: int | None = None
-    suffix: str = ""
-
-
-def span_of(info: schema.Recording, values: Mapping[str, str]) -> Span:
-    """Return the part between `from` and `to`, seconds since the recording's start.
-
-    Raises:
-        RefusedRequest: If they are no times of the recording.
-    """
-    if not values.get("from") and not values.get("to"):
-        return Span()
-    first, last_s = info.start.ToNanoseconds(), info.duration.ToNanoseconds() * 1e-9
-    try:
-        begin_s, end_s = float(values.get("from") or 0.0), float(values.get("to") or last_s)
-    except ValueError:
-        begin_s = end_s = math.nan
-    # A little after the end: callers round.
-    if not 0.0 <= begin_s <= end_s or begin_s > last_s:
-        raise RefusedRequest(400, codes.RECORDING_SPAN(file=info.file, seconds=last_s))
-    end_s = min(end_s, last_s)
-    end_ns = first + round(end_s * 1e9) if end_s < last_s else first + info.duration.ToNanoseconds()
-    return Span(first + round(begin_s * 1e9), end_ns, f"_{begin_s:g}-{end_s:g}s")
 
 
 class Recordings:
@@ -258,8 +225,4 @@ def _decoded(kind: type[AnyMessage], data: bytes) -> AnyMessage | None:
 
 
 def _answered(handler: Handler) -> Handler:
-    return with_error_responses(handler, as_text, _refused)
-
-
-def _refused(error: Exception) -> RefusedRequest | None:
-    return refused_on_the_mesh(error) if isinstance(error, RobomeshError) else None
+    return with_error_responses(handler, as_text, refused_error)

@@ -1553,6 +1553,28 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ["{count} recordings for one ZIP: name 1 to {most}", "一个 ZIP 有 {count} 个录制：应为 1 至 {most} 个"],
   ],
   [
+    "recording.video_long",
+    [
+      "the part is longer than {most} min: choose a shorter one, or use robomesh recordings export",
+      "所选部分长于 {most} 分钟：请选择更短的部分，或使用 robomesh recordings export",
+    ],
+  ],
+  [
+    "recording.video_space",
+    [
+      "the console's machine has no {mib} MiB free for the video: make room there",
+      "控制台所在机器没有 {mib} MiB 可用空间来生成视频：请在那里腾出空间",
+    ],
+  ],
+  [
+    "recording.video_busy",
+    ["{count} videos are being made or wait already: try again later", "已有 {count} 个视频正在生成或等待：请稍后再试"],
+  ],
+  [
+    "recording.video_gone",
+    ["no such video: it is kept for {minutes} min: render it again", "没有此视频：仅保留 {minutes} 分钟：请重新生成"],
+  ],
+  [
     "recording.ambiguous",
     ["several recordings have the name '{name}': name the file: {files}", "多个录制名为“{name}”：请指定文件：{files}"],
   ],

@@ -3,10 +3,11 @@
 import { useState } from "preact/hooks";
 import type { Recording } from "../../gen/robomesh_pb";
 import { count } from "../../i18n/format";
-import { lostText, sizeText, startedText, topicOf } from "../../i18n/recording-format";
+import { durationS, lostText, sizeText, startedText, topicOf } from "../../i18n/recording-format";
 import { r, viewName } from "../../i18n/recordings";
 import { Panel } from "../../ui/panel";
 import type { RecordingName } from "../../ui/route";
+import { RangeExport } from "./range-export";
 import { Download } from "./recording-card";
 import "./contents.css";
 
@@ -17,6 +18,9 @@ export function Contents(props: {
   robotKey: string | null;
   /** Views that can be saved during playback. */
   views: readonly string[];
+  /** Views that the site can render. */
+  rendered: readonly string[];
+  position: () => number;
 }) {
   const { name, info } = props;
   const title = info?.name || name.file;
@@ -29,6 +33,9 @@ export function Contents(props: {
           <Download {...name} name={title} kind="MCAP" hint={r("download_mcap_hint")} />
           <Download {...name} name={title} kind="CSV" hint={r("download_csv_hint")} rest="/values.csv" />
         </div>
+        {info && !info.open && (
+          <RangeExport name={name} durationS={durationS(info)} views={props.rendered} position={props.position} />
+        )}
         {props.robotKey && <LiveVideo robotKey={props.robotKey} views={props.views} title={title} />}
         <p class="dim small">{r("export_line")}</p>
         <Copyable text={exportLine(name)} />

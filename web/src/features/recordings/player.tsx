@@ -120,6 +120,8 @@ export function Player({ first, second }: { first: RecordingName; second: Record
           info={info.value}
           robotKey={replay?.robotKey ?? null}
           views={[...recorded, ...viewsOf(description).map(({ name }) => name)]}
+          rendered={viewsOf(description).map(({ name }) => name)}
+          position={() => replay?.position() ?? 0}
         />
       </div>
       <Plots
