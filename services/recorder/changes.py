@@ -132,7 +132,8 @@ class Changes:
             except DamagedChangesError as error:
                 log.warning("%s", error)
                 deleted = False
-            if deleted:
+            # An empty one made room for its entry on a full disk.
+            if deleted or not path.stat().st_size:
                 path.unlink()
             elif not recording.exists():
                 path.rename(recording)
@@ -205,9 +206,13 @@ class Changes:
             if error.errno not in _NO_SPACE:
                 deleting.rename(path)
                 raise
-            # On a disk so full that not even the entry fits, the recording makes room for it.
-            deleting.unlink()
-            self._write(path, changes)
+            # On a disk so full that not even the entry fits, the recording makes room for it. The lock keeps
+            # the file open, so that removing its name alone would free nothing.
+            os.truncate(deleting, 0)
+            try:
+                self._write(path, changes)
+            except OSError as still:
+                log.error("%s is deleted, but its entry cannot be written: %s", path, error_text(still))
         deleting.unlink(missing_ok=True)
 
     def _write(self, path: Path, changes: tuple[schema.RecordingChange, ...]) -> None:
