@@ -194,7 +194,7 @@ const TEXTS = {
   range_from: ["From [s]", "从 [秒]"],
   range_to: ["To [s]", "到 [秒]"],
   range_now: ["Here", "此处"],
-  range_here: ["{what}: the player's position", "{what}：播放位置"],
+  range_here: ["Here: {what}", "此处：{what}"],
   range_csv: ["CSV of this part", "此部分的 CSV"],
   range_mp4: ["Render MP4", "生成 MP4"],
   range_invalid: ["The part must begin before its end, within {duration}.", "起点须早于终点，且在 {duration} 之内。"],
