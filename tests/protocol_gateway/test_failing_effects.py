@@ -40,6 +40,7 @@ class FailingPorts:
     """
 
     problem = None
+    cell_closed = None
 
     def __init__(self, send_error):
         self.calls = []

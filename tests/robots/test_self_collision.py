@@ -251,7 +251,7 @@ def test_kinematics_service_answers_checks_during_a_study(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pair_study, "_running", {})
-    answer = begin((CellDescription((CellRobot("arm", hollow(tmp_path), np.eye(4)),)),))
+    answer = begin({"arm": CellDescription((CellRobot("arm", hollow(tmp_path), np.eye(4)),))})
     home = CheckQuestion("arm", schema.CheckRequest(program="home").SerializeToString(), np.zeros(2), {})
     text = "links whose hulls touch are not studied yet; until then they are checked as hulls"
 
