@@ -98,7 +98,7 @@ def set_speed(page, percent):
 def move_slowly(page):
     """Start a motion of many seconds: 5 degrees at 0.9 degrees a second, three times."""
     set_speed(page, 1)
-    button(page, "5").click()
+    button(page.locator(".joints"), "5").click()
     for _ in range(3):
         button(page, "waist +5°").click()
     expect(page.locator(".headline .state")).to_have_text("Moving")

@@ -174,7 +174,7 @@ def test_each_press_is_one_step_in_order_none_lost_and_none_twice(open_arm, plan
         button(page, name).click()
     expect(page.locator('[data-joint="waist"]')).to_have_text(f"{waist + 3:.2f}°")
     expect(page.locator('[data-joint="roll"]')).to_have_text(f"{roll - 1:.2f}°".replace("-", "−"))
-    button(page, "0.1").click()
+    button(page.locator(".joints"), "0.1").click()
     # A key that is held down presses once.
     button(page, "waist −0.1°").focus()
     for _ in range(5):
@@ -193,7 +193,7 @@ def test_a_step_beyond_a_limit_is_refused_at_its_row_with_value_and_limit(open_a
         handle.press(key)
     expect(page.locator('[data-joint="elbow"]')).to_have_text("−110.00°")
     expect(page.locator(".headline .state")).to_have_text("Idle")
-    button(page, "5").click()
+    button(page.locator(".joints"), "5").click()
     button(page, "elbow −5°").click()
     expect(page.locator(".joints .notice")).to_have_text(
         "Not sent: joint elbow at −115.00° is beyond its limit −110.00°."

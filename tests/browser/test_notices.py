@@ -60,7 +60,7 @@ def test_what_was_sent_is_done_when_the_arm_is_there_and_gone_when_it_was_stoppe
 def test_a_motion_that_another_goes_on_from_has_not_failed(open_page):
     page = open_page(ARM, drawn=False)
     ready(page)
-    button(page, "5").click()
+    button(page.locator(".joints"), "5").click()
     button(page, "waist +5°").click()
     expect(page.locator('[data-joint="waist"]')).to_have_text("5.00°")
     expect(page.locator(".joints .notice")).to_contain_text("Done: waist")

@@ -20,7 +20,7 @@ def test_a_moving_arm_is_drawn_as_it_moves(open_page):
     )
     expect(page.locator('[data-joint="waist"]')).not_to_have_text(f"{before[0]:.2f}°".replace("-", "−"))
     expect(page.locator(".scene-stale")).to_have_count(0)
-    expect(page.locator(".tool dd").first).to_have_text(re.compile(r"\d+\.\d\s*mm"))
+    expect(page.locator(".tool .number").first).to_have_text(re.compile(r"\d+\.\d\s*mm"))
 
 
 def test_control_needs_a_name_and_says_what_a_name_is(open_page):

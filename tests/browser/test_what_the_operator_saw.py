@@ -139,7 +139,7 @@ def test_a_video_that_freezes_ends_a_jog_but_no_motion(open_page, video):
         ready(page)
         page.get_by_label("Speed").fill("1")
         page.get_by_label("Speed").press("Enter")
-        button(page, "5").click()
+        button(page.locator(".joints"), "5").click()
         before = degrees(page, "waist")
         for _ in range(3):
             button(page, "waist +5°").click()
@@ -168,7 +168,7 @@ def test_a_drawing_that_stands_still_while_the_arm_moves_lets_no_motion_start(op
     expect(page.locator(".canvas-place canvas")).to_have_attribute("data-loaded", "true")
     ready(page)
     set_speed(page, 1)
-    button(page, "5").click()
+    button(page.locator(".joints"), "5").click()
     page.evaluate("() => { window.requestAnimationFrame = () => 1; }")
     # At rest the old picture is still right.
     page.wait_for_timeout(1500)

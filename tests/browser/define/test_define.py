@@ -101,7 +101,7 @@ def test_an_arm_of_dropped_files_gets_rows_and_limits_is_saved_started_and_moves
     expect(page.locator('[data-joint="elbow"]')).to_have_text("10.00°")
     # Rows of the table: tool 0.1 m on from an elbow at 10°, base 0.3 m up, two links of 0.25 m.
     reach = 250 + 350 * math.cos(math.radians(10))
-    expect(page.locator(".tool dd").first).to_have_text(f"{reach:.1f}mm")
+    expect(page.locator(".tool .number").first).to_have_text(f"{reach:.1f}mm")
     button(page, "Release").click()
     page.goto(f"{plant.address}/#/define/five")
     button(page, "End simulation").click()
