@@ -1,6 +1,7 @@
 """A whole site in one thread (router, controller, gateway, kinematics, console) and a Chromium before it."""
 
 import asyncio
+import re
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -302,10 +303,10 @@ def open_page(contexts, plant):
         page.on("pageerror", lambda error: wrong.append(f"error: {error}"))
         page.on(
             "console",
-            # 504: a service that is starting or busy did not answer yet; the page asks it again.
+            # 503, 504: a service that is starting or busy did not answer yet; the page asks it again.
             lambda line: (
                 wrong.append(f"{line.type}: {line.text} {line.location.get('url', '')}")
-                if line.type == "error" and "status of 504" not in line.text and not refused
+                if line.type == "error" and not re.search("status of 50[34] ", line.text) and not refused
                 else None
             ),
         )

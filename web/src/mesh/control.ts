@@ -52,6 +52,8 @@ const RENEW_INTERVAL_MS = 650;
 const RETRY_MS = 100;
 const SLOW_GAP_MS = 500;
 const SLOW_FOR_MS = 60_000; // after a long gap
+/** Ends that another person caused, also if this page was slow at the time. */
+const TAKEN = ["lease.ended.taken", "lease.ended.handed_over", "lease.ended.no_right", "lease.ended.signed_out"];
 const OPERATOR = "robomesh.operator";
 const OPERATOR_NAME = /^[A-Za-z0-9][A-Za-z0-9_.-]*$/;
 
@@ -207,8 +209,9 @@ async function renew(): Promise<void> {
     hold(mine.robotKey, mine.operator, { ...answer, lease: answer.lease || mine.lease }, requestedAt);
   } catch (error) {
     if (heldLease.value?.lease !== mine.lease) return;
-    const slow = requestedAt > mine.endsAt + SLOW_GAP_MS || wasInactive(mine.endsAt - mine.requestedAt);
     const silent = error instanceof AskError && error.noAnswer;
+    const held = error instanceof AskError && error.reason?.code === "lease.held";
+    const slow = !held && (requestedAt > mine.endsAt + SLOW_GAP_MS || wasInactive(mine.endsAt - mine.requestedAt));
     // An attempt after the end would look like a slow browser's.
     if (silent && performance.now() + RETRY_MS < mine.endsAt) renewIn(RETRY_MS);
     else if (slow) lose(t("lost_slow"), true);
@@ -255,7 +258,7 @@ function handleLoss(robotKey: string, lease: Lease): void {
   if (mine?.robotKey !== robotKey || ms(lease.timestamp) <= mine.saidAt) return;
   if (isOf(mine, lease)) return;
   if (heldLease.value) {
-    const slow = wasInactive(mine.endsAt - mine.requestedAt);
+    const slow = !TAKEN.includes(lease.endedReason?.code ?? "") && wasInactive(mine.endsAt - mine.requestedAt);
     lose(slow ? t("lost_slow") : "", slow);
     if (slow) return;
   }
