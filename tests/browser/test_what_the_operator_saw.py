@@ -152,6 +152,22 @@ def test_a_video_that_freezes_ends_a_jog_but_no_motion(open_page, video):
     button(page, "Release").click()
 
 
+def test_a_step_of_the_tool_is_followed_to_its_end_although_the_video_freezes(open_page, video):
+    page = open_page(ARM, drawn=False)
+    tool = page.locator(".panel.tool")
+    with repeated(video.publish):
+        page.wait_for_selector('.camera canvas[data-drawn="true"]')
+        ready(page)
+        set_speed(page, 1)
+        button(tool, "Base").click()
+        button(tool, "20").click()
+        button(tool, "Base X +20\u202fmm").click()
+        expect(page.locator(".headline .state")).to_have_text("Running · moving")
+    expect(button(tool, "Base X +20\u202fmm")).to_be_disabled()
+    expect(tool.locator(".notice")).to_contain_text("Done: Base X +20")
+    button(page, "Release").click()
+
+
 def test_a_frozen_state_lets_no_motion_start(open_page, plant):
     page = open_page(ARM, drawn=False)
     ready(page)

@@ -47,7 +47,7 @@ export function useJointSteps(props: {
     });
     return accepted ? { target: at + offset, what, warning } : null;
   };
-  const steps = useStepQueue({ enabled, tell, send });
+  const steps = useStepQueue({ enabled, followed: enabled, tell, send });
   const { step, sent } = steps.going ?? { step: null, sent: null };
   const position = step ? current[step.index] : undefined;
   const off = sent && position !== undefined ? (sent.target - position) / Math.abs(step.offset) : null;

@@ -23,13 +23,16 @@ export interface StepQueue<Step, Sent> {
 }
 
 /**
+ * @param props.enabled If it becomes false, the steps that wait are dropped.
+ * @param props.followed If it becomes false, the end of the step that is going is not awaited.
  * @param props.send Sends a step; returns null if it was refused, which it tells. */
 export function useStepQueue<Step, Sent>(props: {
   enabled: boolean;
+  followed: boolean;
   send: (step: Step, tell: (notice: Notice) => void) => Promise<Sent | null>;
   tell: (notice: Notice) => void;
 }): StepQueue<Step, Sent> {
-  const { enabled, tell } = props;
+  const { enabled, followed, tell } = props;
   const [waiting, setWaiting] = useState<readonly Step[]>([]);
   const [going, setGoing] = useState<{ step: Step; sent: Sent | null } | null>(null);
   const [refused, setRefused] = useState<Step | null>(null);
@@ -61,9 +64,11 @@ export function useStepQueue<Step, Sent>(props: {
   useEffect(() => {
     if (enabled) return;
     setWaiting([]);
-    setGoing(null);
     setRefused(null);
   }, [enabled]);
+  useEffect(() => {
+    if (!followed) setGoing(null);
+  }, [followed]);
 
   const press = (step: Step) => {
     setRefused(null);

@@ -128,6 +128,7 @@ export function RobotPage({ site, robot }: RobotName) {
             description={description?.message}
             controller={state}
             program={program?.message}
+            motion={motion}
           />
           <EventsPanel
             robotKey={key}

@@ -11,6 +11,8 @@ import { Command, command } from "../../mesh/command";
 import { reachable } from "../../mesh/connection";
 import type { Notice } from "../../mesh/control";
 import { holds, ms } from "../../mesh/control";
+import type { Motion } from "../../mesh/notice-expiry";
+import { useNoticeExpiry } from "../../mesh/notice-expiry";
 import { whyNoNewMotion, whyNoTarget } from "../../mesh/robot-state";
 import { whyFrozen } from "../../mesh/sight";
 import { useStepQueue } from "../../mesh/step-queue";
@@ -46,6 +48,7 @@ export function RobotTool(props: {
   description: Description | undefined;
   controller: ControllerState | undefined;
   program: ProgramState | undefined;
+  motion: Motion;
 }) {
   const { robotKey, controller, program } = props;
   const [frame, setFrame] = useState<(typeof FRAMES)[number]>("tool");
@@ -55,6 +58,7 @@ export function RobotTool(props: {
   const whyNone = reachable.value ? whyNoTarget(controller) || whyFrozen(robotKey, now.value) : t("no_connection");
   const queue = useStepQueue<ToolStep, Sent>({
     enabled: mine && !whyNone,
+    followed: mine, // also while a picture is frozen, and up to the reason of a stop
     tell: setNotice,
     send: async (step, tell) => {
       const what = nameOf(step);
@@ -68,6 +72,7 @@ export function RobotTool(props: {
       return accepted ? { what, before, warning } : null;
     },
   });
+  useNoticeExpiry(notice, setNotice, props.motion);
   useEffect(() => {
     if (!mine) setNotice(null);
   }, [mine]);
