@@ -36,6 +36,18 @@ def stand_still(page, seconds):
     page.evaluate("alert()")
 
 
+def answers_of(page):
+    """Control, from the next load on, whether the page receives the console's messages: `answers["come"]`."""
+    answers = {"come": True}
+
+    def connect(socket):
+        console = socket.connect_to_server()
+        console.on_message(lambda message: socket.send(message) if answers["come"] else None)
+
+    page.route_web_socket(re.compile("ws://"), connect)
+    return answers
+
+
 def take(page, name="li", slow=True):
     """Take control; `slow`: as a browser that was seen to be slow, which gets leases of 4 s.
 
@@ -96,11 +108,9 @@ def set_speed(page, percent):
 
 
 def move_slowly(page):
-    """Start a motion of many seconds: 5 degrees at 0.9 degrees a second, three times."""
+    """Start one motion of more than half a minute, at 0.9 degrees a second."""
     set_speed(page, 1)
-    button(page.locator(".joints"), "5").click()
-    for _ in range(3):
-        button(page, "waist +5°").click()
+    wait_to_move(page, "waist", lambda: drag(page, "waist", 60))
     expect(page.locator(".headline .state")).to_have_text("Moving")
 
 

@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.robot_page import ARM, button, move_slowly, ready, set_speed, stand_still, take
+from tests.browser.robot_page import ARM, answers_of, button, move_slowly, ready, set_speed, stand_still, take
 
 pytestmark = pytest.mark.browser
 
@@ -101,18 +101,6 @@ def test_a_window_that_is_closed_has_not_given_control_back(open_page):
     bob.get_by_role("button", name="Reset stop").click()
     set_speed(bob, 100)
     button(bob, "Release").click()
-
-
-def answers_of(page):
-    """Control, from the next load on, whether the page receives the console's messages: `answers["come"]`."""
-    answers = {"come": True}
-
-    def connect(socket):
-        console = socket.connect_to_server()
-        console.on_message(lambda message: socket.send(message) if answers["come"] else None)
-
-    page.route_web_socket(re.compile("ws://"), connect)
-    return answers
 
 
 def test_a_browser_that_is_seen_to_be_slow_keeps_control_and_is_told_when_it_is_too_slow(open_page):

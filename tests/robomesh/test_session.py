@@ -35,6 +35,12 @@ async def until(condition, timeout_s=30.0):
             await asyncio.sleep(0.01)
 
 
+async def answered(session, key):
+    """Wait until a query on the first link finds a publisher: nothing confirms its declarations there."""
+    while not await asyncio.to_thread(lambda: [*session.zenoh_session.get(key)]):
+        pass
+
+
 def test_publication_arrives_with_key_number_and_source_time(mesh):
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
@@ -61,6 +67,7 @@ def test_value_published_during_its_query_is_live(mesh):
             publisher.put(joints(1.0))
             # Simulates the middle of `put`: the reply has the value before its publication.
             put_unheard(publisher, joints(2.0))
+            await answered(monitor, publisher.key)
             subscription = monitor.subscribe("robomesh/site/arm/joints", newest=10)
             answer = await anext(subscription)
             assert (answer.live, answer.message()) == (False, joints(2.0))
@@ -180,6 +187,7 @@ def test_late_joiner_of_a_video_gets_the_frames_since_the_last_key_frame(mesh):
             publisher.put(CompressedVideo(data=b"lost"))
             for data in (b"K1", b"P1", b"K2", b"P2", b"P3"):
                 publisher.put(CompressedVideo(data=data), key_frame=data.startswith(b"K"))
+            await answered(monitor, publisher.key)
             sample = await anext(monitor.subscribe("robomesh/site/arm/video/top", newest=100))
             frames = sample.message().frames
             assert [CompressedVideo.FromString(frame.data).data for frame in frames] == [b"K2", b"P2", b"P3"]
