@@ -179,7 +179,10 @@ class CellChanges:
     async def _change(self, asked: schema.CellRequest, engineer: str) -> schema.CellAnswer:
         if self._changing_by:
             raise RefusedError(codes.CELL_CHANGES(operator=self._changing_by, robot=self._first))
-        self._known_problem = await asyncio.to_thread(self._problem)
+        problem = await asyncio.to_thread(self._problem)
+        if problem != self._known_problem:
+            self._known_problem = problem
+            self._publish()
         if self._known_problem is not None:
             raise RefusedError(self._known_problem)
         if asked.based_on != self._content.version:

@@ -382,7 +382,7 @@ STOP_GATEWAY_KILLED = Code(
     "stop.gateway_killed",
     "dead-man: the gateway was killed while {holder} had control, and the robot still moves",
 )
-STOP_LINK_LOST = Code("stop.link_lost", "{holder}'s motion ran, and {detail}")
+STOP_LINK_LOST = Code("stop.link_lost", "the link was lost during a motion of {holder}: {detail}")
 STOP_SENT = Code("stop.sent", "stop request {id} is on the controller's socket")
 STOP_NOT_SENT = Code("stop.not_sent", "stop request {id} is latched, but not sent: {cause}")
 STOP_READ_ONLY = Code(
@@ -465,12 +465,12 @@ POINT_UNKNOWN = Code("program.point_unknown", "{word}: there is no point '{name}
 POINT_NONE = Code("program.point_none", "{word}: there is no point '{name}'; none is defined")
 FRAME_FORM = Code(
     "program.frame_form",
-    "'move_line_by' needs the frame of its numbers, not {given}",
-    "write 'move_line_by tool X Y Z ROLL PITCH YAW', or base or site instead of tool",
+    "'move_line_by' needs tool, base or site first, not {given}",
+    "write for example 'move_line_by tool X Y Z ROLL PITCH YAW'",
 )
 LINE_ROLL = Code(
     "program.line_roll",
-    "lines leave the roll about the tool's axis free with five joints",
+    "with five joints, a straight line cannot set the roll about the tool's axis",
     "move a joint instead",
 )
 TRACE_FORM = Code("program.trace_form", "'trace' takes on or off, not {given}")
@@ -521,11 +521,13 @@ CELL_CHANGES = Code(
 )
 CELL_DISAGREES = Code(
     "cell.disagrees",
-    "the kinematics service shows {robot} in another cell than the one that motions are checked against",
-    "wait until it follows, or restart it",
+    "kinematics shows other fixtures or another floor for {robot} than motions are checked against",
+    "wait, or restart kinematics",
 )
 CELL_NOT_FOLLOWED = Code(
-    "cell.not_followed", "the kinematics service cannot show the cell of {robot}: {cause}", "correct that"
+    "cell.not_followed",
+    "kinematics cannot show the cell of {robot}: {cause}",
+    "correct the cause, then restart kinematics",
 )
 CELL_CONTROLLED = Code(
     "cell.controlled",
@@ -572,13 +574,13 @@ CELL_FILE_FORM = Code(
     "{file} writes this part in a form that cannot be changed without touching other lines",
     "write fixtures as [[fixture]] and robots as [[robot]] tables, or change the file by hand",
 )
-CELL_DISK = Code("cell.disk", "{file} cannot be written, so nothing has changed: {detail}")
+CELL_DISK = Code("cell.disk", "{file} cannot be read or written: {detail}")
 CELL_FIXTURE = Code("cell.fixture", "fixture '{name}': {detail}")
 CELL_CONTENT = Code("cell.content", "{detail}")
 CELL_TOO_MANY = Code(
     "cell.too_many",
-    "{count} {what}: a request may have {most}",
-    "write more of them into the site file",
+    "a cell that is changed by request has at most {most} {what}, not {count}",
+    "combine some in one mesh, or edit the site file by hand and restart",
 )
 CELL_MESH = Code(
     "cell.mesh",
@@ -590,7 +592,7 @@ CELL_NO_KINEMATICS = Code(
     "the kinematics service of {robot} does not take the change, so nothing has changed: {cause}",
 )
 CELL_CHECK_FAILED = Code(
-    "cell.check_failed", "the change cannot be checked against, so nothing has changed: {cause}"
+    "cell.check_failed", "motions cannot be checked against the changed cell, so nothing has changed: {cause}"
 )
 CELL_TAKEN_BACK = Code(
     "cell.taken_back",
@@ -948,7 +950,7 @@ RECORDING_NOT_FOUND = Code(
 )
 RECORDING_SPAN = Code(
     "recording.span",
-    "the part of {file} is not within its {seconds:.3f} s",
+    "{file} is {seconds:.3f} s long, and the part is not within it, or ends before it begins",
     "choose a begin and an end, in seconds since its start",
 )
 RECORDING_VIDEO_LONG = Code(
@@ -965,9 +967,9 @@ RECORDING_VIDEO_BUSY = Code(
     "recording.video_busy", "{count} videos are being made or wait already", "try again later"
 )
 RECORDING_VIDEO_GONE = Code(
-    "recording.video_gone", "no such video: it is kept for {minutes:g} min", "render it again"
+    "recording.video_gone", "this video is no longer kept (at most {minutes:g} min)", "render it again"
 )
-RECORDING_ZIP = Code("recording.zip", "{count} recordings for one ZIP", "name 1 to {most}")
+RECORDING_ZIP = Code("recording.zip", "a ZIP cannot have {count} recordings", "choose 1 to {most}")
 RECORDING_AMBIGUOUS = Code(
     "recording.ambiguous", "several recordings have the name '{name}'", "name the file: {files}"
 )
@@ -1009,7 +1011,7 @@ RECORDING_CHANGES = Code("recording.changes", "'{name}' was already changed {mos
 RECORDING_LABELS_DAMAGED = Code(
     "recording.labels_damaged",
     "name, note and tags of a recording cannot be read ({detail})",
-    "restore the file from a backup",
+    "the damaged file ends with .changes.damaged; restore the .changes.json from a backup",
 )
 RECORDING_DISK = Code(
     "recording.disk", "the recorder cannot write to its disk, so nothing has changed: {detail}"
@@ -1017,7 +1019,9 @@ RECORDING_DISK = Code(
 RECORDING_WRITTEN = Code("recording.written", "'{name}' is still being recorded", "stop it first")
 RECORDING_INDEXED = Code("recording.indexed", "'{name}' is being indexed", "try again soon")
 RECORDING_PLAYED = Code(
-    "recording.played", "'{name}' is being played, or another program reads its file", "close it there first"
+    "recording.played",
+    "'{name}' is being played, or opened by another robomesh program",
+    "close it there first",
 )
 RECORDING_FETCHED = Code(
     "recording.fetched", "{who} is downloading '{name}'", "wait for the end, or try again in {seconds:.0f} s"

@@ -28,7 +28,7 @@ class Note:
         author: Operator's name.
         begin, end: The range, UTC; `end` None: a moment.
         written: Time at which the site's store received it, UTC.
-        withdrawn_by: Author or administrator who withdrew it; empty: it stands.
+        withdrawn_by: Author or administrator who withdrew it; empty: not withdrawn.
     """
 
     id: str

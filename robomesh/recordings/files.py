@@ -46,9 +46,9 @@ def describe_file(path: Path) -> schema.Recording:
     return recording
 
 
-def describe_deleted(path: Path, changes: Sequence[RecordingChange]) -> schema.Recording:
+def describe_deleted(path: Path, changes: Sequence[RecordingChange], *, robot: str) -> schema.Recording:
     """Describe a recording of which only its changes are left."""
-    recording = schema.Recording(robot=path.parent.name, file=path.name, start=_timestamp(_begun_ns(path)))
+    recording = schema.Recording(robot=robot, file=path.name, start=_timestamp(_begun_ns(path)))
     recording.deleted, recording.bytes = True, changes[-1].bytes
     set_labels(recording, changes, history=True)
     return recording

@@ -15,6 +15,20 @@ def is_file_name(name: str) -> bool:
     return bool(_NAME.fullmatch(name)) and name.endswith(SUFFIX)
 
 
+def robot_of(folder: Path, path: Path) -> str:
+    """Return the robot in whose folder a file is; empty: it is in the recorder's own folder."""
+    return path.parent.name if path.parent != folder else ""
+
+
+def files_in(folder: Path, ending: str) -> list[Path]:
+    """Return the files with an ending in a recorder's folder and in the robots' folders below it.
+
+    Args:
+        ending: A pattern of pathlib, of file names: "*.mcap".
+    """
+    return [*folder.glob(f"*/{ending}"), *folder.glob(ending)]
+
+
 def find_file(folder: Path, name: str) -> Path:
     """Return the file with a name, in the folder or in a robot's folder below it.
 

@@ -158,7 +158,7 @@ def _changed(
                 assert isinstance(answer, schema.CellAnswer)
                 if dry_run:
                     return answer
-                _print(answer)
+                _print(answer, err=as_json)
                 if not typer.confirm(f"Change the cell of {found} and its site file?", err=True):
                     return None
             request.dry_run = False
@@ -168,7 +168,7 @@ def _changed(
 
     answer = discovery.run(ask())
     if answer is None:
-        print("nothing was changed")
+        typer.echo("nothing was changed", err=as_json)
         raise typer.Exit(1)
     if as_json:
         print(to_json(answer))
@@ -185,11 +185,11 @@ async def _state(session: Session, robot: discovery.Robot) -> schema.CellState:
     return state
 
 
-def _print(answer: schema.CellAnswer) -> None:
+def _print(answer: schema.CellAnswer, *, err: bool = False) -> None:
     from services.site_file.cell_content import summary
 
     for each in answer.changes:
-        print(for_terminal(summary([each])))
+        typer.echo(for_terminal(summary([each])), err=err)
 
 
 def _text(state: schema.CellState) -> str:

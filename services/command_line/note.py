@@ -27,7 +27,12 @@ def note(
     robot: Robot,
     text: Annotated[str, typer.Argument(metavar="[TEXT]", help="The note; without it, list the notes.")] = "",
     from_: Annotated[
-        str, typer.Option("--from", metavar="TIME", help="RFC 3339, 15:04, or 10m (ago); else now.")
+        str,
+        typer.Option(
+            "--from",
+            metavar="TIME",
+            help="The moment or the begin of a range: RFC 3339, 15:04, or 10m (ago); else now.",
+        ),
     ] = "",
     to: Annotated[str, typer.Option(metavar="TIME", help="The end of a range.")] = "",
     withdraw: Annotated[str, typer.Option(metavar="ID", help="Withdraw a note of yours.")] = "",

@@ -21,7 +21,7 @@ from robomesh.recordings.changes import (
 from robomesh.recordings.channel_names import SUFFIX
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.files import describe_deleted, describe_file, describe_unreadable
-from robomesh.recordings.folder import find_file
+from robomesh.recordings.folder import files_in, find_file, robot_of
 from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.series import MOST_POINTS, POINTS, SeriesReader, known_values
 from robomesh.recordings.video import holds_key_frame
@@ -66,12 +66,12 @@ class Answers:
     def list(self, query: schema.RecordingListQuery) -> schema.RecordingList:
         """List every recording, newest first; an unreadable file has its problem as text."""
         recordings = schema.RecordingList()
-        paths = [*self._folder.glob(f"*/*{SUFFIX}"), *self._folder.glob(f"*{SUFFIX}")]
+        paths = files_in(self._folder, f"*{SUFFIX}")
         for path in sorted(paths, key=lambda path: path.name, reverse=True):
             try:
                 recordings.recordings.append(describe_file(path))
             except RecordingError as error:
-                robot = path.parent.name if path.parent != self._folder else ""
+                robot = robot_of(self._folder, path)
                 recordings.recordings.append(describe_unreadable(path, robot=robot, problem=error.reason))
         for recording in recordings.recordings:
             del recording.history[:]
@@ -82,12 +82,12 @@ class Answers:
         return recordings
 
     def _deleted(self) -> Iterator[schema.Recording]:
-        for path in (*self._folder.glob(f"*/*{CHANGES}"), *self._folder.glob(f"*{CHANGES}")):
+        for path in files_in(self._folder, f"*{CHANGES}"):
             recording = recording_path(path)
             with suppress(DamagedChangesError):
                 changes = read_changes(recording)
                 if is_deleted(changes) and not recording.exists():
-                    yield describe_deleted(recording, changes)
+                    yield describe_deleted(recording, changes, robot=robot_of(self._folder, recording))
 
     def info(self, request: schema.RecordingQuery) -> schema.Recording:
         """Describe one recording."""

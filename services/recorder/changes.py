@@ -37,7 +37,7 @@ from robomesh.recordings.changes import (
 from robomesh.recordings.channel_names import SUFFIX
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.files import describe_deleted, describe_unreadable
-from robomesh.recordings.folder import find_file, is_file_name
+from robomesh.recordings.folder import files_in, find_file, is_file_name, robot_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
 from robomesh.topics import check_operator
@@ -47,7 +47,6 @@ log = logging.getLogger(__name__)
 
 _DELETING = ".deleting"
 _DAMAGED = ".damaged"
-_HASHED_BYTES = 1 << 20
 # A program that only lists recordings holds a file for a moment.
 _LOCK_WITHIN_S, _LOCK_RETRY_S = 1.0, 0.05
 _Change = schema.RecordingChange
@@ -123,9 +122,9 @@ class Changes:
         Raises:
             OSError: If the disk refuses.
         """
-        for path in (*self._folder.glob("*/.*.new"), *self._folder.glob(".*.new")):
+        for path in files_in(self._folder, ".*.new"):
             path.unlink(missing_ok=True)
-        for path in (*self._folder.glob(f"*/*{_DELETING}"), *self._folder.glob(f"*{_DELETING}")):
+        for path in files_in(self._folder, f"*{_DELETING}"):
             recording = path.with_suffix(SUFFIX)
             try:
                 deleted = is_deleted(read_changes(recording))
@@ -163,7 +162,7 @@ class Changes:
             if (gone := self._deleted(file, author)) is not None:
                 return gone  # a repeated request
             raise error from None
-        return describe_unreadable(path, robot=path.parent.name, problem=error.reason)
+        return describe_unreadable(path, robot=robot_of(self._folder, path), problem=error.reason)
 
     def _label(self, now: schema.Recording, asked: schema.RecordingRequest, author: str) -> _Changed:
         path = find_file(self._folder, asked.file)
@@ -192,7 +191,7 @@ class Changes:
                 self._remove(path, (*changes, change))
         except OSError as error:
             raise RefusedError(codes.RECORDING_DISK(detail=error_text(error))) from None
-        gone = describe_deleted(path, (*changes, change))
+        gone = describe_deleted(path, (*changes, change), robot=robot_of(self._folder, path))
         gone.site, gone.robot = now.site, now.robot
         values = {"file": path.name, "sha256": change.sha256, "bytes": str(change.bytes)}
         return _Changed(gone, _reason(change, now.name, now.name, path.name), values)
@@ -247,7 +246,7 @@ class Changes:
             with contextlib.suppress(DamagedChangesError):
                 changes = read_changes(path)
                 if is_deleted(changes) and changes[-1].author == author:
-                    return describe_deleted(path, changes)
+                    return describe_deleted(path, changes, robot=robot_of(self._folder, path))
         return None
 
 
@@ -278,11 +277,8 @@ def _locked(path: Path, name: str) -> Iterator[None]:
 
 
 def _sha256(path: Path) -> str:
-    found = hashlib.sha256()
     with path.open("rb") as stream:
-        while data := stream.read(_HASHED_BYTES):
-            found.update(data)
-    return found.hexdigest()
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def _reason(change: schema.RecordingChange, name: str, old_name: str, file: str = "") -> Reason:

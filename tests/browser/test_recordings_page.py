@@ -351,7 +351,7 @@ def test_a_note_on_a_recording_is_beside_it_and_its_file_is_unchanged(noted, rec
     form = page.get_by_role("form", name="Note")
     form.get_by_label("Your name").fill("wang")
     form.get_by_label("Text").fill("starts late")
-    button(form, "From here to the position").click()
+    button(form, "From here to the player's position").click()
     page.get_by_label("Moment", exact=True).fill("1.5")  # it plays, so the range grows
     button(form, "Save note").click()
     expect(events).to_contain_text("starts late")

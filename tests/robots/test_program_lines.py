@@ -138,7 +138,7 @@ def test_five_joints_move_by_a_step_and_turn_only_as_they_can() -> None:
     assert plan.notes[0].code == codes.CHECK_NOTE_BENT(angle_deg=1, lines="2").code
     above = "move_line 400 0 300 180 0 0\nmove_line_by tool "
     assert not planned("pt600", f"{above} 0 0 10 0 5 0\n").violations
-    for turn, why in (("5 0 0", "not this orientation"), ("0 0 10", "leave the roll")):
+    for turn, why in (("5 0 0", "not this orientation"), ("0 0 10", "cannot set the roll")):
         (violation,) = planned("pt600", f"{above} 0 0 0 {turn}\n").violations
         assert (violation.kind, violation.line) == (ViolationKind.UNREACHABLE, 2)
         assert why in violation.text

@@ -142,6 +142,12 @@ def test_check_picture_clearance_and_file_change_together(mesh, tmp_path):
             await site.ask(content=state.previous)
             assert await site.agreed() == before
 
+            with site.path.open("a") as file:
+                file.write("# by hand\n")
+            with refused(codes.CELL_FILE_CHANGED):
+                await site.ask(x=0.8)
+            assert (await site.state()).problem.code == codes.CELL_FILE_CHANGED.name
+
     run(main(), timeout_s=300.0)
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from robomesh import reason_codes as codes
+from robomesh.atomic_write import write_atomically
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from services.site_file.cell_content import MOST_FIXTURES, changes, summary, version_of
@@ -192,13 +193,18 @@ def test_a_site_without_a_file_cannot_be_changed(tmp_path):
         save(file, content)
 
 
-def test_a_full_disk_leaves_the_file(tmp_path, monkeypatch):
+@pytest.mark.parametrize("written", [0, 1])
+def test_a_full_disk_leaves_the_file(tmp_path, monkeypatch, written):
     path, file = opened(tmp_path)
     content, fixtures = changed(file)
     fixtures["post"].xyz.x = 0.0
 
-    def full(*_, **__):
-        raise OSError(28, "No space left on device")
+    def full(target, data, **options):
+        nonlocal written
+        if not written:
+            raise OSError(28, "No space left on device")
+        written -= 1
+        write_atomically(target, data, **options)
 
     monkeypatch.setattr("services.site_file.cell_file.write_atomically", full)
     with refused(codes.CELL_DISK):

@@ -148,6 +148,18 @@ def test_a_deletion_names_author_reason_and_hash_and_stays_visible(mesh, trial, 
     assert [each.name for each in trial.parent.iterdir()] == [changes_path(trial).name]
 
 
+def test_a_deleted_recording_of_the_recorders_own_folder_has_no_robot(mesh, tmp_path):
+    path = tmp_path / "2026-11-25T10-00-00.000000Z_trial.mcap"
+    write_recording(path)
+
+    async def main():
+        async with recording_site(mesh, tmp_path) as session:
+            assert (await ask(session, Ask.DELETE, path.name, reason="test")).deleted
+            assert (await listed(session, deleted=True))[path.name].robot == ""
+
+    run(main())
+
+
 def test_a_recording_in_use_is_not_deleted(mesh, trial, tmp_path):
     async def main():
         async with recording_site(mesh, tmp_path) as session:

@@ -8,7 +8,9 @@ import typer
 from robomesh.endpoints import DEFAULT_ROUTER
 from services.command_line.options import Connect, Json, command_group
 
-app = command_group("recordings", "Recordings: list, inspect, play, export, fetch, rename, tag, delete.")
+app = command_group(
+    "recordings", "Recordings: list, inspect, play, export, fetch, rename, note, tag, delete."
+)
 
 _File = Annotated[Path, typer.Argument(metavar="FILE.mcap")]
 _Named = Annotated[

@@ -64,7 +64,7 @@ def _only_started(site: Site, name: str) -> Site:
     robots = tuple(robot for robot in read_started(site) if robot.name == name)
     if not robots:
         raise ControllerError(f"--started {name}: no such robot was started from the page of {site.site}")
-    # It stands in no cell of the file; other cells' fixtures name robots that this site lacks.
+    # A started robot has no cell; fixtures of other cells name robots that this site lacks.
     fixtures = tuple(fixture for fixture in site.fixture if fixture.cell in {each.cell for each in robots})
     return site.model_copy(update={"robot": robots, "fixture": fixtures})
 

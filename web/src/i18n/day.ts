@@ -29,7 +29,7 @@ const TEXTS = {
   over_after: ["over after {time}", "{time} 后恢复"],
   withdrawn: ["withdrawn", "已撤回"],
   incomplete: ["This day is not complete:", "这一天的记录不完整："],
-  no_audit: ["The requests are missing: {text}", "缺少请求：{text}"],
+  no_audit: ["The requests are missing: {text}", "缺少请求记录：{text}"],
   cut_audit: [
     "Of the requests only the newest {count} are here, from {time} on.",
     "仅有 {time} 起最新的 {count} 条请求。",
@@ -40,7 +40,7 @@ const TEXTS = {
   ],
   events_from: [
     "Events, so links and alarms, are known from {time} on: services keep their last 100.",
-    "事件（即连接和报警）从 {time} 起已知：各服务保留最近 100 条。",
+    "事件（因此连接和报警）从 {time} 起已知：各服务保留最近 100 条。",
   ],
   no_notes: ["The older notes are missing: {text}", "缺少更早的备注：{text}"],
   no_recordings: ["The recordings are missing: {text}", "缺少录制：{text}"],

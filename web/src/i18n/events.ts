@@ -99,7 +99,7 @@ export const EVENTS_TEXTS = {
   journal: ["Journal", "日志"],
   journal_events: ["Events", "事件"],
   journal_notes: ["Notes", "备注"],
-  journal_day: ["Day", "全天"],
+  journal_day: ["Day", "单日"],
   journal_requests: ["Requests", "请求"],
   severity: ["Severity", "严重程度"],
   any_severity: ["All severities", "所有严重程度"],

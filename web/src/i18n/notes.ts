@@ -12,7 +12,7 @@ const TEXTS = {
   last_10: ["Last 10 s", "最近 10 秒"],
   last_60: ["Last minute", "最近 1 分钟"],
   moment: ["This moment", "此时刻"],
-  range: ["From here to the position", "从此处到当前位置"],
+  range: ["From here to the player's position", "从此处到播放位置"],
   from_to: ["{from} to {to}", "{from} 至 {to}"],
   save: ["Save note", "保存备注"],
   saving: ["Saving the note…", "正在保存备注…"],

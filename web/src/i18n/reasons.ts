@@ -566,7 +566,10 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "自动停止：{holder} 控制期间网关异常终止，机器人仍在运动",
     ],
   ],
-  ["stop.link_lost", ["{holder}'s motion ran, and {detail}", "{holder} 的运动正在进行时：{detail}"]],
+  [
+    "stop.link_lost",
+    ["the link was lost during a motion of {holder}: {detail}", "{holder} 的运动期间连接中断：{detail}"],
+  ],
   ["stop.sent", ["stop request {id} is on the controller's socket", "停止 {id} 已发送给控制器"]],
   ["stop.not_sent", ["stop request {id} is latched, but not sent: {cause}", "停止 {id} 已锁定，但未送达：{cause}"]],
   [
@@ -698,14 +701,14 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   [
     "program.frame_form",
     [
-      "'move_line_by' needs the frame of its numbers, not {given}: write 'move_line_by tool X Y Z ROLL PITCH YAW', or base or site instead of tool",
+      "'move_line_by' needs tool, base or site first, not {given}: write for example 'move_line_by tool X Y Z ROLL PITCH YAW'",
       "“move_line_by”须写明坐标系，而不是 {given}：请写“move_line_by tool X Y Z ROLL PITCH YAW”，坐标系可为 tool、base 或 site",
     ],
   ],
   [
     "program.line_roll",
     [
-      "lines leave the roll about the tool's axis free with five joints: move a joint instead",
+      "with five joints, a straight line cannot set the roll about the tool's axis: move a joint instead",
       "五关节机械臂的直线运动不约束工具绕自身轴线的转角：请改为移动关节",
     ],
   ],
@@ -949,15 +952,15 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   [
     "cell.disagrees",
     [
-      "the kinematics service shows {robot} in another cell than the one that motions are checked against: wait until it follows, or restart it",
-      "运动学服务所显示的 {robot} 的单元与运动检查所用的单元不同：请等待其同步，或重启该服务",
+      "kinematics shows other fixtures or another floor for {robot} than motions are checked against: wait, or restart kinematics",
+      "运动学服务所显示的 {robot} 的固定物或地面与运动检查所用的不同：请等待，或重启运动学服务",
     ],
   ],
   [
     "cell.not_followed",
     [
-      "the kinematics service cannot show the cell of {robot}: {cause}: correct that",
-      "运动学服务无法显示 {robot} 的单元：{cause}：请予以纠正",
+      "kinematics cannot show the cell of {robot}: {cause}: correct the cause, then restart kinematics",
+      "运动学服务无法显示 {robot} 的单元：{cause}：请消除原因，然后重启运动学服务",
     ],
   ],
   [
@@ -1031,17 +1034,14 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "{file} 中这一部分的写法使得更改必然触及其他行：请将固定物写成 [[fixture]] 表、将机器人写成 [[robot]] 表，或手动修改文件",
     ],
   ],
-  [
-    "cell.disk",
-    ["{file} cannot be written, so nothing has changed: {detail}", "{file} 无法写入，没有任何更改：{detail}"],
-  ],
+  ["cell.disk", ["{file} cannot be read or written: {detail}", "{file} 无法读取或写入：{detail}"]],
   ["cell.fixture", ["fixture '{name}': {detail}", "固定物“{name}”：{detail}"]],
   ["cell.content", ["{detail}", "{detail}"]],
   [
     "cell.too_many",
     [
-      "{count} {what}: a request may have {most}: write more of them into the site file",
-      "{count} {what}：一个请求最多 {most} 个：其余请写入站点文件",
+      "a cell that is changed by request has at most {most} {what}, not {count}: combine some in one mesh, or edit the site file by hand and restart",
+      "通过请求更改的单元最多有 {most} 个{what}，而不是 {count} 个：请将若干合并为一个网格，或手动修改站点文件并重启",
     ],
   ],
   [
@@ -1061,7 +1061,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   [
     "cell.check_failed",
     [
-      "the change cannot be checked against, so nothing has changed: {cause}",
+      "motions cannot be checked against the changed cell, so nothing has changed: {cause}",
       "无法按更改后的单元进行检查，没有任何更改：{cause}",
     ],
   ],
@@ -1544,13 +1544,16 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   [
     "recording.span",
     [
-      "the part of {file} is not within its {seconds} s: choose a begin and an end, in seconds since its start",
+      "{file} is {seconds} s long, and the part is not within it, or ends before it begins: choose a begin and an end, in seconds since its start",
       "{file} 的所选部分不在其 {seconds} 秒之内：请选择自起点起的开始与结束秒数",
     ],
   ],
   [
     "recording.zip",
-    ["{count} recordings for one ZIP: name 1 to {most}", "一个 ZIP 有 {count} 个录制：应为 1 至 {most} 个"],
+    [
+      "a ZIP cannot have {count} recordings: choose 1 to {most}",
+      "一个 ZIP 不能有 {count} 个录制：请选择 1 至 {most} 个",
+    ],
   ],
   [
     "recording.video_long",
@@ -1572,7 +1575,10 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ],
   [
     "recording.video_gone",
-    ["no such video: it is kept for {minutes} min: render it again", "没有此视频：仅保留 {minutes} 分钟：请重新生成"],
+    [
+      "this video is no longer kept (at most {minutes} min): render it again",
+      "该视频已不再保留（最多 {minutes} 分钟）：请重新生成",
+    ],
   ],
   [
     "recording.ambiguous",
@@ -1634,8 +1640,8 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   [
     "recording.labels_damaged",
     [
-      "name, note and tags of a recording cannot be read ({detail}): restore the file from a backup",
-      "无法读取某个录制的名称、备注和标签（{detail}）：请从备份恢复该文件",
+      "name, note and tags of a recording cannot be read ({detail}): the damaged file ends with .changes.damaged; restore the .changes.json from a backup",
+      "无法读取某个录制的名称、备注和标签（{detail}）：损坏的文件以 .changes.damaged 结尾；请从备份恢复 .changes.json",
     ],
   ],
   [
@@ -1650,8 +1656,8 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   [
     "recording.played",
     [
-      "'{name}' is being played, or another program reads its file: close it there first",
-      "“{name}”正在播放，或有其他程序正在读取其文件：请先在那里关闭",
+      "'{name}' is being played, or opened by another robomesh program: close it there first",
+      "“{name}”正在播放，或已被另一 robomesh 程序打开：请先在那里关闭",
     ],
   ],
   [
@@ -1953,6 +1959,8 @@ const WORDS: Readonly<Record<string, string>> = {
   "what:site": "站点",
   "what:robot": "机器人",
   "what:fixture": "固定物",
+  "what:fixtures": "固定物",
+  "what:ignored links": "忽略的连杆",
   "what:account": "账户",
   "what:operator": "操作员",
   "what:view": "视图",
