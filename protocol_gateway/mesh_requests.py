@@ -9,6 +9,7 @@ from protocol_gateway.audit.entry import Entry, Outcome
 from protocol_gateway.control.control import Control
 from protocol_gateway.control.deadlines import set_deadline
 from protocol_gateway.control.entries import entry_of
+from protocol_gateway.control.jog import Jogs
 from protocol_gateway.control.program import Programs
 from protocol_gateway.text_limits import LONGEST_SENTENCE, LONGEST_TEXT
 from robomesh import reason_codes as codes
@@ -22,7 +23,7 @@ from robomesh.topics import check_operator
 
 MESH = "mesh"
 # Request names in the audit log where the request itself could not be read.
-_LEASE, _COMMAND = "LEASE", "COMMAND"
+_LEASE, _COMMAND, _JOG = "LEASE", "COMMAND", "JOG_KEEP_ALIVE"
 
 
 class MeshRequests:
@@ -40,9 +41,10 @@ class MeshRequests:
         *,
         control: Control,
         programs: Programs,
+        jogs: Jogs,
         audit: Callable[[Entry], None],
     ) -> None:
-        self._control, self._programs, self._audit = control, programs, audit
+        self._control, self._programs, self._jogs, self._audit = control, programs, jogs, audit
         self._stops = session.answer(site, robot, "stop", self._answer_stop)
 
         def answer(name: str, handler: Handler, what: str) -> Answerer:
@@ -52,6 +54,7 @@ class MeshRequests:
         self._answerers = (
             answer("lease/request/*", self._answer_lease, _LEASE),
             answer("command/*", self._answer_command, _COMMAND),
+            answer("jog/*", self._answer_keep_alive, _JOG),
         )
         self._turned_away = 0
 
@@ -87,7 +90,19 @@ class MeshRequests:
         set_deadline(message, request)
         if message.command == schema.CommandRequest.RUN_PROGRAM:
             return await self._programs.run(message, operator=operator, source=MESH)
+        if message.command == schema.CommandRequest.JOG:
+            return await self._jogs.begin(message, operator=operator, source=MESH)
         return await self._control.commands([message], operator=operator, source=MESH)
+
+    async def _answer_keep_alive(self, request: Request) -> schema.JogAnswer:
+        message = request.message
+        assert isinstance(message, schema.JogRequest)
+        operator = self._operator(_JOG, request)
+        try:
+            return self._jogs.keep_alive(message, operator=operator)
+        except RefusedError as error:
+            self._record_refused(_JOG, operator, error.reason)
+            raise
 
     def _operator(self, what: str, request: Request) -> str:
         """Return the name of the operator who sends a request.

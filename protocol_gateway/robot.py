@@ -22,6 +22,7 @@ from protocol_gateway.control import events
 from protocol_gateway.control.audit_trail import AuditTrail
 from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.control import Control, Ports
+from protocol_gateway.control.jog import Jogs
 from protocol_gateway.control.program import Programs
 from protocol_gateway.control.robot_authority import RobotAuthority
 from protocol_gateway.core.codes import code_table
@@ -147,6 +148,15 @@ class Robot:
             publish=self._publish_state,
             publish_source=publisher("program/source").put,
         )
+        self._jogs = Jogs(
+            self._control,
+            self._checks,
+            joints=joints,
+            journal=self._journal,
+            controller=self._controller,
+            can_jog=driver.can_jog,
+            tool_speed=settings.jog_speed,
+        )
         if settings.legacy_clients is not None:
             table = code_table(settings.codes)
             self._legacy = LegacyClients(
@@ -164,6 +174,7 @@ class Robot:
             settings.name,
             control=self._control,
             programs=self._programs,
+            jogs=self._jogs,
             audit=self._audit_trail.write_later,
         )
         session.answer(site, settings.name, "audit/find", SearchServer(audit_path).answer)
@@ -268,6 +279,7 @@ class Robot:
         """Disconnect old client programs, write pending entries, and close the audit log."""
         if self._legacy is not None:
             await self._legacy.close()
+        await self._jogs.close()
         await self._programs.close()
         await self._control.close()
         # Stop answering before the audit log closes, so that every answer has an entry.
@@ -389,6 +401,7 @@ class Robot:
                 unchecked=self._checks.problem,
                 check_starting=self._checks.starting,
                 program=self._programs.running,
+                jog=self._jogs.running,
                 now=now,
             )
         )

@@ -17,6 +17,7 @@ from robomesh.quotas import DEFAULT_QUOTAS, Quotas
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.cells import CellDescription, CellRobot
+from robots.programs.jog_steps import MOST_M_S
 
 _KNOWN_UNKNOWNS = frozenset({"mode", "homed"})
 
@@ -38,6 +39,7 @@ class RobotSettings:
             long, motion is refused.
         reconnect_after_s: Without a unit for this long, the gateway reconnects.
         legacy_clients: Where old client programs attach; None: they cannot.
+        jog_speed: Greatest speed of the tool while an operator jogs [m/s]; 0: no jogs.
         check: Policy of the collision check before a motion: "require", "warn", "off".
         cell: Fixtures and other robots around the robot; None: there are none.
     """
@@ -53,6 +55,7 @@ class RobotSettings:
     stale_after_s: float = 1.0
     reconnect_after_s: float = 4.0
     legacy_clients: LegacySettings | None = None
+    jog_speed: float = MOST_M_S
     check: str = "off"
     cell: CellDescription | None = None
 

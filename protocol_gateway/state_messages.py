@@ -84,6 +84,7 @@ def controller_state(
     unchecked: Reason | None,
     check_starting: bool,
     program: schema.ControllerState.Program | None,
+    jog: schema.JogState | None,
     now: Now,
 ) -> schema.ControllerState:
     """Return the controller's state; a value that the controller does not report is "unknown"."""
@@ -108,6 +109,7 @@ def controller_state(
         check_reason=None if unchecked is None else reason_message(unchecked),
         check_starting=check_starting,
         program=program,
+        jog=jog,
         counters=schema.LinkCounters(
             units_received=counters.units_received,
             units_malformed=counters.units_malformed,

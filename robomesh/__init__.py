@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from robomesh.client.blocking import Arm, Mesh, Recording, Robot, open_recording
-    from robomesh.client.commands import CommandResult, StopResult
+    from robomesh.client.commands import CommandResult, JogResult, StopResult
     from robomesh.client.control import AsyncArm
     from robomesh.client.mesh import AsyncMesh, RobotNotFoundError, Service
     from robomesh.client.notes import Note
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 # Imported when they are used: the services import parts of this package, and need no client.
 _MODULES = {
     "client.blocking": ("Arm", "Mesh", "Recording", "Robot", "open_recording"),
-    "client.commands": ("CommandResult", "StopResult"),
+    "client.commands": ("CommandResult", "JogResult", "StopResult"),
     "client.control": ("AsyncArm",),
     "client.mesh": ("AsyncMesh", "RobotNotFoundError", "Service"),
     "client.notes": ("Note",),
@@ -83,6 +83,7 @@ __all__ = [
     "CommandResult",
     "Event",
     "InverseResult",
+    "JogResult",
     "JointState",
     "KeyNameError",
     "Mesh",

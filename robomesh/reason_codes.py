@@ -468,6 +468,12 @@ FRAME_FORM = Code(
     "'move_line_by' needs tool, base or site first, not {given}",
     "write for example 'move_line_by tool X Y Z ROLL PITCH YAW'",
 )
+LINE_AT_LIMIT = Code("program.line_at_limit", "joint {name} is at its limit there")
+LINE_ENDS = Code(
+    "program.line_ends",
+    "the arm reaches no farther on this line without another posture",
+    "move single joints",
+)
 LINE_ROLL = Code(
     "program.line_roll",
     "with five joints, a straight line cannot set the roll about the tool's axis",
@@ -691,6 +697,43 @@ NOTES_DAMAGED = Code(
     "{count} lines of {file} cannot be read as notes",
     "they stay in the file; restore it from a backup and restart the store",
 )
+JOG_MISSING = Code("jog.missing", "JOG without a direction", "send `jog` with frame, axis and speed")
+JOG_FRAME = Code("jog.frame", "the frame of a jog is missing", "choose TOOL, BASE, SITE or JOINT")
+JOG_AXIS = Code("jog.axis", "the axis of a jog is missing", "choose X, Y, Z, ROLL, PITCH or YAW")
+JOG_JOINT = Code("jog.joint", "there is no joint {number}", "choose 1 to {joints}")
+JOG_SPEED = Code(
+    "jog.speed",
+    "the speed of a jog, {speed:g} {unit}, is 0 or outside ±{most:g} {unit}",
+    "choose another speed",
+)
+JOG_FORBIDDEN = Code("jog.forbidden", "the site file forbids jogging this robot (jog_speed = 0)", "use steps")
+JOG_NO_DRIVER = Code(
+    "jog.no_driver",
+    "this controller cannot be jogged: its driver does not declare that a hold can be given up",
+    "use steps",
+)
+JOG_NO_STATE = Code(
+    "jog.no_state",
+    "this controller cannot be jogged: it does not report whether it moves or is on hold",
+    "use steps",
+)
+JOG_RUNS = Code("jog.runs", "a jog runs", "release it, and try again when the arm rests")
+JOG_UNKNOWN = Code("jog.unknown", "no jog {id} runs")
+JOG_SEQUENCE = Code(
+    "jog.sequence", "keep-alive {sequence} of the jog is not new: the last one was {last}", "count up"
+)
+JOG_RELEASED = Code("jog.released", "released")
+JOG_NOT_ALIVE = Code("jog.not_alive", "no keep-alive for {ms} ms")
+JOG_NOT_HELD_DOWN = Code("jog.not_held_down", "no keep-alive came: nothing has moved")
+JOG_COMMANDED = Code("jog.commanded", "the operator commanded {names}")
+JOG_NOT_MOVING = Code("jog.not_moving", "the robot does not move", "check the controller")
+JOG_FAILED = Code("jog.failed", "the gateway failed with an internal error", "see its log")
+JOG_ENDED = Code("jog.ended", "jog {name} ended after {distance}: {cause}")
+JOG_TOO_FAST = Code(
+    "jog.too_fast",
+    "the controller's lowest speed, {percent:g} %, moves the tool at {tool_mm_s:.0f} mm/s here",
+    "choose a higher speed, or move single joints",
+)
 PROGRAM_MOVED = Code("program.moved", "the robot has moved since its program was checked")
 PROGRAM_HOLD = Code("program.hold", "HOLD arrived during its check: not started")
 PROGRAM_ASKER_GAVE_UP = Code(
@@ -699,6 +742,7 @@ PROGRAM_ASKER_GAVE_UP = Code(
     "allow more time (not_after) and try again",
 )
 PROGRAM_PLAN_TOO_SLOW = Code("program.plan_too_slow", "planning it takes longer than {seconds:g} s")
+STOP_JOG_NOT_HELD = Code("stop.jog_not_held", "the robot still moves {seconds:g} s after the hold of a jog")
 PROGRAM_STOPPED = Code("program.stopped", "stopped by {by}: {reason}")
 PROGRAM_STOPPED_BY_NUMBER = Code("program.stopped_by_number", "stopped: stop request {id}")
 PROGRAM_GIVEN_UP = Code("program.given_up", "cancelled by RESET")

@@ -267,6 +267,17 @@ _REQUESTS = (
         own_link="requests",
         in_name=True,
     ),
+    # Keep-alives of a jog, with the operator's name.
+    Request(
+        name="jog/*",
+        request=schema.JogRequest,
+        answer=schema.JogAnswer,
+        priority=Priority.REAL_TIME,
+        owners=_GATEWAY_OR_REPLAY,
+        askers=_COMMANDERS,
+        own_link="requests",
+        in_name=True,
+    ),
     Request(
         name="audit/find",
         request=schema.AuditQuery,

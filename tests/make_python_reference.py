@@ -25,7 +25,7 @@ Generated from the package by `tests/make_python_reference.py`; do not edit. The
 """
 _SECTIONS = {
     "Connections": ("connect", "connect_async", "Service"),
-    "Robots and control": ("Robot", "Arm", "CommandResult", "StopResult"),
+    "Robots and control": ("Robot", "Arm", "CommandResult", "JogResult", "StopResult"),
     "Kinematics": ("CheckResult", "Violation", "InverseResult"),
     "Streams": ("Stream", "JointState", "Sample", "Event", "Alarm", "Note"),
     "Recordings": (

@@ -74,6 +74,7 @@ def admit_all(
 
 def content_of(request: CommandRequest) -> Content:
     """Return a request's content: requests of one id with equal content are the same command."""
+    jog = request.jog
     return Content(
         command=request.command,
         joint_positions=tuple(request.joint_positions),
@@ -81,6 +82,7 @@ def content_of(request: CommandRequest) -> Content:
         stop_id=request.stop_id,
         program=request.program,
         program_name=request.program_name,
+        jog=(jog.frame, jog.axis, jog.joint, jog.speed) if request.HasField("jog") else None,
     )
 
 

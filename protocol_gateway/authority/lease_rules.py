@@ -50,7 +50,7 @@ MOST_ASKERS = 20
 ENDED_AFTER_UNITS = 2
 
 _C = CommandRequest.Command
-MOTION_COMMANDS = frozenset({_C.HOME, _C.RESUME, _C.MOVE_ABSOLUTE, _C.MOVE_RELATIVE, _C.RUN_PROGRAM})
+MOTION_COMMANDS = frozenset({_C.HOME, _C.RESUME, _C.MOVE_ABSOLUTE, _C.MOVE_RELATIVE, _C.RUN_PROGRAM, _C.JOG})
 
 
 class Now(NamedTuple):
@@ -129,6 +129,7 @@ class Content(NamedTuple):
 
     Attributes:
         joint_positions: [rad] or [m].
+        jog: Frame, axis, joint and speed [m/s] or [rad/s]; None: no jog.
     """
 
     command: CommandRequest.Command
@@ -137,6 +138,7 @@ class Content(NamedTuple):
     stop_id: int = 0
     program: str = ""
     program_name: str = ""
+    jog: tuple[int, int, int, float] | None = None
 
     def description(self) -> str:
         """Return a readable line."""

@@ -41,6 +41,7 @@ def command_sent(
     waypoints: tuple[tuple[float, ...], ...] = (),
     arrived: bool = False,
     isolated: bool = True,
+    replaces: bool = False,
 ) -> Authority:
     """Record a command after its unit was put on the controller's socket.
 
@@ -48,6 +49,7 @@ def command_sent(
         waypoints: Path of a motion command [rad] or [m]; empty: unknown.
         arrived: The robot is at the target of the previous motion.
         isolated: No other unit was sent within `ANSWERED_WITHIN_S` before.
+        replaces: The controller does not queue the motion: only the last target is still on its path.
     """
     lease = authority.lease
     if request.command == _C.RESET and authority.stop is not None and authority.stop.id == request.stop_id:
@@ -65,7 +67,8 @@ def command_sent(
             waypoints = motion.waypoints
         elif motion is not None and not arrived:
             # A controller may queue motions: earlier targets are still on its path.
-            waypoints = _appended(motion.waypoints, waypoints)
+            before = motion.waypoints[-1:] if replaces else motion.waypoints
+            waypoints = _appended(before, waypoints)
         # After the first commanded motion, uncommanded motion is no longer tolerated.
         lease = replace(lease, commanded=True, tolerates_motion=False)
         motion = Motion(last_s=now.monotonic_s, waypoints=waypoints, isolated=isolated, conclusive=conclusive)
@@ -97,6 +100,12 @@ def _appended(
     """Append waypoints to those of the previous motion; empty (unknown) if there are too many."""
     both = (*before, *(place for place in waypoints if place not in before[-1:]))
     return both if len(both) <= MOST_WAYPOINTS else ()
+
+
+def given_up(authority: Authority) -> Authority:
+    """Drop a motion that was on hold at rest, after its RESET."""
+    lease = authority.lease
+    return authority if lease is None else replace(authority, lease=replace(lease, motion=None))
 
 
 def refused(authority: Authority) -> Authority:

@@ -8,6 +8,7 @@
     HOME                        x     x     x               not stale
     RESUME                      x     x     x, idle         x          x, or on hold
     RUN_PROGRAM                 x     x     x               x
+    JOG                         x     x     x               x          x
     MOVE_ABSOLUTE MOVE_RELATIVE x     x     x               x          x      x
 
 HOLD can only slow a robot down, so an unknown mode does not forbid it.

@@ -5,11 +5,14 @@ import contextlib
 import logging
 import time
 from collections.abc import Collection, Mapping
+from typing import Any
 
 from protocol_gateway.checking.worker_messages import (
     Checked,
     CheckMotion,
     CheckProgram,
+    Extended,
+    ExtendJog,
     Prepare,
     Prepared,
     ReplaceCells,
@@ -169,7 +172,18 @@ class Checker:
         Raises:
             CheckError: If it could not be checked, or not in time; the text says why.
         """
-        return await self._ask(question, timeout_s=MOTION_TIMEOUT_S)
+        checked: Checked = await self._ask(question, timeout_s=MOTION_TIMEOUT_S)
+        return checked
+
+    async def jog(self, question: ExtendJog) -> Extended:
+        """Plan and check the next part of a jog.
+
+        Raises:
+            CheckError: If it could not be checked, or not in time; the text says why.
+        """
+        self._start_requested.set()
+        extended: Extended = await self._ask(question, timeout_s=MOTION_TIMEOUT_S)
+        return extended
 
     async def program(self, question: CheckProgram) -> Checked:
         """Check a program.
@@ -182,9 +196,10 @@ class Checker:
             async with asyncio.timeout(PROGRAM_TIMEOUT_S):
                 while self._problems[question.robot] == _STARTING:
                     await asyncio.sleep(0.05)
-        return await self._ask(question, timeout_s=PROGRAM_TIMEOUT_S)
+        checked: Checked = await self._ask(question, timeout_s=PROGRAM_TIMEOUT_S)
+        return checked
 
-    async def _ask(self, question: CheckMotion | CheckProgram, *, timeout_s: float) -> Checked:
+    async def _ask(self, question: CheckMotion | CheckProgram | ExtendJog, *, timeout_s: float) -> Any:
         if (problem := self._problems[question.robot]) is not None:
             raise CheckError(problem)
         start_s = time.monotonic()
@@ -203,14 +218,13 @@ class Checker:
             raise CheckError(codes.CHECK_TOO_SLOW(seconds=timeout_s))
         return asked.result()
 
-    async def _answer(self, question: CheckMotion | CheckProgram, hang_timeout_s: float) -> Checked:
+    async def _answer(self, question: CheckMotion | CheckProgram | ExtendJog, hang_timeout_s: float) -> Any:
         try:
-            found: Checked = await self._worker.ask(question, timeout_s=hang_timeout_s)
+            return await self._worker.ask(question, timeout_s=hang_timeout_s)
         except Exception as error:
             raise CheckError(codes.CHECK_FAILED(_reason_of(error))) from error
-        return found
 
-    def _on_done(self, asked: asyncio.Future[Checked]) -> None:
+    def _on_done(self, asked: asyncio.Future[Any]) -> None:
         self._lock.release()
         if not asked.cancelled():
             asked.exception()  # retrieved, because the caller may have timed out
@@ -227,7 +241,7 @@ def _reason_of(error: Exception) -> Reason:
     return codes.OTHER(detail=text)
 
 
-def _log_late_failure(asked: asyncio.Future[Checked]) -> None:
+def _log_late_failure(asked: asyncio.Future[Any]) -> None:
     """Log the failure of a query after its caller's timeout."""
     if not asked.cancelled() and (error := asked.exception()) is not None:
         log.warning("a check failed after its timeout: %s", error)

@@ -10,6 +10,8 @@ from protocol_gateway.checking.worker_messages import (
     Checked,
     CheckMotion,
     CheckProgram,
+    Extended,
+    ExtendJog,
     Positions,
     Prepare,
     Prepared,
@@ -19,8 +21,10 @@ from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.worker import answer_all
 from robots.collision import Cell, build_cell, missing_meshes, pending, unshaped, unshaped_moving
+from robots.inverse import InverseSolver, build_solver
 from robots.joints import FloatArray
 from robots.programs.check import check_plan, check_program
+from robots.programs.jog import next_part
 from robots.programs.steps import CheckResult, Step, StepKind, Violation, ViolationKind
 
 # A program with these violations is not planned to its end, so it must not run.
@@ -30,6 +34,7 @@ _UNREADABLE = (ViolationKind.PROGRAM, ViolationKind.UNREACHABLE)
 def begin(cells: Cells) -> Callable[[Any], Any]:
     """Return the function that answers queries; robots of one cell share a prepared cell."""
     ready: dict[tuple[str, ...], Cell] = {}
+    solvers: dict[str, InverseSolver] = {}
 
     def cell_of(robot: str) -> Cell:
         names = tuple(each.name for each in cells[robot].robots)
@@ -41,13 +46,45 @@ def begin(cells: Cells) -> Callable[[Any], Any]:
             ready[names] = cell
         return ready[names]
 
-    def answer(question: ReplaceCells | Prepare | CheckMotion | CheckProgram) -> Prepared | Checked | None:
+    def extended(question: ExtendJog, cell: Cell) -> Extended:
+        robot = question.robot
+        if robot not in solvers:
+            solvers[robot] = build_solver(cell.arms[robot].description)
+        part = next_part(
+            cell,
+            robot,
+            solvers[robot],
+            question.jog,
+            origin=np.array(question.origin),
+            measured=np.array(question.measured),
+            last=np.array(question.last),
+            commanded=question.commanded,
+            others=_paths(question.others),
+            collisions=question.collisions,
+            more=question.more,
+        )
+        uncovered, warnings = _coverage(cell) if question.collisions else ([], [])
+        return Extended(
+            target=None if part.target is None else tuple(part.target.tolist()),
+            commanded=part.commanded,
+            moved=part.moved,
+            percent=part.percent,
+            end=part.end,
+            uncovered=tuple(uncovered),
+            warnings=(*(_reason(each) for each in part.violations), *warnings),
+        )
+
+    def answer(
+        question: ReplaceCells | Prepare | CheckMotion | CheckProgram | ExtendJog,
+    ) -> Prepared | Checked | Extended | None:
         if isinstance(question, ReplaceCells):
             cells.update(question.cells)
             ready.clear()
             return None
         cell = cell_of(question.robot)
         match question:
+            case ExtendJog():
+                return extended(question, cell)
             case Prepare(robot):
                 return Prepared(pending=bool(pending(cell)), problem=_uncheckable(cell, robot))
             case CheckMotion():

@@ -5,6 +5,7 @@ from typing import TypeAlias
 
 from robomesh.reasons import Reason
 from robots.cells import CellDescription
+from robots.programs.jog_steps import Jog
 from robots.programs.steps import Step
 
 Positions: TypeAlias = tuple[float, ...]
@@ -62,6 +63,50 @@ class CheckProgram:
     text: str
     start: Positions
     others: dict[str, tuple[Positions, ...]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExtendJog:
+    """Request to plan and check the next part of a jog; see `robots.programs.jog.next_part`.
+
+    Attributes:
+        origin, measured, last: Joint positions [rad] or [m].
+        commanded: Distance of `last` from the origin [m] or [rad].
+        others: As of CheckMotion.
+        collisions: Collisions end the jog.
+        more: Plan a part; otherwise answer only how far the arm is.
+    """
+
+    robot: str
+    jog: Jog
+    origin: Positions
+    measured: Positions
+    last: Positions
+    commanded: float
+    others: dict[str, tuple[Positions, ...]]
+    collisions: bool
+    more: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Extended:
+    """Next part of a jog.
+
+    Attributes:
+        target: End of the next motion [rad] or [m]; None: nothing is to be sent now.
+        commanded, moved: Distance of the newest target, and of the arm, from the origin [m] or [rad].
+        percent: Speed of the motion.
+        end: Why the jog cannot go on beyond `commanded`; None: it can.
+        uncovered, warnings: As of Checked.
+    """
+
+    target: Positions | None
+    commanded: float
+    moved: float
+    percent: float
+    end: Reason | None = None
+    uncovered: tuple[Reason, ...] = ()
+    warnings: tuple[Reason, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

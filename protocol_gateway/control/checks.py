@@ -20,7 +20,14 @@ from protocol_gateway.authority.preconditions import Controller, predicted, targ
 from protocol_gateway.checking.cell_occupancy import CellOccupancy, Occupancy
 from protocol_gateway.checking.checker import Checker
 from protocol_gateway.checking.policy import Policy
-from protocol_gateway.checking.worker_messages import Checked, CheckMotion, CheckProgram, Positions
+from protocol_gateway.checking.worker_messages import (
+    Checked,
+    CheckMotion,
+    CheckProgram,
+    Extended,
+    ExtendJog,
+    Positions,
+)
 from protocol_gateway.control.effects import Finding
 from protocol_gateway.control.robot_authority import RobotAuthority
 from protocol_gateway.drivers.driver import Activity
@@ -30,6 +37,7 @@ from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest
 from robots.joints import Joints
+from robots.programs.jog_steps import Jog
 
 _C = CommandRequest.Command
 _CLOSE, _FAILED, _SKIPPED = "check.warning", "check.failed", "check.skipped"
@@ -119,6 +127,51 @@ class Checks:
         # Each step is checked again before it is sent, against the other robots' state at that time.
         finding = self._evaluate(checked, left_out, start, others, program=True)
         return checked, replace(finding, start=start, others=None)
+
+    async def jog_part(
+        self,
+        jog: Jog,
+        *,
+        origin: Positions | None = None,
+        last: Positions | None = None,
+        commanded: float = 0.0,
+        more: bool = True,
+    ) -> tuple[Positions, Extended, Finding]:
+        """Plan and check the next part of a jog; return also the robot's positions from which it was checked.
+
+        With every policy but "off", what "require" refuses ends the jog.
+
+        Args:
+            origin: Positions where the jog began; None: it begins here, with the robot at rest.
+            last: Newest commanded target; None: none yet.
+            commanded: Its distance from the origin [m] or [rad].
+            more: False: return only how far the robot is.
+
+        Raises:
+            CheckError: If it could not be checked, or not in time.
+        """
+        start = self._start(must_rest=origin is None)
+        others, left_out = ({}, None) if self.policy is Policy.OFF or not more else self._others()
+        origin = origin or start
+        extended = await self._checker.jog(
+            ExtendJog(
+                robot=self._name,
+                jog=jog,
+                origin=origin,
+                measured=start,
+                last=last or origin,
+                commanded=commanded,
+                others=others,
+                collisions=self.policy is not Policy.OFF,
+                more=more,
+            )
+        )
+        if more and extended.uncovered and self.policy is Policy.REQUIRE:
+            raise CheckError(codes.CHECK_REQUIRED(*_first_few(extended.uncovered)))
+        warnings = (*extended.uncovered, *extended.warnings, *(() if left_out is None else (left_out,)))
+        code = _SKIPPED if extended.uncovered or left_out else _CLOSE
+        required = others if self.policy is Policy.REQUIRE else None
+        return start, extended, Finding(warning=_combined(warnings), code=code, others=required)
 
     def occupancy(self) -> Occupancy:
         """Return the positions that this robot may occupy from now on."""

@@ -68,16 +68,18 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class Program:
-    """A planned and checked program, ready to run.
+    """A planned and checked program, or a jog, ready to run.
 
     Attributes:
         targets: Its targets in order [rad] or [m].
         start: Positions at which the robot must rest when it starts; None: anywhere.
+        is_jog: A jog, whose targets are planned while it runs.
     """
 
     name: str
     targets: tuple[Positions, ...]
     start: Positions | None = None
+    is_jog: bool = False
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,14 @@ import contextlib
 import math
 from collections.abc import Mapping
 from hashlib import sha256
+from typing import Any
 
 from protocol_gateway.audit.entry import Entry, Outcome
 from protocol_gateway.audit.log import GATEWAY
 from protocol_gateway.authority.lease_rules import Answer, LeaseEnd, Now
 from protocol_gateway.control.events import (
     CommandsRequested,
+    JogEnded,
     LeaseRequested,
     ProgramEnded,
     StopRequested,
@@ -17,11 +19,13 @@ from protocol_gateway.control.events import (
 )
 from protocol_gateway.text_limits import LONGEST_SENTENCE, LONGEST_TEXT
 from robomesh.reasons import Reason
-from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest, PageReport
+from robomesh.schemas.robomesh_pb2 import CommandRequest, Jog, LeaseRequest, PageReport
 from robomesh.texts import one_line
 
 # Source of a program's steps.
 PROGRAM = "program"
+# Source of the end of a jog.
+JOG = "jog"
 
 
 def entry_of(
@@ -87,10 +91,27 @@ def command_entries(event: CommandsRequested, outcome: Outcome, answer: Answer) 
             stop_id=request.stop_id,
             program_name=request.program_name,
             program_sha256=sha256(request.program.encode()).hexdigest() if request.program else "",
+            **_jog_values(request),
             **page_values(request.page),
         )
         for request in event.requests
     )
+
+
+def _jog_values(request: CommandRequest) -> Mapping[str, str]:
+    if not request.HasField("jog"):
+        return {}
+    jog = request.jog
+    return {
+        "jog_frame": _name(Jog.Frame, jog.frame),
+        "jog_axis": f"joint {jog.joint}" if jog.frame == Jog.JOINT else _name(Jog.Axis, jog.axis),
+        "jog_speed": f"{jog.speed:.6g}",
+    }
+
+
+def _name(kind: Any, number: int) -> str:
+    """Return the name of an enum's value; a later schema may have more."""
+    return str(kind.Name(number)) if number in kind.values() else str(number)
 
 
 def page_values(report: PageReport) -> Mapping[str, str]:
@@ -150,6 +171,22 @@ def lease_end_entry(request: str, ended: LeaseEnd, now: Now) -> Entry:
     """Create the entry of a lease that the gateway ended."""
     return _gateway_entry(
         request, Outcome.ACCEPTED, ended.why, now, holder=ended.holder, renewals=ended.renewals
+    )
+
+
+def jog_end_entry(event: JogEnded, now: Now) -> Entry:
+    """Create the entry of a jog's end."""
+    return entry_of(
+        "JOG_END",
+        time_ns=now.wall_ns,
+        operator=event.operator,
+        source=JOG,
+        outcome=Outcome.FAILED if event.failed else Outcome.ACCEPTED,
+        text=event.outcome.text,
+        why=event.outcome,
+        **{"moved_rad" if event.rotary else "moved_m": f"{event.moved:.6g}"},
+        duration_s=f"{event.duration_s:.3f}",
+        keep_alives=event.keep_alives,
     )
 
 

@@ -16,6 +16,7 @@ from protocol_gateway.control.effects import Program, Seen
 from protocol_gateway.control.events import CommandsRequested
 from protocol_gateway.drivers.driver import Activity
 from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest
 from robots.joints import Joints
 
@@ -27,18 +28,20 @@ RESET_SHOWS_WITHIN_S = 0.3
 
 @dataclass(frozen=True, kw_only=True)
 class RunningProgram:
-    """Program that moves the robot.
+    """Program or jog that moves the robot.
 
     Attributes:
         done: Number of targets that were sent to the controller.
         held: HOLD was sent, and no RESUME since.
         given_up: RESET was sent while the program was held, so the rest of it must not run.
+        ending: Why a jog ends: nothing more of it is sent; None: it goes on.
     """
 
     program: Program
     done: int = 0
     held: bool = False
     given_up: bool = False
+    ending: Reason | None = None
 
     @property
     def ahead(self) -> tuple[tuple[float, ...], ...]:
@@ -152,4 +155,6 @@ def _program_refusal(request: CommandRequest, program: RunningProgram | None) ->
     # The check of a program holds only at its speed.
     if program is None or request.command not in (MOTION_COMMANDS | {_C.SPEED}) - {_C.RESUME}:
         return None
+    if program.program.is_jog:
+        return not_sent(codes.JOG_RUNS())
     return not_sent(codes.COMMAND_PROGRAM_RUNS(name=program.program.name))

@@ -6,10 +6,11 @@ Answer.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import degrees
 from typing import NamedTuple, TypeAlias
 
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, Lease, Now
-from protocol_gateway.control.effects import Program
+from protocol_gateway.control.effects import Finding, Program
 from protocol_gateway.drivers.driver import Activity
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
@@ -102,6 +103,69 @@ class CommandsRequested:
         return ", ".join(_C.Name(each.command) for each in self.requests)
 
 
+@dataclass(frozen=True, kw_only=True)
+class JogPartReady:
+    """The next part of the jog that runs is planned and checked; its result: why it was not sent, or None.
+
+    Attributes:
+        secret: Secret of the lease under which it runs.
+        target: [rad] or [m].
+    """
+
+    operator: str
+    secret: str
+    target: tuple[float, ...]
+    percent: float
+    finding: Finding
+
+
+@dataclass(frozen=True)
+class JogEnding:
+    """The jog that runs must end now: hold the robot."""
+
+    why: Reason
+
+
+@dataclass(frozen=True)
+class JogHeld:
+    """The robot rests at the end of a jog: give the rest up, and set the operator's speed again.
+
+    Attributes:
+        percent: Speed before the jog; None: unknown.
+    """
+
+    percent: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class JogEnded:
+    """The jog that ran has ended, and the robot rests, as far as is known.
+
+    Attributes:
+        moved: [m], or [rad] if `rotary`.
+        failed: It was not the operator who ended it, nor the end of the line.
+    """
+
+    name: str
+    operator: str
+    moved: float
+    rotary: bool
+    duration_s: float
+    keep_alives: int
+    why: Reason
+    failed: bool
+
+    @property
+    def distance(self) -> str:
+        """Distance for people."""
+        return f"{degrees(self.moved):.2f}°" if self.rotary else f"{self.moved * 1000:.1f} mm"
+
+    @property
+    def outcome(self) -> Reason:
+        """Reason of the end."""
+        return codes.JOG_ENDED(self.why, name=self.name, distance=self.distance)
+
+
 @dataclass(frozen=True)
 class ProgramEnded:
     """The program that ran has ended; `problem`: reason of an abort at `line`, None: it is done."""
@@ -183,6 +247,10 @@ Event: TypeAlias = (
     StopRequested
     | LeaseRequested
     | CommandsRequested
+    | JogPartReady
+    | JogEnding
+    | JogHeld
+    | JogEnded
     | ProgramEnded
     | TimePassed
     | SessionEnded

@@ -16,10 +16,10 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from protocol_gateway.authority import lease_rules
 from protocol_gateway.authority.lease_rules import Answer, refused
 from protocol_gateway.authority.preconditions import Controller
 from protocol_gateway.checking.worker_messages import Checked
+from protocol_gateway.control.abort import abort_reason
 from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.control import Control, command_answer, refusal
 from protocol_gateway.control.effects import Program
@@ -340,17 +340,10 @@ class Programs:
         return not holding and (program is None or not program.held)
 
     def _abort_reason(self, run: _Run) -> Reason | None:
-        authority = self._control.authority
-        if authority.stop is not None:
-            return codes.PROGRAM_STOPPED(by=authority.stop.by, reason=authority.stop.reason)
-        if authority.last_stop_id != run.last_stop_id:
-            return codes.PROGRAM_STOPPED_BY_NUMBER(id=authority.last_stop_id)
-        program = self._control.program
-        if program is not None and program.given_up:
+        authority, program = self._control.authority, self._control.program
+        if authority.stop is None and program is not None and program.given_up:
             return codes.PROGRAM_GIVEN_UP()
-        if not lease_rules.holds(authority, run.operator, run.secret):
-            return codes.PROGRAM_CONTROL_ENDED(authority.ended or codes.ENDED_UNKNOWN())
-        return None
+        return abort_reason(authority, run.operator, run.secret, run.last_stop_id)
 
     def _end(self, run: _Run, problem: Reason | None) -> None:
         self.state.outcome = _STATE.DONE if problem is None else _STATE.ENDED

@@ -2,7 +2,7 @@
 
 from protocol_gateway.authority.lease_rules import LeaseEnd
 from protocol_gateway.control.effects import Finding, Report
-from protocol_gateway.control.events import ProgramEnded, StopRequested, StopResult
+from protocol_gateway.control.events import JogEnded, ProgramEnded, StopRequested, StopResult
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import Event
 
@@ -70,6 +70,17 @@ def check_warning(names: str, finding: Finding) -> Report:
     """Report the warning of a check: of commands, or of a program."""
     text = f"{names}: {finding.warning}"
     return Report(_S.WARNING, finding.code, text, why=finding.warning, values={"command": names})
+
+
+def jog_ended(event: JogEnded) -> Report:
+    """Report the end of a jog."""
+    return Report(
+        _S.WARNING if event.failed else _S.INFO,
+        event.outcome.code,
+        event.outcome.text,
+        why=event.outcome,
+        values={"operator": event.operator},
+    )
 
 
 def program_ended(event: ProgramEnded) -> Report:

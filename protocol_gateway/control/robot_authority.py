@@ -1,10 +1,12 @@
-"""Authority over one robot: the one owner of its lease, its latched stop, its commands and its program.
+"""Authority over one robot: the one owner of its lease, its latched stop, its commands, its program or jog.
 
 `handle(event, seen)` yields effects in the order in which they must be performed. No I/O, no clock.
 
     event            effects, in this order
     ---------------  -----------------------------------------------------------------------------------
     stop             wire -> latch -> latch file -> programs cancelled -> published -> audit later
+    jog part         evaluated -> wire: checked before, and its command is in the audit log
+    end of a jog     hold on the wire -> at rest, reset on the wire -> published -> audit later
     commands, step   admitted -> cell -> evaluated -> checked -> audit on disk -> evaluated again -> wire
     lease: ACQUIRE,  evaluated -> audit on disk -> evaluated again -> applied
       OFFER, ACCEPT, TAKE
@@ -17,7 +19,7 @@
 in the order of the audit log. Stops, HOLD, renewals and releases do not wait.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, assert_never
 
@@ -90,6 +92,17 @@ class RobotAuthority:
                 return (yield from self._lease_requested(event, seen))
             case events.CommandsRequested():
                 return (yield from self._commands_requested(event, seen))
+            case events.JogPartReady():
+                return (yield from self._jog_part(event, seen))
+            case events.JogEnding():
+                yield from self._end_jog(event.why, seen)
+            case events.JogHeld():
+                yield from self._give_jog_up(event.percent, seen)
+            case events.JogEnded():
+                self._program = None
+                yield reports.jog_ended(event)
+                yield effects.AppendLater(entries.jog_end_entry(event, seen.now))
+                yield effects.Publish()
             case events.ProgramEnded():
                 self._program = None
                 yield reports.program_ended(event)
@@ -263,6 +276,8 @@ class RobotAuthority:
         if verdict.repeat:
             return verdict.answer
         problem = command.refused or (None if verdict.answer.accepted else verdict.answer)
+        if verdict.answer.accepted and not command.step:
+            yield from self._end_jog(codes.JOG_COMMANDED(names=command.names), seen)
         sends = command.program is None
         if problem is None and command.is_immediate:
             cancelled = yield effects.CancelPrograms(codes.PROGRAM_HOLD())
@@ -302,7 +317,7 @@ class RobotAuthority:
         yield from self._expire(seen)
         problem = evaluation.refusal_meanwhile(command, self._authority, self._program, seen, self._joints)
         if problem is None and (changed := (yield effects.Recheck(finding))) is not None:
-            runs = command.program is not None
+            runs = command.program is not None and not command.program.is_jog
             problem = not_sent(codes.PROGRAM_MOVED() if runs else codes.COMMAND_CHANGED(changed))
         if problem is None and unit is not None:
             failure = yield effects.Send(unit)
@@ -348,6 +363,76 @@ class RobotAuthority:
             # From now on the lease's motion holds this target.
             self._program = replace(self._program, done=self._program.done + 1)
         return f"{command.names} {'is' if len(command.requests) == 1 else 'are'} on the controller's socket"
+
+    # ------------------------------------------------------------------- jogs
+
+    def _jog_part(self, part: events.JogPartReady, seen: Seen) -> Effects[Reason | None]:
+        """Send the next part of the jog that runs; return why it was not sent."""
+        yield from self._expire(seen)
+        program = self._program
+        if program is None or program.ending is not None:
+            return codes.COMMAND_HELD()
+        requests = (
+            CommandRequest(command=_C.SPEED, speed_percent=part.percent),
+            CommandRequest(command=_C.MOVE_ABSOLUTE, joint_positions=part.target),
+        )
+        if not lease_rules.holds(self._authority, part.operator, part.secret):
+            return codes.COMMAND_CONTROL_ENDED()
+        command = events.CommandsRequested(
+            requests=requests, operator=part.operator, source=entries.JOG, arrived=seen.now, step=True
+        )
+        refusal = evaluation.refusal_of(command, self._authority, program, seen, self._joints)
+        if refusal is not None:
+            return refusal.reason
+        if (changed := (yield effects.Recheck(part.finding))) is not None:
+            return codes.COMMAND_CHANGED(changed)
+        return (yield from self._send_for_jog(requests, seen))
+
+    def _end_jog(self, why: Reason, seen: Seen) -> Effects[None]:
+        """Hold the robot, if a jog runs that does not end already."""
+        program = self._program
+        if program is None or not program.program.is_jog or program.ending is not None:
+            return
+        self._program = replace(program, ending=why)
+        # A HOLD sent to an arm at rest would make the controller refuse every motion.
+        if self._authority.motion is not None:
+            yield from self._send_for_jog((CommandRequest(command=_C.HOLD),), seen)
+
+    def _give_jog_up(self, percent: float | None, seen: Seen) -> Effects[None]:
+        """Discard the rest of a jog that is on hold, and set the operator's speed again."""
+        requests = []
+        # RESET would also clear a stop.
+        if seen.controller.status.activity is Activity.HOLDING and self._authority.stop is None:
+            requests.append(CommandRequest(command=_C.RESET))
+        if percent is not None and percent != self._authority.speed_percent and self._authority.stop is None:
+            requests.append(CommandRequest(command=_C.SPEED, speed_percent=percent))
+        if not requests or (yield from self._send_for_jog(requests, seen)) is not None:
+            return
+        if requests[0].command == _C.RESET:
+            self._authority = motion_owner.given_up(self._authority)
+
+    def _send_for_jog(self, requests: Sequence[CommandRequest], seen: Seen) -> Effects[Reason | None]:
+        """Send commands of a jog as one unit, and apply them; return why they were not sent."""
+        try:
+            unit = self._encode(*map(controller_command, requests))
+        except CommandError as error:
+            return error.reason
+        problem: Reason | None = yield effects.Send(unit)
+        if problem is not None:
+            return problem
+        self._last_unit_s = seen.now.monotonic_s
+        for request in requests:
+            target = target_of(request, seen.controller, self._joints)
+            self._authority = motion_owner.command_sent(
+                self._authority,
+                request,
+                seen.now,
+                waypoints=() if target is None else (target,),
+                arrived=self._has_arrived(seen.controller),
+                isolated=False,
+                replaces=True,
+            )
+        return None
 
     def _keep_answer(self, command: events.CommandsRequested, answer: Answer, verdict: Verdict) -> None:
         if verdict.id_used:

@@ -185,6 +185,14 @@ class Driver(Protocol):
         """True if the driver has a stop unit for the controller; a test at the site proves that it works."""
         ...
 
+    @property
+    def can_jog(self) -> bool:
+        """True if `Reset` gives a held motion up without a latch, and a new target replaces a running motion.
+
+        The arm must go on smoothly from where it is, without a stop between the targets.
+        """
+        ...
+
     def connected(self) -> None:
         """Discard the unfinished unit, because a new connection begins or bytes were discarded."""
         ...

@@ -89,6 +89,11 @@ class UnitDriver:
         """True if there is a stop unit: a controller that knows only codes needs a code for `stop`."""
         return self._table.supports(_WORDS[Stop])
 
+    @property
+    def can_jog(self) -> bool:
+        """True if there are units to hold, and to give the held motion up."""
+        return all(self._table.supports(_WORDS[each]) for each in (Hold, Reset))
+
     def connected(self) -> None:
         """Discard the unfinished unit of the previous connection."""
         self._stream = UnitStream(self._table)

@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal, Self, TypeVar
 
-from robomesh.client.commands import CommandResult, Progress, StopResult
+from robomesh.client.commands import CommandResult, JogResult, Progress, StopResult
 from robomesh.client.control import AsyncArm
 from robomesh.client.event_loop import EventLoopThread
 from robomesh.client.mesh import AsyncMesh, Service
@@ -89,6 +89,19 @@ class Arm:
     def resume(self, *, wait: bool = True) -> CommandResult:
         """Resume the motion that `hold` paused."""
         return self._run(self._arm.resume(wait=wait))
+
+    def jog(
+        self, axis: str | int, speed: float, *, held: Callable[[], bool], frame: str = "base"
+    ) -> JogResult:
+        """Jog while `held` returns true, called 25 times a second on another thread; see `AsyncArm.jog`.
+
+        Args:
+            axis: "x", "y", "z", "roll", "pitch" or "yaw" (about x, y, z); or a joint's number, from 1.
+            speed: The greatest speed [m/s] or [rad/s]; negative: in the other direction.
+            held: Returns quickly whether the operator still holds the button down.
+            frame: "tool", "base" or "site"; not used for a joint.
+        """
+        return self._run(self._arm.jog(axis, speed, held=held, frame=frame))
 
     def wait(self) -> None:
         """Wait for the end of the motion or program that a call with `wait=False` started."""

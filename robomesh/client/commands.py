@@ -45,6 +45,22 @@ class CommandResult:
 
 
 @dataclass(frozen=True)
+class JogResult:
+    """End of a jog.
+
+    Attributes:
+        distance: Distance from its beginning [m], or [rad] if `rotary`.
+        text: Why it ended, for people.
+        code: Code of the reason: "jog.released", "jog.not_alive", "joints.outside", ...
+    """
+
+    distance: float
+    rotary: bool
+    text: str
+    code: str
+
+
+@dataclass(frozen=True)
 class Progress:
     """Callbacks of a program that waits for the end of its command.
 

@@ -16,6 +16,7 @@ from typing import Any, Self, TypeVar
 from robomesh import reason_codes as codes
 from robomesh.client.commands import (
     CommandResult,
+    JogResult,
     Progress,
     StopResult,
     numbers,
@@ -37,6 +38,15 @@ _A = schema.LeaseRequest
 _C = schema.CommandRequest
 _MOTIONS = (_C.HOME, _C.RESUME, _C.MOVE_ABSOLUTE, _C.MOVE_RELATIVE)
 
+_AXES = {
+    "x": schema.Jog.X,
+    "y": schema.Jog.Y,
+    "z": schema.Jog.Z,
+    "roll": schema.Jog.ROLL,
+    "pitch": schema.Jog.PITCH,
+    "yaw": schema.Jog.YAW,
+}
+_FRAMES = {"tool": schema.Jog.TOOL, "base": schema.Jog.BASE, "site": schema.Jog.SITE}
 # While a call waits; renewed four times in that time, so that the lease outlives late answers.
 _WAITING_TTL_S = 2.0
 # After a call: the longest that a gateway grants.
@@ -51,6 +61,8 @@ _REASON_S = 1.5
 # A stopped arm comes to rest within this time.
 _REST_S, _POLL_S = 5.0, 0.2
 _WARNING = "; mind: "
+# Interval of a jog's keep-alives, and how many releases may go without an answer.
+_KEEP_ALIVE_S, _MOST_UNANSWERED = 0.04, 4
 
 
 class AsyncArm:
@@ -187,6 +199,26 @@ class AsyncArm:
         """Resume the motion that `hold` paused."""
         return await self._motion(_C(command=_C.RESUME), wait=wait)
 
+    async def jog(
+        self, axis: str | int, speed: float, *, held: Callable[[], bool], frame: str = "base"
+    ) -> JogResult:
+        """Jog while `held` returns true: the tool on a straight line or about an axis, or one joint.
+
+        A keep-alive follows every call of `held`, about 25 times a second. The gateway holds the robot if
+        none arrives for 150 ms, so `held` must return quickly.
+
+        Args:
+            axis: "x", "y", "z", "roll", "pitch" or "yaw" (about x, y, z); or a joint's number, from 1.
+            speed: The greatest speed [m/s] or [rad/s]; negative: in the other direction.
+            held: Returns whether the operator still holds the button down.
+            frame: "tool", "base" or "site"; not used for a joint.
+
+        Raises:
+            MessageError: If there is no such axis or frame.
+        """
+        request = _C(command=_C.JOG, jog=_direction(axis, frame, speed))
+        return await self._guarded(self._jog(request, held))
+
     async def wait(self) -> None:
         """Wait for the end of the motion or program that a call with `wait=False` started.
 
@@ -274,6 +306,40 @@ class AsyncArm:
             return replace(answer, text="done")
         return answer
 
+    async def _jog(self, request: schema.CommandRequest, held: Callable[[], bool]) -> JogResult:
+        moved, self._moving = self._moving, True
+        try:
+            await self._command(request)
+        except RefusedError:
+            self._moving = moved
+            raise
+        answer = await self._renewed(self._keep_alive(request.id, held))
+        self._moving = False
+        return JogResult(answer.moved, answer.rotary, answer.text, answer.reason.code)
+
+    async def _keep_alive(self, jog: int, held: Callable[[], bool]) -> schema.JogAnswer:
+        """Send keep-alives while `held`, then the release until the robot rests; return the last answer."""
+        released, unanswered = False, 0
+        request = schema.JogRequest(lease=self._lease, jog=jog)
+        while True:
+            sent_s = time.monotonic()
+            request.sequence += 1
+            request.release = released = released or not held()
+            try:
+                answer = await self._session.ask(
+                    self._key(f"jog/{self.operator}"), request, timeout_s=_RENEWAL_TIMEOUT_S
+                )
+            except (NoAnswerError, BusyError):
+                # The gateway has held the robot meanwhile.
+                released, unanswered = True, unanswered + 1
+                if unanswered > _MOST_UNANSWERED:
+                    raise
+                continue
+            assert isinstance(answer, schema.JogAnswer)
+            if not answer.running:
+                return answer
+            await asyncio.sleep(max(0.0, sent_s + _KEEP_ALIVE_S - time.monotonic()))
+
     async def _guarded(self, waiting: Coroutine[Any, Any, T]) -> T:
         """Wait, and stop the robot if the program is interrupted."""
         try:
@@ -355,3 +421,18 @@ class AsyncArm:
 
     def _key(self, name: str) -> str:
         return robot_key(self.site, self.robot, name)
+
+
+def _direction(axis: str | int, frame: str, speed: float) -> schema.Jog:
+    """Return a jog's message.
+
+    Raises:
+        MessageError: If there is no such axis or frame.
+    """
+    if isinstance(axis, int):
+        return schema.Jog(frame=schema.Jog.JOINT, joint=max(axis, 0), speed=speed)
+    if axis not in _AXES:
+        raise MessageError(f"no axis {axis!r}: use {', '.join(_AXES)}, or a joint's number")
+    if frame not in _FRAMES:
+        raise MessageError(f"no frame {frame!r}: use {', '.join(_FRAMES)}")
+    return schema.Jog(frame=_FRAMES[frame], axis=_AXES[axis], speed=speed)

@@ -12,7 +12,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class ControllerState(_message.Message):
-    __slots__ = ("timestamp", "link", "mode", "activity", "homed", "trace", "fault", "last_unit_age_s", "controller_time_s", "counters", "read_only", "stop", "link_text", "rate_hz", "health", "audit_head", "legacy_clients", "speed_percent", "check", "check_text", "check_starting", "link_reasons", "check_reason", "program")
+    __slots__ = ("timestamp", "link", "mode", "activity", "homed", "trace", "fault", "last_unit_age_s", "controller_time_s", "counters", "read_only", "stop", "link_text", "rate_hz", "health", "audit_head", "legacy_clients", "speed_percent", "check", "check_text", "check_starting", "link_reasons", "check_reason", "program", "jog")
     class Link(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         LINK_UNSPECIFIED: _ClassVar[ControllerState.Link]
@@ -102,6 +102,7 @@ class ControllerState(_message.Message):
     LINK_REASONS_FIELD_NUMBER: _ClassVar[int]
     CHECK_REASON_FIELD_NUMBER: _ClassVar[int]
     PROGRAM_FIELD_NUMBER: _ClassVar[int]
+    JOG_FIELD_NUMBER: _ClassVar[int]
     timestamp: _timestamp_pb2.Timestamp
     link: ControllerState.Link
     mode: ControllerState.Mode
@@ -126,7 +127,16 @@ class ControllerState(_message.Message):
     link_reasons: _containers.RepeatedCompositeFieldContainer[Reason]
     check_reason: Reason
     program: ControllerState.Program
-    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., link: _Optional[_Union[ControllerState.Link, str]] = ..., mode: _Optional[_Union[ControllerState.Mode, str]] = ..., activity: _Optional[_Union[ControllerState.Activity, str]] = ..., homed: _Optional[_Union[ControllerState.Known, str]] = ..., trace: _Optional[_Union[ControllerState.Known, str]] = ..., fault: _Optional[str] = ..., last_unit_age_s: _Optional[float] = ..., controller_time_s: _Optional[float] = ..., counters: _Optional[_Union[LinkCounters, _Mapping]] = ..., read_only: _Optional[bool] = ..., stop: _Optional[_Union[StopState, _Mapping]] = ..., link_text: _Optional[str] = ..., rate_hz: _Optional[float] = ..., health: _Optional[_Union[LinkHealth, _Mapping]] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., legacy_clients: _Optional[_Union[LegacyClients, _Mapping]] = ..., speed_percent: _Optional[float] = ..., check: _Optional[_Union[ControllerState.Check, str]] = ..., check_text: _Optional[str] = ..., check_starting: _Optional[bool] = ..., link_reasons: _Optional[_Iterable[_Union[Reason, _Mapping]]] = ..., check_reason: _Optional[_Union[Reason, _Mapping]] = ..., program: _Optional[_Union[ControllerState.Program, _Mapping]] = ...) -> None: ...
+    jog: JogState
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., link: _Optional[_Union[ControllerState.Link, str]] = ..., mode: _Optional[_Union[ControllerState.Mode, str]] = ..., activity: _Optional[_Union[ControllerState.Activity, str]] = ..., homed: _Optional[_Union[ControllerState.Known, str]] = ..., trace: _Optional[_Union[ControllerState.Known, str]] = ..., fault: _Optional[str] = ..., last_unit_age_s: _Optional[float] = ..., controller_time_s: _Optional[float] = ..., counters: _Optional[_Union[LinkCounters, _Mapping]] = ..., read_only: _Optional[bool] = ..., stop: _Optional[_Union[StopState, _Mapping]] = ..., link_text: _Optional[str] = ..., rate_hz: _Optional[float] = ..., health: _Optional[_Union[LinkHealth, _Mapping]] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., legacy_clients: _Optional[_Union[LegacyClients, _Mapping]] = ..., speed_percent: _Optional[float] = ..., check: _Optional[_Union[ControllerState.Check, str]] = ..., check_text: _Optional[str] = ..., check_starting: _Optional[bool] = ..., link_reasons: _Optional[_Iterable[_Union[Reason, _Mapping]]] = ..., check_reason: _Optional[_Union[Reason, _Mapping]] = ..., program: _Optional[_Union[ControllerState.Program, _Mapping]] = ..., jog: _Optional[_Union[JogState, _Mapping]] = ...) -> None: ...
+
+class JogState(_message.Message):
+    __slots__ = ("operator", "jog")
+    OPERATOR_FIELD_NUMBER: _ClassVar[int]
+    JOG_FIELD_NUMBER: _ClassVar[int]
+    operator: str
+    jog: Jog
+    def __init__(self, operator: _Optional[str] = ..., jog: _Optional[_Union[Jog, _Mapping]] = ...) -> None: ...
 
 class LinkHealth(_message.Message):
     __slots__ = ("jitter_s", "network_round_trip_s", "answer_s", "flooding")
@@ -383,7 +393,7 @@ class LeaseAnswer(_message.Message):
     def __init__(self, lease: _Optional[str] = ..., holder: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., until: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., now: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class CommandRequest(_message.Message):
-    __slots__ = ("lease", "id", "not_after", "command", "joint_positions", "speed_percent", "stop_id", "program", "program_name", "page")
+    __slots__ = ("lease", "id", "not_after", "command", "joint_positions", "speed_percent", "stop_id", "program", "program_name", "page", "jog")
     class Command(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         COMMAND_UNSPECIFIED: _ClassVar[CommandRequest.Command]
@@ -397,6 +407,7 @@ class CommandRequest(_message.Message):
         MOVE_ABSOLUTE: _ClassVar[CommandRequest.Command]
         MOVE_RELATIVE: _ClassVar[CommandRequest.Command]
         RUN_PROGRAM: _ClassVar[CommandRequest.Command]
+        JOG: _ClassVar[CommandRequest.Command]
     COMMAND_UNSPECIFIED: CommandRequest.Command
     HOME: CommandRequest.Command
     HOLD: CommandRequest.Command
@@ -408,6 +419,7 @@ class CommandRequest(_message.Message):
     MOVE_ABSOLUTE: CommandRequest.Command
     MOVE_RELATIVE: CommandRequest.Command
     RUN_PROGRAM: CommandRequest.Command
+    JOG: CommandRequest.Command
     LEASE_FIELD_NUMBER: _ClassVar[int]
     ID_FIELD_NUMBER: _ClassVar[int]
     NOT_AFTER_FIELD_NUMBER: _ClassVar[int]
@@ -418,6 +430,7 @@ class CommandRequest(_message.Message):
     PROGRAM_FIELD_NUMBER: _ClassVar[int]
     PROGRAM_NAME_FIELD_NUMBER: _ClassVar[int]
     PAGE_FIELD_NUMBER: _ClassVar[int]
+    JOG_FIELD_NUMBER: _ClassVar[int]
     lease: str
     id: int
     not_after: _timestamp_pb2.Timestamp
@@ -428,7 +441,74 @@ class CommandRequest(_message.Message):
     program: str
     program_name: str
     page: PageReport
-    def __init__(self, lease: _Optional[str] = ..., id: _Optional[int] = ..., not_after: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., command: _Optional[_Union[CommandRequest.Command, str]] = ..., joint_positions: _Optional[_Iterable[float]] = ..., speed_percent: _Optional[float] = ..., stop_id: _Optional[int] = ..., program: _Optional[str] = ..., program_name: _Optional[str] = ..., page: _Optional[_Union[PageReport, _Mapping]] = ...) -> None: ...
+    jog: Jog
+    def __init__(self, lease: _Optional[str] = ..., id: _Optional[int] = ..., not_after: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., command: _Optional[_Union[CommandRequest.Command, str]] = ..., joint_positions: _Optional[_Iterable[float]] = ..., speed_percent: _Optional[float] = ..., stop_id: _Optional[int] = ..., program: _Optional[str] = ..., program_name: _Optional[str] = ..., page: _Optional[_Union[PageReport, _Mapping]] = ..., jog: _Optional[_Union[Jog, _Mapping]] = ...) -> None: ...
+
+class Jog(_message.Message):
+    __slots__ = ("frame", "axis", "joint", "speed")
+    class Frame(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        FRAME_UNSPECIFIED: _ClassVar[Jog.Frame]
+        TOOL: _ClassVar[Jog.Frame]
+        BASE: _ClassVar[Jog.Frame]
+        SITE: _ClassVar[Jog.Frame]
+        JOINT: _ClassVar[Jog.Frame]
+    FRAME_UNSPECIFIED: Jog.Frame
+    TOOL: Jog.Frame
+    BASE: Jog.Frame
+    SITE: Jog.Frame
+    JOINT: Jog.Frame
+    class Axis(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        AXIS_UNSPECIFIED: _ClassVar[Jog.Axis]
+        X: _ClassVar[Jog.Axis]
+        Y: _ClassVar[Jog.Axis]
+        Z: _ClassVar[Jog.Axis]
+        ROLL: _ClassVar[Jog.Axis]
+        PITCH: _ClassVar[Jog.Axis]
+        YAW: _ClassVar[Jog.Axis]
+    AXIS_UNSPECIFIED: Jog.Axis
+    X: Jog.Axis
+    Y: Jog.Axis
+    Z: Jog.Axis
+    ROLL: Jog.Axis
+    PITCH: Jog.Axis
+    YAW: Jog.Axis
+    FRAME_FIELD_NUMBER: _ClassVar[int]
+    AXIS_FIELD_NUMBER: _ClassVar[int]
+    JOINT_FIELD_NUMBER: _ClassVar[int]
+    SPEED_FIELD_NUMBER: _ClassVar[int]
+    frame: Jog.Frame
+    axis: Jog.Axis
+    joint: int
+    speed: float
+    def __init__(self, frame: _Optional[_Union[Jog.Frame, str]] = ..., axis: _Optional[_Union[Jog.Axis, str]] = ..., joint: _Optional[int] = ..., speed: _Optional[float] = ...) -> None: ...
+
+class JogRequest(_message.Message):
+    __slots__ = ("lease", "jog", "sequence", "release")
+    LEASE_FIELD_NUMBER: _ClassVar[int]
+    JOG_FIELD_NUMBER: _ClassVar[int]
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    RELEASE_FIELD_NUMBER: _ClassVar[int]
+    lease: str
+    jog: int
+    sequence: int
+    release: bool
+    def __init__(self, lease: _Optional[str] = ..., jog: _Optional[int] = ..., sequence: _Optional[int] = ..., release: _Optional[bool] = ...) -> None: ...
+
+class JogAnswer(_message.Message):
+    __slots__ = ("running", "moved", "rotary", "text", "reason")
+    RUNNING_FIELD_NUMBER: _ClassVar[int]
+    MOVED_FIELD_NUMBER: _ClassVar[int]
+    ROTARY_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    running: bool
+    moved: float
+    rotary: bool
+    text: str
+    reason: Reason
+    def __init__(self, running: _Optional[bool] = ..., moved: _Optional[float] = ..., rotary: _Optional[bool] = ..., text: _Optional[str] = ..., reason: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
 
 class PageReport(_message.Message):
     __slots__ = ("view", "picture", "picture_time", "picture_age_s", "state_age_s")

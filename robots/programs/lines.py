@@ -25,6 +25,8 @@ _MOST_HALVINGS = 14
 BENT_DEG = 15.0
 # Search for this axis: steps, and the weight of a metre off the line in radians of the axis.
 _STEPS = 12
+# A joint nearer to its limit than this [rad] or [m] is what a short line fails at.
+_NEAR_LIMIT = 0.02
 _PLACE_WEIGHT = 1000.0
 
 
@@ -142,13 +144,23 @@ def follow_line(model: RobotModel, solver: InverseSolver, line: Line, start: Flo
     Raises:
         UnreachableError: If the arm cannot reach the end, or would have to jump to another posture.
     """
+    followed = try_line(model, solver, line, start)
+    if isinstance(followed, Followed):
+        return followed
+    raise _unreachable(model, solver, line, followed)
+
+
+def try_line(
+    model: RobotModel, solver: InverseSolver, line: Line, start: FloatArray
+) -> "Followed | _StuckError":
+    """Approximate a line like `follow_line`, but without a search for the reason of a failure."""
     for bent in (False, True) if line.task is Task.POSITION_AND_AXIS_5D else (False,):
         follower = _Follower(model, solver, line, bent=bent)
         try:
             return Followed(tuple(follower.ends(start)), follower.bent_rad)
         except _StuckError as error:
             stuck = error
-    raise _unreachable(model, solver, line, stuck)
+    return stuck
 
 
 class _StuckError(Exception):
@@ -232,6 +244,25 @@ def _reason(
         bent = _bent_problem(model, pose, nearest_axis(model, pose, stuck.at))
         return bent or result.reason
     return result.reason
+
+
+def why_stuck(model: RobotModel, line: Line, at: FloatArray) -> Reason:
+    """Return why a short line from joint positions cannot be followed, as far as that shows without a search.
+
+    Args:
+        at: (n,) [rad] or [m].
+    """
+    joints = model.joints
+    margins = np.minimum(at - joints.lower, joints.upper - at)
+    nearest = int(margins.argmin())
+    if margins[nearest] < _NEAR_LIMIT:
+        return codes.LINE_AT_LIMIT(name=joints.names[nearest])
+    if line.task is Task.POSITION_AND_AXIS_5D:
+        end = line.pose(1.0)
+        bent = _bent_problem(model, end, nearest_axis(model, end, at))
+        if bent is not None:
+            return bent
+    return codes.LINE_ENDS()
 
 
 def nearest_axis(model: RobotModel, pose: FloatArray, near: FloatArray) -> FloatArray:

@@ -12,7 +12,16 @@ from robots.inverse import InverseSolver, Task, natural_task, solve
 from robots.inverse.tasks import tool_misses
 from robots.joints import FloatArray
 from robots.model import tool_placement
-from robots.programs.lines import BENT_DEG, UnreachableError, follow_line, line_to, nearest_axis
+from robots.programs.lines import (
+    BENT_DEG,
+    Followed,
+    UnreachableError,
+    follow_line,
+    line_to,
+    nearest_axis,
+    try_line,
+    why_stuck,
+)
 from robots.programs.statements import (
     Home,
     JointTarget,
@@ -68,6 +77,47 @@ def _bent_notes(bent: Mapping[int, float]) -> tuple[Reason, ...]:
     return (codes.CHECK_NOTE_BENT(angle_deg=most, lines=lines),)
 
 
+def plan_line_part(
+    arm: Arm, solver: InverseSolver, *, origin: FloatArray, at: FloatArray, offset: FloatArray
+) -> FloatArray | Reason:
+    """Plan the next joint move of a line that is followed part by part, as `move_line_by` plans it.
+
+    Args:
+        origin: (n,) joint positions at the line's beginning [rad] or [m].
+        at: (n,) joint positions on the line, where this part begins.
+        offset: (4, 4) this part's end, from the origin, along and about the base's axes.
+
+    Returns:
+        (n,) the end of one joint move, perhaps before the part's end; or why the part cannot be followed.
+    """
+    planner = _Planner(arm, solver, at)
+    try:
+        end = planner.moved(0, StepFrame.BASE, offset, origin=origin)
+    except _PlanEndsError as error:
+        return error.violation.reason
+    line = line_to(tool_placement(arm.model, at), end, natural_task(arm.joints))
+    followed = try_line(arm.model, solver, line, at)
+    if isinstance(followed, Followed):
+        return _rounded(followed.ends[0])
+    # The solver's own search for a reason may take seconds.
+    return why_stuck(arm.model, line, at)
+
+
+def axes_of(frame: StepFrame, arm: Arm, tool: FloatArray) -> FloatArray:
+    """Return the (3, 3) axes of a step's frame in the base frame, as columns.
+
+    Args:
+        tool: (4, 4) tool to base.
+    """
+    match frame:
+        case StepFrame.TOOL:
+            return tool[:3, :3]
+        case StepFrame.BASE:
+            return np.eye(3)
+        case StepFrame.SITE:
+            return arm.base_to_site[:3, :3].T
+
+
 class _PlanEndsError(Exception):
     """The plan ends here."""
 
@@ -100,7 +150,7 @@ class _Planner:
                     for positions in self._line(line, self._pose(target)):
                         self._move(line, positions, along_line=True)
                 case MoveLineBy(line, frame, offset):
-                    for positions in self._line(line, self._moved(line, frame, offset)):
+                    for positions in self._line(line, self.moved(line, frame, offset, origin=self._at)):
                         self._move(line, positions, along_line=True)
                 case Speed(line, percent):
                     self._speed_set = True
@@ -147,16 +197,10 @@ class _Planner:
             return target.tool_to_base
         return tool_placement(self._arm.model, target.positions)
 
-    def _moved(self, line: int, frame: StepFrame, offset: FloatArray) -> FloatArray:
-        """Return the tool's pose (4, 4) moved by an offset from where it is; it turns about its origin."""
-        tool = tool_placement(self._arm.model, self._at)
-        match frame:
-            case StepFrame.TOOL:
-                axes = tool[:3, :3]
-            case StepFrame.BASE:
-                axes = np.eye(3)
-            case StepFrame.SITE:
-                axes = self._arm.base_to_site[:3, :3].T
+    def moved(self, line: int, frame: StepFrame, offset: FloatArray, *, origin: FloatArray) -> FloatArray:
+        """Return the tool's pose (4, 4) at `origin` moved by an offset; it turns about its origin."""
+        tool = tool_placement(self._arm.model, origin)
+        axes = axes_of(frame, self._arm, tool)
         moved = tool.copy()
         moved[:3, 3] += axes @ offset[:3, 3]
         turn = axes @ offset[:3, :3] @ axes.T

@@ -4,6 +4,7 @@ Vectorized, because Pinocchio computes one position per call and a program has t
 """
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -37,8 +38,18 @@ class ToolChain:
     _offsets: FloatArray
 
 
+# By the arm: a chain takes as long as the check of a short motion.
+_CHAINS: WeakKeyDictionary[Arm, ToolChain] = WeakKeyDictionary()
+
+
 def tool_chain(arm: Arm) -> ToolChain:
-    """Build the chain of an arm's tool."""
+    """Return the chain of an arm's tool."""
+    if arm not in _CHAINS:
+        _CHAINS[arm] = _build_chain(arm)
+    return _CHAINS[arm]
+
+
+def _build_chain(arm: Arm) -> ToolChain:
     tree = tree_of(arm.description)
     on_link, tool_to_link = tool_frame(arm.description)
     link = next(link for link in tree.links if link.name == on_link)

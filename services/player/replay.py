@@ -141,7 +141,9 @@ class Replay:
         answers: dict[str, Handler] = {
             "replay/request": self._on_request,
             "mesh/*": self._on_mesh,
-            **dict.fromkeys(("stop", "lease/request/*", "command/*", "recorder/request"), self._refuse),
+            **dict.fromkeys(
+                ("stop", "lease/request/*", "command/*", "jog/*", "recorder/request"), self._refuse
+            ),
         }
         for name, handler in answers.items():
             self._answerers.append(self._session.answer(self._site, self.robot, name, handler))

@@ -36,6 +36,7 @@ class Robot(BaseModel):
             unknown.
         check: The check of each motion for collisions: `require` refuses a motion that fails it or cannot
             be checked, `warn` reports it, `off` checks nothing.
+        jog_speed: The tool's greatest speed [mm/s] while an operator holds a button to jog it; 0: no jogs.
         clearance: Distances to fixtures and other robots.
         floor: The floor of its cell: its height [mm], a table, or `false` for none. In a cell of several
             robots one robot's key applies to all.
@@ -58,6 +59,7 @@ class Robot(BaseModel):
     codes: dict[int, str] = Field(default_factory=dict)
     accept_unknown: tuple[Literal["mode", "homed"], ...] = ()
     check: Literal["require", "warn", "off"] = "warn"
+    jog_speed: Annotated[float, Field(ge=0, le=250)] = 250.0
     clearance: Clearance = Clearance()
     floor: Floor | None = Floor()
     stop_proven: StrictBool | None = None

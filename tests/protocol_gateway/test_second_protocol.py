@@ -36,7 +36,7 @@ _WORDS = {Home: "home", Stop: "stop", Reset: "reset"}
 class JsonLines:
     """Driver of JSON lines (`protocol_gateway.drivers.driver.Driver`)."""
 
-    can_stop = True
+    can_stop, can_jog = True, False
 
     def __init__(self, joint_types, codes, *, relay):
         self._joints = len(joint_types)

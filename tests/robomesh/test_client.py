@@ -11,6 +11,7 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import robomesh
@@ -95,6 +96,25 @@ def test_motions_wait_for_their_end_and_refusals_carry_their_code(robot):
             pass
         with pytest.raises(robomesh.RefusedError):
             arm.hold()
+    assert not robot.last("controller").message.HasField("stop")
+
+
+def test_a_jog_runs_while_it_is_held_and_says_how_far(robot):
+    with robot.control("ops") as arm:
+        arm.home()
+        begin = robot.forward(next(robot.joints()).positions)["tool"]
+        held = iter([True] * 12)
+        result = arm.jog("z", -0.05, held=lambda: next(held, False))
+        # A busy machine may be late with a keep-alive.
+        assert result.code in ("jog.released", "jog.not_alive")
+        assert not result.rotary
+        end = robot.forward(next(robot.joints()).positions)["tool"]
+        assert np.asarray(end)[2, 3] - np.asarray(begin)[2, 3] == pytest.approx(-result.distance, abs=1e-3)
+        with pytest.raises(robomesh.RefusedError) as refused:
+            arm.jog(1, 99.0, held=lambda: True)
+        assert refused.value.code == "jog.speed"
+        with pytest.raises(robomesh.MessageError, match="no axis"):
+            arm.jog("w", 0.1, held=lambda: True)
     assert not robot.last("controller").message.HasField("stop")
 
 

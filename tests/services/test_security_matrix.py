@@ -29,6 +29,7 @@ WITNESS = "router-2.here"
 IN_NAME = (
     "lease/request/*",
     "command/*",
+    "jog/*",
     "alarms/request/*",
     "cell/request/*",
     "programs/request/*",

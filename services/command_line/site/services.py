@@ -72,6 +72,7 @@ def _gateway(site: "Site", options: Options) -> Any:
             codes=robot.codes,
             accept_unknown=frozenset(robot.accept_unknown),
             stop_proven=robot.can_be_stopped,
+            jog_speed=robot.jog_speed / 1000,
             stale_after_s=robot.stale_after_s,
             reconnect_after_s=max(4.0, 2.0 * robot.stale_after_s),
             legacy_clients=legacy_settings(robot),

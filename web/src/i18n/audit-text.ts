@@ -19,6 +19,8 @@ const ASKED: Record<string, readonly [english: string, chinese: string]> = {
   MOVE_ABSOLUTE: ["move to {target}", "移动到 {target}"],
   MOVE_RELATIVE: ["{target}", "{target}"],
   RUN_PROGRAM: ["program {program_name}", "程序 {program_name}"],
+  JOG: ["jog {jog_frame} {jog_axis}", "点动 {jog_frame} {jog_axis}"],
+  JOG_KEEP_ALIVE: ["keep-alive of a jog", "点动保活信号"],
   ACQUIRE: ["take control", "取得控制权"],
   RELEASE: ["release control", "释放控制权"],
   OFFER: ["offer control to {to}", "提出将控制权移交给 {to}"],
@@ -36,7 +38,7 @@ const WITHOUT: Record<string, readonly [english: string, chinese: string]> = {
   TAKE: ["take over control", "接管控制权"],
 };
 /** Requests whose outcome says more than their name: an end of control or of a program, a stop that was sent again. */
-const OUTCOME_SAYS_ALL = new Set(["EXPIRE", "REVOKE", "PROGRAM_END", "STOP_AGAIN", "ROTATE"]);
+const OUTCOME_SAYS_ALL = new Set(["EXPIRE", "REVOKE", "PROGRAM_END", "JOG_END", "STOP_AGAIN", "ROTATE"]);
 
 /** Return the reason's sentence; entries of older gateways have only the gateway's text. */
 export const entryText = (entry: AuditEntry): string => reasonText(entry.reason, entry.text);

@@ -705,6 +705,14 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "“move_line_by”须写明坐标系，而不是 {given}：请写“move_line_by tool X Y Z ROLL PITCH YAW”，坐标系可为 tool、base 或 site",
     ],
   ],
+  ["program.line_at_limit", ["joint {name} is at its limit there", "关节 {name} 在该处到达限位"]],
+  [
+    "program.line_ends",
+    [
+      "the arm reaches no farther on this line without another posture: move single joints",
+      "机械臂不改变构型无法沿此直线继续：请移动单个关节",
+    ],
+  ],
   [
     "program.line_roll",
     [
@@ -1110,6 +1118,83 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ["program.stopped_by_number", ["stopped: stop request {id}", "已停止：停止请求 {id}"]],
   ["program.given_up", ["cancelled by RESET", "已以复位放弃"]],
   ["program.control_ended", ["control ended: {cause}", "控制权已结束：{cause}"]],
+  [
+    "jog.missing",
+    [
+      "JOG without a direction: send `jog` with frame, axis and speed",
+      "点动缺少方向：请在 `jog` 中给出坐标系、轴和速度",
+    ],
+  ],
+  [
+    "jog.frame",
+    [
+      "the frame of a jog is missing: choose TOOL, BASE, SITE or JOINT",
+      "点动缺少坐标系：请选择 TOOL、BASE、SITE 或 JOINT",
+    ],
+  ],
+  [
+    "jog.axis",
+    [
+      "the axis of a jog is missing: choose X, Y, Z, ROLL, PITCH or YAW",
+      "点动缺少轴：请选择 X、Y、Z、ROLL、PITCH 或 YAW",
+    ],
+  ],
+  ["jog.joint", ["there is no joint {number}: choose 1 to {joints}", "没有关节 {number}：请选择 1 至 {joints}"]],
+  [
+    "jog.speed",
+    [
+      "the speed of a jog, {speed} {unit}, is 0 or outside ±{most} {unit}: choose another speed",
+      "点动速度 {speed} {unit} 为 0 或超出 ±{most} {unit}：请选择其他速度",
+    ],
+  ],
+  [
+    "jog.forbidden",
+    [
+      "the site file forbids jogging this robot (jog_speed = 0): use steps",
+      "站点文件禁止点动该机器人（jog_speed = 0）：请使用步进",
+    ],
+  ],
+  [
+    "jog.no_driver",
+    [
+      "this controller cannot be jogged: its driver does not declare that a hold can be given up: use steps",
+      "该控制器不能点动：其驱动未声明保持可以放弃：请使用步进",
+    ],
+  ],
+  [
+    "jog.no_state",
+    [
+      "this controller cannot be jogged: it does not report whether it moves or is on hold: use steps",
+      "该控制器不能点动：它不报告是否在运动或保持：请使用步进",
+    ],
+  ],
+  [
+    "jog.too_fast",
+    [
+      "the controller's lowest speed, {percent} %, moves the tool at {tool_mm_s} mm/s here: choose a higher speed, or move single joints",
+      "控制器的最低速度 {percent} % 在此处使工具以 {tool_mm_s} mm/s 运动：请选择更高速度，或移动单个关节",
+    ],
+  ],
+  ["jog.runs", ["a jog runs: release it, and try again when the arm rests", "正在点动：请松开，待机械臂静止后重试"]],
+  ["jog.unknown", ["no jog {id} runs", "没有正在进行的点动 {id}"]],
+  [
+    "jog.sequence",
+    [
+      "keep-alive {sequence} of the jog is not new: the last one was {last}: count up",
+      "点动的保活信号 {sequence} 不是新的：上一个为 {last}：请递增",
+    ],
+  ],
+  ["jog.released", ["released", "已松开"]],
+  ["jog.not_alive", ["no keep-alive for {ms} ms", "{ms} 毫秒内没有保活信号"]],
+  ["jog.not_held_down", ["no keep-alive came: nothing has moved", "没有收到保活信号：未发生运动"]],
+  ["jog.commanded", ["the operator commanded {names}", "操作员发出了命令 {names}"]],
+  ["jog.not_moving", ["the robot does not move: check the controller", "机器人没有运动：请检查控制器"]],
+  ["jog.failed", ["the gateway failed with an internal error: see its log", "网关执行点动时出错：详见其日志"]],
+  ["jog.ended", ["jog {name} ended after {distance}: {cause}", "点动 {name} 在 {distance} 后结束：{cause}"]],
+  [
+    "stop.jog_not_held",
+    ["the robot still moves {seconds} s after the hold of a jog", "点动保持 {seconds} 秒后机器人仍在运动"],
+  ],
   ["program.not_arrived", ["the robot came to rest before the target of the line", "机器人在到达该行目标之前停下"]],
   ["program.done", ["program {program} is done", "程序 {program} 已完成"]],
   ["program.ended", ["program {program} ended at line {line}: {cause}", "程序 {program} 中止于第 {line} 行：{cause}"]],

@@ -239,6 +239,20 @@ const TEXTS = {
     "Each press is a straight line of the tool, at most {percent} % and {speed} mm/s.",
     "每按一次，工具走一段直线，最高 {percent} % 及 {speed} mm/s。",
   ],
+  tool_by: ["Step, or move while held", "步进或按住点动"],
+  tool_by_step: ["Step", "步进"],
+  tool_by_hold: ["Hold", "按住"],
+  jog_speed: ["Greatest speed", "最高速度"],
+  jog_slow: ["Slow", "慢"],
+  jog_medium: ["Medium", "中"],
+  jog_fast: ["Fast", "快"],
+  jog_hint: [
+    "Moves while a button (or Enter on it) is held, at most {speed} mm/s or {turn}°/s.",
+    "按住按钮（或在其上按住回车）时运动，最高 {speed} mm/s 或 {turn}°/s。",
+  ],
+  jog_runs: ["{what}: {distance}", "{what}：{distance}"],
+  jog_ended: ["{what}: {distance}. Ended: {why}.", "{what}：{distance}。结束：{why}。"],
+  jog_lost: ["{what}: its end is not known: {why}", "{what}：结果未知：{why}"],
   tool_step_checked: ["{what}: the gateway checks the way…", "{what}：网关正在检查路径…"],
   enter_sends: ["Not sent yet: Enter sends {value}, Escape takes it back.", "尚未发送：回车发送 {value}，Esc 取消。"],
 
@@ -405,6 +419,10 @@ const TEXTS = {
   ],
   no_motion_reason: ["No motion: {text}.", "无法运动：{text}。"],
   no_motion_held: ["On hold: press Resume first.", "已保持：请先继续。"],
+  no_motion_jog: [
+    "The arm is being jogged: release it, and wait until it rests.",
+    "正在点动：请松开并等待机械臂静止。",
+  ],
   no_motion_program: [
     "A program runs: wait for its end, or hold or stop it.",
     "程序正在运行：请等其结束，或保持、停止。",

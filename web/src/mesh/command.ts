@@ -1,7 +1,9 @@
 // Commands to the robot that this tab controls.
 
+import type { MessageInitShape } from "@bufbuild/protobuf";
 import { timestampFromMs } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
+import type { JogSchema } from "../gen/robomesh_pb";
 import { CommandRequest_Command as Command, CommandAnswerSchema, CommandRequestSchema } from "../gen/robomesh_pb";
 import { reasonText } from "../i18n/reasons";
 import { t } from "../i18n/texts";
@@ -17,14 +19,24 @@ export interface CommandValues {
   stopId?: bigint;
   program?: string;
   programName?: string;
+  jog?: MessageInitShape<typeof JogSchema>;
 }
 
 const VALID_MS = 1000;
 const ANSWERED_S = 2;
 // The gateway checks a program before it answers, and does not start it after this timeout.
 const CHECKED_S = 30;
-const MOTIONS: readonly Command[] = [Command.HOME, Command.MOVE_ABSOLUTE, Command.MOVE_RELATIVE, Command.RUN_PROGRAM];
+const MOTIONS: readonly Command[] = [
+  Command.HOME,
+  Command.MOVE_ABSOLUTE,
+  Command.MOVE_RELATIVE,
+  Command.RUN_PROGRAM,
+  Command.JOG,
+];
 const STARTS_MOTION: readonly Command[] = [...MOTIONS, Command.RESUME];
+
+/** Return the id of the newest command of this page. */
+export const newestCommand = (): bigint => lastId;
 
 // Sequence numbers rise within a lease, so one counter serves all leases.
 let lastId = 0n;

@@ -142,6 +142,7 @@ export function whyNoNewMotion(state: ControllerState | undefined): string {
   const why = whyNoMotion(state);
   if (why || !state) return why;
   if (state.activity === Activity.HOLDING || state.program?.held) return t("no_motion_held");
+  if (state.jog) return t("no_motion_jog");
   return state.program ? t("no_motion_program") : "";
 }
 

@@ -116,7 +116,7 @@ function auditLinesOf(audit: readonly AuditEntry[]): DayLine[] {
       if (accepted) runs.done++;
       else runs.problem = entryText(entry);
       if (runs.name) Object.assign(runs.line, { text: runsText(runs), bad: runs.problem !== "" });
-    } else if (entry.source === PROGRAM_SOURCE) {
+    } else if (entry.source === PROGRAM_SOURCE || (request === "JOG_END" && accepted)) {
     } else if (request === "RUN_PROGRAM" && accepted) {
       const name = entry.values.program_name ?? "";
       if (runs?.name === name && runs.who === who && !motions) runs.count++;
