@@ -3,6 +3,7 @@
 import re
 import time
 from contextlib import contextmanager, suppress
+from pathlib import Path
 
 from playwright.sync_api import Error, expect
 
@@ -10,6 +11,9 @@ from robomesh.schemas.robomesh_pb2 import FaultRequest
 from web import build_page
 
 ARM = "#/hall/arm"
+# A picture of every page at each of these widths, for a person to look through.
+PICTURES = Path(__file__).resolve().parents[2] / ".pictures"
+PICTURE_SIZES = ((1440, 900), (360, 740))
 HOME = ["0.00°", "90.00°", "−90.00°", "0.00°", "0.00°"]
 
 
@@ -168,6 +172,17 @@ def drag(page, joint, pixels, *, release=True):
     page.mouse.move(x + pixels, y, steps=4)
     if release:
         page.mouse.up()
+
+
+def keep_picture(page, name):
+    """Keep pictures of a page as `<name>-<width>.png`."""
+    size = page.viewport_size
+    PICTURES.mkdir(exist_ok=True)
+    for width, height in PICTURE_SIZES:
+        page.set_viewport_size({"width": width, "height": height})
+        page.wait_for_timeout(300)  # what is drawn on a canvas follows its size
+        page.screenshot(path=PICTURES / f"{name}-{width}.png")
+    page.set_viewport_size(size)
 
 
 def serious(page, within="html"):

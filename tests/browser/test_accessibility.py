@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import expect
 
 from robomesh.schemas import robomesh_pb2 as schema
-from tests.browser.robot_page import serious
+from tests.browser.robot_page import keep_picture, serious
 
 pytestmark = pytest.mark.browser
 
@@ -22,6 +22,17 @@ PAGES = {
     "#/hall/nowhere": "main h1",
     "#/events": ".alarm-line",
     "#/settings": ".panel.mesh",
+}
+PICTURED = {
+    "#/": "fleet",
+    "#/hall/arm": "robot-without-3d",
+    "#/wall": "wall",
+    "#/recordings": "recordings-empty",
+    "#/program": "programs",
+    "#/program/hall/arm": "program",
+    "#/hall/nowhere": "no-such-robot",
+    "#/events": "events",
+    "#/settings": "settings",
 }
 # Check that servers' texts are marked with their own language.
 ENGLISH = """
@@ -71,6 +82,8 @@ def test_axe_finds_nothing_serious_on_any_page_and_a_chinese_page_is_chinese(
     for path in PAGES:
         visit(page, path)
         found[path] = serious(page)
+        if language == "en":
+            keep_picture(page, PICTURED[path])
         if (headings := page.locator("h1").count()) != 1:
             found[path] += [f"{headings} headings of the first level"]
         if language == "zh":

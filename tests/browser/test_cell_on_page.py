@@ -11,7 +11,7 @@ from playwright.sync_api import expect
 
 from robomesh.session import open_session
 from tests.browser.conftest import CHROMIUM
-from tests.browser.robot_page import serious
+from tests.browser.robot_page import keep_picture, serious
 from tests.conftest import last_value
 from tests.site import READY_S, running_site
 from web import build_page
@@ -93,6 +93,7 @@ def test_a_fixture_is_moved_with_numbers_after_a_confirmation_and_moved_back(ope
     expect(form).to_contain_text("post: xyz [300, 250, 450] → [320, 250, 450]", timeout=SLOWLY_MS)
     assert file.read_text() == before
     assert serious(page) == []
+    keep_picture(page, "cell")
     form.get_by_role("button", name="Change cell").click()
     said = page.get_by_role("region", name="Fixtures and floor").get_by_role("status")
     expect(said).to_contain_text("Changed: post", timeout=SLOWLY_MS)

@@ -15,7 +15,7 @@ from services.site_file.fixtures import Fixture as FixtureRow
 from services.site_file.fixtures import fixture_shape, fixture_to_site
 from tests.browser.crowd import crowd
 from tests.browser.rendering import rendering
-from tests.browser.robot_page import take
+from tests.browser.robot_page import keep_picture, take
 from tests.site import wait_until
 
 pytestmark = pytest.mark.browser
@@ -71,6 +71,7 @@ def test_the_page_shows_the_arm_moving_in_3d_and_as_video(open_page, rendered):
     if WANTED:
         time.sleep(CURVES_S)
     take(page)
+    keep_picture(page, "robot")
     # A move has just begun, so that it is still going on when the picture is taken; nothing is late.
     slow, fast = (
         "() => { const speed = Number.parseFloat(document.querySelectorAll('.tool .number')[6].textContent);"

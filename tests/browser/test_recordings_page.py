@@ -13,7 +13,7 @@ from robomesh.errors import RefusedError
 from robomesh.keys import WHOLE_SITE
 from robomesh.schemas import robomesh_pb2 as schema
 from services import player, recorder, store
-from tests.browser.robot_page import button, serious
+from tests.browser.robot_page import button, keep_picture, serious
 
 pytestmark = pytest.mark.browser
 
@@ -269,6 +269,7 @@ def test_the_list_and_the_player_fit_a_phone_and_axe_finds_nothing_serious(open_
     fits = "document.documentElement.scrollWidth <= innerWidth"
     assert page.evaluate(fits)
     assert serious(page) == []
+    keep_picture(page, "recordings")
     page.get_by_role("link", name=f"Play {NAME}").click()
     expect(page.locator(".transport .play")).to_be_in_viewport()
     expect(page.locator(".stop")).to_be_in_viewport()
@@ -276,6 +277,7 @@ def test_the_list_and_the_player_fit_a_phone_and_axe_finds_nothing_serious(open_
     assert page.locator(".transport .play").bounding_box()["height"] >= 44
     expect(page.locator(".chart")).to_be_visible()
     assert serious(page) == []
+    keep_picture(page, "player")
 
 
 def test_the_steps_of_a_run_are_folded_under_it(open_page, recorded):
@@ -341,6 +343,7 @@ def test_a_note_of_one_page_is_seen_and_withdrawn_on_another(noted, plant, open_
     other.get_by_label("Robot", exact=True).select_option("pt600")
     expect(other.locator(".day-hours s")).to_contain_text("gripper slips")
     expect(other.locator(".day-gaps")).to_contain_text("This day is not complete")
+    keep_picture(other, "day")
 
 
 def test_a_note_on_a_recording_is_beside_it_and_its_file_is_unchanged(noted, recorded, plant, open_page):

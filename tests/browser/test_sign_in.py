@@ -10,7 +10,7 @@ from services.console.accounts import sessions
 from services.console.accounts.auth_service import change_account
 from services.console.accounts.file import AccountRole
 from tests.browser.conftest import NO_WEBGL, Plant, run_plant
-from tests.browser.robot_page import ARM, button, serious
+from tests.browser.robot_page import ARM, button, keep_picture, serious
 from tests.services.certificates import self_signed
 from tests.services.signing_in import PASSWORD, accounts_file
 from tests.site import wait_until
@@ -77,6 +77,7 @@ def test_an_operator_signs_in_has_control_in_its_own_name_and_signs_out_in_all_t
     expect(page.locator(".sign-in")).to_contain_text("Encrypted connection")
     expect(button(page, "Stop request")).to_be_disabled()
     assert serious(page) == []
+    keep_picture(page, "sign-in")
     sign_in(page, "li", "not the password")
     expect(page.get_by_role("alert")).to_have_text("Not signed in: the account or the password is wrong")
     expect(page.get_by_label("Password", exact=True)).to_have_value("")

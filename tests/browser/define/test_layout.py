@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.define.page import button, choose, opened, settled, tab
-from tests.browser.robot_page import serious
+from tests.browser.robot_page import keep_picture, serious
 
 pytestmark = pytest.mark.browser
 
@@ -59,6 +59,7 @@ def test_axe_finds_nothing_serious_in_define(open_page):
     page = open_page("#/define", drawn=False)
     expect(page.locator(".robot-card").first).to_be_attached()
     found = {"start": serious(page)}
+    keep_picture(page, "define-start")
     button(page, "Light").click()
     found["start, light"] = serious(page)
     go(page, "#/define/pt500")
@@ -89,6 +90,7 @@ def test_the_arm_and_its_frames_are_drawn(open_page):
     choose(page, 2)
     settled(page)
     expect(page.locator('.define-scene canvas[data-shapes="6"]')).to_have_count(1)
+    keep_picture(page, "define")
     picture = page.screenshot()
     if os.environ.get("ROBOMESH_PICTURES") == "1":
         PICTURE.write_bytes(picture)

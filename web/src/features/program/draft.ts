@@ -3,6 +3,7 @@
 // The text field's undo takes seconds for a thousand lines, and loses what the page writes.
 
 import { computed, effect, signal } from "@preact/signals";
+import { p } from "../../i18n/program";
 
 export interface Draft {
   robotKey: string;
@@ -26,7 +27,6 @@ interface Step {
 }
 
 const STORAGE_PREFIX = "robomesh.program/";
-export const FIRST_NAME = "program";
 export const FILE_ENDING = ".prog";
 const MOST_STEPS = 200;
 const TOGETHER_MS = 800; // text typed without a longer pause is one step
@@ -51,7 +51,7 @@ let typedAt = 0;
 /** Open a robot's draft; false: it had none, and gets an empty one. */
 export function openDraft(robotKey: string): boolean {
   const kept = storedDraft(robotKey);
-  draft.value = kept ?? { robotKey, name: FIRST_NAME, text: "", base: null };
+  draft.value = kept ?? { robotKey, name: p("first_name"), text: "", base: null };
   past.value = future.value = [];
   return kept !== null;
 }
@@ -189,7 +189,7 @@ function show(text: string, cursor: number): void {
 export function download(text: string, name: string): void {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
-  link.download = `${name.trim() || FIRST_NAME}${FILE_ENDING}`;
+  link.download = `${name.trim() || p("first_name")}${FILE_ENDING}`;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }

@@ -13,12 +13,12 @@ import {
 } from "../../gen/robomesh_pb";
 import { stampFull } from "../../i18n/format";
 import type { Words } from "../../i18n/program";
-import { noWords } from "../../i18n/program";
+import { noWords, p } from "../../i18n/program";
 import { s } from "../../i18n/stored-programs";
 import { ask, hello, inOwnName } from "../../mesh/connection";
 import { reasonOf } from "../../mesh/control";
 import type { Base } from "./draft";
-import { draft, FIRST_NAME, replaceDraft, setBase } from "./draft";
+import { draft, replaceDraft, setBase } from "./draft";
 
 const TIMEOUT_S = 10;
 
@@ -55,7 +55,7 @@ export const timeOf = (version: ProgramVersion | undefined): string => stampFull
 export function unusedProgramName(): string {
   const names = new Set(stored.value?.programs.map((each) => each.current?.name.toLowerCase()));
   for (let number = 1; ; number++) {
-    const name = number === 1 ? FIRST_NAME : `${FIRST_NAME}-${number}`;
+    const name = number === 1 ? p("first_name") : `${p("first_name")}-${number}`;
     if (!names.has(name)) return name;
   }
 }
