@@ -70,3 +70,15 @@ def test_a_robot_of_another_site_is_shown_from_its_slow_states_until_all_is_aske
     until(page, lambda: "yard/r007" in many.watched)
     page.get_by_role("button", name="All", exact=True).click()
     until(page, lambda: "yard/r007" not in many.watched)
+
+
+def test_one_of_many_robots_is_found_by_typing_in_the_bar(open_page, many):
+    page = open_page("#/yard/r007", drawn=False)
+    page.get_by_role("button", name="r007").click()
+    options = page.get_by_role("dialog", name="Go to a robot").get_by_role("option")
+    expect(options).to_have_count(COUNT + 2)
+    page.keyboard.type("yard 19")
+    expect(options).to_have_count(12)  # r019, r119, r190 to r199
+    page.keyboard.press("PageDown")
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("heading", level=1)).to_have_text("r196")

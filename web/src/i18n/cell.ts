@@ -9,6 +9,7 @@ const TEXTS = {
   to_robot: ["Robot", "机器人"],
   waiting: ["Waiting for the cell of {robot}…", "正在等待 {robot} 的单元…"],
   fixtures: ["Fixtures and floor", "固定物与地面"],
+  numbers: ["Place and size", "位置与尺寸"],
   floor: ["Floor", "地面"],
   no_floor: ["none", "无"],
   lowest_base: ["lowest base", "最低基座"],

@@ -33,7 +33,11 @@ export const mustSignIn = computed(() => !!me.value?.accounts && !me.value.accou
 export const isMonitor = computed(() => me.value?.role === "monitor");
 /** Whether the account is an administrator's. */
 export const isAdministrator = computed(() => me.value?.role === "admin");
-export const commandSuspended = computed(() => !!hello.value?.account && !hello.value.mayCommand && !isMonitor.value);
+/** Whether the account may request, record, write; without accounts the mesh decides. */
+export const mayAct = computed(() => !hello.value?.account || hello.value.mayCommand);
+/** Whether the account may change cells; without accounts the mesh decides. */
+export const isEngineer = computed(() => !me.value?.accounts || ["engineer", "admin"].includes(me.value.role));
+export const commandSuspended = computed(() => !mayAct.value && !isMonitor.value);
 
 let connects: () => void = () => undefined;
 

@@ -107,9 +107,6 @@ export const nameOf = ({ site, id }: Alarm): string => `${site}/${id}`;
 /** The operator's name in this page's requests; empty: not given. */
 export const asker = computed(() => hello.value?.operator || operator.value.trim());
 
-/** Whether the signed-in account may acknowledge; without accounts the mesh decides. */
-export const mayAct = computed(() => !hello.value?.account || hello.value.mayCommand);
-
 /** Send a request to each site's watch for its own alarms.
  *
  * @throws AskError with the reason in words, from the first site that refused. */

@@ -10,8 +10,8 @@ import {
   NoteRequestSchema,
 } from "../gen/robomesh_pb";
 import { n } from "../i18n/notes";
-import { isAdministrator } from "./account";
-import { asker, mayAct } from "./alarms";
+import { isAdministrator, mayAct } from "./account";
+import { asker } from "./alarms";
 import { AskError, ask } from "./connection";
 
 export const LONGEST_TEXT = 500;

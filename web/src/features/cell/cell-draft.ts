@@ -4,7 +4,7 @@ import { clone, create, equals } from "@bufbuild/protobuf";
 import { computed, signal } from "@preact/signals";
 import type { CellAnswer, CellContent, CellFixture, CellState } from "../../gen/robomesh_pb";
 import { CellAnswerSchema, CellContentSchema, CellFixtureSchema, CellRequestSchema } from "../../gen/robomesh_pb";
-import { me } from "../../mesh/account";
+import { isEngineer } from "../../mesh/account";
 import { ask, hello, inOwnName } from "../../mesh/connection";
 
 /** The gateway waits for kinematics and for its own checks. */
@@ -18,16 +18,14 @@ export const published = signal<CellState | null>(null);
 export const draft = signal<{ basedOn: string; content: CellContent } | null>(null);
 /** Name of the chosen fixture; empty: none. */
 export const chosen = signal("");
+/** What `chosen` has for the floor: no fixture can have this name. */
+export const FLOOR = "the floor";
 
 export const shownContent = computed(() => draft.value?.content ?? published.value?.content ?? null);
 export const isEdited = computed(() => {
   const before = published.value?.content;
   return Boolean(draft.value && before && !equals(CellContentSchema, before, sorted(draft.value.content)));
 });
-/** Whether this page's account has the right; without accounts the mesh decides. */
-export const isEngineer = computed(
-  () => !me.value?.accounts || me.value.role === "engineer" || me.value.role === "admin",
-);
 export const mayEdit = computed(
   () => isEngineer.value && Boolean(published.value && !published.value.problem && !published.value.changing),
 );

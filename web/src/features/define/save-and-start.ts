@@ -3,6 +3,7 @@
 import { signal } from "@preact/signals";
 import { d } from "../../i18n/define";
 import { RefusedRequest } from "../../mesh/refusal";
+import { saveFile } from "../../ui/save-file";
 import { checked, invalidNumbers, parsePath } from "./checks";
 import { draft, identity, isOpen, isUnsaved, markSaved } from "./draft";
 import { openField } from "./selection";
@@ -99,11 +100,7 @@ export async function download(): Promise<void> {
   if (!now) return;
   const archive = await perform(d("download"), () => server.zip(now));
   if (!archive) return;
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(archive);
-  link.download = `${now.description.name || "robot"}.zip`;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+  saveFile(archive, `${now.description.name || "robot"}.zip`);
 }
 
 export async function start(): Promise<void> {

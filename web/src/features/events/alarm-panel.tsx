@@ -6,6 +6,7 @@ import { alarmText } from "../../i18n/alarm-text";
 import type { EventsTextName } from "../../i18n/events";
 import { e } from "../../i18n/events";
 import { t } from "../../i18n/texts";
+import { mayAct } from "../../mesh/account";
 import type { Alarm } from "../../mesh/alarms";
 import {
   Action,
@@ -15,7 +16,6 @@ import {
   anyWatch,
   asker,
   isUnacknowledged,
-  mayAct,
   nameOf,
   Priority,
   State,

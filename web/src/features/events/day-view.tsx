@@ -5,6 +5,7 @@ import type { DayTextName } from "../../i18n/day";
 import { d, lastedText } from "../../i18n/day";
 import { count, DASH, dateOf, fullTime, timeOfDay } from "../../i18n/format";
 import { lostAt } from "../../mesh/connection";
+import { saveFile } from "../../ui/save-file";
 import type { DayLine, Totals } from "./day";
 import { exported, linesOf, spanOfDay, totalsOf, wordsOf } from "./day";
 import type { DayAnswers } from "./day-sources";
@@ -109,11 +110,8 @@ function Sentences(props: { robotKey: string; date: string; answers: DayAnswers;
       ...missing(props.answers, sources.eventsFrom),
     ];
     const text = exported(linesOf(sources), head, timeOfDay, csv);
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([text], { type: csv ? "text/csv" : "text/plain" }));
-    link.download = `${name.replace("/", "-")}-${props.date}.${csv ? "csv" : "txt"}`;
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    const blob = new Blob([text], { type: csv ? "text/csv" : "text/plain" });
+    saveFile(blob, `${name.replace("/", "-")}-${props.date}.${csv ? "csv" : "txt"}`);
   };
   return (
     <span class="day-save">

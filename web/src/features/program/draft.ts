@@ -4,6 +4,7 @@
 
 import { computed, effect, signal } from "@preact/signals";
 import { p } from "../../i18n/program";
+import { saveFile } from "../../ui/save-file";
 
 export interface Draft {
   robotKey: string;
@@ -187,11 +188,7 @@ function show(text: string, cursor: number): void {
 
 /** Download a text as a file. */
 export function download(text: string, name: string): void {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
-  link.download = `${name.trim() || p("first_name")}${FILE_ENDING}`;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+  saveFile(new Blob([text], { type: "text/plain" }), `${name.trim() || p("first_name")}${FILE_ENDING}`);
 }
 
 /** Return the line of the cursor, from 1. */

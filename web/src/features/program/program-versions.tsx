@@ -5,10 +5,11 @@ import type { ProgramContent, ProgramVersion } from "../../gen/robomesh_pb";
 import { ProgramVersion_Change as Change } from "../../gen/robomesh_pb";
 import { s } from "../../i18n/stored-programs";
 import { t } from "../../i18n/texts";
+import { mayAct } from "../../mesh/account";
 import { ReasonForm } from "../../ui/reason-form";
 import { Difference } from "./difference";
 import { download, draft } from "./draft";
-import { isDeleted, mayChange, open, remove, rename, restore, shown, showVersion, timeOf } from "./stored-programs";
+import { isDeleted, open, remove, rename, restore, shown, showVersion, timeOf } from "./stored-programs";
 
 export function Versions(props: {
   robotKey: string;
@@ -32,14 +33,14 @@ export function Versions(props: {
         <h3>{title}</h3>
         <button
           class="action"
-          disabled={!mayChange.value || isDeleted(program)}
+          disabled={!mayAct.value || isDeleted(program)}
           onClick={() => (setName(title), setForm(form === "rename" ? "" : "rename"))}
         >
           {s("rename")}
         </button>
         <button
           class="action"
-          disabled={!mayChange.value || isDeleted(program)}
+          disabled={!mayAct.value || isDeleted(program)}
           onClick={() => setForm(form === "delete" ? "" : "delete")}
         >
           {s("delete")}
@@ -125,7 +126,7 @@ export function Versions(props: {
         </button>
         <button
           class="action"
-          disabled={!mayChange.value || (isCurrent && !isDeleted(program))}
+          disabled={!mayAct.value || (isCurrent && !isDeleted(program))}
           onClick={() => void restore(robotKey, content)}
         >
           {s("restore", { version: version.number })}

@@ -4,6 +4,7 @@ import { useState } from "preact/hooks";
 import { p } from "../../i18n/program";
 import { s } from "../../i18n/stored-programs";
 import { t } from "../../i18n/texts";
+import { mayAct } from "../../mesh/account";
 import { Toggle } from "../../ui/choice";
 import { FileButton } from "../../ui/file-button";
 import { Panel } from "../../ui/panel";
@@ -12,19 +13,7 @@ import { readProgramFile } from "./program-files";
 import { description } from "./program-robot";
 import { example } from "./program-text";
 import { Conflict, RunText, Versions } from "./program-versions";
-import {
-  attempt,
-  importText,
-  isDeleted,
-  mayChange,
-  open,
-  read,
-  say,
-  shown,
-  showVersion,
-  stored,
-  timeOf,
-} from "./stored-programs";
+import { attempt, importText, isDeleted, open, read, say, shown, showVersion, stored, timeOf } from "./stored-programs";
 import "./stored-panel.css";
 
 export function StoredPanel({ robotKey }: { robotKey: string }) {
@@ -80,7 +69,7 @@ function List({ robotKey }: { robotKey: string }) {
         </Toggle>
         <FileButton
           label={s("import")}
-          disabled={!mayChange.value || !stored.value}
+          disabled={!mayAct.value || !stored.value}
           multiple
           accept={`${FILE_ENDING},.txt,text/plain`}
           take={(files) => void importFiles(files)}

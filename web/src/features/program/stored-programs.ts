@@ -15,7 +15,8 @@ import { stampFull } from "../../i18n/format";
 import type { Words } from "../../i18n/program";
 import { noWords, p } from "../../i18n/program";
 import { s } from "../../i18n/stored-programs";
-import { ask, hello, inOwnName } from "../../mesh/connection";
+import { mayAct } from "../../mesh/account";
+import { ask, inOwnName } from "../../mesh/connection";
 import { reasonOf } from "../../mesh/control";
 import type { Base } from "./draft";
 import { draft, replaceDraft, setBase } from "./draft";
@@ -38,9 +39,6 @@ export type Shown =
   | { kind: "conflict"; mine: ProgramContent; theirs: ProgramContent }
   | { kind: "run"; content: ProgramContent }
   | { kind: "loading" };
-
-/** Whether this page's account may change programs; without accounts the mesh decides. */
-export const mayChange = computed(() => !hello.value?.account || hello.value.mayCommand);
 
 export const isDeleted = (program: StoredProgram): boolean => program.current?.change === Change.DELETED;
 
@@ -107,7 +105,7 @@ const baseOf = (id: string, version: ProgramVersion, text: string): Base => ({
 /** Save the draft: a new version of its program, or a new program if it was never saved or has another name. */
 export async function save(): Promise<void> {
   const now = draft.value;
-  if (!now?.text || saving.value || !mayChange.value) return;
+  if (!now?.text || saving.value || !mayAct.value) return;
   const base = now.base && now.base.name === now.name ? now.base : null;
   saving.value = true;
   say(() => s("saving"));

@@ -3,6 +3,7 @@
 import type { Words } from "../../i18n/program";
 import { p } from "../../i18n/program";
 import { s } from "../../i18n/stored-programs";
+import { mayAct } from "../../mesh/account";
 import { FileButton } from "../../ui/file-button";
 import { canRedo, canUndo, download, draft, FILE_ENDING, isUnsaved, redo, rename, startProgram, undo } from "./draft";
 import { readProgramFile } from "./program-files";
@@ -11,7 +12,6 @@ import { example } from "./program-text";
 import {
   isDeleted,
   lastAction,
-  mayChange,
   programOfDraft,
   save,
   saving,
@@ -61,8 +61,8 @@ export function Toolbar({ tell }: { tell: (words: Words) => void }) {
           <button
             class="action primary"
             onClick={() => void save()}
-            disabled={!now?.text || saving.value || !mayChange.value || (!isUnsaved.value && now.base !== null)}
-            title={mayChange.value ? s("save_hint") : s("monitor")}
+            disabled={!now?.text || saving.value || !mayAct.value || (!isUnsaved.value && now.base !== null)}
+            title={mayAct.value ? s("save_hint") : s("monitor")}
           >
             {s(now?.base && isNew ? "save_as" : "save")}
           </button>

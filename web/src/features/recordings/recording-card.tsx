@@ -19,6 +19,7 @@ import {
   startMs,
 } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
+import { mayAct } from "../../mesh/account";
 import { reasonOf } from "../../mesh/control";
 import { Action, askRecorder } from "../../mesh/recorder";
 import { NoticeLine } from "../../ui/notice-line";
@@ -26,7 +27,6 @@ import type { RecordingName } from "../../ui/route";
 import { recordingsLink } from "../../ui/route";
 import { Silhouette } from "../../ui/silhouette";
 import { rowKey } from "./bulk-download";
-import { mayChange } from "./recording-changes";
 import { RecordingEditor } from "./recording-editor";
 import type { Row } from "./recordings-of-sites";
 import { refreshSite } from "./recordings-of-sites";
@@ -99,7 +99,7 @@ export function RecordingCard(props: {
         )}
       </div>
       <div class="recording-does">
-        {open && mayChange.value && !isOfFlight(recording) && <Stop row={props.row} name={name} />}
+        {open && mayAct.value && !isOfFlight(recording) && <Stop row={props.row} name={name} />}
         {!empty && (
           <>
             <a
@@ -122,7 +122,7 @@ export function RecordingCard(props: {
         )}
         <Download {...mine} name={name} kind="MCAP" hint={r("download_mcap_hint")} />
         {!empty && <Download {...mine} name={name} kind="CSV" hint={r("download_csv_hint")} rest="/values.csv" />}
-        {mayChange.value && !(open && isOfFlight(recording)) && (
+        {mayAct.value && !(open && isOfFlight(recording)) && (
           <button
             class="action"
             aria-expanded={editing}

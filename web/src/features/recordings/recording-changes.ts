@@ -1,18 +1,14 @@
 // Requests that change a recording: name, note, tags, deletion.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
-import { computed } from "@preact/signals";
 import type { Recording } from "../../gen/robomesh_pb";
 import { RecordingRequest_Action as Action, RecordingRequestSchema, RecordingSchema } from "../../gen/robomesh_pb";
-import { ask, hello, inOwnName } from "../../mesh/connection";
+import { ask, inOwnName } from "../../mesh/connection";
 import type { Row } from "./recordings-of-sites";
 import { refreshSite } from "./recordings-of-sites";
 
 // The recorder hashes a file before it deletes it.
 const TIMEOUT_S = 60;
-
-/** Whether this page's account may change recordings; without accounts the mesh decides. */
-export const mayChange = computed(() => !hello.value?.account || hello.value.mayCommand);
 
 /** Change a recording and refresh the list.
  *

@@ -1,5 +1,7 @@
 // Export of the displayed plots as a picture.
 
+import { saveFile } from "../../ui/save-file";
+
 const EDGE_PX = 16;
 const LINE_PX = 24;
 
@@ -41,10 +43,5 @@ export function savePicture(element: HTMLElement, name: string): void {
     context.drawImage(canvas, EDGE_PX * scale, y);
     y += canvas.height;
   }
-  drawn.toBlob((blob) => {
-    if (!blob) return;
-    const url = URL.createObjectURL(blob);
-    Object.assign(document.createElement("a"), { href: url, download: name }).click();
-    setTimeout(() => URL.revokeObjectURL(url), 10_000);
-  });
+  drawn.toBlob((blob) => blob && saveFile(blob, name));
 }

@@ -7,11 +7,12 @@ import { t, viewText } from "../../i18n/texts";
 import { viewsOf } from "../../scene/scene-view";
 import { isRemote, topicSelection } from "../../scene/topic-selection";
 import { Panel } from "../../ui/panel";
+import { saveFile } from "../../ui/save-file";
 import { Age } from "../../ui/state";
 import { useLiveVideo } from "../../video/live-video";
 import type { RequestedView } from "../../video/requested-view";
 import { standardView } from "../../video/requested-view";
-import { saveBlob, saveStill, useRecording } from "./export";
+import { dated, saveStill, useRecording } from "./export";
 
 /** Place of the video: next to the 3-D view, in its corner, or instead of it. */
 export type VideoPlace = "beside" | "inset" | "large";
@@ -64,7 +65,7 @@ export function CameraPanel(props: {
   const [problem, setProblem] = useState("");
   const savePicture = () =>
     saveStill(live.place.current).then(
-      (blob) => (setProblem(""), saveBlob(blob, `${name}.png`)),
+      (blob) => (setProblem(""), saveFile(blob, dated(`${name}.png`))),
       (error: Error) => setProblem(t("record_failed", { text: error.message })),
     );
   const words = problem || recording.problem || live.problem || (live.video || isOff ? "" : t("camera_still"));

@@ -3,21 +3,13 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../../i18n/texts";
 import { readRefusal } from "../../mesh/refusal";
+import { saveFile } from "../../ui/save-file";
 
 // A browser keeps the recording in memory.
 const MOST_BYTES = 512 * 1024 * 1024;
 
-/** Let the browser save a file. */
-export function saveBlob(blob: Blob, name: string): void {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(blob);
-  link.download = dated(name);
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
-}
-
 /** Return a file name with the current time: pt600-front-20261121-140211.png */
-function dated(name: string): string {
+export function dated(name: string): string {
   const at = new Date();
   const two = (value: number) => String(value).padStart(2, "0");
   const day = `${at.getFullYear()}${two(at.getMonth() + 1)}${two(at.getDate())}`;
@@ -86,7 +78,7 @@ export function useRecording(address: string, name: string): VideoRecording {
     }
     end.current = null;
     setSince(null);
-    if (bytes) saveBlob(new Blob(pieces, { type: "video/mp4" }), name);
+    if (bytes) saveFile(new Blob(pieces, { type: "video/mp4" }), dated(name));
   };
   const toggle = () => (end.current ? end.current.abort() : void record());
   return { on: since !== null, seconds, problem, toggle };

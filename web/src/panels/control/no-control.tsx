@@ -2,14 +2,13 @@
 
 import { useState } from "preact/hooks";
 import { a } from "../../i18n/account";
-import { commandSuspended, isMonitor, me, unlock } from "../../mesh/account";
-import { hello } from "../../mesh/connection";
+import { isMonitor, mayAct, me, unlock } from "../../mesh/account";
 import { PasswordField } from "../../ui/password-field";
 import "../account-form.css";
 
 /** Return whether the signed-in account may not request control now. */
 export function mayNotCommand(): boolean {
-  return isMonitor.value || commandSuspended.value || (!!hello.value?.account && !hello.value.mayCommand);
+  return isMonitor.value || !mayAct.value;
 }
 
 export function NoControl() {
