@@ -1,16 +1,19 @@
 // The tool of a live robot, with steps on straight lines along and about the axes of a frame.
 //
-// A step is a program of one line, so the gateway plans and checks its whole way.
+// A step is a program of one line, so the gateway plans and checks its whole way. Held buttons jog.
 
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import type { ControllerState, Description, KinematicState, ProgramState } from "../../gen/robomesh_pb";
 import { ProgramState_Outcome as Outcome } from "../../gen/robomesh_pb";
+import { toRadians } from "../../i18n/format";
 import { reasonText } from "../../i18n/reasons";
 import { t } from "../../i18n/texts";
 import { Command, command } from "../../mesh/command";
 import { reachable } from "../../mesh/connection";
 import type { Notice } from "../../mesh/control";
 import { holds, ms } from "../../mesh/control";
+import type { Pressed } from "../../mesh/jog";
+import { JogAxis, JogFrame, startJog } from "../../mesh/jog";
 import type { Motion } from "../../mesh/notice-expiry";
 import { useNoticeExpiry } from "../../mesh/notice-expiry";
 import { whyNoNewMotion, whyNoTarget } from "../../mesh/robot-state";
@@ -21,11 +24,16 @@ import { now } from "../../mesh/topics";
 import type { Axis } from "../../panels/tool-panel";
 import { POSE_AXES, ToolPanel } from "../../panels/tool-panel";
 import { Choice } from "../../ui/choice";
+import { HoldButton } from "../../ui/hold-button";
 import { NoticeLine } from "../../ui/notice-line";
 import { StepButton } from "../../ui/step-button";
 
 const FRAMES = ["tool", "base", "site"] as const;
 const STEPS = ["1", "5", "20"] as const; // mm or degrees
+const WAYS = ["step", "hold"] as const;
+const JOG_SPEEDS = { slow: [10, 2], medium: [50, 10], fast: [250, 30] } as const; // mm/s, degrees/s
+type JogSpeed = keyof typeof JOG_SPEEDS;
+const FRAME_OF = { tool: JogFrame.TOOL, base: JogFrame.BASE, site: JogFrame.SITE };
 const MOST_SPEED_PERCENT = 25;
 const MOST_TOOL_SPEED = 250; // mm/s
 const NOT_STARTED_MS = 5000;
@@ -53,6 +61,9 @@ export function RobotTool(props: {
   const { robotKey, controller, program } = props;
   const [frame, setFrame] = useState<(typeof FRAMES)[number]>("tool");
   const [size, setSize] = useState<(typeof STEPS)[number]>("5");
+  const [way, setWay] = useState<(typeof WAYS)[number]>("step");
+  const [jogSpeed, setJogSpeed] = useState<JogSpeed>("slow");
+  const [jogging, setJogging] = useState(false);
   const [notice, setNotice] = useState<Notice | null>(null);
   const mine = holds(robotKey);
   const whyNone = reachable.value ? whyNoTarget(controller) || whyFrozen(robotKey, now.value) : t("no_connection");
@@ -94,12 +105,33 @@ export function RobotTool(props: {
     }
   }, [sent, outcome]);
 
-  const why = whyNone || (queue.going ? "" : whyNoNewMotion(controller));
+  const jogs = useRef(0);
+  const lastJog = useRef<Pressed | null>(null);
+  const hold = (axis: Axis, sign: 1 | -1): (() => void) => {
+    const [along, about] = JOG_SPEEDS[jogSpeed];
+    const speed = sign * (isTurn(axis) ? toRadians(about) : along / 1000);
+    const jog = { frame: FRAME_OF[frame], axis: JogAxis[axis.toUpperCase() as keyof typeof JogAxis], speed };
+    const number = ++jogs.current;
+    setJogging(true);
+    const tell = (told: Notice) => number === jogs.current && setNotice(told);
+    const pressed = startJog(robotKey, jog, jogName(axis, frame, sign), tell, lastJog.current);
+    lastJog.current = pressed;
+    void pressed.over.finally(() => number === jogs.current && setJogging(false));
+    return pressed.release;
+  };
+  const why = whyNone || (queue.going || jogging ? "" : whyNoNewMotion(controller));
   const enabled = mine && !why;
   const idle = queue.waiting
     ? t("steps_wait", { count: queue.waiting })
-    : why || t("tool_step_hint", { percent: MOST_SPEED_PERCENT, speed: MOST_TOOL_SPEED });
+    : why ||
+      (way === "hold"
+        ? t("jog_hint", { speed: JOG_SPEEDS[jogSpeed][0], turn: JOG_SPEEDS[jogSpeed][1] })
+        : t("tool_step_hint", { percent: MOST_SPEED_PERCENT, speed: MOST_TOOL_SPEED }));
   const step = (axis: Axis, sign: 1 | -1) => {
+    if (way === "hold") {
+      const name = jogName(axis, frame, sign);
+      return <HoldButton name={name} sign={sign} enabled={enabled && !queue.going} hold={() => hold(axis, sign)} />;
+    }
     const wanted = { axis, frame, amount: sign * Number(size) };
     return <StepButton name={nameOf(wanted)} sign={sign} enabled={enabled} press={() => queue.press(wanted)} />;
   };
@@ -113,7 +145,18 @@ export function RobotTool(props: {
           text={(each) => t(`frame_${each}`)}
           choose={setFrame}
         />
-        <Choice label={t("step")} values={STEPS} chosen={size} text={(each) => each} choose={setSize} />
+        <Choice label={t("tool_by")} values={WAYS} chosen={way} text={(each) => t(`tool_by_${each}`)} choose={setWay} />
+        {way === "step" ? (
+          <Choice label={t("step")} values={STEPS} chosen={size} text={(each) => each} choose={setSize} />
+        ) : (
+          <Choice
+            label={t("jog_speed")}
+            values={Object.keys(JOG_SPEEDS) as JogSpeed[]}
+            chosen={jogSpeed}
+            text={(each) => `${JOG_SPEEDS[each][0]}`}
+            choose={setJogSpeed}
+          />
+        )}
       </>
     ),
     button: step,
@@ -135,6 +178,11 @@ function axisText(axis: ToolStep["axis"]): string {
 
 function isTurn(axis: ToolStep["axis"]): axis is "roll" | "pitch" | "yaw" {
   return axis !== "x" && axis !== "y" && axis !== "z";
+}
+
+/** Return the direction in words: "Tool X +". */
+function jogName(axis: Axis, frame: ToolStep["frame"], sign: 1 | -1): string {
+  return `${t(`frame_${frame}`)} ${axisText(axis)} ${sign > 0 ? "+" : "−"}`;
 }
 
 /** Return the step in words, which is the program's name in the audit log: "Tool X +5 mm". */
