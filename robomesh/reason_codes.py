@@ -1021,6 +1021,11 @@ RECORDING_TOO_MANY_VALUES = Code(
     "recording.too_many_values", "{count} values are too many: request at most {most}"
 )
 RECORDING_TIMES = Code("recording.times", "the range ends before it begins")
+RECORDING_TOO_LONG = Code(
+    "recording.too_long",
+    "the range is longer than a robot's values are read at once",
+    "request at most {hours:g} h, with start and end",
+)
 RECORDING_OUTSIDE = Code(
     "recording.outside", "{file}: nothing from {start} to {end}: it goes from {first} to {last}"
 )

@@ -5,7 +5,6 @@ import logging
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from math import isfinite
 
 import numpy as np
 from google.protobuf.message import DecodeError
@@ -28,7 +27,8 @@ _LOOKED_AT = 200
 # Limits of the cache: total size, and values of a topic that were not requested.
 _MOST_KEPT_BYTES = 64 << 20
 _MOST_UNASKED = 32
-_JOINTS = "joints/"
+_ROWS = 5000
+_OF_JOINTS = ("joints/", "kinematics/margin/")
 
 log = logging.getLogger(__name__)
 
@@ -51,7 +51,7 @@ class Series:
 
 
 @dataclass
-class _Pieces:
+class Pieces:
     """Minimum and maximum of values while they are read, one column for each interval.
 
     Attributes:
@@ -69,27 +69,30 @@ class _Pieces:
 
     @property
     def bytes(self) -> int:
+        """Return the size in memory."""
         return len(self.lowest) * self.count * 16
 
-    def take(self, name: str, piece: int, value: float) -> None:
-        lowest = self.lowest.get(name)
-        if lowest is None:
-            if name not in self.asked and len(self.lowest) >= _MOST_UNASKED:
-                self.all = False
-                return
-            lowest = self.lowest[name] = np.full(self.count, np.inf)
-            self.highest[name] = np.full(self.count, -np.inf)
-        if value < lowest[piece]:
-            lowest[piece] = value
-        if value > self.highest[name][piece]:
-            self.highest[name][piece] = value
+    def take(self, names: Sequence[str], places: Sequence[int], rows: Sequence[Sequence[float]]) -> None:
+        """Add rows of numbers, each to an interval."""
+        index, numbers = np.array(places), np.array(rows)
+        for column, name in enumerate(names):
+            if name not in self.lowest:
+                if name not in self.asked and len(self.lowest) >= _MOST_UNASKED:
+                    self.all = False
+                    continue
+                self.lowest[name] = np.full(self.count, np.inf)
+                self.highest[name] = np.full(self.count, -np.inf)
+            finite = np.isfinite(numbers[:, column])
+            own = numbers[:, column][finite]
+            np.minimum.at(self.lowest[name], index[finite], own)
+            np.maximum.at(self.highest[name], index[finite], own)
 
 
 class SeriesReader:
     """A reader of series with a cache of the intervals of whole recordings."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[tuple[str, int, int, str], _Pieces] = OrderedDict()
+        self._kept: OrderedDict[tuple[str, int, int, str], Pieces] = OrderedDict()
 
     def read(
         self, file: RecordingFile, names: Sequence[str], *, start_ns: int, end_ns: int, points: int
@@ -109,13 +112,13 @@ class SeriesReader:
                 there = ", ".join(f"{topic}/..." for topic in topics) or "none"
                 raise RecordingError(codes.RECORDING_NO_VALUE(file=file.path.name, name=name, topics=there))
             wanted.setdefault(topic, []).append(name)
-        sliding = _sliding(file, names)
+        prismatic = sliding_joints(file, names)
         found: dict[str, Series] = {}
         for topic, own in wanted.items():
             pieces = self._pieces(file, topic, topics[topic], start_ns, end_ns, points, frozenset(own))
             for name in own:
                 combined = _combined(name, pieces, file.layout.start_ns, start_ns, end_ns, points)
-                found[name] = replace(combined, unit=unit_of(name, sliding))
+                found[name] = replace(combined, unit=unit_of(name, prismatic))
         return [found[name] for name in names]
 
     def _pieces(
@@ -127,17 +130,17 @@ class SeriesReader:
         end_ns: int,
         points: int,
         asked: frozenset[str],
-    ) -> _Pieces:
+    ) -> Pieces:
         whole_ns = max(file.layout.end_ns - file.layout.start_ns, 1)
         share = (end_ns - start_ns) / whole_ns
         if share * _PIECES < points * 4:
-            return _cut(file, topic, key, _Pieces(asked, start_ns, end_ns, points))
+            return cut(file, topic, key, Pieces(asked, start_ns, end_ns, points))
         found = file.path.stat()
         about = (str(file.path), found.st_mtime_ns, found.st_size, topic)
         pieces = self._kept.get(about)
         if pieces is None or not (pieces.all or asked <= pieces.asked | pieces.lowest.keys()):
             first, last = file.layout.start_ns, file.layout.end_ns
-            pieces = self._kept[about] = _cut(file, topic, key, _Pieces(asked, first, last, _PIECES))
+            pieces = self._kept[about] = cut(file, topic, key, Pieces(asked, first, last, _PIECES))
         self._kept.move_to_end(about)
         while len(self._kept) > 1 and sum(each.bytes for each in self._kept.values()) > _MOST_KEPT_BYTES:
             self._kept.popitem(last=False)
@@ -177,10 +180,10 @@ def known_values(file: RecordingFile) -> list[str]:
     return list(known)
 
 
-def _sliding(file: RecordingFile, names: Sequence[str]) -> frozenset[str]:
+def sliding_joints(file: RecordingFile, names: Sequence[str]) -> frozenset[str]:
     """Return the prismatic joints (unit: metre)."""
     description = robot_channels(file.layout.messages, file.path.name).get("description")
-    if not any(name.startswith(_JOINTS) for name in names) or description is None:
+    if not any(name.startswith(_OF_JOINTS) for name in names) or description is None:
         return frozenset()
     told = file.newest(description, file.layout.end_ns)
     try:
@@ -207,23 +210,39 @@ class _Values:
         return values_of(self._schema, message)
 
 
-def _cut(file: RecordingFile, topic: str, key: str, pieces: _Pieces) -> _Pieces:
+def cut(file: RecordingFile, topic: str, key: str, pieces: Pieces) -> Pieces:
     """Fill intervals with the file's values."""
     start_ns, end_ns, count = pieces.start_ns, pieces.end_ns, pieces.count
     values = _Values(file, key)
     scale = count / max(end_ns - start_ns + 1, 1)
     times = PublisherTimes()
+    # Rows of messages with the same values.
+    before: tuple[str, ...] = ()
+    places: list[int] = []
+    rows: list[tuple[float, ...]] = []
+
+    def flush() -> None:
+        if rows:
+            pieces.take([f"{topic}/{name}" for name in before], places, rows)
+        places.clear()
+        rows.clear()
+
     for message in file.messages([key], start_ns=start_ns, end_ns=end_ns + 1):
         piece = min(max(int((times.of(message) - start_ns) * scale), 0), count - 1)
-        for name, value in values.of(message.data):
-            if isfinite(value):
-                pieces.take(f"{topic}/{name}", piece, value)
+        names, numbers = tuple(zip(*values.of(message.data), strict=True)) or ((), ())
+        if names != before or len(rows) >= _ROWS:
+            flush()
+            before = names
+        if names:
+            places.append(piece)
+            rows.append(numbers)
+    flush()
     if values.unread:
         log.warning("%s: %d messages of %s cannot be read: left out", file.path.name, values.unread, topic)
     return pieces
 
 
-def _combined(name: str, pieces: _Pieces, zero_ns: int, start_ns: int, end_ns: int, points: int) -> Series:
+def _combined(name: str, pieces: Pieces, zero_ns: int, start_ns: int, end_ns: int, points: int) -> Series:
     """Combine a value's intervals into the requested number."""
     lowest, highest = pieces.lowest.get(name), pieces.highest.get(name)
     none = np.empty(0)

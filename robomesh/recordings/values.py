@@ -3,13 +3,20 @@
 A name is the topic below its robot, then the fields; repeated messages are identified by their `name` field.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
+from functools import lru_cache
+from math import atan2, hypot
 from typing import Any
 
 from google.protobuf.descriptor import FieldDescriptor as Field
 
 from robomesh.schemas.robomesh_pb2 import Description
+from robomesh.topics import TOPICS, History
 
+_JOINT_UNITS = {"position": "", "velocity": "/s", "acceleration": "/s²"}
+_MARGIN = "kinematics/margin/"
+_ANGLES = ("roll", "pitch", "yaw")
+_VERTICAL = 1e-6  # least horizontal length of a tool's x axis that has a direction
 _NUMBERS = frozenset(
     {
         Field.CPPTYPE_DOUBLE,
@@ -42,18 +49,38 @@ def has_values(schema: str) -> bool:
     return schema not in _NO_NUMBERS
 
 
+def live_topics() -> dict[str, str]:
+    """Return the topics of a robot whose newest messages have values, with their schemas' full names."""
+    return {
+        name: row.schema.DESCRIPTOR.full_name
+        for name, row in TOPICS.items()
+        if row.recorded and row.history is History.LAST and has_values(row.schema.DESCRIPTOR.full_name)
+    }
+
+
 def values_of(schema: str, message: Any) -> Iterator[tuple[str, float]]:
     """Yield the numbers of a message with their names below its topic."""
     if schema == "foxglove.JointStates":
         for joint in message.joints:
+            position, velocity, acceleration, effort = _joint_values(joint.name)
+            # Written out: an hour of joint states has millions of numbers.
             if joint.HasField("position"):
-                yield f"{joint.name}/position", joint.position
+                yield position, joint.position
             if joint.HasField("velocity"):
-                yield f"{joint.name}/velocity", joint.velocity
+                yield velocity, joint.velocity
+            if joint.HasField("acceleration"):
+                yield acceleration, joint.acceleration
+            if joint.HasField("effort"):
+                yield effort, joint.effort
     elif schema == "robomesh.KinematicState":
         yield from _kinematics(message)
     else:
         yield from _fields(message, "", _DEEPEST)
+
+
+@lru_cache(maxsize=1000)
+def _joint_values(joint: str) -> tuple[str, str, str, str]:
+    return f"{joint}/position", f"{joint}/velocity", f"{joint}/acceleration", f"{joint}/effort"
 
 
 def topic_of(name: str, topics: Collection[str]) -> str | None:
@@ -75,18 +102,35 @@ def unit_of(name: str, prismatic: Collection[str] = ()) -> str:
     """
     first, *between, last = name.split("/")
     if first == "joints":
-        length = "m" if "/".join(between) in prismatic else "rad"
-        return {"position": length, "velocity": f"{length}/s"}.get(last, "")
+        slides = "/".join(between) in prismatic
+        if last == "effort":
+            return "N" if slides else "N·m"
+        return ("m" if slides else "rad") + _JOINT_UNITS[last] if last in _JOINT_UNITS else ""
     if first == "kinematics":
         if name.startswith("kinematics/tool/"):
-            return "m" if len(last) == 1 else "m/s"
-        if name.startswith("kinematics/margin/"):
-            return "rad"
+            return "rad" if last in _ANGLES else "m" if len(last) == 1 else "m/s"
+        if name.startswith(_MARGIN):
+            return "m" if name.removeprefix(_MARGIN) in prismatic else "rad"
         return "m" if "clearance" in last else ""
     for ending, unit in (("_s", "s"), ("_m", "m"), ("_hz", "Hz"), ("_percent", "%"), ("bytes", "B")):
         if last.endswith(ending):
             return unit
     return ""
+
+
+def fixed_angles(pose: Sequence[float]) -> tuple[float, float, float]:
+    """Return roll, pitch and yaw [rad] about the fixed axes, as in a URDF.
+
+    At a pitch of ±90 degrees roll and yaw are one rotation, returned as roll.
+
+    Args:
+        pose: A placement's 16 numbers by rows.
+    """
+    across = hypot(pose[0], pose[4])
+    pitch = atan2(-pose[8], across)
+    if across < _VERTICAL:
+        return atan2(-pose[6], pose[5]), pitch, 0.0
+    return atan2(pose[9], pose[10]), pitch, atan2(pose[4], pose[0])
 
 
 def _kinematics(message: Any) -> Iterator[tuple[str, float]]:
@@ -95,6 +139,7 @@ def _kinematics(message: Any) -> Iterator[tuple[str, float]]:
         yield "tool/x", pose[3]
         yield "tool/y", pose[7]
         yield "tool/z", pose[11]
+        yield from zip((f"tool/{name}" for name in _ANGLES), fixed_angles(pose), strict=True)
     if message.HasField("linear_velocity"):
         v = message.linear_velocity
         yield "tool/speed", (v.x * v.x + v.y * v.y + v.z * v.z) ** 0.5

@@ -1377,21 +1377,23 @@ class RecordedMessages(_message.Message):
     def __init__(self, messages: _Optional[_Iterable[_Union[RecordedMessages.Message, _Mapping]]] = ..., more: _Optional[bool] = ..., schema: _Optional[str] = ...) -> None: ...
 
 class SeriesRequest(_message.Message):
-    __slots__ = ("file", "values", "start", "end", "points")
+    __slots__ = ("file", "values", "start", "end", "points", "robot")
     FILE_FIELD_NUMBER: _ClassVar[int]
     VALUES_FIELD_NUMBER: _ClassVar[int]
     START_FIELD_NUMBER: _ClassVar[int]
     END_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
+    ROBOT_FIELD_NUMBER: _ClassVar[int]
     file: str
     values: _containers.RepeatedScalarFieldContainer[str]
     start: _timestamp_pb2.Timestamp
     end: _timestamp_pb2.Timestamp
     points: int
-    def __init__(self, file: _Optional[str] = ..., values: _Optional[_Iterable[str]] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., end: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., points: _Optional[int] = ...) -> None: ...
+    robot: str
+    def __init__(self, file: _Optional[str] = ..., values: _Optional[_Iterable[str]] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., end: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., points: _Optional[int] = ..., robot: _Optional[str] = ...) -> None: ...
 
 class SeriesAnswer(_message.Message):
-    __slots__ = ("known", "series")
+    __slots__ = ("known", "series", "recorded")
     class Series(_message.Message):
         __slots__ = ("name", "unit", "times_s", "lowest", "highest")
         NAME_FIELD_NUMBER: _ClassVar[int]
@@ -1405,11 +1407,20 @@ class SeriesAnswer(_message.Message):
         lowest: _containers.RepeatedScalarFieldContainer[float]
         highest: _containers.RepeatedScalarFieldContainer[float]
         def __init__(self, name: _Optional[str] = ..., unit: _Optional[str] = ..., times_s: _Optional[_Iterable[float]] = ..., lowest: _Optional[_Iterable[float]] = ..., highest: _Optional[_Iterable[float]] = ...) -> None: ...
+    class Span(_message.Message):
+        __slots__ = ("start_s", "end_s")
+        START_S_FIELD_NUMBER: _ClassVar[int]
+        END_S_FIELD_NUMBER: _ClassVar[int]
+        start_s: float
+        end_s: float
+        def __init__(self, start_s: _Optional[float] = ..., end_s: _Optional[float] = ...) -> None: ...
     KNOWN_FIELD_NUMBER: _ClassVar[int]
     SERIES_FIELD_NUMBER: _ClassVar[int]
+    RECORDED_FIELD_NUMBER: _ClassVar[int]
     known: _containers.RepeatedScalarFieldContainer[str]
     series: _containers.RepeatedCompositeFieldContainer[SeriesAnswer.Series]
-    def __init__(self, known: _Optional[_Iterable[str]] = ..., series: _Optional[_Iterable[_Union[SeriesAnswer.Series, _Mapping]]] = ...) -> None: ...
+    recorded: _containers.RepeatedCompositeFieldContainer[SeriesAnswer.Span]
+    def __init__(self, known: _Optional[_Iterable[str]] = ..., series: _Optional[_Iterable[_Union[SeriesAnswer.Series, _Mapping]]] = ..., recorded: _Optional[_Iterable[_Union[SeriesAnswer.Span, _Mapping]]] = ...) -> None: ...
 
 class PieceRequest(_message.Message):
     __slots__ = ("file", "offset", "length", "attachment")
@@ -2072,7 +2083,7 @@ class ToPage(_message.Message):
         alive: bool
         def __init__(self, key: _Optional[str] = ..., alive: _Optional[bool] = ...) -> None: ...
     class Hello(_message.Message):
-        __slots__ = ("version", "site", "insecure", "stale", "connected", "session", "account", "operator", "may_command", "presence_known")
+        __slots__ = ("version", "site", "insecure", "stale", "connected", "session", "account", "operator", "may_command", "presence_known", "values")
         class Stale(_message.Message):
             __slots__ = ("topic", "after_s")
             TOPIC_FIELD_NUMBER: _ClassVar[int]
@@ -2080,6 +2091,13 @@ class ToPage(_message.Message):
             topic: str
             after_s: float
             def __init__(self, topic: _Optional[str] = ..., after_s: _Optional[float] = ...) -> None: ...
+        class Values(_message.Message):
+            __slots__ = ("topic", "schema")
+            TOPIC_FIELD_NUMBER: _ClassVar[int]
+            SCHEMA_FIELD_NUMBER: _ClassVar[int]
+            topic: str
+            schema: str
+            def __init__(self, topic: _Optional[str] = ..., schema: _Optional[str] = ...) -> None: ...
         VERSION_FIELD_NUMBER: _ClassVar[int]
         SITE_FIELD_NUMBER: _ClassVar[int]
         INSECURE_FIELD_NUMBER: _ClassVar[int]
@@ -2090,6 +2108,7 @@ class ToPage(_message.Message):
         OPERATOR_FIELD_NUMBER: _ClassVar[int]
         MAY_COMMAND_FIELD_NUMBER: _ClassVar[int]
         PRESENCE_KNOWN_FIELD_NUMBER: _ClassVar[int]
+        VALUES_FIELD_NUMBER: _ClassVar[int]
         version: str
         site: str
         insecure: bool
@@ -2100,7 +2119,8 @@ class ToPage(_message.Message):
         operator: str
         may_command: bool
         presence_known: bool
-        def __init__(self, version: _Optional[str] = ..., site: _Optional[str] = ..., insecure: _Optional[bool] = ..., stale: _Optional[_Iterable[_Union[ToPage.Hello.Stale, _Mapping]]] = ..., connected: _Optional[bool] = ..., session: _Optional[str] = ..., account: _Optional[str] = ..., operator: _Optional[str] = ..., may_command: _Optional[bool] = ..., presence_known: _Optional[bool] = ...) -> None: ...
+        values: _containers.RepeatedCompositeFieldContainer[ToPage.Hello.Values]
+        def __init__(self, version: _Optional[str] = ..., site: _Optional[str] = ..., insecure: _Optional[bool] = ..., stale: _Optional[_Iterable[_Union[ToPage.Hello.Stale, _Mapping]]] = ..., connected: _Optional[bool] = ..., session: _Optional[str] = ..., account: _Optional[str] = ..., operator: _Optional[str] = ..., may_command: _Optional[bool] = ..., presence_known: _Optional[bool] = ..., values: _Optional[_Iterable[_Union[ToPage.Hello.Values, _Mapping]]] = ...) -> None: ...
     SAMPLE_FIELD_NUMBER: _ClassVar[int]
     ANSWER_FIELD_NUMBER: _ClassVar[int]
     PRESENCE_FIELD_NUMBER: _ClassVar[int]

@@ -3,11 +3,12 @@
 Works on the URDF text only, without kinematics.
 """
 
-import math
 import xml.etree.ElementTree as Xml
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
+
+from robomesh.recordings.values import fixed_angles
 
 MeshUri = Callable[[str], str | None]
 
@@ -187,18 +188,9 @@ def _fixed(whole: Xml.Element, parent: str, child: str, pose: Sequence[float] = 
     joint = Xml.SubElement(whole, "joint", name=f"{child}_in_{parent}", type="fixed")
     if len(pose) == 16:
         x, y, z = pose[3], pose[7], pose[11]
-        roll, pitch, yaw = _rpy(pose)
+        roll, pitch, yaw = fixed_angles(pose)
         Xml.SubElement(
             joint, "origin", xyz=f"{x:.9g} {y:.9g} {z:.9g}", rpy=f"{roll:.9g} {pitch:.9g} {yaw:.9g}"
         )
     Xml.SubElement(joint, "parent", link=parent)
     Xml.SubElement(joint, "child", link=child)
-
-
-def _rpy(pose: Sequence[float]) -> tuple[float, float, float]:
-    """Return URDF's fixed-axis angles [rad] of a placement, 16 numbers by rows."""
-    across = math.hypot(pose[0], pose[4])
-    pitch = math.atan2(-pose[8], across)
-    if across < 1e-9:  # straight up or down: roll and yaw are one rotation, given as yaw
-        return 0.0, pitch, math.atan2(-pose[1], pose[5])
-    return math.atan2(pose[9], pose[10]), pitch, math.atan2(pose[4], pose[0])

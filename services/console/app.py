@@ -26,6 +26,7 @@ from robomesh import reason_codes as codes
 from robomesh.errors import NoAnswerError
 from robomesh.health import own_version
 from robomesh.keys import PresenceKey
+from robomesh.recordings.values import live_topics
 from robomesh.schemas.robomesh_pb2 import Event, ToPage
 from robomesh.session import Session
 from services.console.accounts.auth_middleware import SIGNED_OUT, AuthMiddleware, cookie_name
@@ -267,6 +268,8 @@ class Hub:
         for name, row in topics.TOPICS.items():
             if row.stale_after_s is not None:
                 hello.stale.add(topic=name, after_s=row.stale_after_s)
+        for name, values_schema in live_topics().items():
+            hello.values.add(topic=name, schema=values_schema)
         return ToPage(hello=hello)
 
     async def _watch_presence(self) -> None:

@@ -26,6 +26,7 @@ from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.series import MOST_POINTS, POINTS, SeriesReader, known_values
 from robomesh.recordings.video import holds_key_frame
 from robomesh.schemas import robomesh_pb2 as schema
+from services.recorder.robot_series import RobotSeries
 
 _MESSAGES, _MOST_MESSAGES, _MOST_BYTES = 1000, 10_000, 4 << 20
 _PIECE, _MOST_PIECE = 1 << 20, 4 << 20
@@ -46,6 +47,7 @@ class Answers:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._series = SeriesReader()
+        self._robots = RobotSeries(folder)
 
     def answer(self, question: Question) -> bytes:
         """Return the serialized answer to a question.
@@ -116,6 +118,8 @@ class Answers:
 
     def series(self, request: schema.SeriesRequest) -> schema.SeriesAnswer:
         """Return values over time, or the known value names if the request names none."""
+        if request.robot:
+            return self._robots.read(request)
         with RecordingFile(find_file(self._folder, request.file)) as file:
             if not request.values:
                 return schema.SeriesAnswer(known=known_values(file))

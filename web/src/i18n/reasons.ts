@@ -1673,6 +1673,13 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     "recording.too_many_values",
     ["{count} values are too many: request at most {most}", "{count} 个数值过多：最多请求 {most} 个"],
   ],
+  [
+    "recording.too_long",
+    [
+      "the range is longer than a robot's values are read at once: request at most {hours} h, with start and end",
+      "时间范围过长，无法一次读取机器人的数值：请给出开始和结束时间，最长 {hours} 小时",
+    ],
+  ],
   ["recording.times", ["the range ends before it begins", "时间范围的结束早于开始"]],
   [
     "recording.outside",

@@ -135,6 +135,8 @@ const TEXTS = {
   joints: ["Joints", "关节"],
   tool_and_margins: ["Tool and distances", "工具与距离"],
   controller: ["Controller", "控制器"],
+  control: ["Control", "控制权"],
+  program: ["Program", "程序"],
 
   transport: ["Transport", "播放控制"],
   pause: ["Pause", "暂停"],

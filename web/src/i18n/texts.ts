@@ -496,10 +496,7 @@ const TEXTS = {
   outcome_failed: ["failed", "失败"],
   repeated: ["{count} more like it", "另有 {count} 条相同"],
 
-  history: ["Last 60 s", "最近 60 秒"],
-  pause: ["Pause", "暂停"],
   live: ["Live", "实时"],
-  plot_empty: ["The plot begins with the first live state.", "收到第一个实时状态后开始绘图。"],
   seconds_ago: ["seconds ago", "秒前"],
   nominal: ["Nominal", "标称值"],
 

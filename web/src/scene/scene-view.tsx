@@ -14,6 +14,7 @@ import type { MomentState } from "../mesh/replay-moment";
 import { OWN_DRAWING, useShownView } from "../mesh/sight";
 import { ageOf, isStale, useTopic } from "../mesh/topics";
 import { Choice, Toggle } from "../ui/choice";
+import type { Camera } from "../ui/layout";
 import { theme } from "../ui/theme";
 import { useFramesAge } from "./frames-age";
 import { ghost, redLinks, toolPath } from "./ghost";
@@ -26,6 +27,7 @@ import { framesTopic } from "./topic-selection";
 // Eye of the free camera relative to its target, in multiples of the arm's reach.
 const FREE_EYE = { x: 1.2, y: -1.69, z: 0.72 };
 const NOMINAL_REACH = 1.1; // m, until the description arrives
+const CAMERA_LOOK_MS = 500;
 const KEPT_SAMPLES = 16; // more than the drawing lags behind
 
 type Drawing = typeof import("./drawing");
@@ -77,13 +79,18 @@ export function SceneView(props: {
   arm?: MomentState;
   /** Called with each new scene, and with null at its end, so that other components can add parts. */
   staged?: (stage: Stage | null) => void;
+  /** The view, and where a person put its camera; absent: the component keeps it. */
+  camera?: Camera;
+  setCamera?: (camera: Camera) => void;
 }) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const label = useRef<HTMLSpanElement>(null);
   const scene = useRef<RobotScene | null>(null);
   const [problem, setProblem] = useState("");
   const [loaded, setLoaded] = useState(false);
-  const [view, setView] = useState("free");
+  const [ownView, setOwnView] = useState("free");
+  const view = props.camera?.view ?? ownView;
+  const setView = (name: string) => (props.setCamera ? props.setCamera({ view: name, pose: null }) : setOwnView(name));
   const [trail, setTrail] = useState(false);
   const [frames, setFrames] = useState(false);
   const { robotKey, description } = props;
@@ -178,7 +185,7 @@ export function SceneView(props: {
   useEffect(() => scene.current?.showGap(near?.nearest ?? null, near?.sourceTime), [near, identity, code]);
   const views = viewsOf(description);
   const chosen = views.find((each) => each.name === view) ?? freeView([]);
-  useEffect(() => scene.current?.look(chosen), [chosen.name, identity, code]);
+  useCamera(scene, chosen, props.camera?.pose ?? null, props.setCamera, [chosen.name, identity, code]);
 
   const onKey = (event: KeyboardEvent) => {
     const step = 0.1;
@@ -253,6 +260,61 @@ export function SceneView(props: {
       )}
     </section>
   );
+}
+
+/** Set the camera to a view, or to where a person put it, and report where a person puts it. */
+function useCamera(
+  scene: { readonly current: RobotScene | null },
+  chosen: View,
+  pose: readonly number[] | null,
+  report: ((camera: Camera) => void) | undefined,
+  depends: readonly unknown[],
+): void {
+  const reported = useRef("");
+  const latest = useRef(report);
+  latest.current = report;
+  const wanted = pose?.join() ?? "";
+  const settled = useRef("");
+  useEffect(() => {
+    // The scene's own camera, which the address follows.
+    if (wanted && wanted === reported.current) return;
+    reported.current = "";
+    scene.current?.look(pose ? lookFrom(chosen, pose) : chosen);
+    settled.current = "";
+  }, [...depends, wanted]);
+  useEffect(() => {
+    const made = scene.current;
+    if (!made || !latest.current) return;
+    if (pose && wanted === reported.current) made.look(lookFrom(chosen, pose)); // a new scene
+    settled.current = "";
+    let before = "";
+    const timer = setInterval(() => {
+      const at = poseOf(made.view());
+      const now = at.join();
+      // At rest: each report changes the address. A flat view has a zoom, which a pose does not say.
+      if (settled.current && now !== settled.current && now === before) {
+        settled.current = now;
+        if (chosen.projection !== View_Projection.ORTHOGRAPHIC) {
+          reported.current = now;
+          latest.current?.({ view: chosen.name, pose: at });
+        }
+      }
+      settled.current ||= now;
+      before = now;
+    }, CAMERA_LOOK_MS);
+    return () => clearInterval(timer);
+  }, depends);
+}
+
+function poseOf({ eye, target }: View): number[] {
+  return [eye, target].flatMap((at) => [at?.x ?? 0, at?.y ?? 0, at?.z ?? 0].map((each) => Number(each.toFixed(3))));
+}
+
+function lookFrom(view: View, [x = 0, y = 0, z = 0, ...target]: readonly number[]): View {
+  const [tx = 0, ty = 0, tz = 0] = target;
+  const { name, projection } = view;
+  const up = view.up ?? { z: 1 };
+  return create(ViewSchema, { name, projection, up, eye: { x, y, z }, target: { x: tx, y: ty, z: tz } });
 }
 
 /** Return the two nearest points of the arm and its surroundings; null: not known. */

@@ -1,6 +1,6 @@
 // Route of the page, read from the address's hash, and links to each page.
 
-import { signal } from "@preact/signals";
+import { batch, signal } from "@preact/signals";
 import type { RobotName } from "../mesh/robot-name";
 import { canBe, isReplay } from "../mesh/robot-name";
 
@@ -36,7 +36,7 @@ const VIEW = /^[A-Za-z0-9][\w.-]{0,62}$/;
 
 // A site with the name of a page could not link to its robots.
 function readRoute(): Route {
-  const [, first = "", ...rest] = location.hash.split("/").map(decoded);
+  const [, first = "", ...rest] = (location.hash.split("?")[0] ?? "").split("/").map(decoded);
   switch (first) {
     case "events":
     case "settings":
@@ -96,10 +96,28 @@ function decoded(text: string): string {
   }
 }
 
+function readQuery(): string {
+  const at = location.hash.indexOf("?");
+  return at < 0 ? "" : location.hash.slice(at + 1);
+}
+
 export const route = signal(readRoute());
+/** The layout in the address, as text; empty: the default. */
+export const layoutQuery = signal(readQuery());
 addEventListener("hashchange", () => {
-  route.value = readRoute();
+  // Together: a layout belongs to its robot.
+  batch(() => {
+    route.value = readRoute();
+    layoutQuery.value = readQuery();
+  });
 });
+
+/** Write a layout into the address, without a new entry in the browser's history. */
+export function setLayoutQuery(text: string): void {
+  const page = location.hash.split("?")[0] ?? "";
+  history.replaceState(history.state, "", text ? `${page}?${text}` : page);
+  layoutQuery.value = text;
+}
 
 /** Return the robot that a route shows, on its own page, its program's or its cell's. */
 export function robotOf(shown: Route): RobotName | null {

@@ -7,10 +7,10 @@ import "uplot/dist/uPlot.min.css";
 import type { SeriesAnswer_Series as Series } from "../../gen/robomesh_pb";
 import { DASH, fixed } from "../../i18n/format";
 import { momentText } from "../../i18n/recording-format";
+import { commonOf, labelOf, shownUnit } from "../../i18n/value-names";
 import { plotAppearance } from "../../ui/plot-appearance";
 import { theme } from "../../ui/theme";
 import type { Window } from "./recorder-requests";
-import { commonOf, labelOf, shownUnit } from "./units";
 
 const GAP = 3; // a gap is longer than 3 usual intervals, and
 const GAP_S = 1; // at least so long

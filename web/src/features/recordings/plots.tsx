@@ -4,6 +4,7 @@ import type { ReadonlySignal } from "@preact/signals";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import type { Recording, SeriesAnswer_Series as Series } from "../../gen/robomesh_pb";
 import { r } from "../../i18n/recordings";
+import { ValueChoice } from "../../panels/value-choice";
 import { Toggle } from "../../ui/choice";
 import { Panel } from "../../ui/panel";
 import type { RecordingName } from "../../ui/route";
@@ -12,7 +13,6 @@ import { Chart } from "./chart";
 import type { Window } from "./recorder-requests";
 import { useSeries, useValueNames } from "./recorder-requests";
 import { savePicture } from "./save-picture";
-import { ValueChoice } from "./value-choice";
 import "./plots.css";
 
 const POINTS = 1000;

@@ -6,6 +6,8 @@ import { clock } from "../../i18n/format";
 import { t, viewText } from "../../i18n/texts";
 import { viewsOf } from "../../scene/scene-view";
 import { isRemote, topicSelection } from "../../scene/topic-selection";
+import type { VideoPlace } from "../../ui/layout";
+import { PLACES } from "../../ui/layout";
 import { Panel } from "../../ui/panel";
 import { saveFile } from "../../ui/save-file";
 import { Age } from "../../ui/state";
@@ -13,10 +15,6 @@ import { useLiveVideo } from "../../video/live-video";
 import type { RequestedView } from "../../video/requested-view";
 import { standardView } from "../../video/requested-view";
 import { dated, saveStill, useRecording } from "./export";
-
-/** Place of the video: next to the 3-D view, in its corner, or instead of it. */
-export type VideoPlace = "beside" | "inset" | "large";
-const PLACES: readonly VideoPlace[] = ["beside", "inset", "large"];
 
 /** The renderer's view of every robot, which follows the arm. */
 const CLOSE_VIEW = "close";
@@ -31,6 +29,9 @@ const CHECK_INTERVAL_MS = 300;
 export function CameraPanel(props: {
   robotKey: string;
   description: Description | undefined;
+  /** The chosen view; empty: the usual one. */
+  view: string;
+  setView: (view: string) => void;
   place: VideoPlace;
   setPlace: (place: VideoPlace) => void;
   /** Camera of the 3-D view; null: no 3-D view. */
@@ -38,8 +39,7 @@ export function CameraPanel(props: {
 }) {
   const { robotKey, description } = props;
   const isSlow = topicSelection(robotKey) === "slow";
-  const [chosen, setView] = useState("");
-  const view = chosen || (isSlow ? SLOW_LINK_VIEW : "front");
+  const view = props.view || (isSlow ? SLOW_LINK_VIEW : "front");
   const names = [
     ...new Set([
       ...viewsOf(description).map((each) => each.name),
@@ -81,7 +81,7 @@ export function CameraPanel(props: {
             </span>
           )}
           <Age stale={live.stale} age={live.age} />
-          <select aria-label={t("view")} value={shown} onChange={(event) => setView(event.currentTarget.value)}>
+          <select aria-label={t("view")} value={shown} onChange={(event) => props.setView(event.currentTarget.value)}>
             {names.map((each) => (
               <option key={each} value={each}>
                 {viewText(each)}

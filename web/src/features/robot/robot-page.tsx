@@ -36,13 +36,13 @@ import { jointsTopic } from "../../scene/topic-selection";
 import { cellLink, programLink } from "../../ui/route";
 import { State } from "../../ui/state";
 import { Tag } from "../../ui/tag";
-import type { VideoPlace } from "./camera-panel";
 import { CameraPanel } from "./camera-panel";
 import { EventsPanel } from "./events-panel";
-import { JointHistory } from "./joint-history";
 import { JointsPanel } from "./joints-panel";
+import { LayoutButton, LayoutPanel, layoutClasses, useLayout } from "./layout-panel";
 import { ClockHint, TopicChoice } from "./low-bandwidth";
 import { NoteButton, NotePanel } from "./note-panel";
+import { PlotsPanel } from "./plots-panel";
 import { isShown, ProgramLine } from "./program-line";
 import { RecordButton, RecordPanel } from "./record-panel";
 import { RobotTool } from "./robot-tool";
@@ -65,7 +65,7 @@ export function RobotPage({ site, robot }: RobotName) {
   useEffect(() => {
     if (lease) handleLease(key, lease.message);
   }, [key, lease]);
-  const [videoPlace, setVideoPlace] = useState<VideoPlace>("beside");
+  const { layout, problem, change } = useLayout();
   const stage = useRef<Stage | null>(null);
   const state = controller?.message;
   const positions = new Map(joints?.message.joints.map((joint) => [joint.name, joint.position]));
@@ -79,7 +79,7 @@ export function RobotPage({ site, robot }: RobotName) {
   return (
     <>
       <RobotAlarm state={state} events={events} />
-      <div class={`robot video-${videoPlace} ${holds(key) ? "in-control" : ""}`}>
+      <div class={`robot ${layoutClasses(layout)} ${holds(key) ? "in-control" : ""}`}>
         <Headline
           site={site}
           name={robot}
@@ -95,6 +95,8 @@ export function RobotPage({ site, robot }: RobotName) {
           age={joints ? age : undefined}
           lostAt={lost}
           staged={(made) => (stage.current = made)}
+          camera={layout.camera}
+          setCamera={(camera) => change({ camera })}
         />
         <Messages>
           <Troubles site={site} controller={controller} events={events} />
@@ -102,6 +104,7 @@ export function RobotPage({ site, robot }: RobotName) {
           <ControlRequests robotKey={key} holder={holder} lease={lease?.message} />
           <RecordPanel robotKey={key} description={description?.message} />
           <NotePanel robotKey={key} />
+          <LayoutPanel layout={layout} problem={problem} change={change} />
         </Messages>
         <div class="side">
           <ControlPanel
@@ -137,14 +140,25 @@ export function RobotPage({ site, robot }: RobotName) {
             joints={description?.message.joints ?? []}
           />
         </div>
-        <CameraPanel
-          robotKey={key}
-          description={description?.message}
-          place={videoPlace}
-          setPlace={setVideoPlace}
-          sceneView={() => stage.current?.view() ?? null}
-        />
-        <JointHistory robotKey={key} description={description?.message} />
+        {!layout.hidden.includes("video") && (
+          <CameraPanel
+            robotKey={key}
+            description={description?.message}
+            view={layout.video}
+            setView={(video) => change({ video })}
+            place={layout.place}
+            setPlace={(place) => change({ place })}
+            sceneView={() => stage.current?.view() ?? null}
+          />
+        )}
+        {!layout.hidden.includes("plots") && (
+          <PlotsPanel
+            robotKey={key}
+            description={description?.message}
+            plots={layout.plots}
+            setPlots={(plots) => change({ plots })}
+          />
+        )}
       </div>
     </>
   );
@@ -208,6 +222,7 @@ function Headline(props: {
         </a>
         <RecordButton robotKey={`robomesh/${props.site}/${props.name}`} />
         <NoteButton />
+        <LayoutButton />
         <TopicChoice robotKey={`robomesh/${props.site}/${props.name}`} />
         {/* A program replaces less important facts, so that nothing below moves. */}
         {runs || (

@@ -1,15 +1,18 @@
 // Choice of plotted values by topic.
 
 import { useState } from "preact/hooks";
-import type { RecordingsText } from "../../i18n/recordings";
-import { r } from "../../i18n/recordings";
-import { labelOf } from "./units";
+import type { RecordingsText } from "../i18n/recordings";
+import { r } from "../i18n/recordings";
+import { labelOf } from "../i18n/value-names";
+import "./value-choice.css";
 
 /** The most wanted values, by topic. */
 const GROUPS: Partial<Record<string, RecordingsText>> = {
   joints: "joints",
   kinematics: "tool_and_margins",
   controller: "controller",
+  lease: "control",
+  program: "program",
 };
 const rank = (topic: string) => Object.keys(GROUPS).indexOf(topic) + 1 || 99;
 const topicOfValue = (value: string) => value.split("/")[0] ?? "";
@@ -19,11 +22,19 @@ export function ValueChoice(props: {
   chosen: readonly string[];
   most: number;
   choose: (chosen: readonly string[]) => void;
+  /** A value's words, without its topic. */
+  text?: (value: string) => string;
+  unit?: (value: string) => string;
 }) {
   const { known, chosen, most } = props;
   const [filter, setFilter] = useState("");
   const searchText = filter.trim().toLowerCase();
-  const shown = known.filter((value) => value.toLowerCase().includes(searchText));
+  const textOf = props.text ?? ((value: string) => labelOf(value, "").replaceAll("_", " "));
+  const words = searchText.split(/\s+/);
+  const shown = known.filter((value) => {
+    const text = `${value} ${textOf(value)}`.toLowerCase();
+    return words.every((word) => text.includes(word));
+  });
   const full = chosen.length >= most;
   const turn = (value: string) =>
     props.choose(chosen.includes(value) ? chosen.filter((each) => each !== value) : [...chosen, value]);
@@ -50,7 +61,8 @@ export function ValueChoice(props: {
                 return (
                   <label key={value} title={value}>
                     <input type="checkbox" checked={on} disabled={!on && full} onChange={() => turn(value)} />
-                    {labelOf(value, "").replaceAll("_", " ")}
+                    {textOf(value)}
+                    {props.unit?.(value) && <span class="dim small">{props.unit(value)}</span>}
                   </label>
                 );
               })}

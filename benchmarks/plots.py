@@ -1,0 +1,241 @@
+"""Twenty values at 100 Hz for an hour in the plots of the Robot page: heap and processor time.
+
+A site runs as real processes. The page's clocks run `--factor` times faster than the machine's, and the
+page's own WebSocket handler receives as many more joint states of 20 joints: `accelerated` is an hour of
+them. `real` is the same at the clocks' speed, with the moving arm's own 10 joint values at 100 Hz and the
+tool's, distances and figures of the controller. `uplot` draws the same numbers as uPlot's streaming example
+does, with its newest 60 s in arrays that are shifted, without protobuf or WebSocket.
+The heap is measured after garbage collection.
+
+    ./dev run python benchmarks/plots.py [--only accelerated,real,uplot] [--factor 20] [--hours 1]
+                                         [--minutes 5] [--json]
+
+Target: no growth after the first minute of data.
+"""
+
+import argparse
+import base64
+import json
+import math
+import os
+import re
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from playwright.sync_api import Browser, Page, sync_playwright
+
+if __name__ == "__main__":
+    # Import from the root: a program in this folder has the same name as a package.
+    sys.path[0] = str(Path(__file__).parents[1])
+
+from robomesh.schemas.robomesh_pb2 import ToPage
+from tests.browser.conftest import ARGUMENTS, CHROMIUM, PATIENCE_MS
+from tests.site import running_site
+from web import build_page
+
+PARTS = ("accelerated", "real", "uplot")
+ROBOT = '[[robot]]\nname = "moving"\nmodel = "pt600"\ndemo = true\n'
+VALUES, RATE_HZ = 20, 100
+STARTED_S = 10.0
+LOOKS = 10
+FRAMES = 500
+MARK = bytes(range(100, 124))
+UPLOT = build_page.MODULES / "uplot" / "dist" / "uPlot.iife.min.js"
+
+FAST = """
+(factor) => {
+  const now = performance.now.bind(performance), began = Date.now();
+  performance.now = () => now() * factor;
+  Date.now = () => Math.round(began + now() * factor);
+  const Socket = window.WebSocket;
+  window.WebSocket = class extends Socket {
+    constructor(...given) { super(...given); window.socket = this; }
+  };
+}
+"""
+# Frames are patched in place with the next sequence number and time.
+FEED = """
+([frames, mark, rate]) => {
+  const made = frames.map((text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)));
+  const views = made.map((bytes) => new DataView(bytes.buffer));
+  window.fed = 0;
+  let at = Date.now();
+  setInterval(() => {
+    for (const end = Date.now(); at < end; at += 1000 / rate) {
+      const i = window.fed++ % made.length;
+      views[i].setBigUint64(mark + 8, BigInt(window.fed), true);
+      views[i].setBigInt64(mark + 16, BigInt(Math.round(at * 1e6)), true);
+      window.socket?.onmessage?.({ data: made[i].slice().buffer });
+    }
+  }, 10);
+}
+"""
+STREAM = """
+([values, rate, factor]) => {
+  const now = performance.now.bind(performance);
+  const data = Array.from({ length: values + 1 }, () => []);
+  const line = { stroke: "red", points: { show: false } };
+  const series = [{}, ...Array.from({ length: values }, () => line)];
+  const place = document.body.appendChild(document.createElement("div"));
+  const options = { width: 500, height: 200, scales: { x: { time: false } }, series };
+  const plot = new uPlot(options, data, place);
+  window.fed = 0;
+  const began = now();
+  setInterval(() => {
+    for (const end = ((now() - began) / 1000) * factor * rate; window.fed < end; window.fed++) {
+      data[0].push(window.fed / rate);
+      for (let i = 1; i <= values; i++) data[i].push(Math.sin(window.fed / rate + i));
+      if (data[0].length > 60 * rate) for (const column of data) column.shift();
+    }
+  }, 10);
+  setInterval(() => plot.setData(data), 200);
+}
+"""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--only", default=",".join(PARTS))
+    parser.add_argument("--factor", type=float, default=20.0)
+    parser.add_argument("--hours", type=float, default=1.0, help="of accelerated and uplot")
+    parser.add_argument("--minutes", type=float, default=5.0, help="of real")
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    build_page.build()
+    result = measure(arguments)
+    if arguments.json:
+        print(json.dumps(result))
+        return
+    for part, found in result.items():
+        print(f"{part}: {json.dumps(found)}")
+
+
+def measure(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Run the wanted parts, each in a new browser."""
+    wanted = arguments.only.split(",")
+    result: dict[str, Any] = {"cores": os.cpu_count(), "load": os.getloadavg()[0]}
+    fast_s = arguments.hours * 3600 / arguments.factor
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        running_site(Path(folder) / "site", robots=ROBOT) as site,
+        sync_playwright() as playwright,
+    ):
+        time.sleep(STARTED_S)
+        for part in wanted:
+            browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS)
+            address = f"{site.console}#/test/moving"
+            if part == "accelerated":
+                result[part] = accelerated(browser, address, arguments.factor, fast_s)
+            elif part == "real":
+                result[part] = real(browser, address, arguments.minutes * 60)
+            elif part == "uplot":
+                result[part] = uplot(browser, arguments.factor, fast_s)
+            browser.close()
+    return result
+
+
+def accelerated(browser: Browser, address: str, factor: float, seconds: float) -> dict[str, Any]:
+    """Feed the page with joint states of 20 joints, faster than in real time."""
+    page = browser.new_page(viewport={"width": 1440, "height": 900})
+    page.add_init_script(f"({FAST})({factor})")
+    page.goto(address)
+    page.wait_for_selector(".plot-card", timeout=PATIENCE_MS)
+    page.evaluate(FEED, [*frames(), RATE_HZ])
+    choose(page, ["position"], r"j\d+ position")
+    return heap(page, seconds, factor)
+
+
+def real(browser: Browser, address: str, seconds: float) -> dict[str, Any]:
+    """Plot 20 values of the moving arm."""
+    page = browser.new_page(viewport={"width": 1440, "height": 900})
+    page.goto(address)
+    page.wait_for_selector(".plot-card", timeout=PATIENCE_MS)
+    choose(page, ["joints position", "joints velocity", "tool", "health", "margin"])
+    return heap(page, seconds, 1.0)
+
+
+def uplot(browser: Browser, factor: float, seconds: float) -> dict[str, Any]:
+    """Stream the same number of values into uPlot alone."""
+    page = browser.new_page(viewport={"width": 1440, "height": 900})
+    page.add_script_tag(path=UPLOT)
+    page.evaluate(STREAM, [VALUES, RATE_HZ, factor])
+    return heap(page, seconds, factor)
+
+
+def frames() -> tuple[list[str], int]:
+    """Return messages of a console with joint states, and where their header begins."""
+    made = []
+    for i in range(FRAMES):
+        states = JointStates()
+        for number in range(VALUES):
+            position = math.sin(2 * math.pi * i / FRAMES + number)
+            states.joints.add(name=f"j{number + 1:02d}", position=position, velocity=0.5)
+        sample = ToPage.Sample(
+            key="robomesh/test/moving/joints",
+            attachment=MARK,
+            payload=states.SerializeToString(),
+            live=True,
+        )
+        made.append(ToPage(sample=sample).SerializeToString())
+    (mark,) = {each.index(MARK) for each in made}
+    return [base64.b64encode(each).decode() for each in made], mark
+
+
+def choose(page: Page, searches: list[str], words: str = "") -> None:
+    """Choose 20 fields that are found by typing, and whose words begin as a regular expression says."""
+    fields = page.get_by_role("button", name="Fields of plot 1")
+    fields.click()
+    boxes = page.locator(".values label")
+    page.wait_for_timeout(3000)
+    for box in page.locator(".values input:checked").all()[::-1]:
+        box.dispatch_event("click")
+    left = VALUES
+    for search in searches:
+        page.get_by_role("searchbox").fill(search)
+        page.wait_for_timeout(300)
+        for label in boxes.all():
+            box = label.locator("input")
+            if left and re.match(words, label.inner_text()) and not box.is_checked():
+                box.dispatch_event("click")
+                left -= 1
+    assert not left, f"{left} values too few"
+    page.get_by_role("searchbox").fill("")
+    fields.click()
+
+
+def heap(page: Page, seconds: float, factor: float) -> dict[str, Any]:
+    """Measure the heap [MB] and the main thread's share while the page plots."""
+    cdp = page.context.new_cdp_session(page)
+    cdp.send("Performance.enable")
+
+    def task_s() -> float:
+        metrics = cdp.send("Performance.getMetrics")["metrics"]
+        return float(next(each["value"] for each in metrics if each["name"] == "TaskDuration"))
+
+    found: list[tuple[float, float]] = []
+    began, busy_s = time.monotonic(), 0.0
+    for _ in range(LOOKS + 1):
+        cdp.send("HeapProfiler.collectGarbage")
+        used = cdp.send("Runtime.getHeapUsage")
+        found.append(((time.monotonic() - began) * factor / 60, used["usedSize"] / 1e6))
+        before_s = task_s()
+        page.wait_for_timeout(seconds / LOOKS * 1000)
+        busy_s += task_s() - before_s
+    later = [(minute, size) for minute, size in found if minute > 2]
+    slope = float(np.polyfit(*zip(*later, strict=True), 1)[0]) if len(later) > 2 else math.nan
+    return {
+        "minutes": [round(minute, 1) for minute, _ in found],
+        "heap_mb": [round(size, 2) for _, size in found],
+        "growth_mb_an_hour": round(slope * 60, 3),
+        "samples": page.evaluate("() => window.fed ?? null"),
+        "main_thread_percent": round(100 * busy_s / (seconds * (LOOKS + 1) / LOOKS), 1),
+    }
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,229 @@
+"""Numbers that the page plots: named and read as the recorder does, and kept with every peak and gap."""
+
+import base64
+import random
+from math import floor
+
+import pytest
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+
+from robomesh.messages import decode
+from robomesh.recordings.values import live_topics, prismatic_joints, unit_of, values_of
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.topics import SCHEMAS
+from tests import page_modules
+from web import build_page
+
+pytestmark = pytest.mark.slow
+
+READ = """
+const { values, connection, gen, pb, buckets, layout } = await import(process.argv[1]);
+const chunks = [];
+for await (const chunk of process.stdin) chunks.push(chunk);
+const asked = JSON.parse(Buffer.concat(chunks).toString());
+const bytes = (text) => new Uint8Array(Buffer.from(text, "base64"));
+connection.hello.value = { values: asked.topics ?? [], stale: [] };
+const done = (answer) => process.stdout.write(JSON.stringify(answer), () => process.exit(0));
+"""
+VALUES = """
+const description = pb.fromBinary(gen.DescriptionSchema, bytes(asked.description));
+done(asked.messages.map(([topic, payload]) => {
+  const found = [];
+  const take = (name, value) => found.push([name, value, values.unitOf(name, description)]);
+  values.readerOf(topic)(bytes(payload), take);
+  return found;
+}));
+"""
+COLUMNS = """
+const kept = asked.series.map((samples) => {
+  const made = new buckets.Buckets(asked.span);
+  for (const [at, value] of samples) made.take(at, value);
+  return { buckets: made, holds: asked.holds, factor: 1 };
+});
+const { from, to, most } = asked;
+const columns = buckets.columnsOf(kept, from, to, most, [[]]);
+done(columns.map((column) => [...column].map((cell) => (cell === undefined ? "none" : cell))));
+"""
+
+
+@pytest.fixture(scope="module")
+def module(tmp_path_factory):
+    return page_modules.bundle(
+        tmp_path_factory.mktemp("values"),
+        values="mesh/values.ts",
+        connection="mesh/connection.ts",
+        gen="gen/robomesh_pb.ts",
+        layout="ui/layout.ts",
+        buckets="features/robot/plot-buckets.ts",
+        pb=build_page.MODULES / "@bufbuild/protobuf/dist/esm/index.js",
+    )
+
+
+def text(message):
+    return base64.b64encode(message.SerializeToString()).decode()
+
+
+def messages():
+    joints = JointStates()
+    joints.joints.add(name="waist", position=0.5, velocity=-0.25, acceleration=3.0, effort=12.5)
+    joints.joints.add(name="rail/left", position=1.25)
+    joints.joints.add(name="unknown")
+    tilted = [0.36, 0.48, -0.8, 0.1, -0.8, 0.6, 0.0, 0.2, 0.48, 0.64, 0.6, 0.3, 0, 0, 0, 1]
+    upright = [0, 0, 1, 0.1, 0, 1, 0, 0.2, -1, 0, 0, 0.3, 0, 0, 0, 1]
+    kinematics = []
+    for pose in (tilted, upright, []):
+        state = schema.KinematicState(tool_to_base=pose, manipulability=0.0)
+        state.linear_velocity.x = 3.0
+        state.linear_velocity.y = 4.0
+        state.clearance.distance = 0.25
+        state.limit_margins.add(name="rail/left", lower=0.5, upper=0.25)
+        state.limit_margins.add(name="waist", lower=1.0, upper=2.0)
+        kinematics.append(("kinematics", state))
+    controller = schema.ControllerState(link=2, read_only=True, rate_hz=100.0, speed_percent=0.0)
+    controller.timestamp.GetCurrentTime()
+    controller.health.jitter_s = 0.002
+    controller.counters.units_received = 2**40
+    controller.link_reasons.add(code="x")
+    controller.program.held = True
+    lease = schema.Lease(holder="li", motion=True)
+    lease.asked_by.add(operator="wang")
+    program = schema.ProgramState(outcome=1, line=7, left_s=3.5)
+    return [
+        ("joints", joints),
+        *kinematics,
+        ("controller", controller),
+        ("controller", schema.ControllerState()),
+        ("lease", lease),
+        ("program", program),
+    ]
+
+
+def test_the_page_reads_the_same_numbers_as_the_recorder_with_the_same_names_and_units(module):
+    description = schema.Description()
+    description.joints.add(name="waist")
+    description.joints.add(name="rail/left", type=schema.Description.Joint.PRISMATIC)
+    sent = messages()
+    topics = [{"topic": topic, "schema": name} for topic, name in live_topics().items()]
+    asked = {
+        "topics": topics,
+        "description": text(description),
+        "messages": [(topic, text(message)) for topic, message in sent],
+    }
+    answers = page_modules.run(module, READ + VALUES, asked)
+    slides = prismatic_joints(description)
+    for (topic, message), found in zip(sent, answers, strict=True):
+        name = message.DESCRIPTOR.full_name
+        read = decode(SCHEMAS[name], message.SerializeToString())
+        expected = [
+            (f"{topic}/{own}", pytest.approx(value, abs=1e-12), unit_of(f"{topic}/{own}", slides))
+            for own, value in values_of(name, read)
+        ]
+        assert [tuple(each) for each in found] == expected
+    units = {name: unit for each in answers for name, _, unit in each}
+    assert units["joints/waist/effort"] == "N·m"
+    assert units["joints/rail/left/position"] == units["kinematics/margin/rail/left"] == "m"
+    assert units["kinematics/tool/pitch"] == "rad"
+    assert units["controller/health/jitter_s"] == "s"
+
+
+def test_every_topic_of_a_robot_that_has_numbers_can_be_plotted():
+    assert set(live_topics()) >= {"joints", "kinematics", "controller", "lease", "program"}
+    assert not {"frames", "joints/slow", "raw", "events", "description", "mesh"} & set(live_topics())
+
+
+@pytest.mark.parametrize("most", [400, 7000])
+def test_columns_keep_every_peak_and_break_the_line_at_a_gap(module, most):
+    random.seed(7)
+    times = [100.004 + i / 100 for i in range(6000) if not 2000 <= i < 2300]
+    samples = [(at, random.gauss(0, 1)) for at in times]
+    samples[1234] = (samples[1234][0], 99.0)
+    asked = {"series": [samples], "span": 60, "holds": 1.0, "from": 100.0, "to": 160.0, "most": most}
+    middles, low, high = page_modules.run(module, READ + COLUMNS, asked)
+    width = middles[1] - middles[0]
+    assert len(middles) <= max(most, 6000) + 2
+    expected = {}
+    for at, value in samples:
+        column = floor((at - middles[0] + width / 2) / width)
+        expected.setdefault(column, []).append(value)
+    assert max(each for each in high if isinstance(each, float | int)) == 99.0
+    assert sum(each is None for each in low) == 1
+    gap = middles[low.index(None)]
+    assert 120.0 - width <= gap <= 123.0
+    ranges = {i: (a, b) for i, (a, b) in enumerate(zip(low, high, strict=True)) if isinstance(a, float | int)}
+    assert ranges == {column: (min(values), max(values)) for column, values in expected.items()}
+
+
+def test_what_is_older_than_the_span_is_forgotten_and_a_repeated_sample_changes_nothing(module):
+    once = [(1000.004 + i / 100, float(i)) for i in range(20_000)]
+    twice = [*once, *once[-500:], (1000.0, 1e9)]
+    asked = {"series": [once, twice], "span": 60, "holds": 1.0, "from": 1130.0, "to": 1200.0, "most": 50_000}
+    middles, low, high, low_again, high_again = page_modules.run(module, READ + COLUMNS, asked)
+    assert (low, high) == (low_again, high_again)
+    kept = [at for at, value in zip(middles, low, strict=True) if isinstance(value, float | int)]
+    assert kept[0] == pytest.approx(1140.0, abs=0.03)
+    assert kept[-1] == pytest.approx(1199.99, abs=0.03)
+
+
+LAYOUTS = """
+done(asked.map((text) => {
+  const { layout: read, problem } = layout.readLayout(text);
+  return { read, problem, text: layout.layoutText(read) };
+}));
+"""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "plot=none",
+        "plot=60",
+        "plot=600,joints",
+        "plot=3600,joints/waist/position,kinematics/tool/x&plot=10,controller/rate_hz",
+        "plot=60,joints/a%2Cb%26c%3Fd/position,joints/%E8%85%B0/position",
+        "video=close,large",
+        "video=,inset",
+        "camera=top",
+        "camera=free,1.2,-1.69,0.72,0,0,0.5",
+        "hide=video,plots",
+        "plot=300,joints&video=top&camera=left&hide=plots",
+    ],
+)
+def test_a_layout_is_the_same_after_it_was_read_and_written(module, text):
+    (answer,) = page_modules.run(module, READ + LAYOUTS, [text])
+    assert answer["problem"] is None
+    assert answer["text"] == text
+
+
+def test_an_invalid_layout_is_named_and_the_default_one_is_used(module):
+    wrong = {
+        "plot=61,joints/a/b": "layout_plot",
+        "plot=60s": "layout_plot",
+        "plot=": "layout_plot",
+        "plot=060": "layout_plot",
+        "plot=60,<script>": "layout_plot",
+        "plot=60,a/b%00": "layout_plot",
+        "plot=60,a/b%E2%80%AE": "layout_plot",
+        "plot=60,a/%E0%A4%A": "layout_plot",
+        "plot=60,a/b,a/b": "layout_plot",
+        "plot=60," + ",".join(f"a/{i}" for i in range(21)): "layout_plot",
+        "plot=60,a/" + "b" * 200: "layout_plot",
+        "&".join(["plot=60"] * 7): "layout_plots",
+        "plot=60&plot=none": "layout_plots",
+        "video=front,huge": "layout_video",
+        "video=../x": "layout_video",
+        "camera=": "layout_camera",
+        "camera=free,1,2,3": "layout_camera",
+        "camera=free,1,2,3,1,2,3": "layout_camera",
+        "camera=free,1e9,2,3,0,0,0": "layout_camera",
+        "camera=free,NaN,2,3,0,0,0": "layout_camera",
+        "camera=free,,,,,,": "layout_camera",
+        "hide=stop": "layout_hide",
+        "zoom=3": "layout_key",
+        "__proto__=1": "layout_key",
+        "plot": "layout_plot",
+        "plot=60," + "a/b" * 9000: "layout_long",
+    }
+    answers = page_modules.run(module, READ + LAYOUTS, list(wrong))
+    assert [each["problem"]["text"] for each in answers] == list(wrong.values())
+    assert {each["text"] for each in answers} == {""}

@@ -1,0 +1,109 @@
+// Layout of the robot's page: in the address, so that a link opens the same on another machine.
+
+import { signal } from "@preact/signals";
+import { useMemo, useState } from "preact/hooks";
+import { p } from "../../i18n/plots";
+import type { Layout, LayoutProblem } from "../../ui/layout";
+import { DEFAULT_LAYOUT, layoutText, PANELS, readLayout } from "../../ui/layout";
+import { layoutQuery, setLayoutQuery } from "../../ui/route";
+import "./layout-panel.css";
+
+/** Whether the panel is open, for all robots. */
+const shown = signal(false);
+
+export interface LayoutState {
+  layout: Layout;
+  problem: LayoutProblem | null;
+  change: (changed: Partial<Layout>) => void;
+}
+
+/** Return the layout in the address, which a change rewrites. */
+export function useLayout(): LayoutState {
+  const query = layoutQuery.value;
+  const read = useMemo(() => readLayout(query), [query]);
+  const change = (changed: Partial<Layout>) =>
+    setLayoutQuery(layoutText({ ...readLayout(layoutQuery.peek()).layout, ...changed }));
+  return { ...read, change };
+}
+
+/** Return the classes of the page's grid. */
+export function layoutClasses({ place, hidden }: Layout): string {
+  const video = hidden.includes("video") ? "no-video" : `video-${place}`;
+  return hidden.includes("plots") ? `${video} no-plots` : video;
+}
+
+export function LayoutButton() {
+  return (
+    <button
+      class="note-button"
+      aria-expanded={shown.value}
+      title={p("layout_hint")}
+      onClick={() => (shown.value = !shown.value)}
+    >
+      {p("layout_open")}
+    </button>
+  );
+}
+
+export function LayoutPanel(props: LayoutState) {
+  const { layout, problem, change } = props;
+  const [told, setTold] = useState(false);
+  if (!shown.value && !problem) return null;
+  const copy = () =>
+    navigator.clipboard?.writeText(location.href).then(
+      () => setTold(true),
+      () => setTold(false),
+    );
+  return (
+    <section class="panel layout-panel" aria-label={p("layout")}>
+      {problem && (
+        <div class="layout-row">
+          <p class="layout-problem" role="alert">
+            <span class="shape warning" aria-hidden="true" />
+            {p("layout_wrong", { why: p(problem.text, problem.values) })}
+          </p>
+          <button class="action" onClick={() => setLayoutQuery("")}>
+            {p("layout_reset")}
+          </button>
+        </div>
+      )}
+      {shown.value && (
+        <div class="layout-row">
+          {PANELS.map((each) => (
+            <label key={each}>
+              <input
+                type="checkbox"
+                checked={!layout.hidden.includes(each)}
+                onChange={(event) =>
+                  change({
+                    hidden: event.currentTarget.checked
+                      ? layout.hidden.filter((other) => other !== each)
+                      : PANELS.filter((other) => other === each || layout.hidden.includes(other)),
+                  })
+                }
+              />
+              {p(each === "video" ? "panel_video" : "panel_plots")}
+            </label>
+          ))}
+          {navigator.clipboard && (
+            <button class="action" onClick={() => void copy()}>
+              {p(told ? "copied" : "copy_link")}
+            </button>
+          )}
+          {!problem && (
+            <button
+              class="action"
+              disabled={layoutText(layout) === layoutText(DEFAULT_LAYOUT)}
+              onClick={() => setLayoutQuery("")}
+            >
+              {p("layout_reset")}
+            </button>
+          )}
+          <button class="quiet layout-close" onClick={() => (shown.value = false)}>
+            {p("close")}
+          </button>
+        </div>
+      )}
+    </section>
+  );
+}
