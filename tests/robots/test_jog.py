@@ -15,6 +15,8 @@ from robots.programs.jog_steps import AHEAD_M, AHEAD_RAD, Jog
 from robots.programs.statements import StepFrame
 from robots.urdf.write import to_urdf
 
+pytestmark = pytest.mark.slow
+
 STARTS = {"pt600": [-40, 90, -90, 10, 0], "puma560": [0, -45, 170, 0, 30, 0]}
 SITE = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 
