@@ -60,3 +60,17 @@ def run(module: Path, script: str, asked: object, **environment: str) -> object:
     )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
+
+
+ASK = """
+const page = Object.assign({}, ...Object.values(await import(process.argv[1])));
+const chunks = [];
+for await (const chunk of process.stdin) chunks.push(chunk);
+const asked = JSON.parse(Buffer.concat(chunks).toString());
+const answer = (value) => process.stdout.write(JSON.stringify(value), () => process.exit(0));
+"""
+
+
+def ask(module: Path, script: str, asked: object) -> object:
+    """Return what a script gives to `answer`; it has all exports of the modules in `page`, and `asked`."""
+    return run(module, ASK + script, asked)

@@ -86,3 +86,18 @@ def tools(page):
     settled(page)
     drawn = np.reshape(json.loads(page.locator(".define-scene canvas").get_attribute("data-tool")), (4, 4))
     return drawn, np.array(json.loads(page.locator(".tool-at").get_attribute("data-tool")))
+
+
+def paste(field, text):
+    """Paste a text into a field, as from a spreadsheet."""
+    field.evaluate(
+        """(element, text) => {
+            const data = new DataTransfer();
+            data.setData("text/plain", text);
+            const how = { clipboardData: data, bubbles: true, cancelable: true };
+            const event = new ClipboardEvent("paste", how);
+            element.focus();
+            if (element.dispatchEvent(event)) document.execCommand("insertText", false, text);
+        }""",
+        text,
+    )

@@ -19,11 +19,13 @@ from tests.browser.define.page import (
     drop,
     field,
     opened,
+    paste,
     settled,
     shape,
     tab,
     tools,
 )
+from tests.browser.robot_page import serious
 from tests.robots.test_dh import KUKA_LIKE
 from tests.site import wait_until
 
@@ -136,6 +138,9 @@ def test_a_wrong_limit_is_told_marked_and_found_again_by_a_click(open_page):
     expect(page.locator(".problem")).to_contain_text(
         "joint 'elbow' limits = [120, 110]: the lower must be below the upper"
     )
+    expect(page.get_by_role("list", name="Problems in the table")).to_contain_text("lower must be below")
+    expect(page.get_by_label("speed, °/s of elbow")).to_have_value("120")
+    expect(page.get_by_role("columnheader", name="speed °/s")).to_be_visible()
     expect(field(page, "joint/2/limits/0")).to_have_attribute("aria-invalid", "true")
     expect(field(page, "joint/2/limits/1")).to_have_attribute("aria-invalid", "true")
     expect(field(page, "joint/2/home")).to_have_attribute("aria-invalid", "false")
@@ -160,6 +165,37 @@ def test_what_is_no_number_stays_marked_and_is_not_saved(open_page):
         page.keyboard.press("Escape")
         expect(page.locator(".checks")).to_contain_text("Nothing is wrong with it.")
         expect(cell).to_have_attribute("aria-invalid", "false")
+
+
+def test_a_pasted_table_is_shown_as_it_is_read_fills_the_rows_and_is_undone(open_page):
+    page = opened(open_page, "pt500", drawn=False)
+    dialog = page.get_by_role("dialog", name="Table from a spreadsheet")
+    button(page, "Paste a table…").click()
+    text = dialog.get_by_role("textbox")
+    for hostile, words in (("1\t2\n" * 2_500_000, "10,000,000 characters"), ("1\t2\n" * 10_000, "64 rows")):
+        paste(text, hostile)
+        expect(dialog.get_by_role("alert")).to_contain_text(words)
+        expect(button(dialog, "Fill the table")).to_be_disabled()
+    button(dialog, "Cancel").click()
+    # Into the cells from the second row on.
+    rows = "a (m)\td\tα\tmin\tmax\n0,25\t1,5\tx\t-30\t120\n" + "0\t2\t90\t-9\t9\n" * 4
+    paste(field(page, "joint/1/a"), rows)
+    words = dialog.get_by_role("status")
+    expect(words).to_contain_text("Row 2, α: “x” cannot be read as Link twist α.")
+    expect(words).to_contain_text("5 rows go into joints 2 to 6.")
+    expect(words).to_contain_text("1 joint is added.")
+    expect(dialog.get_by_role("table")).to_contain_text("250 mm")
+    button(dialog.get_by_role("group", name="Lengths without a unit"), "m").click()
+    assert serious(page) == []
+    button(dialog, "Fill the table").click()
+    expect(page.locator(".outcome")).to_contain_text("5 rows of the pasted table were read")
+    paths = ("a", "alpha", "d", "limits/0", "limits/1")
+    values = [field(page, f"joint/1/{path}").input_value() for path in paths]
+    assert values == ["250", "0", "1500", "−30", "120"]
+    expect(page.locator(".dh-table tbody tr")).to_have_count(6)
+    button(page, "Undo").click()
+    expect(page.locator(".dh-table tbody tr")).to_have_count(5)
+    expect(field(page, "joint/1/limits/1")).to_have_value("130")
 
 
 def test_a_shape_in_the_wrong_unit_is_told(open_page):

@@ -16,6 +16,7 @@ import { MissingFiles } from "./missing-files";
 import { NewRobot } from "./new-robot";
 import { loading, openRobot } from "./open-robot";
 import { PartDetails } from "./part-details";
+import { PasteTable } from "./paste-table";
 import { PositionsPanel } from "./positions-panel";
 import { ProblemsPanel } from "./problems-panel";
 import { RobotTab } from "./robot-tab";
@@ -93,6 +94,7 @@ function DraftPanels() {
           {tabs[tab.value]()}
         </div>
       </section>
+      <PasteTable />
     </>
   );
 }

@@ -1,70 +1,144 @@
-// All D-H rows in an editable table.
+// All D-H rows in an editable table, with the limits, speed and acceleration of each joint.
 
+import { useId } from "preact/hooks";
 import { d } from "../../i18n/define";
 import { problemsAt } from "./checks";
-import { angleUnit, jointUnit } from "./description";
+import type { Joint } from "./description";
+import { jointUnit } from "./description";
+import { COLUMNS, type Column, columnUnit, jointValue, setJointValue } from "./dh-columns";
 import { draft, editDraft } from "./draft";
 import { NumberField } from "./fields";
+import { isTable, openPasteTable } from "./paste-table";
 import { choosePart, chosenPart } from "./selection";
 
-const COLUMNS = ["a", "alpha", "d", "theta"] as const;
-const HEADS = { a: "a", alpha: "α", d: "d", theta: "θ" };
-
 export function DhTable() {
+  const words = useId();
   const now = draft.value;
   if (!now || now.description.joint.length === 0) return null;
   const { joint: joints, units } = now.description;
-  const angle = angleUnit(units);
-  const unitOf = (column: (typeof COLUMNS)[number]) => (column === "a" || column === "d" ? units.length : angle);
+  const mixed = new Set(joints.map(({ type }) => type)).size > 1;
+  const heads = COLUMNS.map((column) => ({
+    column,
+    units: [...new Set(joints.map((each) => columnUnit(column, each, units)))],
+  }));
   return (
-    <table class="dh-table" aria-label={d("dh_table")}>
-      <thead>
-        <tr>
-          <th scope="col">{d("joint")}</th>
-          {COLUMNS.map((column) => (
-            <th key={column} scope="col">
-              {HEADS[column]} <span class="unit">{unitOf(column)}</span>
-            </th>
-          ))}
-        </tr>
-      </thead>
-      <tbody>
-        {joints.map((joint, index) => (
-          <tr key={index} class={chosenPart.value === index ? "chosen" : ""}>
-            <th scope="row">
-              <button class="row-name" onClick={() => choosePart(index)}>
-                {joint.name || "–"}
-                {problemsAt(`joint/${index}`).length > 0 && <span class="shape warning" aria-hidden="true" />}
-              </button>
-            </th>
-            {COLUMNS.map((column) => {
-              const varies = column === (joint.type === "rotary" ? "theta" : "d");
-              return (
-                <td
-                  key={column}
-                  class={varies ? "varies" : ""}
-                  title={varies ? d("variable", { unit: jointUnit(joint.type, units) }) : ""}
-                >
-                  <NumberField
-                    quiet
-                    path={`joint/${index}/${column}`}
-                    label={d("field_of", { field: HEADS[column], name: joint.name })}
-                    value={joint[column]}
-                    step={unitOf(column) === "m" || unitOf(column) === "rad" ? 0.01 : 1}
-                    onFocus={() => (chosenPart.value = index)}
-                    set={(value) =>
-                      editDraft(({ description }) => {
-                        const row = description.joint[index];
-                        if (row) row[column] = value;
-                      }, `joint/${index}/${column}`)
-                    }
+    <>
+      <div class="dh-head">
+        <h3>{d("dh_head")}</h3>
+        <button class="quiet" title={d("paste_hint")} onClick={() => openPasteTable()}>
+          {d("paste_button")}
+        </button>
+      </div>
+      <section
+        class="dh-scroll"
+        onPaste={(event) => {
+          const text = event.clipboardData?.getData("text/plain") ?? "";
+          if (!isTable(text)) return;
+          event.preventDefault();
+          openPasteTable(text, typeof chosenPart.value === "number" ? chosenPart.value : 0);
+        }}
+        tabIndex={0}
+        aria-label={d("dh_table")}
+      >
+        <table class={`dh-table ${mixed ? "mixed" : ""}`} aria-label={d("dh_table")}>
+          <thead>
+            <tr>
+              <th scope="col">{d("joint")}</th>
+              {heads.map(({ column, units: shown }) => (
+                <th key={column.key} scope="col" class={column.group} title={column.title()}>
+                  {column.head()} <span class="unit">{shown.join(", ")}</span>
+                </th>
+              ))}
+            </tr>
+          </thead>
+          <tbody>
+            {joints.map((joint, index) => (
+              <tr key={index} class={chosenPart.value === index ? "chosen" : ""}>
+                <th scope="row">
+                  <button class="row-name" title={joint.name} onClick={() => choosePart(index)}>
+                    <span>{joint.name || "–"}</span>
+                    {problemsAt(`joint/${index}`).length > 0 && <span class="shape warning" aria-hidden="true" />}
+                  </button>
+                </th>
+                {heads.map(({ column, units: shown }) => (
+                  <Cell
+                    key={column.key}
+                    column={column}
+                    joint={joint}
+                    index={index}
+                    unit={columnUnit(column, joint, units)}
+                    showUnit={shown.length > 1}
+                    words={words}
                   />
-                </td>
-              );
-            })}
-          </tr>
-        ))}
-      </tbody>
-    </table>
+                ))}
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      </section>
+      <TableProblems id={words} joints={joints} />
+    </>
+  );
+}
+
+function Cell(props: {
+  column: Column;
+  joint: Joint;
+  index: number;
+  unit: string;
+  /** Whether the rows of this column differ in their units. */
+  showUnit: boolean;
+  /** Id of the problems in words. */
+  words: string;
+}) {
+  const { column, joint, index, unit } = props;
+  const units = draft.value?.description.units;
+  const varies = column.key === (joint.type === "rotary" ? "theta" : "d");
+  const path = `joint/${index}/${column.path}`;
+  return (
+    <td
+      class={`${column.group} ${varies ? "varies" : ""}`}
+      title={varies && units ? d("variable", { unit: jointUnit(joint.type, units) }) : ""}
+    >
+      <NumberField
+        quiet
+        path={path}
+        label={d("field_of", { field: `${column.head()}, ${unit}`, name: joint.name })}
+        value={jointValue(joint, column.key)}
+        describedBy={props.words}
+        {...(props.showUnit && { unit })}
+        step={/^(m|rad)/.test(unit) && !unit.startsWith("mm") ? 0.01 : column.step}
+        onFocus={() => (chosenPart.value = index)}
+        set={(value) =>
+          editDraft(({ description }) => {
+            const row = description.joint[index];
+            if (row) setJointValue(row, column.key, value);
+          }, path)
+        }
+      />
+    </td>
+  );
+}
+
+/** Problems of the table's cells in words, each with its joint and column. */
+function TableProblems({ id, joints }: { id: string; joints: readonly Joint[] }) {
+  const found = joints.flatMap((joint, index) =>
+    [...new Set(COLUMNS.map(({ path }) => path))].flatMap((path) => {
+      const column = COLUMNS.find((each) => each.path === path);
+      return problemsAt(`joint/${index}/${path}`)
+        .filter(({ path: at }) => at[0] === "joint" && at[1] === index && at.length > 2)
+        .map(({ text }) => ({ text, name: joint.name, head: column?.title() ?? "" }));
+    }),
+  );
+  const lines = [...new Map(found.map((each) => [`${each.name} ${each.text}`, each])).values()];
+  return (
+    <ul id={id} class="dh-problems" aria-label={d("dh_problems")} hidden={lines.length === 0}>
+      {lines.map(({ name, head, text }) => (
+        <li key={`${name} ${text}`} class="problem-word">
+          <span class="shape warning" aria-hidden="true" />
+          <span>{text.includes(name) ? text : d("cell_problem", { name, head, text })}</span>
+        </li>
+      ))}
+    </ul>
   );
 }

@@ -18,7 +18,15 @@ interface Place {
 
 /** A number with its unit. Arrow keys step it; invalid text stays, marked, until it is corrected or Escape. */
 export function NumberField(
-  props: Place & { value: number; unit?: string; step?: number; set: (value: number) => void; onFocus?: () => void },
+  props: Place & {
+    value: number;
+    unit?: string;
+    step?: number;
+    /** Id of an element with the field's problems in words. */
+    describedBy?: string;
+    set: (value: number) => void;
+    onFocus?: () => void;
+  },
 ) {
   const id = useId();
   const [being, setBeing] = useState<string | null>(null);
@@ -56,6 +64,7 @@ export function NumberField(
           data-path={props.path}
           value={text}
           aria-invalid={wrong !== ""}
+          aria-describedby={wrong ? props.describedBy : undefined}
           title={wrong}
           onFocus={() => props.onFocus?.()}
           onInput={(event) => {

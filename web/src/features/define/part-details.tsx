@@ -3,7 +3,7 @@
 import { d } from "../../i18n/define";
 import { Choice } from "../../ui/choice";
 import { FileButton } from "../../ui/file-button";
-import type { Body, Description, Joint, Range } from "./description";
+import type { Body, Description, Joint } from "./description";
 import { angleUnit, jointUnit } from "./description";
 import { draft, editDraft, endUndoStep } from "./draft";
 import { chosen, takeShapeFor } from "./dropped-files";
@@ -13,8 +13,6 @@ import { fileName } from "./kinematic-chain";
 import { shapeOf } from "./mesh-files";
 import { chosenBody, chosenJoint, chosenLinkName, chosenPart } from "./selection";
 
-const MOTION = ["max_speed", "max_acceleration", "max_jerk"] as const;
-const PER_SECOND = { max_speed: "/s", max_acceleration: "/s²", max_jerk: "/s³" };
 const SCALES: Record<string, number> = { mm: 0.001, cm: 0.01, m: 1, inch: 0.0254 };
 
 export function PartDetails() {
@@ -40,21 +38,6 @@ function JointDetails({ joint, index, description }: { joint: Joint; index: numb
       const own = now.description.joint[index];
       if (own) change(own);
     }, `${path}/${field}`);
-  const limit = (which: 0 | 1) => (
-    <NumberField
-      path={`${path}/limits/${which}`}
-      label={d(which === 0 ? "lower" : "upper")}
-      value={joint.limits[which]}
-      unit={unit}
-      set={(value) =>
-        set(`limits/${which}`, (own) => {
-          const limits: Range = [...own.limits];
-          limits[which] = value;
-          own.limits = limits;
-        })
-      }
-    />
-  );
   return (
     <Section
       title={`${d("joint")} ${index + 1}`}
@@ -94,23 +77,16 @@ function JointDetails({ joint, index, description }: { joint: Joint; index: numb
             set={(title) => set(key, (own) => void (own[key] = title))}
           />
         ))}
-        {limit(0)}
-        {limit(1)}
+        <NumberField
+          path={`${path}/max_jerk`}
+          label={d("max_jerk")}
+          value={joint.max_jerk}
+          unit={`${unit}/s³`}
+          step={10}
+          set={(value) => set("max_jerk", (own) => void (own.max_jerk = value))}
+        />
       </div>
-      <div class="grid-3">
-        {MOTION.map((key) => (
-          <NumberField
-            key={key}
-            path={`${path}/${key}`}
-            label={d(key)}
-            value={joint[key]}
-            unit={unit + PER_SECOND[key]}
-            step={10}
-            set={(value) => set(key, (own) => void (own[key] = value))}
-          />
-        ))}
-      </div>
-      {["name", "title", "title_zh", "type", "a", "alpha", "d", "theta", "limits", "home", ...MOTION].map((key) => (
+      {["name", "title", "title_zh", "type", "home", "max_jerk"].map((key) => (
         <ProblemWords key={key} path={`${path}/${key}`} />
       ))}
     </Section>

@@ -10,6 +10,7 @@ import "./scene-panel.css";
 import "./positions-panel.css";
 import "./fields.css";
 import "./dh-table.css";
+import "./paste-table.css";
 import "./tabs.css";
 import "./part-details.css";
 import "./collisions-tab.css";
