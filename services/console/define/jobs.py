@@ -22,6 +22,7 @@ from robots.joints import joints_of
 from robots.mesh_inspection import mesh_findings
 from robots.meshes.mesh import Mesh
 from robots.meshes.read import read_mesh
+from robots.meshes.surface_points import surface_points
 from robots.meshes.unit_guess import guess
 from robots.meshes.write_glb import glb_of
 from robots.model import RobotModel, build_model, link_placements, tool_placement
@@ -35,6 +36,7 @@ from services.console.errors import RefusedRequest
 Json = dict[str, Any]
 
 _MOST_UNZIPPED = 500_000_000
+_POINTS = 200  # of a mesh's surface; the page compares those of each two parts
 
 
 def mesh(store: Store, folder: Path, request: Json) -> Json:
@@ -52,6 +54,7 @@ def mesh(store: Store, folder: Path, request: Json) -> Json:
     return {
         "glb": put(store, glb_of(found)),
         **mesh_summary(found),
+        "points": [[float(f"{value:.5g}") for value in point] for point in surface_points(found, _POINTS)],
         "missing": list(found.missing),
         "scale": guessed.scale_m,
         "up": guessed.up,

@@ -14,8 +14,8 @@ const TEXTS = {
   ],
   start_files: ["From link files", "从连杆文件开始"],
   start_files_words: [
-    "Drop them here, all at once: the first by name becomes the base, each other one a link with a joint of its own. VRML, 3DS, STL, OBJ, PLY, DAE, GLB, DXF, STEP, with the files that they refer to.",
-    "一次拖入全部文件：按名称第一个为基座，其余各为一个连杆及其关节。支持 VRML、3DS、STL、OBJ、PLY、DAE、GLB、DXF、STEP 及其引用的文件。",
+    "Drop them here, all at once: the first in the order becomes the base, each other one a link with a joint of its own. The order is guessed from names and shapes, and can be changed. VRML, 3DS, STL, OBJ, PLY, DAE, GLB, DXF, STEP, with the files that they refer to.",
+    "一次拖入全部文件：第一个为基座，其余各为一个连杆及其关节。顺序按名称和外形推测，可更改。支持 VRML、3DS、STL、OBJ、PLY、DAE、GLB、DXF、STEP 及其引用的文件。",
   ],
   choose_files: ["Choose files…", "选择文件…"],
   start_urdf: ["From a URDF or a zip", "从 URDF 或 zip 开始"],
@@ -97,7 +97,29 @@ const TEXTS = {
   ],
 
   chain: ["Chain", "运动链"],
-  chain_hint: ["Alt+↑ and Alt+↓ move a joint; Delete removes it.", "Alt+↑/↓ 移动关节，Delete 删除。"],
+  chain_hint: [
+    "Drag a joint to its place, or onto the base to make it the base. Alt+↑ and Alt+↓ move it; Delete removes it.",
+    "将关节拖到所需位置，或拖到基座上使其成为基座。Alt+↑/↓ 移动关节，Delete 删除。",
+  ],
+  drag_hint: ["Drag to order", "拖动排序"],
+  now_at: ["{name} is joint {number} of {count}.", "{name} 为第 {number} 个关节，共 {count} 个。"],
+  is_removed: ["{name} is removed.", "{name} 已删除。"],
+  is_base: ["{name} is the base.", "{name} 为基座。"],
+  order_names: ["Order guessed from the names: {order}.", "顺序按名称推测：{order}。"],
+  order_geometry: [
+    "Order guessed from the shapes: from the base, the lower or larger end, each part touches the next: {order}.",
+    "顺序按外形推测：从较低或较大的一端（基座）起，依次为相互接触的部件：{order}。",
+  ],
+  order_both: [
+    "Order guessed from the names, and for parts whose names say nothing from which parts touch: {order}.",
+    "顺序按名称推测；名称无法判断的部件按接触关系推测：{order}。",
+  ],
+  order_alphabet: [
+    "Neither names nor shapes tell the order. Alphabetical: {order}.",
+    "名称和外形均无法判断顺序，按字母排列：{order}。",
+  ],
+  order_unnamed: ["The names of these say nothing: {names}.", "以下名称无法判断：{names}。"],
+  order_correct: ["Drag a row of the chain to correct it.", "可在运动链中拖动更正。"],
   base: ["Base", "基座"],
   tool: ["Tool", "工具"],
   add_joint: ["Add joint", "添加关节"],

@@ -21,6 +21,8 @@ export interface Body {
 
 export interface Joint {
   name: string;
+  /** Whether the page gave the name, by the joint's place; it is never saved. */
+  numbered: boolean;
   /** For people, in English and Chinese; empty: the name. */
   title: string;
   title_zh: string;
@@ -149,7 +151,7 @@ export function concise(from: Description): object {
     ...(from.provenance_zh && { provenance_zh: from.provenance_zh }),
     units: from.units,
     base: { ...shape(from.base), ...(!isZero(from.base.pose) && { pose: from.base.pose }) },
-    joint: from.joint.map(({ name, title, title_zh, ...row }) => ({
+    joint: from.joint.map(({ name, numbered: _, title, title_zh, ...row }) => ({
       name,
       ...(title && { title }),
       ...(title_zh && { title_zh }),
@@ -212,6 +214,7 @@ const USUAL = {
 export function newJoint(name: string, type: JointType, units: Units): Joint {
   return {
     name,
+    numbered: false,
     title: "",
     title_zh: "",
     type,

@@ -9,6 +9,8 @@ import { draft, editDraft, identity, isOpen, openDraft } from "./draft";
 import { insertJoint, nameFromFile, unusedName } from "./edits";
 import { cacheFile } from "./file-cache";
 import { baseName, missingFiles, readShape, resolvePath, setShape } from "./mesh-files";
+import type { PartOrder } from "./part-order";
+import { guessOrder, stemOf } from "./part-order";
 import { choosePart, resetSelection } from "./selection";
 import type { MeshInfo } from "./server-requests";
 import { importRobot, mesh, unzip, upload } from "./server-requests";
@@ -19,6 +21,7 @@ const SHAPE = /\.(wrl|wrz|vrml|3ds|stl|obj|ply|off|dae|glb|gltf|dxf|ste?p|ige?s)
 const USEFUL = [SHAPE, PART_OF_SHAPE, /\.(urdf|toml|zip)$/i];
 const MESH_FOLDER = "meshes";
 const MOST_NAMED = 6; // of the files that are not taken
+const MOST_ORDERED = 10; // that a guessed order names
 
 /** A file with its path in the dropped folder, or its name. */
 export interface Dropped {
@@ -195,9 +198,13 @@ async function takeShapes(sent: Map<string, string>): Promise<void> {
   }
   for (const path of newPaths) if (!infos.has(path) && !parts.has(path)) delete added[path];
   const links = draft.value?.description.joint.length ?? 0;
+  const order = guessOrder([...infos].map(([path, info]) => ({ path, points: pointsOf(info) })));
   editDraft((now) => {
     Object.assign(now.files, added); // it may have changed while these were read
-    for (const [path, info] of infos) addLink(now.description, path, info);
+    for (const path of order.paths) {
+      const info = infos.get(path);
+      if (info) addLink(now.description, path, info);
+    }
   });
   if ((draft.value?.description.joint.length ?? 0) > links) choosePart(links);
   const files = draft.value?.files ?? {};
@@ -205,6 +212,23 @@ async function takeShapes(sent: Map<string, string>): Promise<void> {
   const whole =
     sent.size === 1 ? d("read_one", { name: [...sent.keys()][0] ?? "" }) : d("read_done", { count: sent.size });
   if (fileNotices.value.length === 0) notice("done", whole);
+  if (order.paths.length > 1) notice("done", orderText(order));
+}
+
+/** Return points of a mesh's surface [m], z up: parts of an assembly lie where they touch. */
+function pointsOf({ points, scale, up }: MeshInfo): number[][] {
+  return points.map(([x, y, z]) => (up === "y" ? [x, -z, y] : [x, y, z]).map((value) => value * scale));
+}
+
+/** Say that an order is a guess, and how it was guessed. */
+function orderText({ paths, by, unnamed }: PartOrder): string {
+  const shown = (all: readonly string[]) => {
+    const names = all.map((path) => stemOf(path));
+    return names.slice(0, MOST_ORDERED).join(" → ") + (names.length > MOST_ORDERED ? " → …" : "");
+  };
+  const left =
+    by === "names" && unnamed.length > 0 ? ` ${d("order_unnamed", { names: unnamed.map(stemOf).join(", ") })}` : "";
+  return `${d(`order_${by}`, { order: shown(paths) })}${left} ${d("order_correct")}`;
 }
 
 /** Read new mesh files; those that another refers to (Inline) are its parts, not links. */

@@ -1,7 +1,7 @@
 // Edits of a description that change several values. Each changes the copy that it receives.
 
-import type { Description, Joint, JointType, Pose, Triple, Units } from "./description";
-import { linkName, linkNames, metres, newJoint, radians, tidy, usualLimits } from "./description";
+import type { Body, Description, Joint, JointType, Pose, Triple, Units } from "./description";
+import { BASE, linkName, metres, newJoint, radians, tidy, usualLimits } from "./description";
 
 /** Return a free name: "joint3". */
 export function unusedName(stem: string, taken: readonly string[]): string {
@@ -14,11 +14,11 @@ export function nameFromFile(path: string): string {
   return stem.replace(/[^A-Za-z0-9_.-]+/g, "_").replace(/^[^A-Za-z0-9]+/, "") || "link";
 }
 
-/** Insert a joint and its link into the chain; return the joint. */
+/** Insert a joint and its link into the chain, with a name by its place; return the joint. */
 export function insertJoint(into: Description, at: number): Joint {
-  const names = into.joint.map((joint) => joint.name);
-  const joint = newJoint(unusedName("joint", [...names, ...linkNames(into)]), "rotary", into.units);
+  const joint = { ...newJoint("", "rotary", into.units), numbered: true };
   into.joint.splice(at, 0, joint);
+  renumber(into);
   return joint;
 }
 
@@ -31,11 +31,63 @@ export function removeJoint(from: Description, at: number): void {
   from.collision.ignore = from.collision.ignore.filter((pair) => !pair.includes(link));
   for (const constraint of from.constraint) delete constraint.joints[gone.name];
   from.constraint = from.constraint.filter((constraint) => Object.keys(constraint.joints).length > 0);
+  renumber(from);
 }
 
 export function moveJoint(of: Description, from: number, to: number): void {
   const [moved] = of.joint.splice(from, 1);
   if (moved) of.joint.splice(to, 0, moved);
+  renumber(of);
+}
+
+/** Make a joint's link the base: each link before it, and the base, move on by one joint. */
+export function makeBase(of: Description, at: number): void {
+  const links = of.joint.map(({ link }) => link);
+  const chosen = links[at];
+  if (!chosen) return;
+  const { name, ...body } = chosen;
+  const { pose: place, ...base } = of.base;
+  const moved = [{ ...base, name: baseLinkName(base, of) }, ...links.slice(0, at)];
+  moved.forEach((link, index) => {
+    const joint = of.joint[index];
+    if (joint) joint.link = link;
+  });
+  of.base = { ...body, pose: place };
+}
+
+/** Return a name for the base's shape when it becomes a link's. */
+function baseLinkName({ mesh }: Body, of: Description): string {
+  if (!mesh) return "";
+  const name = nameFromFile(mesh);
+  const taken = [BASE, "tool", ...of.joint.flatMap((joint) => [joint.name, joint.link.name])];
+  return taken.includes(name) ? unusedName(`${name}_`, taken) : name;
+}
+
+/** Name joints whose names the page gave by their places: "joint1", "joint2"; names that a user typed stay.
+ *
+ * @param reserved A name that another joint or link is about to get. */
+export function renumber(of: Description, reserved = ""): void {
+  const typed = [BASE, "tool", reserved];
+  for (const { name, numbered, link } of of.joint) typed.push(...(numbered ? [link.name] : [name, link.name || name]));
+  const joints = new Map<string, string>();
+  const links = new Map<string, string>();
+  of.joint.forEach((joint, index) => {
+    if (!joint.numbered) return;
+    const place = `joint${index + 1}`;
+    const name = typed.includes(place) ? unusedName(`${place}_`, typed) : place;
+    joints.set(joint.name, name);
+    if (!joint.link.name) links.set(joint.name, name);
+    joint.name = name;
+  });
+  // All at once: two joints may exchange their names.
+  const newLink = (link: string) => links.get(link) ?? link;
+  for (const frame of of.frame) frame.link = newLink(frame.link);
+  of.collision.ignore = of.collision.ignore.map((pair) => pair.map(newLink) as [string, string]);
+  for (const constraint of of.constraint) {
+    constraint.joints = Object.fromEntries(
+      Object.entries(constraint.joints).map(([key, factor]) => [joints.get(key) ?? key, factor]),
+    );
+  }
 }
 
 /** Change a joint's type; its limits are reset, because the unit differs. */
@@ -48,6 +100,8 @@ export function setType(of: Description, at: number, type: JointType): void {
 export function renameJoint(of: Description, at: number, name: string): void {
   const joint = of.joint[at];
   if (!joint) return;
+  joint.numbered = false;
+  renumber(of, name);
   const [old, oldLink] = [joint.name, linkName(joint)];
   joint.name = name;
   linkRenamed(of, oldLink, linkName(joint));
@@ -56,11 +110,13 @@ export function renameJoint(of: Description, at: number, name: string): void {
       Object.entries(constraint.joints).map(([key, factor]) => [key === old ? name : key, factor]),
     );
   }
+  renumber(of);
 }
 
 export function renameLink(of: Description, at: number, name: string): void {
   const joint = of.joint[at];
   if (!joint) return;
+  renumber(of, name);
   const old = linkName(joint);
   joint.link.name = name === joint.name ? "" : name;
   linkRenamed(of, old, linkName(joint));

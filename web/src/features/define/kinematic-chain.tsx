@@ -1,44 +1,137 @@
 // The kinematic chain as a list: the base, each joint with its link, the tool.
 
+import { signal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
-import { useState } from "preact/hooks";
 import { d } from "../../i18n/define";
 import { problemsAt } from "./checks";
-import type { Joint } from "./description";
+import type { Description, Joint } from "./description";
 import { linkName } from "./description";
-import { draft, editDraft } from "./draft";
-import { insertJoint, moveJoint, removeJoint } from "./edits";
+import { draft, editDraft, endUndoStep } from "./draft";
+import { insertJoint, makeBase, moveJoint, removeJoint } from "./edits";
 import type { Part } from "./selection";
-import { choosePart, chosenPart } from "./selection";
+import { choosePart, chosenPart, sliderPositions } from "./selection";
+
+/** What the last change of the order was, for screen readers. */
+const announced = signal("");
+/** The joint that is being dragged, how far, and the row below the pointer; null: none. */
+const dragged = signal<{ from: number; by: number; over: Part } | null>(null);
+const DRAG_PX = 5; // a pointer that moves less is a click
+const EDGE_PX = 32; // of the list, where it scrolls
+
+/** Change the order of the joints in one step of undo. `order` does the same to a list; sliders stay with their joints. */
+function arrange(change: (description: Description) => void, order: (list: unknown[]) => void): void {
+  const before = draft.value?.description.joint ?? [];
+  const sliders: unknown[] = before.map(({ name }) => sliderPositions.value.get(name));
+  order(sliders);
+  endUndoStep();
+  editDraft((now) => change(now.description));
+  const after = draft.value?.description.joint ?? [];
+  const kept = after.flatMap(({ name }, index): [string, number][] => {
+    const position = sliders[index];
+    return typeof position === "number" ? [[name, position]] : [];
+  });
+  sliderPositions.value = new Map(kept);
+}
+
+function announce(at: number): void {
+  const joints = draft.value?.description.joint ?? [];
+  announced.value = d("now_at", { name: joints[at]?.name ?? "", number: at + 1, count: joints.length });
+}
 
 function add(at: number): void {
-  editDraft((now) => void insertJoint(now.description, at));
+  arrange(
+    (description) => void insertJoint(description, at),
+    (list) => list.splice(at, 0, undefined),
+  );
   choosePart(at);
+  announce(at);
 }
 
 function move(from: number, to: number, count: number): void {
   if (to < 0 || to >= count || to === from) return;
-  editDraft((now) => moveJoint(now.description, from, to));
+  arrange(
+    (description) => moveJoint(description, from, to),
+    (list) => list.splice(to, 0, ...list.splice(from, 1)),
+  );
   choosePart(to);
+  announce(to);
 }
 
 function remove(at: number, count: number): void {
-  editDraft((now) => removeJoint(now.description, at));
+  const name = draft.value?.description.joint[at]?.name ?? "";
+  arrange(
+    (description) => removeJoint(description, at),
+    (list) => list.splice(at, 1),
+  );
   choosePart(count > 1 ? Math.min(at, count - 2) : "base");
+  announced.value = d("is_removed", { name });
+}
+
+/** Make a link the base, in place of the present one. */
+function rebase(at: number): void {
+  endUndoStep();
+  editDraft((now) => makeBase(now.description, at));
+  choosePart("base");
+  announced.value = d("is_base", { name: fileName(draft.value?.description.base.mesh ?? "") });
+}
+
+/** Drag a row by the mouse anywhere on it, by a finger at its handle: elsewhere a finger scrolls. */
+function startDrag(event: PointerEvent & { currentTarget: HTMLElement }, from: number, count: number): void {
+  const byHandle = (event.target as Element).closest(".chain-handle") !== null;
+  if (event.button !== 0 || !event.isPrimary || (event.pointerType !== "mouse" && !byHandle)) return;
+  const list = event.currentTarget.parentElement;
+  const [start, scrolled] = [event.clientY, list?.scrollTop ?? 0];
+  const ending = new AbortController();
+  const options = { signal: ending.signal };
+  const end = () => {
+    ending.abort();
+    dragged.value = null;
+  };
+  const onMove = ({ clientY }: PointerEvent) => {
+    if (!list || (!dragged.value && Math.abs(clientY - start) < DRAG_PX)) return;
+    const box = list.getBoundingClientRect();
+    if (clientY < box.top + EDGE_PX) list.scrollTop -= 8;
+    if (clientY > box.bottom - EDGE_PX) list.scrollTop += 8;
+    const rows = [...list.querySelectorAll<HTMLElement>("[data-row]")];
+    const slots = rows.map((each) => each.offsetTop + each.offsetHeight / 2);
+    const at = clientY - list.getBoundingClientRect().top + list.scrollTop;
+    // The row whose middle is nearest; the first is the base.
+    const near = slots.reduce(
+      (best, slot, index) => (Math.abs(slot - at) < Math.abs((slots[best] ?? 0) - at) ? index : best),
+      0,
+    );
+    const over: Part = near === 0 ? "base" : near - 1;
+    dragged.value = { from, by: clientY - start + list.scrollTop - scrolled, over };
+  };
+  addEventListener("pointermove", onMove, options);
+  addEventListener(
+    "pointerup",
+    () => {
+      const over = dragged.value?.over;
+      end();
+      if (over === "base") rebase(from);
+      else if (typeof over === "number") move(from, over, count);
+    },
+    options,
+  );
+  addEventListener("pointercancel", end, options);
+  addEventListener("keydown", ({ key }) => key === "Escape" && end(), options);
+}
+
+function dropClass(part: Part): string {
+  const drag = dragged.value;
+  if (!drag) return "";
+  if (drag.from === part) return "dragged";
+  if (drag.over !== part) return "";
+  return part === "base" ? "drop-on" : drag.from < (part as number) ? "drop-below" : "drop-above";
 }
 
 export function KinematicChain() {
-  const [dragged, setDragged] = useState<number | null>(null);
-  const [over, setOver] = useState<number | null>(null);
   const now = draft.value;
   if (!now) return null;
   const { joint: joints, base } = now.description;
   const count = joints.length;
   const selected = typeof chosenPart.value === "number" ? chosenPart.value : null;
-  const end = () => {
-    setDragged(null);
-    setOver(null);
-  };
   return (
     <section class="panel chain" aria-label={d("chain")}>
       <div class="panel-head">
@@ -59,25 +152,10 @@ export function KinematicChain() {
         {joints.map((joint, index) => (
           <li
             key={index}
-            class={`chain-item ${over === index && dragged !== null ? (dragged < index ? "drop-below" : "drop-above") : ""}`}
-            draggable
-            onDragStart={(event) => {
-              event.dataTransfer?.setData("text/plain", joint.name);
-              setDragged(index);
-            }}
-            onDragOver={(event) => {
-              if (dragged === null) return;
-              event.preventDefault();
-              setOver(index);
-            }}
-            onDragEnd={end}
-            onDrop={(event) => {
-              if (dragged === null) return;
-              event.preventDefault();
-              event.stopPropagation();
-              move(dragged, index, count);
-              end();
-            }}
+            data-row={index}
+            class={`chain-item ${dropClass(index)}`}
+            style={dragged.value?.from === index ? { transform: `translateY(${dragged.value.by}px)` } : {}}
+            onPointerDown={(event) => startDrag(event, index, count)}
             onKeyDown={(event) => {
               const by = event.altKey ? { ArrowUp: -1, ArrowDown: 1 }[event.key] : undefined;
               if (by) {
@@ -99,6 +177,7 @@ export function KinematicChain() {
               path={`joint/${index}`}
               end={<JointSign joint={joint} />}
             />
+            <Handle />
           </li>
         ))}
         <Row
@@ -110,6 +189,9 @@ export function KinematicChain() {
           path="tool"
         />
       </ol>
+      <p class="chain-said" role="status">
+        {announced.value}
+      </p>
       <div class="chain-tools" role="group" aria-label={d("chain")}>
         <button
           class="quiet"
@@ -151,7 +233,7 @@ function focusRow(index: number): void {
 
 function Row(props: Parameters<typeof RowButton>[0]) {
   return (
-    <li class="chain-item">
+    <li class={`chain-item ${dropClass(props.part)}`} {...(props.part === "base" && { "data-row": "base" })}>
       <RowButton {...props} />
     </li>
   );
@@ -184,6 +266,16 @@ function RowButton(props: {
       {wrong && <span class="shape warning" role="img" aria-label={wrong.text} title={wrong.text} />}
       {props.end}
     </button>
+  );
+}
+
+/** Where a finger drags a row; keys and buttons do the same. */
+function Handle() {
+  return (
+    <svg class="chain-handle" viewBox="0 0 20 20" width="20" height="20" aria-hidden="true">
+      <title>{d("drag_hint")}</title>
+      {[6, 10, 14].flatMap((y) => [7, 13].map((x) => <circle key={`${x} ${y}`} cx={x} cy={y} r="1.4" />))}
+    </svg>
   );
 }
 

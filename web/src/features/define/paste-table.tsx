@@ -18,6 +18,7 @@ import type { DecimalSign } from "./table-units";
 
 /** What is pasted, and into which joint its first row goes; null: the dialog is closed. */
 const pasted = signal<{ text: string; start: number } | null>(null);
+let opened = 0;
 const MOST_PROBLEMS = 6; // that are listed
 const SEPARATORS: Record<Delimiter, "by_tab" | "by_semicolon" | "by_bar" | "by_comma" | "by_space"> = {
   "\t": "by_tab",
@@ -28,6 +29,7 @@ const SEPARATORS: Record<Delimiter, "by_tab" | "by_semicolon" | "by_bar" | "by_c
 };
 
 export function openPasteTable(text = "", start = 0): void {
+  opened++; // another text begins with nothing chosen
   pasted.value = { text, start };
 }
 
@@ -39,7 +41,7 @@ export function isTable(text: string): boolean {
 export function PasteTable() {
   const now = draft.value;
   if (!pasted.value || !now) return null;
-  return <PasteDialog description={now.description} {...pasted.value} />;
+  return <PasteDialog key={opened} description={now.description} {...pasted.value} />;
 }
 
 function PasteDialog({ description, text: given, start }: { description: Description; text: string; start: number }) {
@@ -66,7 +68,7 @@ function PasteDialog({ description, text: given, start }: { description: Descrip
   const reading = { decimal: sign ?? found?.decimal.sign ?? ("." as const), length, angle };
   const read =
     found && columns && readValues({ ...found, columns }, reading, description.units, typesFrom(description, first));
-  const close = () => (pasted.value = null);
+  const close = () => void (pasted.value = null);
   const setTable = (value: string) => {
     setText(value);
     setDelimiter(null);
@@ -90,12 +92,11 @@ function PasteDialog({ description, text: given, start }: { description: Descrip
       ref={dialog}
       class="paste-dialog panel"
       aria-labelledby={id}
-      onClose={close}
-      onKeyDown={(event) => event.key === "Escape" && dialog.current?.close()}
+      onKeyDown={(event) => event.key === "Escape" && close()}
     >
       <div class="panel-head">
         <h2 id={id}>{d("paste_title")}</h2>
-        <button class="quiet panel-end" onClick={() => dialog.current?.close()}>
+        <button class="quiet panel-end" onClick={close}>
           {d("close")}
         </button>
       </div>
@@ -181,7 +182,7 @@ function PasteDialog({ description, text: given, start }: { description: Descrip
         )}
       </div>
       <div class="paste-end">
-        <button class="action" onClick={() => dialog.current?.close()}>
+        <button class="action" onClick={close}>
           {d("cancel")}
         </button>
         <button class="action primary" disabled={values === 0} onClick={fill}>
@@ -226,8 +227,9 @@ function PasteText(props: { text: string; set: (text: string) => void; refused: 
         aria-invalid={refused !== null}
         aria-describedby={`${id}-refused`}
         onPaste={(event) => {
+          // A table replaces what is there, at once: the browser's own insertion takes long for many lines.
           const text = event.clipboardData?.getData("text/plain") ?? "";
-          if (text.length <= MOST_CHARACTERS) return;
+          if (text.length <= MOST_CHARACTERS && !isTable(text)) return;
           event.preventDefault();
           take(text);
         }}

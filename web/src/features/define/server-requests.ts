@@ -44,6 +44,8 @@ export interface MeshInfo {
   triangles: number;
   min: [number, number, number];
   max: [number, number, number];
+  /** Of its surface, spread evenly. */
+  points: [number, number, number][];
   materials: string[];
   warnings: string[];
   missing: string[];
