@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.robot_page import ARM, button
+from tests.browser.robot_page import ARM, button, serious
 
 pytestmark = pytest.mark.browser
 
@@ -21,6 +21,7 @@ def test_a_field_is_found_by_typing_and_a_layout_opens_the_same_on_another_scree
     for words in ("tool x", "rate hz"):
         page.get_by_label("Filter values").fill(words)
         page.get_by_role("region", name="Plot 2").get_by_role("checkbox").first.check()
+    assert serious(page, ".history") == []
     button(page, "Fields of plot 2").click()
     page.get_by_label("Time range of plot 2").select_option("600")
     expect(values(page, 2)).to_have_text([re.compile(r"mm$"), re.compile(r"Hz$")])
@@ -44,8 +45,15 @@ def test_an_invalid_layout_is_named_and_the_page_stays_whole(open_page):
     refused = page.get_by_text("The layout in the address cannot be used")
     expect(refused).to_be_visible()
     expect(values(page, 1)).to_have_count(5)
-    stop = page.locator("button.stop").bounding_box()
+    button(page, "Layout…").click()
+    assert serious(page, ".layout-panel") == []
+    stop, control = (page.locator(each).bounding_box() for each in ("button.stop", ".control"))
     button(page, "Default layout").click()
     expect(refused).to_have_count(0)
     assert page.evaluate("location.hash") == ARM
+    page.get_by_role("checkbox", name="Video").uncheck()
+    page.get_by_role("checkbox", name="Plots").uncheck()
+    expect(page.get_by_role("region", name="Plot 1")).to_have_count(0)
+    assert page.evaluate("location.hash") == f"{ARM}?hide=video,plots"
     assert page.locator("button.stop").bounding_box() == stop
+    assert page.locator(".control").bounding_box() == control

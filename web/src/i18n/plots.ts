@@ -12,7 +12,6 @@ const TEXTS = {
   range: ["Time range of plot {number}", "曲线 {number} 的时间范围"],
   fields: ["Fields…", "字段…"],
   fields_of: ["Fields of plot {number}", "曲线 {number} 的字段"],
-  done: ["Done", "完成"],
   whole: ["Whole range", "全部范围"],
   seconds: ["{count} s", "{count} 秒"],
   minutes: ["{count} min", "{count} 分钟"],

@@ -215,7 +215,7 @@ function drawMissing(
     const left = Math.max(bbox.left, valToPos(from, "x", true));
     const width = Math.min(bbox.left + bbox.width, valToPos(to, "x", true)) - left;
     if (!words) {
-      ctx.fillStyle = colour("--raised");
+      ctx.fillStyle = colour("--ground");
       ctx.fillRect(left, bbox.top, width, bbox.height);
       continue;
     }
@@ -224,7 +224,7 @@ function drawMissing(
     const length = ctx.measureText(text).width + 16 * ratio;
     if (length > width) continue;
     const [x, y] = [left + width / 2, bbox.top + bbox.height / 2];
-    ctx.fillStyle = colour("--raised");
+    ctx.fillStyle = colour("--ground");
     ctx.fillRect(x - length / 2, y - 10 * ratio, length, 20 * ratio);
     ctx.fillStyle = colour("--dim");
     ctx.textAlign = "center";

@@ -144,7 +144,7 @@ function PlotCard(props: {
             aria-label={p("fields_of", { number })}
             onClick={() => setChoosing(!choosing)}
           >
-            {p(choosing ? "done" : "fields")}
+            {p("fields")}
           </button>
           <button class="quiet plot-remove" aria-label={p("remove", { number })} onClick={() => props.change(null)}>
             <span aria-hidden="true">×</span>
