@@ -32,7 +32,7 @@ class Quotas:
         checks: Program checks in parallel at one kinematics service.
         checks_a_minute: Program checks at one kinematics service.
         recordings_mib_a_minute: Answers from one recorder [MiB]: files, messages, values.
-        program_saves_a_minute: Changes of stored programs.
+        program_saves_a_minute: Changes of stored programs and layouts.
         notes_a_minute: Notes that are written or withdrawn.
         cell_changes_a_minute: Changes of cells at one gateway, and trials of changes.
     """

@@ -615,7 +615,7 @@ CELL_ACCEPTED = Code("cell.accepted", "{summary}")
 CELL_NOT_CHANGED = Code("cell.not_changed", "the cell was not changed: {cause}")
 PROGRAMS_NAME = Code(
     "programs.name",
-    "'{name}' is not a valid name of a program",
+    "'{name}' is not a valid name",
     'use 1 to {most} letters, digits, spaces and signs except / \\ : * ? " < > |, without a full stop at '
     "the begin or end",
 )
@@ -671,6 +671,26 @@ PROGRAMS_DAMAGED = Code(
 )
 PROGRAMS_RUN_LOST = Code(
     "programs.run_lost", "the text of program '{name}', which ran, is not kept: {detail}"
+)
+LAYOUTS_UNKNOWN = Code("layouts.unknown", "the site has no layout '{name}'", "look at the list")
+LAYOUTS_NAME_TAKEN = Code(
+    "layouts.name_taken",
+    "the site already has a layout '{name}', by {author}",
+    "choose another name, or replace it",
+)
+LAYOUTS_TEXT = Code(
+    "layouts.text",
+    "a layout is the part of an address after its '?', at most {most} characters without spaces",
+)
+LAYOUTS_FULL = Code(
+    "layouts.full",
+    "a site keeps at most {most} layouts and {most_kib} KiB of them",
+    "delete one that nobody needs",
+)
+LAYOUTS_DAMAGED = Code(
+    "layouts.damaged",
+    "the stored layouts cannot be read ({detail})",
+    "the damaged file is layouts.damaged; restore layouts.json from a backup and restart the store",
 )
 NOTE_WRITTEN = Code("note.written", "{author} noted: {text}")
 NOTE_WITHDRAWN = Code("note.withdrawn", "{by} withdrew the note of {author}: {text}")

@@ -168,6 +168,14 @@ _TOPICS = (
         priority=Priority.DATA,
         publishers=_STORE,
     ),
+    # Below a site's `-`.
+    Topic(
+        name="layouts",
+        schema=schema.LayoutList,
+        recorded=False,  # the site's work, not a robot's state
+        priority=Priority.DATA,
+        publishers=_STORE,
+    ),
     Topic(
         name="recording",
         schema=schema.Recording,
@@ -470,6 +478,16 @@ _REQUESTS = (
         priority=Priority.DATA,
         owners=_STORE,
         askers=EVERYONE,
+    ),
+    # Below a site's `-`, with the author's name.
+    Request(
+        name="layouts/request/*",
+        request=schema.LayoutRequest,
+        answer=schema.LayoutList,
+        priority=Priority.DATA,
+        owners=_STORE,
+        askers=_COMMANDERS,
+        in_name=True,
     ),
     # Below a site's `-`, with the author's name.
     Request(

@@ -1789,6 +1789,48 @@ class ProgramVersion(_message.Message):
     reason: str
     def __init__(self, number: _Optional[int] = ..., change: _Optional[_Union[ProgramVersion.Change, str]] = ..., timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., author: _Optional[str] = ..., name: _Optional[str] = ..., sha256: _Optional[str] = ..., bytes: _Optional[int] = ..., based_on: _Optional[int] = ..., reason: _Optional[str] = ...) -> None: ...
 
+class StoredLayout(_message.Message):
+    __slots__ = ("name", "text", "author", "timestamp")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    AUTHOR_FIELD_NUMBER: _ClassVar[int]
+    TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    text: str
+    author: str
+    timestamp: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., text: _Optional[str] = ..., author: _Optional[str] = ..., timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+
+class LayoutList(_message.Message):
+    __slots__ = ("layouts",)
+    LAYOUTS_FIELD_NUMBER: _ClassVar[int]
+    layouts: _containers.RepeatedCompositeFieldContainer[StoredLayout]
+    def __init__(self, layouts: _Optional[_Iterable[_Union[StoredLayout, _Mapping]]] = ...) -> None: ...
+
+class LayoutRequest(_message.Message):
+    __slots__ = ("action", "name", "text", "new_name", "replace")
+    class Action(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        ACTION_UNSPECIFIED: _ClassVar[LayoutRequest.Action]
+        SAVE: _ClassVar[LayoutRequest.Action]
+        RENAME: _ClassVar[LayoutRequest.Action]
+        DELETE: _ClassVar[LayoutRequest.Action]
+    ACTION_UNSPECIFIED: LayoutRequest.Action
+    SAVE: LayoutRequest.Action
+    RENAME: LayoutRequest.Action
+    DELETE: LayoutRequest.Action
+    ACTION_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    NEW_NAME_FIELD_NUMBER: _ClassVar[int]
+    REPLACE_FIELD_NUMBER: _ClassVar[int]
+    action: LayoutRequest.Action
+    name: str
+    text: str
+    new_name: str
+    replace: bool
+    def __init__(self, action: _Optional[_Union[LayoutRequest.Action, str]] = ..., name: _Optional[str] = ..., text: _Optional[str] = ..., new_name: _Optional[str] = ..., replace: _Optional[bool] = ...) -> None: ...
+
 class StoredProgram(_message.Message):
     __slots__ = ("id", "current", "versions")
     ID_FIELD_NUMBER: _ClassVar[int]

@@ -1,4 +1,4 @@
-"""The store service: answers requests for programs and notes, publishes them, and keeps what ran."""
+"""The store service: answers requests for programs, notes and layouts, publishes them, keeps what ran."""
 
 import asyncio
 import contextlib
@@ -22,6 +22,7 @@ from robomesh.server import Request
 from robomesh.session import Session
 from robomesh.topics import check_operator
 from services.errors import ServiceError
+from services.store.layouts import Layouts
 from services.store.notes import NoteBook
 from services.store.programs import ProgramStore
 from services.store.settings import Settings
@@ -40,7 +41,7 @@ class FolderInUseError(ServiceError):
 
 
 async def serve(session: Session, settings: Settings) -> None:
-    """Serve a site's programs and notes until cancelled.
+    """Serve a site's programs, notes and layouts until cancelled.
 
     Raises:
         FolderInUseError: If another store uses the folder.
@@ -51,17 +52,26 @@ async def serve(session: Session, settings: Settings) -> None:
     store = ProgramStore(folder, most_bytes=settings.most_bytes, most_run_bytes=settings.most_run_bytes)
     with await _locked(folder):
         notes = NoteBook(folder, most_bytes=settings.most_note_bytes)
-        await _Service(session, settings, store, notes).run()
+        await _Service(session, settings, store, notes, Layouts(folder)).run()
 
 
 class _Service:
     """One run of the service."""
 
-    def __init__(self, session: Session, settings: Settings, store: ProgramStore, notes: NoteBook) -> None:
-        self._session, self._settings, self._store, self._notes = session, settings, store, notes
+    def __init__(
+        self,
+        session: Session,
+        settings: Settings,
+        store: ProgramStore,
+        notes: NoteBook,
+        layouts: Layouts,
+    ) -> None:
+        self._session, self._settings = session, settings
+        self._store, self._notes, self._layouts = store, notes, layouts
         self._saves = Quota("program_saves", a_minute=settings.quotas.program_saves_a_minute)
         self._note_quota = Quota("notes", a_minute=settings.quotas.notes_a_minute)
         self._one_at_a_time = asyncio.Lock()
+        self._layout_list = session.declare_publisher(settings.site, WHOLE_SITE, "layouts")
         self._lists: dict[str, Publisher] = {}
         self._events: dict[str, Publisher] = {}
         session.measure("programs", "Stored programs, without deleted ones", lambda: store.count)
@@ -75,7 +85,11 @@ class _Service:
             self._report(WHOLE_SITE, _S.ERROR, reason)
         for robot in (*self._settings.robots, *self._store.robots):
             self._add(robot)
+        if (damaged := self._layouts.open()) is not None:
+            self._report(WHOLE_SITE, _S.ERROR, damaged)
         site = self._settings.site
+        self._layout_list.put(self._layouts.message)
+        self._session.answer(site, WHOLE_SITE, "layouts/request/*", self._change_layouts)
         self._session.answer(site, WHOLE_SITE, "programs/request/*", self._change)
         self._session.answer(site, WHOLE_SITE, "programs/read", self._read)
         self._session.answer(site, WHOLE_SITE, "notes/request/*", self._note)
@@ -175,6 +189,25 @@ class _Service:
         assert isinstance(asked, schema.NoteQuery)
         async with self._one_at_a_time:
             return await asyncio.to_thread(self._notes.read, asked)
+
+    async def _change_layouts(self, request: Request) -> schema.LayoutList:
+        """Save, rename or delete a layout; reply after the change is on disk.
+
+        Raises:
+            QuotaError: If the author saves too often.
+            RefusedError: If the request is not possible.
+        """
+        asked = request.message
+        assert isinstance(asked, schema.LayoutRequest)
+        author = check_operator(request.chunk)
+        self._saves.check(author, 1.0)
+        self._saves.count(author, 1.0)
+        async with self._one_at_a_time:
+            await asyncio.to_thread(self._layouts.change, asked, author, time.time_ns())
+            self._layout_list.put(self._layouts.message)
+        action = schema.LayoutRequest.Action.Name(asked.action).lower()
+        log.info("%s: %s layout %r", author, action, asked.name)
+        return self._layouts.message
 
     async def _keep_runs(self) -> None:
         key = f"{ROOT}/{self._settings.site}/*/program/source"

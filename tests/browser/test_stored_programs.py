@@ -174,3 +174,39 @@ def test_a_phone_shows_stored_programs_and_axe_finds_nothing_serious(open_page):
         page.wait_for_selector(".stored-panel")
         assert page.evaluate("document.documentElement.scrollWidth") == 360
         assert serious(page) == []
+
+
+def test_a_layout_saved_under_a_name_opens_on_another_machine(open_page):
+    robot = PAGE.replace("#/program/", "#/")
+    page, other = open_page(robot, drawn=False), open_page(robot, drawn=False, width=360, height=740)
+    page.get_by_label("Your name").fill("li")
+    button(page, "Layout…").click()
+    page.get_by_role("checkbox", name="Video").uncheck()
+    form = page.get_by_role("form", name=re.compile("^Layouts saved at"))
+    form.get_by_label("Name").fill("night")
+    button(form, "Save layout").click()
+    expect(form.get_by_role("status")).to_have_text("Saved: “night”.", timeout=STORED_MS)
+    assert serious(page, ".layout-panel") == []
+
+    button(other, "Layout…").click()
+    theirs = other.get_by_role("form", name=re.compile("^Layouts saved at"))
+    theirs.get_by_role("combobox").select_option("night")
+    expect(other.get_by_role("checkbox", name="Video")).not_to_be_checked()
+    assert other.evaluate("location.hash") == f"{robot}?hide=video"
+    expect(theirs.get_by_role("status")).to_have_text(re.compile("^“night” was saved by li, "))
+    assert other.evaluate("document.documentElement.scrollWidth") == 360
+
+    page.get_by_role("checkbox", name="Plots").uncheck()
+    expect(button(form, "Replace layout")).to_be_enabled()
+    button(form, "Replace layout").click()
+    expect(button(form, "Replace layout")).to_be_disabled(timeout=STORED_MS)
+    for _ in range(100):  # the list may reach the other page later
+        theirs.get_by_role("combobox").select_option("")
+        theirs.get_by_role("combobox").select_option("night")
+        if not other.get_by_role("checkbox", name="Plots").is_checked():
+            break
+        other.wait_for_timeout(100)
+    expect(other.get_by_role("checkbox", name="Plots")).not_to_be_checked()
+    button(form, "Delete…").click()
+    button(form, "Delete “night”").click()
+    expect(theirs.get_by_role("combobox").get_by_role("option")).to_have_text(["none yet"], timeout=STORED_MS)

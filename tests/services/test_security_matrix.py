@@ -33,6 +33,7 @@ IN_NAME = (
     "alarms/request/*",
     "cell/request/*",
     "programs/request/*",
+    "layouts/request/*",
     "notes/request/*",
     "notes/withdraw/*",
     "kinematics/check/*",

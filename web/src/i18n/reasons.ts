@@ -794,8 +794,8 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   [
     "programs.name",
     [
-      "'{name}' is not a valid name of a program: use 1 to {most} letters, digits, spaces and signs except / \\ : * ? \" < > |, without a full stop at the begin or end",
-      '“{name}”不是有效的程序名：请使用 1 至 {most} 个字母、数字、空格及符号（不含 / \\ : * ? " < > |），首尾不得为句点',
+      "'{name}' is not a valid name: use 1 to {most} letters, digits, spaces and signs except / \\ : * ? \" < > |, without a full stop at the begin or end",
+      '“{name}”不是有效的名称：请使用 1 至 {most} 个字母、数字、空格及符号（不含 / \\ : * ? " < > |），首尾不得为句点',
     ],
   ],
   [
@@ -832,6 +832,35 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     [
       "{author} has changed program '{name}' meanwhile: its version is {version} now: look at that version, then try again",
       "{author} 已在此期间更改程序“{name}”：现为版本 {version}：请先查看该版本，再重试",
+    ],
+  ],
+  ["layouts.unknown", ["the site has no layout '{name}': look at the list", "站点没有布局“{name}”：请查看列表"]],
+  [
+    "layouts.name_taken",
+    [
+      "the site already has a layout '{name}', by {author}: choose another name, or replace it",
+      "站点已有布局“{name}”（{author}）：请另选名称，或替换它",
+    ],
+  ],
+  [
+    "layouts.text",
+    [
+      "a layout is the part of an address after its '?', at most {most} characters without spaces",
+      "布局是网址中“?”之后的部分，最多 {most} 个字符，不含空格",
+    ],
+  ],
+  [
+    "layouts.full",
+    [
+      "a site keeps at most {most} layouts and {most_kib} KiB of them: delete one that nobody needs",
+      "站点最多保存 {most} 个布局，共 {most_kib} KiB：请删除无人使用的布局",
+    ],
+  ],
+  [
+    "layouts.damaged",
+    [
+      "the stored layouts cannot be read ({detail}): the damaged file is layouts.damaged; restore layouts.json from a backup and restart the store",
+      "无法读取已保存的布局（{detail}）：损坏的文件是 layouts.damaged；请从备份恢复 layouts.json 并重启存储服务",
     ],
   ],
   ["note.written", ["{author} noted: {text}", "{author} 的备注：{text}"]],

@@ -6,6 +6,7 @@ import { p } from "../../i18n/plots";
 import type { Layout, LayoutProblem } from "../../ui/layout";
 import { DEFAULT_LAYOUT, layoutText, PANELS, readLayout } from "../../ui/layout";
 import { layoutQuery, setLayoutQuery } from "../../ui/route";
+import { SavedLayouts } from "./saved-layouts";
 import "./layout-panel.css";
 
 /** Whether the panel is open, for all robots. */
@@ -45,7 +46,7 @@ export function LayoutButton() {
   );
 }
 
-export function LayoutPanel(props: LayoutState) {
+export function LayoutPanel(props: LayoutState & { site: string }) {
   const { layout, problem, change } = props;
   const [told, setTold] = useState(false);
   if (!shown.value && !problem) return null;
@@ -104,6 +105,7 @@ export function LayoutPanel(props: LayoutState) {
           </button>
         </div>
       )}
+      {shown.value && <SavedLayouts site={props.site} text={layoutText(layout)} />}
     </section>
   );
 }

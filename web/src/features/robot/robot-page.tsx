@@ -104,7 +104,7 @@ export function RobotPage({ site, robot }: RobotName) {
           <ControlRequests robotKey={key} holder={holder} lease={lease?.message} />
           <RecordPanel robotKey={key} description={description?.message} />
           <NotePanel robotKey={key} />
-          <LayoutPanel layout={layout} problem={problem} change={change} />
+          <LayoutPanel site={site} layout={layout} problem={problem} change={change} />
         </Messages>
         <div class="side">
           <ControlPanel

@@ -1,0 +1,144 @@
+// Layouts that the site keeps under a name: open, save, rename, delete.
+
+import { useEffect, useState } from "preact/hooks";
+import type { StoredLayout } from "../../gen/robomesh_pb";
+import { LayoutRequest_Action as Action, LayoutListSchema, LayoutRequestSchema } from "../../gen/robomesh_pb";
+import { stampFull } from "../../i18n/format";
+import { p } from "../../i18n/plots";
+import { mayAct } from "../../mesh/account";
+import { asker } from "../../mesh/alarms";
+import { ask } from "../../mesh/connection";
+import type { Notice } from "../../mesh/control";
+import { reasonOf } from "../../mesh/control";
+import { useTopic } from "../../mesh/topics";
+import { NoticeLine } from "../../ui/notice-line";
+import { setLayoutQuery } from "../../ui/route";
+import { Select } from "../../ui/select";
+
+const TIMEOUT_S = 10; // the answer waits for the disk
+const LONGEST_NAME = 60;
+
+/** @param props.text The layout in the address. */
+export function SavedLayouts(props: { site: string; text: string }) {
+  const { site, text } = props;
+  const list = useTopic(LayoutListSchema, `robomesh/${site}/-/layouts`)?.message;
+  const [chosen, setChosen] = useState("");
+  const [name, setName] = useState("");
+  const [deleting, setDeleting] = useState(false);
+  const [notice, setNotice] = useState<Notice | null>(null);
+  const layouts = list?.layouts ?? [];
+  const opened = layouts.find((each) => each.name === chosen);
+  const choose = (next: string) => {
+    setChosen(next);
+    setName(next);
+    setDeleting(false);
+  };
+  // A link opens a saved layout, too. One that is edited stays chosen.
+  const same = layouts.find((each) => each.text === text)?.name;
+  useEffect(() => {
+    if (same) choose(same);
+  }, [same]);
+  const there = layouts.find((each) => each.name.toLowerCase() === name.trim().toLowerCase());
+  const busy = notice?.kind === "busy";
+  const cannot = !list ? p("no_store") : !mayAct.value ? p("monitor") : !asker.value ? p("name_needed") : "";
+  const send = async (values: object, done: string, next: string) => {
+    setNotice({ kind: "busy", text: p("sending") });
+    try {
+      const key = `robomesh/${site}/-/layouts/request/${asker.value}`;
+      await ask(key, LayoutRequestSchema, values, LayoutListSchema, TIMEOUT_S);
+      choose(next);
+      setNotice({ kind: "done", text: done });
+    } catch (error) {
+      setNotice({ kind: "refused", text: p("not_changed", { why: reasonOf(error) }) });
+    }
+  };
+  const wanted = name.trim();
+  const save = () =>
+    send(
+      { action: Action.SAVE, name: wanted, text, replace: there !== undefined },
+      p("saved", { name: wanted }),
+      wanted,
+    );
+  const rename = () =>
+    send({ action: Action.RENAME, name: chosen, newName: wanted }, p("renamed", { old: chosen, name: wanted }), wanted);
+  const remove = () => send({ action: Action.DELETE, name: chosen }, p("deleted", { name: chosen }), "");
+  const able = !cannot && !busy && wanted !== "";
+  return (
+    <form
+      class="layout-row saved-layouts"
+      aria-label={p("saved_layouts", { site })}
+      onSubmit={(event) => {
+        event.preventDefault();
+        if (able) void save();
+      }}
+    >
+      <span class="layout-field">
+        {p("saved_layouts", { site })}
+        <Select
+          label={p("saved_layouts", { site })}
+          value={opened ? chosen : ""}
+          values={["", ...layouts.map((each) => each.name)]}
+          text={(value) => value || p(layouts.length ? "choose_layout" : "no_layouts")}
+          choose={(value) => {
+            const layout = layouts.find((each) => each.name === value);
+            choose(value);
+            setNotice(null);
+            if (layout) setLayoutQuery(layout.text);
+          }}
+        />
+      </span>
+      <label>
+        <span>{p("layout_name")}</span>
+        <input
+          type="text"
+          autocomplete="off"
+          spellcheck={false}
+          maxLength={LONGEST_NAME}
+          value={name}
+          onInput={(event) => {
+            setName(event.currentTarget.value);
+            setDeleting(false);
+          }}
+        />
+      </label>
+      <button type="submit" class="action primary" title={cannot} disabled={!able || there?.text === text}>
+        {there ? p("replace_layout") : p("save_layout")}
+      </button>
+      <button
+        type="button"
+        class="action"
+        title={cannot}
+        disabled={!able || !opened || wanted === chosen || (there !== undefined && there !== opened)}
+        onClick={() => void rename()}
+      >
+        {p("rename_layout")}
+      </button>
+      {deleting && opened ? (
+        <>
+          <button type="button" class="action" onClick={() => setDeleting(false)}>
+            {p("keep_layout")}
+          </button>
+          <button type="button" class="action destructive" disabled={!able} onClick={() => void remove()}>
+            {p("delete_named", { name: chosen })}
+          </button>
+        </>
+      ) : (
+        <button
+          type="button"
+          class="action"
+          title={cannot}
+          disabled={!able || !opened}
+          onClick={() => setDeleting(true)}
+        >
+          {p("delete_layout")}
+        </button>
+      )}
+      <NoticeLine notice={notice} idle={byWhom(there ?? opened) || cannot} />
+    </form>
+  );
+}
+
+function byWhom(layout: StoredLayout | undefined): string {
+  if (!layout) return "";
+  return p("saved_by", { name: layout.name, author: layout.author, time: stampFull(layout.timestamp) });
+}
