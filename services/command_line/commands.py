@@ -65,7 +65,7 @@ COMMANDS = {
     "note": Row("note", "Write a note on a robot's time, list its notes, or withdraw one."),
     "cell": Row("cell", "Fixtures and the floor of a robot's cell: show, set, move, undo."),
     "recordings": Row(
-        "recordings.app", "Recordings: list, inspect, play, export, fetch, rename, tag, delete."
+        "recordings.app", "Recordings: list, inspect, play, export, fetch, rename, note, tag, delete."
     ),
     "audit": Row("audit", "The gateway's audit log."),
     "alarms": Row("alarms", "Alarms: list, acknowledge, shelve."),

@@ -85,7 +85,7 @@ def test_a_link_lost_during_motion_is_a_stop_sent_after_reconnection(mesh, tmp_p
             await until(lambda: site.controller.HasField("stop"))
             stop = site.controller.stop
             assert not stop.sent
-            assert stop.reason.startswith("li's motion ran, and ")
+            assert stop.reason.startswith("the link was lost during a motion of li: ")
             await stack.enter_async_context(simulator(listen=f"127.0.0.1:{port}"))
             await until(lambda: site.controller.activity == STATE.STOPPED)
             assert site.controller.stop.sent

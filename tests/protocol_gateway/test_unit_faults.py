@@ -104,7 +104,7 @@ def test_a_changed_joint_count_stops_a_motion(mesh, tmp_path):
                 await until(lambda: b"COMMAND*stop" in heard)
             await until(lambda: site.controller.HasField("stop"))
             reason = site.controller.stop.reason
-            assert reason.startswith("li's motion ran, and 127.0.0.1:")
+            assert reason.startswith("the link was lost during a motion of li: 127.0.0.1:")
             assert reason.endswith("sends 6 joint values, the description has 5")
 
     run(main())
