@@ -360,7 +360,7 @@ class Bench:
         page = self._page
         take(page, "bench", slow=False)
         panel = page.locator(".panel.tool")
-        for name in ("Base", "Hold", SPEEDS[speed]):
+        for name in ("Base", "Jog", SPEEDS[speed]):
             panel.get_by_role("button", name=name, exact=True).click()
         panel.get_by_role("button", name=BUTTON, exact=True).scroll_into_view_if_needed()
         time.sleep(1.0)  # a control that has just moved ignores presses

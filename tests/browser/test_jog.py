@@ -18,7 +18,7 @@ def hold_panel(open_page, **settings):
     ready(page)
     panel = page.locator(".panel.tool")
     button(panel, "Base").click()
-    button(panel, "Hold").click()
+    button(panel, "Jog").click()
     return page, panel
 
 

@@ -239,9 +239,9 @@ const TEXTS = {
     "Each press is a straight line of the tool, at most {percent} % and {speed} mm/s.",
     "每按一次，工具走一段直线，最高 {percent} % 及 {speed} mm/s。",
   ],
-  tool_by: ["Step, or move while held", "步进或按住点动"],
+  tool_by: ["Step, or jog while held", "步进或按住点动"],
   tool_by_step: ["Step", "步进"],
-  tool_by_hold: ["Hold", "按住"],
+  tool_by_hold: ["Jog", "点动"],
   jog_speed: ["Greatest speed in mm/s", "最高速度（mm/s）"],
   jog_hint: [
     "Moves while held (pointer or Enter), at most {speed} mm/s or {turn}°/s.",

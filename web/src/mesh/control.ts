@@ -54,6 +54,8 @@ const SLOW_GAP_MS = 500;
 const SLOW_FOR_MS = 60_000; // after a long gap
 /** Ends that another person caused, also if this page was slow at the time. */
 const TAKEN = ["lease.ended.taken", "lease.ended.handed_over", "lease.ended.no_right", "lease.ended.signed_out"];
+/** Refusals of a renewal after which somebody else, or another window, has control. */
+const HELD = ["lease.held", "lease.other"];
 const OPERATOR = "robomesh.operator";
 const OPERATOR_NAME = /^[A-Za-z0-9][A-Za-z0-9_.-]*$/;
 
@@ -210,7 +212,7 @@ async function renew(): Promise<void> {
   } catch (error) {
     if (heldLease.value?.lease !== mine.lease) return;
     const silent = error instanceof AskError && error.noAnswer;
-    const held = error instanceof AskError && error.reason?.code === "lease.held";
+    const held = error instanceof AskError && HELD.includes(error.reason?.code ?? "");
     const slow = !held && (requestedAt > mine.endsAt + SLOW_GAP_MS || wasInactive(mine.endsAt - mine.requestedAt));
     // An attempt after the end would look like a slow browser's.
     if (silent && performance.now() + RETRY_MS < mine.endsAt) renewIn(RETRY_MS);
