@@ -25,6 +25,8 @@ from robomesh.subscription import Subscription
 log = logging.getLogger(__name__)
 
 _RETRY_S = 0.25
+# Messages that `last` keeps while it waits for a list.
+_AFTER_LIST = 1000
 # Name of a measure: remaining validity of the certificate, if there is one [s].
 CERTIFICATE = "certificate_seconds"
 
@@ -150,7 +152,11 @@ class Session:
 
     async def last(self, key: str, *, timeout_s: float = 2.0) -> Message | None:
         """Return the last value of a topic, or its history message; None: no publisher has one."""
-        subscription = Subscription(self.zenoh_session, key, newest=1, history=True, ignored=self.ignored)
+        # Messages that follow a list must not push it out before it is read.
+        newest = 1 if topics.topic(keys.parse_expression(key).topic).history_schema is None else _AFTER_LIST
+        subscription = Subscription(
+            self.zenoh_session, key, newest=newest, history=True, ignored=self.ignored
+        )
         try:
             async with asyncio.timeout(timeout_s):
                 while True:

@@ -24,7 +24,7 @@ def hold_panel(open_page, **settings):
 
 def entries(plant):
     key = "robomesh/hall/arm/audit"
-    found = plant.call(plant.session.last(key)).entries
+    found = plant.call(plant.session.last(key, timeout_s=15)).entries
     return [each for each in found if each.request in ("JOG", "JOG_END")]
 
 
@@ -47,6 +47,7 @@ def test_a_jog_lasts_as_long_as_the_button_is_held(open_page, plant):
             release()
             page.mouse.up()
             expect(notice).to_contain_text(re.compile("Ended|Not sent"))
+            page.evaluate("document.querySelectorAll('body > dialog').forEach((each) => each.remove())")
             text = notice.inner_text()
             if "Ended: released" in text:
                 return
@@ -57,7 +58,6 @@ def test_a_jog_lasts_as_long_as_the_button_is_held(open_page, plant):
     released(page.mouse.up)
     released(lambda: page.evaluate("window.dispatchEvent(new Event('blur'))"))
     released(lambda: page.evaluate("document.body.appendChild(document.createElement('dialog')).showModal()"))
-    page.evaluate("document.querySelector('body > dialog').remove()")
     # A second touch anywhere.
     released(
         lambda: page.evaluate(

@@ -178,6 +178,26 @@ def test_list_arrives_complete_before_later_messages_without_duplicates(mesh):
     run(main())
 
 
+def test_the_last_list_is_returned_although_messages_follow_it(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            publisher = gateway.declare_publisher("site", "arm", "events")
+            publisher.put(schema.Event(code="first"))
+
+            async def flood():
+                while True:
+                    publisher.put(schema.Event(code="more"))
+                    await asyncio.sleep(0)
+
+            task = asyncio.create_task(flood())
+            for _ in range(10):
+                history = await monitor.last("robomesh/site/arm/events", timeout_s=10.0)
+                assert history is not None
+            task.cancel()
+
+    run(main())
+
+
 def test_late_joiner_of_a_video_gets_the_frames_since_the_last_key_frame(mesh):
     async def main():
         from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo

@@ -63,6 +63,7 @@ export function useStepQueue<Step, Sent>(props: {
   }, [going, waiting]);
   useEffect(() => {
     if (enabled) return;
+    if (count.current) tell({ kind: "refused", text: t("steps_dropped", { count: count.current }) });
     setWaiting([]);
     setRefused(null);
   }, [enabled]);

@@ -24,7 +24,8 @@ export function Stopped(props: {
   const needs = moving ? t("reset_moving") : t(stop ? "reset_needs" : "own_reset_needs");
   return (
     <div class="stopped">
-      <div>
+      {/* A long text scrolls. */}
+      <div role="group" aria-label={t("state_stopped")} tabIndex={0}>
         <strong>
           <span class="shape alarm" aria-hidden="true" />
           <span title={stampFull(stop?.since)}>
