@@ -743,7 +743,7 @@ JOG_SEQUENCE = Code(
     "jog.sequence", "keep-alive {sequence} of the jog is not new: the last one was {last}", "count up"
 )
 JOG_RELEASED = Code("jog.released", "released")
-JOG_NOT_ALIVE = Code("jog.not_alive", "no keep-alive for {ms} ms")
+JOG_NOT_ALIVE = Code("jog.not_alive", "no keep-alive for {ms} ms", "use a faster computer or network")
 JOG_NOT_HELD_DOWN = Code("jog.not_held_down", "no keep-alive came: nothing has moved")
 JOG_COMMANDED = Code("jog.commanded", "the operator commanded {names}")
 JOG_NOT_MOVING = Code("jog.not_moving", "the robot does not move", "check the controller")

@@ -153,8 +153,10 @@ def _cell_refusal(request: CommandRequest, seen: Seen) -> Answer | None:
 
 def _program_refusal(request: CommandRequest, program: RunningProgram | None) -> Answer | None:
     # The check of a program holds only at its speed.
-    if program is None or request.command not in (MOTION_COMMANDS | {_C.SPEED}) - {_C.RESUME}:
+    if program is None or request.command not in MOTION_COMMANDS | {_C.SPEED}:
         return None
     if program.program.is_jog:
         return not_sent(codes.JOG_RUNS())
+    if request.command == _C.RESUME:
+        return None
     return not_sent(codes.COMMAND_PROGRAM_RUNS(name=program.program.name))

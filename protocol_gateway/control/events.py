@@ -121,9 +121,14 @@ class JogPartReady:
 
 @dataclass(frozen=True)
 class JogEnding:
-    """The jog that runs must end now: hold the robot."""
+    """The jog that runs must end now.
+
+    Attributes:
+        hold: Hold the robot; False: it rests at the end of its line.
+    """
 
     why: Reason
+    hold: bool = True
 
 
 @dataclass(frozen=True)

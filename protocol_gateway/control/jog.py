@@ -5,10 +5,10 @@
     each part    plan and check from the robot's present positions -> evaluate -> controller's socket
     the end      HOLD -> at rest, RESET, which gives the rest of the motion up -> audit
 
-A part is commanded when the robot has made way for it: never more than 10 mm or 2 degrees beyond its measured
-position. A new part replaces the running one, so the arm does not stop between them. A jog ends with its
-release, without a keep-alive, with another command of its operator, at the end of its line, and as a program
-does. The deadline is a timer of its own, because a check may take longer.
+A part is commanded when the robot is near enough to its last target: never more than 10 mm or 2 degrees
+beyond its measured position. A new part replaces the running one, so the arm does not stop between them. A
+jog ends with its release, without a keep-alive, with another command of its operator, at the end of its line,
+and as a program does. The deadline is a timer of its own, because a check may take longer.
 """
 
 import asyncio
@@ -17,7 +17,7 @@ import logging
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from protocol_gateway.authority import lease_rules
 from protocol_gateway.authority.lease_rules import not_sent, why_not_holder
@@ -49,7 +49,7 @@ FIRST_KEEP_ALIVE_S = 1.0
 _POLL_S = 0.01
 # Timeout of planning and checking the first part, below the default timeout of a client.
 _PREPARE_TIMEOUT_S = 1.5
-# A robot that was told to move and does not, for this long.
+# A robot that does not move for this long after a command has ignored it.
 _START_TIMEOUT_S = 2.0
 # A robot that still moves this long after its hold has ignored it.
 _HOLD_TIMEOUT_S = 2.0
@@ -97,7 +97,7 @@ class _Run:
     progress_s: float = 0.0
     end: Reason | None = None
     why: Reason | None = None
-    warned: bool = field(default=False)
+    warned: bool = False
 
 
 class Jogs:
@@ -363,9 +363,9 @@ class Jogs:
             why = self._why_not(run)
             if why is not None:
                 self._end(run, why)
-            elif run.end is not None and self._rests_at_end(run):
+            elif run.end is not None and self._rests_at_last(run):
                 run.why = run.end
-                self._control.handle(JogEnding(run.end))
+                self._control.handle(JogEnding(run.end, hold=False))
             elif run.keep_alives and run.end is None:
                 await self._send_part(run)
             await asyncio.sleep(_POLL_S)
@@ -381,8 +381,7 @@ class Jogs:
             obstacle = self._control.obstacle(schema.CommandRequest(command=_C.JOG))
             why = None if obstacle is None else obstacle.reason
         if why is None and time.monotonic() - run.progress_s > _START_TIMEOUT_S:
-            waits = run.last is None or self._checks.is_resting_at(run.last)
-            why = None if waits else codes.JOG_NOT_MOVING()
+            why = None if self._rests_at_last(run) else codes.JOG_NOT_MOVING()
         return why
 
     async def _send_part(self, run: _Run) -> None:
@@ -439,7 +438,7 @@ class Jogs:
             why=finding.warning,
         )
 
-    def _rests_at_end(self, run: _Run) -> bool:
+    def _rests_at_last(self, run: _Run) -> bool:
         return run.last is None or self._checks.is_resting_at(run.last)
 
     async def _come_to_rest(self, run: _Run) -> None:
@@ -466,7 +465,7 @@ class Jogs:
             run.moved = extended.moved
 
     def _rests_long(self, run: _Run, waited_s: float) -> bool:
-        """Return whether an idle controller has nothing to hold."""
+        """Return whether a controller has been idle for so long that its hold does not follow any more."""
         return waited_s >= _NOTHING_HELD_S or (run.end is not None and run.why == run.end)
 
     async def _give_up(self, run: _Run) -> None:

@@ -340,10 +340,11 @@ class Programs:
         return not holding and (program is None or not program.held)
 
     def _abort_reason(self, run: _Run) -> Reason | None:
-        authority, program = self._control.authority, self._control.program
-        if authority.stop is None and program is not None and program.given_up:
+        why = abort_reason(self._control.authority, run.operator, run.secret, run.last_stop_id)
+        program = self._control.program
+        if why is None and program is not None and program.given_up:
             return codes.PROGRAM_GIVEN_UP()
-        return abort_reason(authority, run.operator, run.secret, run.last_stop_id)
+        return why
 
     def _end(self, run: _Run, problem: Reason | None) -> None:
         self.state.outcome = _STATE.DONE if problem is None else _STATE.ENDED

@@ -95,7 +95,7 @@ class RobotAuthority:
             case events.JogPartReady():
                 return (yield from self._jog_part(event, seen))
             case events.JogEnding():
-                yield from self._end_jog(event.why, seen)
+                yield from self._end_jog(event.why, seen, hold=event.hold)
             case events.JogHeld():
                 yield from self._give_jog_up(event.percent, seen)
             case events.JogEnded():
@@ -388,15 +388,18 @@ class RobotAuthority:
             return codes.COMMAND_CHANGED(changed)
         return (yield from self._send_for_jog(requests, seen))
 
-    def _end_jog(self, why: Reason, seen: Seen) -> Effects[None]:
-        """Hold the robot, if a jog runs that does not end already."""
+    def _end_jog(self, why: Reason, seen: Seen, *, hold: bool = True) -> Effects[None]:
+        """End a jog that runs and does not end already; stop the robot if its hold cannot be sent."""
         program = self._program
         if program is None or not program.program.is_jog or program.ending is not None:
             return
         self._program = replace(program, ending=why)
         # A HOLD sent to an arm at rest would make the controller refuse every motion.
-        if self._authority.motion is not None:
-            yield from self._send_for_jog((CommandRequest(command=_C.HOLD),), seen)
+        if not hold or self._authority.motion is None:
+            return
+        problem = yield from self._send_for_jog((CommandRequest(command=_C.HOLD),), seen)
+        if problem is not None:
+            yield from self._stop_by_gateway(problem, seen)
 
     def _give_jog_up(self, percent: float | None, seen: Seen) -> Effects[None]:
         """Discard the rest of a jog that is on hold, and set the operator's speed again."""

@@ -62,7 +62,7 @@ _REASON_S = 1.5
 _REST_S, _POLL_S = 5.0, 0.2
 _WARNING = "; mind: "
 # Interval of a jog's keep-alives, and how many releases may go without an answer.
-_KEEP_ALIVE_S, _MOST_UNANSWERED = 0.04, 4
+_KEEP_ALIVE_S, _KEEP_ALIVE_TIMEOUT_S, _MOST_UNANSWERED = 0.04, 0.5, 4
 
 
 class AsyncArm:
@@ -288,6 +288,15 @@ class AsyncArm:
         return await self._guarded(self._start(request, wait=wait))
 
     async def _start(self, request: schema.CommandRequest, *, wait: bool) -> CommandResult:
+        answer = await self._accepted(request)
+        if wait:
+            self.progress.on_accepted(answer)
+            await self._until_ended()
+            return replace(answer, text="done")
+        return answer
+
+    async def _accepted(self, request: schema.CommandRequest) -> CommandResult:
+        """Send a command that begins a motion, a program or a jog."""
         if self._reports is None:
             raise MessageError(f"{self} is not in control: use `with robot.control(...) as arm`")
         self._reports.forget()
@@ -300,44 +309,43 @@ class AsyncArm:
             raise
         self._accepted_s = time.monotonic()
         self._runs_program = request.command == _C.RUN_PROGRAM
-        if wait:
-            self.progress.on_accepted(answer)
-            await self._until_ended()
-            return replace(answer, text="done")
         return answer
 
     async def _jog(self, request: schema.CommandRequest, held: Callable[[], bool]) -> JogResult:
-        moved, self._moving = self._moving, True
-        try:
-            await self._command(request)
-        except RefusedError:
-            self._moving = moved
-            raise
+        await self._accepted(request)
         answer = await self._renewed(self._keep_alive(request.id, held))
         self._moving = False
         return JogResult(answer.moved, answer.rotary, answer.text, answer.reason.code)
 
     async def _keep_alive(self, jog: int, held: Callable[[], bool]) -> schema.JogAnswer:
-        """Send keep-alives while `held`, then the release until the robot rests; return the last answer."""
-        released, unanswered = False, 0
+        """Send keep-alives while `held`, then the release until the robot rests; return the last answer.
+
+        An exception of `held` is a release, and is raised at rest.
+        """
+        unanswered, failure = 0, None
         request = schema.JogRequest(lease=self._lease, jog=jog)
         while True:
             sent_s = time.monotonic()
             request.sequence += 1
-            request.release = released = released or not held()
+            try:
+                request.release = request.release or not held()
+            except Exception as error:
+                request.release, failure = True, error
             try:
                 answer = await self._session.ask(
-                    self._key(f"jog/{self.operator}"), request, timeout_s=_RENEWAL_TIMEOUT_S
+                    self._key(f"jog/{self.operator}"), request, timeout_s=_KEEP_ALIVE_TIMEOUT_S
                 )
             except (NoAnswerError, BusyError):
                 # The gateway has held the robot meanwhile.
-                released, unanswered = True, unanswered + 1
+                request.release, unanswered = True, unanswered + 1
                 if unanswered > _MOST_UNANSWERED:
                     raise
-                continue
-            assert isinstance(answer, schema.JogAnswer)
-            if not answer.running:
-                return answer
+            else:
+                assert isinstance(answer, schema.JogAnswer)
+                if not answer.running:
+                    if failure is not None:
+                        raise failure
+                    return answer
             await asyncio.sleep(max(0.0, sent_s + _KEEP_ALIVE_S - time.monotonic()))
 
     async def _guarded(self, waiting: Coroutine[Any, Any, T]) -> T:

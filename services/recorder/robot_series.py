@@ -1,8 +1,9 @@
 """Values of a robot over time, from its flight recorder and its recordings.
 
-The same state may be in several files. That changes nothing: each interval has the minimum and maximum.
+The same state may be in several files: to read it twice does not change an interval's minimum and maximum.
 """
 
+import logging
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
@@ -34,14 +35,18 @@ from services.recorder.flight import FOLDER
 
 _LONGEST_H = 24
 _SECOND_NS = 1_000_000_000
-# Closed files are read once, into intervals of at least this length.
+# Closed files are read once, into intervals of at least this length. A closer view reads the file again: its
+# intervals are shorter than this many of these.
 _INTERVAL_NS = 50_000_000
 _MOST_INTERVALS = 20_000
+_LEAST_RATIO = 2
 _MOST_CACHED_BYTES = 64 << 20
 # Between the last state of one file and the first of the next.
 _MOST_BETWEEN_NS = 2 * _SECOND_NS
 
 _Span = tuple[int, int]
+
+log = logging.getLogger(__name__)
 
 
 @dataclass
@@ -84,9 +89,12 @@ class _Reading:
         if lowest is None or highest is None:
             return
         there = np.flatnonzero(lowest <= highest)
-        middle_ns = pieces.start_ns + (there + 0.5) * ((pieces.end_ns - pieces.start_ns + 1) / pieces.count)
+        width_ns = (pieces.end_ns - pieces.start_ns + 1) / pieces.count
+        middle_ns = pieces.start_ns + (there + 0.5) * width_ns
+        # An interval over the edge counts too: a peak may be in it.
+        inside = (middle_ns > self.start_ns - width_ns / 2) & (middle_ns < self.end_ns + width_ns / 2)
         place = np.floor((middle_ns - self.start_ns) * (self.points / (self.end_ns - self.start_ns)))
-        inside = (place >= 0) & (place < self.points)
+        place = np.clip(place, 0, self.points - 1)
         if name not in self.found:
             self.found[name] = _Found(np.full(self.points, np.inf), np.full(self.points, -np.inf))
         found, index = self.found[name], place[inside].astype(np.int64)
@@ -129,8 +137,12 @@ class RobotSeries:
         # The flight recorder first: most recordings of the last minutes contain the same.
         for folder in (self._folder / FOLDER / robot, self._folder / robot):
             for path in _files(folder, reading.start_ns):
-                with suppress(RecordingError, OSError):  # the flight recorder removes old files
+                try:
                     self._read(path, reading)
+                except RecordingError as error:
+                    log.warning("%s: %s", path, error)
+                except OSError:
+                    pass  # the flight recorder removes old files
         return reading.answer()
 
     def _read(self, path: Path, reading: _Reading) -> None:
@@ -141,10 +153,15 @@ class RobotSeries:
                 return
             topics = topics_of_values(file)
             prismatic = sliding_joints(file, reading.names)
-            closed = not is_being_written(path)
+            count = min(max((last - first) // _INTERVAL_NS, 1), _MOST_INTERVALS)
+            coarse_ns = _LEAST_RATIO * (last - first) / count
+            whole = (
+                not is_being_written(path)
+                and coarse_ns <= (reading.end_ns - reading.start_ns) / reading.points
+            )
             for topic, names in _by_topic(reading.names, topics):
-                if closed:
-                    pieces = self._closed(file, topic, topics[topic], names)
+                if whole:
+                    pieces = self._whole(file, topic, topics[topic], names, count)
                 else:
                     pieces = Pieces(names, reading.start_ns, reading.end_ns - 1, reading.points)
                     cut(file, topic, topics[topic], pieces)
@@ -152,14 +169,14 @@ class RobotSeries:
                     reading.add(name, unit_of(name, prismatic), pieces)
             reading.add_span(span)
 
-    def _closed(self, file: RecordingFile, topic: str, key: str, names: frozenset[str]) -> Pieces:
+    def _whole(self, file: RecordingFile, topic: str, key: str, names: frozenset[str], count: int) -> Pieces:
+        """Return the intervals of a whole closed file, from the cache if it has them."""
         status = file.path.stat()
         entry = str(file.path), status.st_mtime_ns, status.st_size, topic
         pieces = self._cache.get(entry)
         if pieces is None or not (pieces.all or names <= pieces.asked | pieces.lowest.keys()):
-            first, last = file.layout.start_ns, file.layout.end_ns
-            count = min(max((last - first) // _INTERVAL_NS, 1), _MOST_INTERVALS)
-            pieces = self._cache[entry] = cut(file, topic, key, Pieces(names, first, last, count))
+            own = Pieces(names, file.layout.start_ns, file.layout.end_ns, count)
+            pieces = self._cache[entry] = cut(file, topic, key, own)
         self._cache.move_to_end(entry)
         while len(self._cache) > 1 and sum(each.bytes for each in self._cache.values()) > _MOST_CACHED_BYTES:
             self._cache.popitem(last=False)

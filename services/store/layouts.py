@@ -38,7 +38,7 @@ class Layouts:
     @property
     def message(self) -> LayoutList:
         """The published list, sorted by name."""
-        return LayoutList(layouts=[self._layouts[key] for key in sorted(self._layouts)])
+        return _listed(self._layouts)
 
     def open(self) -> Reason | None:
         """Read the layouts; return what is damaged, which is renamed, so that nothing overwrites it.
@@ -49,7 +49,9 @@ class Layouts:
         if not self._path.exists():
             return None
         try:
-            layouts = ParseDict(json.loads(self._path.read_bytes()), LayoutList()).layouts
+            layouts = ParseDict(
+                json.loads(self._path.read_bytes()), LayoutList(), ignore_unknown_fields=True
+            ).layouts
             self._layouts = {name_key(each.name): each for each in layouts}
         except (ValueError, TypeError, AttributeError, RecursionError, ParseError) as error:
             self._path.replace(self._path.with_suffix(".damaged"))
@@ -105,13 +107,16 @@ class Layouts:
             raise RefusedError(codes.LAYOUTS_NAME_TAKEN(name=there.name, author=there.author))
 
     def _write(self, layouts: dict[str, StoredLayout]) -> None:
-        listed = LayoutList(layouts=[layouts[key] for key in sorted(layouts)])
-        data = json.dumps(MessageToDict(listed), ensure_ascii=False, indent=1).encode()
+        data = json.dumps(MessageToDict(_listed(layouts)), ensure_ascii=False, indent=1).encode()
         try:
             write_atomically(self._path, data)
         except OSError as error:
             raise RefusedError(codes.PROGRAMS_DISK(detail=error.strerror or error)) from None
         self._layouts = layouts
+
+
+def _listed(layouts: dict[str, StoredLayout]) -> LayoutList:
+    return LayoutList(layouts=[layouts[key] for key in sorted(layouts)])
 
 
 def _check_text(text: str) -> str:

@@ -85,7 +85,7 @@ class _Service:
             self._report(WHOLE_SITE, _S.ERROR, reason)
         for robot in (*self._settings.robots, *self._store.robots):
             self._add(robot)
-        if (damaged := self._layouts.open()) is not None:
+        if (damaged := await asyncio.to_thread(self._layouts.open)) is not None:
             self._report(WHOLE_SITE, _S.ERROR, damaged)
         site = self._settings.site
         self._layout_list.put(self._layouts.message)

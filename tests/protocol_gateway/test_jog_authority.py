@@ -117,3 +117,42 @@ def test_the_end_of_control_stops_a_jog(tmp_path):
             assert bench.control.authority.stop is not None
 
     run(main())
+
+
+def test_no_command_moves_the_robot_on_after_the_end_of_a_jog(tmp_path):
+    async def main():
+        async with control_bench(tmp_path) as bench:
+            await begun(bench)
+            assert part(bench) is None
+            for number, activity in ((2, Activity.MOVING), (3, Activity.HOLDING)):
+                bench.status = replace(bench.status, activity=activity)
+                resume = schema.CommandRequest(lease=bench.secret, id=number, command=C.RESUME)
+                answer = await bench.control.attempt([resume], operator="li", source="test")
+                assert answer.reason.code == "jog.runs"
+            assert bench.socket[1:] == [b"1#COMMAND*hold@"]
+
+    run(main())
+
+
+def test_the_end_of_its_line_holds_no_arm_that_rests(tmp_path):
+    async def main():
+        async with control_bench(tmp_path) as bench:
+            await begun(bench)
+            assert part(bench) is None
+            bench.control.handle(JogEnding(codes.JOG_NOT_MOVING(), hold=False))
+            assert len(bench.socket) == 1
+            assert part(bench).code == "command.held"
+
+    run(main())
+
+
+def test_a_hold_that_cannot_be_sent_latches_a_stop(tmp_path):
+    async def main():
+        async with control_bench(tmp_path) as bench:
+            await begun(bench)
+            assert part(bench) is None
+            bench.broken = True
+            bench.control.handle(JogEnding(codes.JOG_RELEASED()))
+            assert bench.control.authority.stop is not None
+
+    run(main())

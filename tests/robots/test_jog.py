@@ -84,7 +84,7 @@ def test_parts_are_one_straight_line_of_at_most_10_mm(arm, frame, axis, sign):
 def test_a_turn_keeps_the_tools_place_and_goes_on_beyond_half_a_turn(arm):
     model, start = arm[2], arm[3]
     if len(start) == 5:
-        return
+        pytest.skip("with five joints the tool cannot turn about its own axis on the spot")
     targets, part = jogged(arm, Jog(frame=StepFrame.TOOL, axis=5, speed=0.3), parts=150)
     begin = tool_of(model, start)
     for one, target in zip([start, *targets], targets, strict=False):
@@ -93,7 +93,7 @@ def test_a_turn_keeps_the_tools_place_and_goes_on_beyond_half_a_turn(arm):
         turn = pinocchio.log3(tool_of(model, one)[:3, :3].T @ tool[:3, :3])
         assert np.linalg.norm(turn) <= AHEAD_RAD + 1e-3
         assert turn[2] > 0
-    assert degrees(part.commanded) > 190 or part.end is not None
+    assert degrees(part.commanded) > 190
 
 
 def test_the_tool_keeps_to_its_speed(arm):

@@ -1214,7 +1214,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ],
   ],
   ["jog.released", ["released", "已松开"]],
-  ["jog.not_alive", ["no keep-alive for {ms} ms", "{ms} 毫秒内没有保活信号"]],
+  ["jog.not_alive", ["no keep-alive for {ms} ms: use a faster computer or network", "{ms} 毫秒内没有保活信号：请使用更快的电脑或网络"]],
   ["jog.not_held_down", ["no keep-alive came: nothing has moved", "没有收到保活信号：未发生运动"]],
   ["jog.commanded", ["the operator commanded {names}", "操作员发出了命令 {names}"]],
   ["jog.not_moving", ["the robot does not move: check the controller", "机器人没有运动：请检查控制器"]],
