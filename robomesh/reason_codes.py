@@ -729,7 +729,7 @@ JOG_SPEED = Code(
 JOG_FORBIDDEN = Code("jog.forbidden", "the site file forbids jogging this robot (jog_speed = 0)", "use steps")
 JOG_NO_DRIVER = Code(
     "jog.no_driver",
-    "this controller cannot be jogged: its driver does not declare that a hold can be given up",
+    "this controller cannot be jogged: its driver does not say that a motion on hold can be cancelled",
     "use steps",
 )
 JOG_NO_STATE = Code(
@@ -1043,7 +1043,7 @@ RECORDING_TOO_MANY_VALUES = Code(
 RECORDING_TIMES = Code("recording.times", "the range ends before it begins")
 RECORDING_TOO_LONG = Code(
     "recording.too_long",
-    "the range is longer than a robot's values are read at once",
+    "the range is too long to read at once",
     "request at most {hours:g} h, with start and end",
 )
 RECORDING_OUTSIDE = Code(

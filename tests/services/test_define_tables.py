@@ -193,3 +193,22 @@ def test_the_last_row_of_a_modified_table_ends_in_its_joint(module):
     rows = answer["description"]["joint"]
     assert [(row["a"], row["alpha"]) for row in rows[-2:]] == [(88, 90), (0, 0)]
     assert all(one["name"] != other["name"] for one, other in pairwise(rows))
+
+
+def test_a_modified_table_changes_no_cell_that_it_does_not_give(module):
+    script = """
+const { readText, readValues, fillJoints, empty, typesFrom } = page;
+const fillOne = (description, text) => {
+  const table = readText(text);
+  const reading = { decimal: table.decimal.sign, ...description.units };
+  const read = readValues(table, reading, description.units, typesFrom(description, 0));
+  fillJoints(description, read, 0, "modified");
+};
+const description = empty();
+fillOne(description, "a\\talpha\\td\\ttheta\\n10\\t90\\t1\\t0\\n20\\t45\\t2\\t0\\n30\\t-90\\t3\\t0");
+fillOne(description, "alpha\\td\\n5\\t1\\nabc\\t2\\n7\\t3");
+answer([description.base.pose, description.joint.map(({ a, alpha }) => [a, alpha])]);
+"""
+    pose, rows = page_modules.ask(module, script, None)
+    assert (pose["xyz"], pose["rpy"]) == ([10, 0, 0], [5, 0, 0])
+    assert rows == [[20, 45], [30, 7], [0, 0]]

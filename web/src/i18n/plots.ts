@@ -25,7 +25,7 @@ const TEXTS = {
   not_recorded: ["not recorded", "未录制"],
   past_problem: ["The past cannot be read: {text}", "无法读取过去的数值：{text}"],
   past_reading: ["Reading the past from the recorder…", "正在从录制服务读取过去的数值…"],
-  past_whole: ["Before this page was open: from the flight recorder.", "打开本页面之前的数值来自循环录制。"],
+  past_whole: ["Values from before this page was open come from the recorder.", "打开本页面之前的数值来自录制服务。"],
   past_none: ["The recorder has nothing of this range.", "录制服务没有此时间范围的数据。"],
   past_lacks: ["{time} of this range are not recorded.", "此范围中有 {time} 未录制。"],
   layout: ["Layout", "布局"],

@@ -13,7 +13,7 @@ const TEXTS = {
 
   file: ["File", "文件"],
   name: ["Program name", "程序名称"],
-  first_name: ["program", "程序"],
+  default_name: ["program", "程序"],
   new: ["New", "新建"],
   new_hint: ["Begins anew with an example. Undo brings the text back.", "以示例重新开始。可用撤销恢复原文。"],
   open: ["Open file…", "打开文件…"],

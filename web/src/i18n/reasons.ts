@@ -1186,8 +1186,8 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   [
     "jog.no_driver",
     [
-      "this controller cannot be jogged: its driver does not declare that a hold can be given up: use steps",
-      "该控制器不能点动：其驱动未声明保持可以放弃：请使用步进",
+      "this controller cannot be jogged: its driver does not say that a motion on hold can be cancelled: use steps",
+      "该控制器不能点动：其驱动未声明可以取消已保持的运动：请使用步进",
     ],
   ],
   [
@@ -1214,7 +1214,10 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ],
   ],
   ["jog.released", ["released", "已松开"]],
-  ["jog.not_alive", ["no keep-alive for {ms} ms: use a faster computer or network", "{ms} 毫秒内没有保活信号：请使用更快的电脑或网络"]],
+  [
+    "jog.not_alive",
+    ["no keep-alive for {ms} ms: use a faster computer or network", "{ms} 毫秒内没有保活信号：请使用更快的电脑或网络"],
+  ],
   ["jog.not_held_down", ["no keep-alive came: nothing has moved", "没有收到保活信号：未发生运动"]],
   ["jog.commanded", ["the operator commanded {names}", "操作员发出了命令 {names}"]],
   ["jog.not_moving", ["the robot does not move: check the controller", "机器人没有运动：请检查控制器"]],
@@ -1705,7 +1708,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   [
     "recording.too_long",
     [
-      "the range is longer than a robot's values are read at once: request at most {hours} h, with start and end",
+      "the range is too long to read at once: request at most {hours} h, with start and end",
       "时间范围过长，无法一次读取机器人的数值：请给出开始和结束时间，最长 {hours} 小时",
     ],
   ],

@@ -108,6 +108,7 @@ function startDrag(event: PointerEvent & { currentTarget: HTMLElement }, from: n
     "pointerup",
     () => {
       const over = dragged.value?.over;
+      if (dragged.value) ignoreClick();
       end();
       if (over === "base") rebase(from);
       else if (typeof over === "number") move(from, over, count);
@@ -116,6 +117,13 @@ function startDrag(event: PointerEvent & { currentTarget: HTMLElement }, from: n
   );
   addEventListener("pointercancel", end, options);
   addEventListener("keydown", ({ key }) => key === "Escape" && end(), options);
+}
+
+/** Ignore the click that follows a drag: it would choose the row where the drag began. */
+function ignoreClick(): void {
+  const stop = (event: Event) => event.stopPropagation();
+  addEventListener("click", stop, { capture: true });
+  setTimeout(() => removeEventListener("click", stop, { capture: true }));
 }
 
 function dropClass(part: Part): string {

@@ -43,13 +43,18 @@ function isBefore(key: ColumnKey): boolean {
 
 function shiftRows(of: Description, { rows }: ReadTable): void {
   if (!rows.some(({ values }) => values.a !== undefined || values.alpha !== undefined)) return;
-  const { a = 0, alpha = 0 } = rows[0]?.values ?? {};
-  of.base.pose = { xyz: [a, 0, 0], rpy: [alpha, 0, 0] };
+  const { a, alpha } = rows[0]?.values ?? {};
+  if (a !== undefined) of.base.pose.xyz = [a, 0, 0];
+  if (alpha !== undefined) of.base.pose.rpy = [alpha, 0, 0];
   rows.forEach((_, index) => {
     const next = rows[index + 1]?.values;
     const joint = of.joint[index];
-    // The last row's frame is its joint's: nothing follows it, unless a joint that stays does.
-    if (joint && (next || index + 1 === of.joint.length))
-      Object.assign(joint, { a: next?.a ?? 0, alpha: next?.alpha ?? 0 });
+    if (!joint) return;
+    for (const key of ["a", "alpha"] as const) {
+      const has = rows.some(({ values }) => values[key] !== undefined);
+      // The last row's frame is its joint's: nothing follows it, unless a joint that stays does.
+      if (next) joint[key] = next[key] ?? joint[key];
+      else if (has && index + 1 === of.joint.length) joint[key] = 0;
+    }
   });
 }

@@ -52,7 +52,7 @@ let typedAt = 0;
 /** Open a robot's draft; false: it had none, and gets an empty one. */
 export function openDraft(robotKey: string): boolean {
   const kept = storedDraft(robotKey);
-  draft.value = kept ?? { robotKey, name: p("first_name"), text: "", base: null };
+  draft.value = kept ?? { robotKey, name: p("default_name"), text: "", base: null };
   past.value = future.value = [];
   return kept !== null;
 }
@@ -188,7 +188,7 @@ function show(text: string, cursor: number): void {
 
 /** Download a text as a file. */
 export function download(text: string, name: string): void {
-  saveFile(new Blob([text], { type: "text/plain" }), `${name.trim() || p("first_name")}${FILE_ENDING}`);
+  saveFile(new Blob([text], { type: "text/plain" }), `${name.trim() || p("default_name")}${FILE_ENDING}`);
 }
 
 /** Return the line of the cursor, from 1. */

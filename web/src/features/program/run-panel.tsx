@@ -32,7 +32,7 @@ export function RunPanel(props: { robotKey: string; controller: ControllerState 
   const state = program.value;
   const running = state?.outcome === Outcome.RUNNING;
   const why = whyNotRun(robotKey, props.controller, running);
-  const name = draft.value?.name.trim() || p("first_name");
+  const name = draft.value?.name.trim() || p("default_name");
   const run = () => {
     hideMoment(); // the ghost would hide the robot
     const of = draft.value;

@@ -53,7 +53,7 @@ export const timeOf = (version: ProgramVersion | undefined): string => stampFull
 export function unusedProgramName(): string {
   const names = new Set(stored.value?.programs.map((each) => each.current?.name.toLowerCase()));
   for (let number = 1; ; number++) {
-    const name = number === 1 ? p("first_name") : `${p("first_name")}-${number}`;
+    const name = number === 1 ? p("default_name") : `${p("default_name")}-${number}`;
     if (!names.has(name)) return name;
   }
 }

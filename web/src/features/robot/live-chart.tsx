@@ -9,8 +9,8 @@ import type { shownUnit } from "../../i18n/value-names";
 import { ageClock } from "../../mesh/age-clock";
 import { plotAppearance } from "../../ui/plot-appearance";
 import { theme } from "../../ui/theme";
-import type { Buckets, Columns } from "./plot-buckets";
-import { columnsOf } from "./plot-buckets";
+import type { Columns } from "./plot-buckets";
+import { Buckets, columnsOf } from "./plot-buckets";
 import type { PlotFeed, Span } from "./plot-feed";
 import { holdOf, LIVE_S } from "./plot-feed";
 
@@ -141,21 +141,22 @@ export function LiveChart(props: {
     );
     const relative = () => seconds <= LIVE_S && latest.current.frozen === null;
     const columns: Columns = [[]];
+    const none = new Buckets(Math.max(seconds, LIVE_S)); // of a value that nothing sends
     let same = false; // the drawn curves are level, from edge to edge
     const draw = (forced: boolean) => {
       const { frozen, zoomed } = latest.current;
       const now = ageClock() / 1000;
       if (frozen && !forced) return;
-      const level = !frozen && curves.every(({ name }) => feed.isLevel(name, seconds, now));
+      // Seconds before now stay as they are; times of day move.
+      const level = relative() && curves.every(({ name }) => feed.isLevel(name, seconds, now));
       if (level && same && !forced) return;
       same = level;
       const end = frozen?.end ?? now;
       shown = zoomed ?? { from: end - seconds, to: end };
       const drawn = curves.flatMap(({ name, unit }) => {
-        const buckets = frozen ? frozen.buckets.get(name) : feed.buckets(name, seconds);
-        return buckets ? [{ buckets, holds: Math.max(holdOf(name), 2 * buckets.width), factor: unit.factor }] : [];
+        const buckets = (frozen ? frozen.buckets.get(name) : feed.buckets(name, seconds)) ?? none;
+        return [{ buckets, holds: Math.max(holdOf(name), 2 * buckets.width), factor: unit.factor }];
       });
-      if (drawn.length < curves.length) return; // the feed does not follow all of them yet
       plot.setData(columnsOf(drawn, shown.from, shown.to, element.clientWidth, columns), true);
       setAny(curves.some(({ name }) => feed.has(name)));
       element.dataset.drawn = String(Number(element.dataset.drawn ?? 0) + 1);
@@ -207,7 +208,7 @@ function drawMissing(
   words: boolean,
 ): void {
   const past = feed.pastOf(seconds);
-  if (seconds <= LIVE_S || past.reading) return;
+  if (seconds <= LIVE_S || past.reads > 0) return;
   const live = Math.min(ageClock() / 1000, ...curves.map(({ name }) => feed.liveFrom(name)));
   const ratio = devicePixelRatio;
   ctx.save();
@@ -248,7 +249,8 @@ function timeTexts(splits: readonly number[], end: number | null): string[] {
   if (end !== null) return splits.map((at) => `${Math.round(at - end)} s`.replace("-", "−"));
   const step = (splits[1] ?? 1) - (splits[0] ?? 0);
   return splits.map((at) => {
-    const ms = Math.round(Date.now() - ageClock() + at * 1000);
+    const unit = step < 1 ? 100 : 1000; // a label is at a full one, but for rounding
+    const ms = Math.round((Date.now() - ageClock() + at * 1000) / unit) * unit;
     const time = timeOfDay(ms);
     if (step >= 60) return time === "00:00:00" ? dateOf(ms) : time.slice(0, 5);
     return step < 1 ? `${time}.${Math.floor((ms % 1000) / 100)}` : time;

@@ -48,7 +48,7 @@ export class Buckets {
     return made;
   }
 
-  /** Return the middle of the newest interval before a time [s] that has data, not more than `back` s before it. */
+  /** Return the lowest and highest value of the newest interval before a time [s] that has data, not more than `back` s before it. */
   newest(at: number, back: number): { low: number; high: number } | null {
     const last = Math.floor(at / this.width);
     for (let number = last; number > last - Math.ceil(back / this.width); number--) {

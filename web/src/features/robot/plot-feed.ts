@@ -20,7 +20,6 @@ const AGAIN_S = 15;
 const TIMEOUT_S = 30; // the longest that a console waits
 const ATTEMPTS = 4;
 const POINTS = 3000;
-const MOST_SPANS = 200;
 
 /** A plotted value: its name and the time that its plot spans [s]. */
 export interface Wanted {
@@ -56,12 +55,13 @@ export interface Span {
 
 /** What the recorder has of a plot's time. */
 export interface Past {
-  reading: boolean;
+  /** Requests that are not answered yet. */
+  reads: number;
   problem: string;
   recorded: readonly Span[];
 }
 
-const NO_PAST: Past = { reading: false, problem: "", recorded: [] };
+const NO_PAST: Past = { reads: 0, problem: "", recorded: [] };
 
 export class PlotFeed {
   private readonly topics = new Map<string, Topic>();
@@ -120,7 +120,7 @@ export class PlotFeed {
   /** Read what was recorded of values in the last `back` s; merging what is known already changes nothing. */
   private async readPast(span: number, names: readonly string[], back: number): Promise<void> {
     if (this.ended) return;
-    this.setPast(span, { reading: true });
+    this.setPast(span, { reads: this.pastOf(span).reads + 1 });
     const problems = await Promise.all(
       [...Map.groupBy(names, (name) => topicOf(name, [...this.topics.keys()]) ?? "")].map(([topic, some]) =>
         this.readTopic(topic, span, some, back).then(
@@ -129,7 +129,7 @@ export class PlotFeed {
         ),
       ),
     );
-    this.setPast(span, { reading: false, problem: problems.find(Boolean) ?? "" });
+    this.setPast(span, { reads: this.pastOf(span).reads - 1, problem: problems.find(Boolean) ?? "" });
   }
 
   private async readTopic(name: string, span: number, names: readonly string[], back: number): Promise<void> {
@@ -158,7 +158,7 @@ export class PlotFeed {
         for (const [i, time] of timesS.entries()) buckets.take(zero + time, lowest[i] ?? 0, highest[i] ?? 0);
     }
     const recorded = answer.recorded.map(({ startS, endS }) => ({ from: zero + startS, to: zero + endS }));
-    this.setPast(span, { recorded: [...this.pastOf(span).recorded, ...recorded].slice(-MOST_SPANS) });
+    this.setPast(span, { recorded: joined([...this.pastOf(span).recorded, ...recorded], ageClock() / 1000 - span) });
   }
 
   private setPast(span: number, changed: Partial<Past>): void {
@@ -180,7 +180,7 @@ export class PlotFeed {
 
   /** Return whether a value has arrived, also if it is stale now. */
   has(name: string): boolean {
-    return this.value(name)?.newestAt !== undefined && (this.value(name)?.newestAt ?? -Infinity) > -Infinity;
+    return (this.value(name)?.newestAt ?? -Infinity) > -Infinity;
   }
 
   /** Return whether the drawn curve of a value is level over the last `span` s, to the right edge. */
@@ -231,6 +231,18 @@ export class PlotFeed {
       setTimeout(() => void this.readPast(span, names, back), RECORDED_MS);
     }
   }
+}
+
+/** Return spans without overlaps, from a time on. */
+function joined(spans: readonly Span[], since: number): Span[] {
+  const found: Span[] = [];
+  for (const { from, to } of [...spans].sort((a, b) => a.from - b.from)) {
+    const last = found.at(-1);
+    if (to < since) continue;
+    if (last && from <= last.to) last.to = Math.max(last.to, to);
+    else found.push({ from, to });
+  }
+  return found;
 }
 
 /** Repeat a request that is not answered: the recorder goes on, and what it has read it need not read again. */

@@ -1,6 +1,6 @@
 // Plots of any numbers of a robot, live.
 
-import { useEffect, useMemo, useState } from "preact/hooks";
+import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
 import type { Description } from "../../gen/robomesh_pb";
 import { ageText, DASH, fixed, jointTitle, timeOfDay } from "../../i18n/format";
 import { p, partText, rangeText } from "../../i18n/plots";
@@ -40,11 +40,19 @@ export function PlotsPanel(props: {
   const fieldsOf = ({ fields }: Plot) => fields ?? joints;
   const wanted = plots.flatMap((plot) => fieldsOf(plot).map((name) => ({ name, span: plot.seconds })));
   const topics = hello.value?.values.length ?? 0;
-  useEffect(() => feed.want(wanted), [feed, topics, JSON.stringify(wanted)]);
-  const change = (index: number, changed: Partial<Plot> | null) =>
+  // Before the plots' own effects, which copy what the feed keeps.
+  useLayoutEffect(() => feed.want(wanted), [feed, topics, JSON.stringify(wanted)]);
+  // A plot that is removed takes its zoom and its open choice with it.
+  const ids = useRef<number[]>([]);
+  const nextId = useRef(0);
+  ids.current.length = Math.min(ids.current.length, plots.length);
+  while (ids.current.length < plots.length) ids.current.push(nextId.current++);
+  const change = (index: number, changed: Partial<Plot> | null) => {
+    if (changed === null) ids.current.splice(index, 1);
     props.setPlots(
       plots.flatMap((plot, i) => (i !== index ? [plot] : changed === null ? [] : [{ ...plot, ...changed }])),
     );
+  };
   return (
     <Panel
       name="history"
@@ -73,7 +81,7 @@ export function PlotsPanel(props: {
         {plots.length === 0 && <p class="plot-none dim">{p("no_plots")}</p>}
         {plots.map((plot, i) => (
           <PlotCard
-            key={i}
+            key={ids.current[i]}
             number={i + 1}
             robotKey={robotKey}
             description={description}
@@ -189,7 +197,7 @@ function PastLine(props: { past: Past; fields: readonly string[]; feed: PlotFeed
   const lacking = missing.reduce((sum, { from, to }) => sum + to - from, 0);
   const text = past.problem
     ? p("past_problem", { text: past.problem })
-    : past.reading && past.recorded.length === 0
+    : past.reads > 0 && past.recorded.length === 0
       ? p("past_reading")
       : lacking < 1
         ? p("past_whole")
@@ -201,11 +209,14 @@ function PastLine(props: { past: Past; fields: readonly string[]; feed: PlotFeed
 
 /** Return copies of the plot's curves as they were when it was paused; null: it is live. */
 function useFrozen(feed: PlotFeed, fields: readonly string[], seconds: number, pausedAt: number | null): Frozen | null {
-  return useMemo(() => {
-    if (pausedAt === null) return null;
+  const [frozen, setFrozen] = useState<Frozen | null>(null);
+  const past = feed.pastOf(seconds); // may arrive later
+  useEffect(() => {
+    if (pausedAt === null) return setFrozen(null);
     const kept = fields.map((name) => [name, feed.buckets(name, seconds)?.copy()] as const);
-    return { end: pausedAt, buckets: new Map(kept) };
-  }, [feed, fields.join(" "), seconds, pausedAt]);
+    setFrozen({ end: pausedAt, buckets: new Map(kept) });
+  }, [feed, fields.join(" "), seconds, pausedAt, past]);
+  return frozen;
 }
 
 function Legend(props: {

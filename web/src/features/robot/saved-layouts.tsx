@@ -36,7 +36,7 @@ export function SavedLayouts(props: { site: string; text: string }) {
   // A link opens a saved layout, too. One that is edited stays chosen.
   const same = layouts.find((each) => each.text === text)?.name;
   useEffect(() => {
-    if (same) choose(same);
+    if (same && opened?.text !== text) choose(same);
   }, [same]);
   const there = layouts.find((each) => each.name.toLowerCase() === name.trim().toLowerCase());
   const busy = notice?.kind === "busy";
