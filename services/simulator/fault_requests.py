@@ -12,7 +12,6 @@ from robomesh.server import Request
 from robomesh.session import SessionSettings, open_session
 from robomesh.topics import Role
 from services.simulator.errors import FaultError
-from services.simulator.fault_table import FAULTS
 from services.simulator.faults import Faults
 
 
@@ -39,7 +38,7 @@ async def answer_requests(mesh: Mesh, faults: Faults) -> None:
                 faults.begin(message.fault, now_s)
         except FaultError as error:
             raise RefusedError(codes.INVALID(error.reason)) from None
-        return FaultAnswer(active=sorted(faults.active(now_s)), known=list(FAULTS))
+        return FaultAnswer(active=sorted(faults.active(now_s)), known=list(faults.known))
 
     served = Served(service=Role.SIMULATOR.value, present_for=((mesh.site, mesh.robot),))
     async with open_session(mesh.session) as session, present(session, served):

@@ -27,20 +27,21 @@ class Span:
     length_s: float
 
 
-def parse_fault(text: str, *, begin_s: float | None = None) -> Span:
+def parse_fault(text: str, *, begin_s: float | None = None, known: Collection[str] = FAULTS.keys()) -> Span:
     """Parse NAME, NAME@BEGIN, NAME+LENGTH or NAME@BEGIN+LENGTH.
 
     Args:
         begin_s: Default begin; None for the default of the fault's row.
+        known: Names of the faults that the controller can show.
 
     Raises:
         FaultError: If the fault is unknown, or a time is invalid.
     """
     head, plus, length = text.partition("+")
     name, at, begin = head.partition("@")
-    row = FAULTS.get(name)
-    if row is None:
-        raise FaultError(codes.FAULT_UNKNOWN(name=text[:80], names=", ".join(FAULTS)))
+    if name not in known:
+        raise FaultError(codes.FAULT_UNKNOWN(name=text[:80], names=", ".join(known)))
+    row = FAULTS[name]
     try:
         span = Span(
             name,
@@ -59,13 +60,15 @@ class Faults:
 
     Args:
         texts: Faults of the command line; their time starts with the first client's connection.
+        known: Names of the faults that the controller can show.
 
     Raises:
         FaultError: If one is invalid.
     """
 
-    def __init__(self, texts: Sequence[str]) -> None:
-        self._waiting = [parse_fault(text) for text in texts]
+    def __init__(self, texts: Sequence[str], *, known: Collection[str] = FAULTS.keys()) -> None:
+        self.known = known
+        self._waiting = [parse_fault(text, known=known) for text in texts]
         self._spans: dict[str, Span] = {}
 
     def first_client(self, now_s: float) -> None:
@@ -80,7 +83,7 @@ class Faults:
         Raises:
             FaultError: If it is invalid.
         """
-        span = parse_fault(text, begin_s=0.0)
+        span = parse_fault(text, begin_s=0.0, known=self.known)
         self._spans[span.name] = replace(span, begin_s=now_s + span.begin_s)
 
     def end(self, text: str) -> None:
@@ -89,7 +92,7 @@ class Faults:
         Raises:
             FaultError: If it is unknown.
         """
-        name = parse_fault(text).name
+        name = parse_fault(text, known=self.known).name
         self._spans.pop(name, None)
         self._waiting = [span for span in self._waiting if span.name != name]
 

@@ -1,0 +1,303 @@
+"""Model of the simulated controller: arm, program, modes and measured values. No I/O; time is an argument.
+
+The program is the demo's tour. Currents, voltages, temperatures and signals are invented: they have
+a plausible magnitude and follow the motion, but no dynamics stand behind them.
+"""
+
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping
+
+import numpy as np
+
+from protocol_gateway.drivers.universal_robots.modes import (
+    JointMode,
+    ReportLevel,
+    RobotMode,
+    RobotStatus,
+    RuntimeState,
+    SafetyMode,
+    SafetyStatus,
+)
+from protocol_gateway.drivers.universal_robots.primary import (
+    Alarm,
+    KeyMessage,
+    Origin,
+    PrimaryMessage,
+    SafetyModeChanged,
+)
+from protocol_gateway.drivers.universal_robots.rtde_messages import Value
+from robots.description import RobotDescription
+from robots.joints import FloatArray, joints_of
+from robots.model import build_model, tool_jacobian, tool_placement
+from robots.motion import Motion
+from services.simulator.errors import SimulatorError
+from services.simulator.fault_table import LEAP
+from services.simulator.universal_robots.fields import OFFERED
+
+JOINTS = 6
+PROGRAM = "demo"
+
+_SPEED = 0.6
+_REST_S = 0.4
+_LOWEST_SPEED = 0.01
+_WARM_UP_S = 1800.0
+_CONTROLLER, _BASE = -2, 0
+_ALARM_CODE, _ALARM_ARGUMENT = 153, 0
+
+
+class UrController:
+    """State of one simulated controller.
+
+    Args:
+        description: A robot of six rotary joints.
+        tour: Targets [rad] of the running program; None: no program, at rest.
+        powered: The motors are on; a restarted controller waits for an operator to power them.
+        now_s: The clock's time at boot.
+        announce: Called with each robot message for the primary interface.
+
+    Raises:
+        SimulatorError: If the robot does not have six rotary joints.
+    """
+
+    def __init__(
+        self,
+        description: RobotDescription,
+        *,
+        tour: Iterator[FloatArray] | None,
+        powered: bool,
+        now_s: float,
+        announce: Callable[[PrimaryMessage], None],
+    ) -> None:
+        self._joints = joints_of(description)
+        if len(self._joints) != JOINTS or set(self._joints.types) != {"rotary"}:
+            raise SimulatorError(
+                f"robot {description.name} has {len(self._joints)} joints, "
+                f"this protocol needs {JOINTS} rotary ones: simulate puma560 or another arm with six"
+            )
+        self._model = build_model(description)
+        self._motion = Motion(self._joints, self._joints.home.copy())
+        self._tour = tour
+        self._announce = announce
+        self._boot_s = now_s
+        self._powered = powered
+        self._safety = SafetyMode.NORMAL
+        self._target: FloatArray | None = None
+        self._leg = 0
+        self._slider = 1.0
+        self._outputs = 0
+        self._inputs: dict[str, Value] = {}
+        if tour is not None:
+            self._key("PROGRAM_XXX_STARTED", now_s)
+
+    # ------------------------------------------------------------------------ behaviour
+
+    def tick(self, now_s: float) -> None:
+        """Begin the next motion of the program if the current one has ended."""
+        if self._tour is None or self._safety is not SafetyMode.NORMAL or self._motion.moving(now_s):
+            return
+        if self._target is None or now_s >= self._motion.end_s + _REST_S:
+            self._target = next(self._tour)
+            self._leg += 1
+            self._move(now_s)
+
+    def protective_stop(self, now_s: float) -> None:
+        """Stop the arm, pause the program and send an alarm."""
+        self._safety = SafetyMode.PROTECTIVE_STOP
+        self._motion.brake(now_s)
+        self._announce(
+            Alarm(
+                self._origin(_BASE, now_s),
+                _ALARM_CODE,
+                _ALARM_ARGUMENT,
+                ReportLevel.VIOLATION,
+                0,
+                0,
+                "position of the base deviates from its path (simulated)",
+            )
+        )
+        self._announce_safety_mode(now_s)
+
+    def unlock(self, now_s: float) -> None:
+        """End the protective stop and continue the program."""
+        self._safety = SafetyMode.NORMAL
+        self._announce_safety_mode(now_s)
+        if self._target is not None:
+            self._move(now_s)
+
+    def write(self, values: Mapping[str, Value], now_s: float) -> None:
+        """Take a client's inputs: speed slider, digital outputs and registers; others have no effect."""
+        self._inputs.update({name: value for name, value in values.items() if name.startswith("input_")})
+        fraction = values.get("speed_slider_fraction")
+        if values.get("speed_slider_mask") == 1 and isinstance(fraction, float) and 0.0 <= fraction <= 1.0:
+            self._slider = fraction
+            if self._motion.moving(now_s) and self._safety is SafetyMode.NORMAL:
+                self._move(now_s)
+        for name, first in (("standard", 0), ("configurable", 8), ("tool", 16)):
+            mask, bits = values.get(f"{name}_digital_output_mask"), values.get(f"{name}_digital_output")
+            if isinstance(mask, int) and isinstance(bits, int):
+                self._outputs = self._outputs & ~(mask << first) | (bits & mask) << first
+
+    def _move(self, now_s: float) -> None:
+        assert self._target is not None
+        self._motion.move(self._target, now_s, speed=_SPEED * max(self._slider, _LOWEST_SPEED))
+
+    def _key(self, title: str, now_s: float) -> None:
+        self._announce(KeyMessage(self._origin(_CONTROLLER, now_s), 0, 0, title, PROGRAM))
+
+    def _announce_safety_mode(self, now_s: float) -> None:
+        self._announce(SafetyModeChanged(self._origin(_CONTROLLER, now_s), 0, 0, self._safety))
+
+    def _origin(self, source: int, now_s: float) -> Origin:
+        return Origin(int(self.uptime_s(now_s) * 1e6), source)
+
+    # ---------------------------------------------------------------------------- state
+
+    def uptime_s(self, now_s: float) -> float:
+        """Return the time since the boot [s]."""
+        return now_s - self._boot_s
+
+    @property
+    def robot_mode(self) -> RobotMode:
+        """Mode of the robot."""
+        return RobotMode.RUNNING if self._powered else RobotMode.POWER_OFF
+
+    @property
+    def safety_mode(self) -> SafetyMode:
+        """Safety mode."""
+        return self._safety
+
+    @property
+    def runtime_state(self) -> RuntimeState:
+        """State of the program."""
+        if self._tour is None:
+            return RuntimeState.STOPPED
+        return RuntimeState.PLAYING if self._safety is SafetyMode.NORMAL else RuntimeState.PAUSED
+
+    @property
+    def speed_slider(self) -> float:
+        """Position of the speed slider, 0 to 1."""
+        return self._slider
+
+    def values(self, names: Collection[str], now_s: float, *, leap: bool = False) -> dict[str, Value]:
+        """Return the values of offered fields.
+
+        Args:
+            leap: The first joint is reported LEAP degrees too high.
+        """
+        state = self._motion.state(now_s)
+        positions = state.positions.copy()
+        positions[0] += math.radians(LEAP) if leap else 0.0
+        found = self._modes() | self._measured(state.positions, state.velocities, state.accelerations, now_s)
+        found |= {
+            "timestamp": self.uptime_s(now_s),
+            "actual_q": _tuple(positions),
+            "actual_qd": _tuple(state.velocities),
+            "target_q": _tuple(state.positions),
+            "target_qd": _tuple(state.velocities),
+            "target_qdd": _tuple(state.accelerations),
+            "script_control_line": 2 + self._leg % 16 if self._tour is not None else 0,
+            **self._inputs,
+        }
+        if any("TCP_pose" in name for name in names):
+            found["target_TCP_pose"] = _pose(tool_placement(self._model, state.positions))
+            found["actual_TCP_pose"] = _pose(tool_placement(self._model, positions))
+        if any("TCP_speed" in name for name in names):
+            speed = _tuple(tool_jacobian(self._model, state.positions) @ state.velocities)
+            found["actual_TCP_speed"] = found["target_TCP_speed"] = speed
+        return {name: found.get(name, _ZEROS[OFFERED[name]]) for name in names}
+
+    def _modes(self) -> dict[str, Value]:
+        normal = self._safety is SafetyMode.NORMAL
+        status = RobotStatus.POWER_ON if self._powered else RobotStatus(0)
+        if self.runtime_state is RuntimeState.PLAYING:
+            status |= RobotStatus.PROGRAM_RUNNING
+        safety = (
+            SafetyStatus.NORMAL_MODE
+            if normal
+            else SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.STOPPED_DUE_TO_SAFETY
+        )
+        return {
+            "joint_mode": (int(JointMode.RUNNING if self._powered else JointMode.POWER_OFF),) * JOINTS,
+            "robot_mode": int(self.robot_mode),
+            "safety_mode": int(self._safety),
+            "safety_status": int(self._safety),
+            "runtime_state": int(self.runtime_state),
+            "robot_status_bits": int(status),
+            "safety_status_bits": int(safety),
+            "speed_scaling": self._slider if normal else 0.0,
+            "target_speed_fraction": self._slider,
+            "actual_digital_input_bits": self._leg % 2,
+            "actual_digital_output_bits": self._outputs,
+        }
+
+    def _measured(
+        self, positions: FloatArray, velocities: FloatArray, accelerations: FloatArray, now_s: float
+    ) -> dict[str, Value]:
+        """Return the invented values."""
+        on = 1.0 if self._powered else 0.0
+        warm = 1.0 - math.exp(-self.uptime_s(now_s) / _WARM_UP_S)
+        size = np.array((1.0, 1.0, 0.7, 0.3, 0.3, 0.2))
+        currents = on * size * (0.4 * np.sin(positions) + 0.8 * velocities + 0.3 * accelerations)
+        return {
+            "actual_current": _tuple(currents),
+            "target_current": _tuple(currents),
+            "joint_control_output": _tuple(currents),
+            "target_moment": _tuple(currents * 10.0),
+            "joint_temperatures": _tuple(24.0 + on * warm * np.array((6.0, 8.0, 8.0, 10.0, 10.0, 11.0))),
+            "actual_joint_voltage": (48.0 * on,) * JOINTS,
+            "actual_tool_accelerometer": (0.0, 0.0, 9.81),
+            "actual_execution_time": 0.2,
+            "actual_main_voltage": 48.0,
+            "actual_robot_voltage": 48.0 * on,
+            "actual_robot_current": on * (0.4 + 0.3 * float(np.abs(currents).sum())),
+            "standard_analog_input0": 2.5,
+            "tool_mode": 253 if self._powered else 255,
+            "tool_output_voltage": 24 if self._powered else 0,
+            "tool_output_current": 0.02 * on,
+            "tool_temperature": 24.0 + on * warm * 9.0,
+            "payload": 1.2,
+            "payload_cog": (0.0, 0.0, 0.05),
+        }
+
+
+_ZEROS: Mapping[str, Value] = {
+    "BOOL": False,
+    "UINT8": 0,
+    "UINT32": 0,
+    "UINT64": 0,
+    "INT32": 0,
+    "DOUBLE": 0.0,
+    "VECTOR3D": (0.0,) * 3,
+    "VECTOR6D": (0.0,) * JOINTS,
+    "VECTOR6INT32": (0,) * JOINTS,
+    "VECTOR6UINT32": (0,) * JOINTS,
+}
+
+
+def _tuple(values: FloatArray) -> tuple[float, ...]:
+    return tuple(values.tolist())
+
+
+def _pose(placement: FloatArray) -> tuple[float, ...]:
+    """Return a (4, 4) placement as position [m] and rotation vector [rad]."""
+    return (*placement[:3, 3].tolist(), *rotation_vector(placement[:3, :3]).tolist())
+
+
+def rotation_vector(rotation: FloatArray) -> FloatArray:
+    """Return a (3, 3) rotation as its axis times its angle [rad], 0 to pi."""
+    # By the quaternion: its largest component is never small, unlike the sine near 0 and pi.
+    xx, yy, zz = np.diag(rotation)
+    squares = np.array((1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz))
+    largest = int(squares.argmax())
+    r = rotation
+    w, x, y, z = (
+        (squares[0], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]),
+        (r[2, 1] - r[1, 2], squares[1], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]),
+        (r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], squares[2], r[1, 2] + r[2, 1]),
+        (r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], squares[3]),
+    )[largest]
+    vector = np.array((x, y, z)) * (1.0 if w >= 0 else -1.0)
+    length = float(np.linalg.norm(vector))
+    if length < 1e-12:
+        return np.zeros(3)
+    return vector / length * 2.0 * math.atan2(length, abs(w))

@@ -1,0 +1,107 @@
+"""Service of the simulated controller: listens for RTDE and for the primary interface."""
+
+import asyncio
+import logging
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from protocol_gateway.drivers.universal_robots.primary import PrimaryMessage
+from protocol_gateway.drivers.universal_robots.rtde_messages import ControllerVersion
+from robots.description import load
+from services.errors import ListenError
+from services.simulator.demo import demo_tour
+from services.simulator.errors import SimulatorError
+from services.simulator.fault_requests import Mesh, answer_requests
+from services.simulator.faults import Faults
+from services.simulator.universal_robots.controller import UrController
+from services.simulator.universal_robots.fields import INPUTS
+from services.simulator.universal_robots.server import UR_FAULTS, UrServer
+from services.site_file.listen_address import check_reach, split_address
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, kw_only=True)
+class UrSettings:
+    """Settings of a simulated controller of Universal Robots' kind.
+
+    Attributes:
+        robot: A library robot, or a path to a robot.toml or URDF, with six rotary joints.
+        listen: `HOST:PORT` of RTDE; a real controller has 30004; port 0 takes a free one.
+        primary: `HOST:PORT` of the primary interface; a real controller has 30011 for reading.
+        version: Version of the software: 3 is CB3 with at most 125 Hz, 5 and above have at most 500 Hz.
+        demo: A program runs and moves the arm.
+        taken: Input fields that are in use by the controller itself, such as by a fieldbus.
+        faults: Faults in the syntax of `services.simulator.faults`, of `UR_FAULTS`.
+        insecure: May listen beyond loopback; these protocols have no TLS.
+        mesh: Where to answer fault requests; None to stay off the mesh.
+    """
+
+    robot: str = "puma560"
+    listen: str = "127.0.0.1:0"
+    primary: str = "127.0.0.1:0"
+    version: tuple[int, int, int, int] = (5, 21, 0, 0)
+    demo: bool = False
+    taken: frozenset[str] = frozenset()
+    faults: tuple[str, ...] = ()
+    insecure: bool = False
+    mesh: Mesh | None = None
+
+
+async def serve_rtde(settings: UrSettings, *, ready: Callable[[int, int], None] | None = None) -> None:
+    """Simulate a controller until cancelled.
+
+    Args:
+        ready: Called with the ports of RTDE and of the primary interface once clients can connect.
+
+    Raises:
+        ListenError: If it cannot listen on an address.
+        SimulatorError: If a setting is invalid.
+        DescriptionError: If the robot is unknown.
+    """
+    for address in (settings.listen, settings.primary):
+        host, _ = split_address(address)
+        remedy = "listen on 127.0.0.1, or take the risk with --insecure: these protocols have no TLS"
+        if warning := check_reach(
+            "the simulator", host, secured=False, insecure=settings.insecure, remedy=remedy
+        ):
+            logger.warning("%s", warning)
+    faults = Faults(settings.faults, known=UR_FAULTS)
+    server = _server(settings, faults)
+    rtde = await _listen(server.new_rtde_client, settings.listen)
+    try:
+        primary = await _listen(server.new_monitor, settings.primary)
+        try:
+            if ready is not None:
+                ready(*(each.sockets[0].getsockname()[1] for each in (rtde, primary)))
+            async with asyncio.TaskGroup() as tasks:
+                tasks.create_task(server.run())
+                if settings.mesh is not None:
+                    tasks.create_task(answer_requests(settings.mesh, faults))
+        finally:
+            primary.close()
+    finally:
+        rtde.close()
+        server.close()
+
+
+async def _listen(protocol: Callable[[], asyncio.Protocol], address: str) -> asyncio.Server:
+    host, port = split_address(address)
+    try:
+        return await asyncio.get_running_loop().create_server(protocol, host, port)
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
+        raise ListenError(f"the simulator cannot listen on {host}:{port}: {reason.lower()}") from None
+
+
+def _server(settings: UrSettings, faults: Faults) -> UrServer:
+    if unknown := sorted(settings.taken - INPUTS.keys()):
+        raise SimulatorError(f"input field {unknown[0]} is unknown: speed_slider_mask is one")
+    description = load(settings.robot)
+
+    def boot(now_s: float, restarted: bool, announce: Callable[[PrimaryMessage], None]) -> UrController:
+        tour = demo_tour(description) if settings.demo and not restarted else None
+        return UrController(description, tour=tour, powered=not restarted, now_s=now_s, announce=announce)
+
+    return UrServer(boot, faults, version=ControllerVersion(*settings.version), taken=settings.taken)
