@@ -11,6 +11,8 @@ from services.command_line.live.monitor import link_words
 from services.simulator.fault_requests import Mesh
 from services.simulator.fault_table import FAULTS
 from services.simulator.simulator import Settings, serve
+from services.simulator.universal_robots.server import UR_FAULTS
+from services.simulator.universal_robots.service import UrSettings, serve_rtde
 from tests.conftest import run
 from tests.site import robomesh
 
@@ -48,6 +50,27 @@ def test_fault_begins_ends_and_lists_faults(mesh, router):
 
 
 @pytest.mark.slow
+def test_fault_that_a_controller_cannot_show_is_refused(mesh, router):
+    async def main():
+        own = Mesh(site="hall", robot="ur", session=mesh)
+        ready = asyncio.get_running_loop().create_future()
+        settings = UrSettings(mesh=own)
+        task = asyncio.create_task(serve_rtde(settings, ready=lambda *ports: ready.set_result(ports)))
+        await ready
+        try:
+            to = ("--connect", router)
+            begun = await ask("fault", "ur", "freeze", "--json", *to)
+            assert json.loads(begun.stdout) == {"active": ["freeze"], "known": list(UR_FAULTS)}
+            mute = await ask("fault", "ur", "mute", *to)
+            assert mute.returncode == 2
+            assert "fault 'mute' is unknown; there are freeze, garbage" in mute.stderr
+        finally:
+            task.cancel()
+            await asyncio.wait([task])
+
+    run(main())
+
+
 def test_a_simulator_for_a_robot_without_a_site_is_refused_in_one_line():
     done = robomesh("simulate", "--for", "arm", "--listen", "127.0.0.1:0")
     assert (done.returncode, done.stderr) == (

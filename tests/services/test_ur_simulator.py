@@ -3,7 +3,9 @@
 import asyncio
 import contextlib
 import math
+import re
 import struct
+import sys
 import time
 from collections import Counter
 from itertools import pairwise
@@ -452,3 +454,37 @@ def test_rotation_vector_is_the_axis_times_the_angle():
         assert min(np.abs(found - axis * angle).max(), np.abs(found + axis * angle).max()) < 1e-7
         if angle < math.pi - 1e-3:
             assert found == pytest.approx(axis * angle, abs=1e-7)
+
+
+def test_command_serves_both_interfaces():
+    words = (
+        "simulate",
+        "--protocol",
+        "rtde",
+        "--demo",
+        "--listen",
+        "127.0.0.1:0",
+        "--primary",
+        "127.0.0.1:0",
+    )
+
+    async def main():
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "services.command_line.main", *words), stdout=asyncio.subprocess.PIPE
+        )
+        try:
+            line = (await process.stdout.readline()).decode()
+            ports = re.fullmatch(
+                r"listening on 127\.0\.0\.1:(\d+), primary interface on 127\.0\.0\.1:(\d+)\n", line
+            )
+            async with connection(int(ports[1])) as streams, connection(int(ports[2])) as (reader, _):
+                assert (await Monitor(*streams).ready()).controller.major == 5
+                (version, *_) = PrimaryStream().receive(await read(reader))
+                assert isinstance(version, PrimaryVersion)
+            process.terminate()
+            assert await process.wait() == 0
+        finally:
+            if process.returncode is None:
+                process.kill()
+
+    run(main())

@@ -1,5 +1,6 @@
 """The commands that run a site, or one service of it."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -126,12 +127,26 @@ def store(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER, metrics: Met
     _run("store", site, connect, metrics)
 
 
+class SimulatedProtocol(StrEnum):
+    """Protocol of a simulated controller."""
+
+    UNIT = "unit"
+    RTDE = "rtde"
+
+
 @app.command()
 def simulate(
-    robot: Annotated[str, typer.Option(metavar="R", help="A library robot or a description.")] = "pt600",
-    listen: Annotated[str, typer.Option(metavar="HOST:PORT")] = "127.0.0.1:5400",
-    rate: Annotated[float, typer.Option(metavar="HZ", min=1, max=1000)] = 100.0,
-    max_clients: Annotated[int, typer.Option(metavar="N", min=1)] = 8,
+    robot: Annotated[
+        str,
+        typer.Option(
+            metavar="R", help="A library robot or a description.", show_default="pt600; with rtde puma560"
+        ),
+    ] = "",
+    listen: Annotated[
+        str, typer.Option(metavar="HOST:PORT", show_default="127.0.0.1:5400; with rtde 127.0.0.1:30004")
+    ] = "",
+    rate: Annotated[float, typer.Option(metavar="HZ", min=1, max=1000, help="With unit.")] = 100.0,
+    max_clients: Annotated[int, typer.Option(metavar="N", min=1, help="With unit.")] = 8,
     demo: Annotated[bool, typer.Option(help="Move until the first command.")] = False,
     fault: Annotated[
         list[str] | None,
@@ -142,9 +157,18 @@ def simulate(
     ] = None,
     code: Annotated[
         list[str] | None,
-        typer.Option(metavar="NUMBER=TYPE", help="A type code of the site file: 2=ABSOLUTE.DEG"),
+        typer.Option(metavar="NUMBER=TYPE", help="A type code of the site file: 2=ABSOLUTE.DEG; with unit."),
     ] = None,
     insecure: Annotated[bool, typer.Option(help="Listen beyond loopback without protection.")] = False,
+    protocol: Annotated[
+        SimulatedProtocol,
+        typer.Option(
+            help="unit: the old text protocol; rtde: RTDE and the primary interface of Universal Robots."
+        ),
+    ] = SimulatedProtocol.UNIT,
+    primary: Annotated[
+        str, typer.Option(metavar="HOST:PORT", help="The primary interface; with rtde.")
+    ] = "127.0.0.1:30011",
     for_: Annotated[
         str,
         typer.Option("--for", metavar="SITE/ROBOT", help="Accept `robomesh fault` for this robot."),
@@ -152,21 +176,31 @@ def simulate(
     site: SiteFile = None,
     connect: Connect = DEFAULT_ROUTER,
 ) -> None:
-    """Run a simulated controller with the old text protocol."""
-    from services.command_line.site.launch import launch_simulator
+    """Run a simulated controller with the old text protocol, or with RTDE."""
+    from services.command_line.site import launch
 
-    launch_simulator(
-        robot=robot,
-        listen=listen,
+    mesh = launch.faults_mesh(for_, site, connect)
+    if protocol is SimulatedProtocol.RTDE:
+        launch.launch_rtde_simulator(
+            robot=robot or "puma560",
+            listen=listen or "127.0.0.1:30004",
+            primary=primary,
+            demo=demo,
+            faults=tuple(fault or ()),
+            insecure=insecure,
+            mesh=mesh,
+        )
+        return
+    launch.launch_simulator(
+        robot=robot or "pt600",
+        listen=listen or "127.0.0.1:5400",
         rate_hz=rate,
         max_clients=max_clients,
         demo=demo,
         faults=tuple(fault or ()),
         codes=code or [],
         insecure=insecure,
-        faults_for=for_,
-        site=site,
-        connect=connect,
+        mesh=mesh,
     )
 
 

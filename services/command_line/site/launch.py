@@ -2,6 +2,7 @@
 
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from robomesh import service
 from robomesh.client.connection import addresses
@@ -16,6 +17,9 @@ from services.site_file import site as site_file
 from services.site_file.listen_address import reachable
 from services.site_file.site import Site
 from services.site_file.started_robots import read_started
+
+if TYPE_CHECKING:
+    from services.simulator.fault_requests import Mesh
 
 
 def launch(name: str, options: Options, connect: str, metrics: str = "") -> None:
@@ -69,6 +73,30 @@ def _only_started(site: Site, name: str) -> Site:
     return site.model_copy(update={"robot": robots, "fixture": fixtures})
 
 
+def faults_mesh(faults_for: str, site: Path | None, connect: str) -> "Mesh | None":
+    """Return where a simulated controller answers fault requests; None: nowhere.
+
+    Args:
+        faults_for: SITE/ROBOT that accepts fault requests on the mesh, with the site file's certificates;
+            empty: none.
+
+    Raises:
+        ControllerError: If it is not SITE/ROBOT.
+    """
+    from services.simulator.fault_requests import Mesh
+
+    if not faults_for:
+        return None
+    site_name, slash, robot_name = faults_for.partition("/")
+    if not slash:
+        raise ControllerError(f"--for {faults_for}: SITE/ROBOT is right, as in demo/pt600")
+    return Mesh(
+        site=check_name(site_name, "site"),
+        robot=check_name(robot_name, "robot"),
+        session=session_settings(site_file.load(site), connect, "simulator"),
+    )
+
+
 def launch_simulator(
     *,
     robot: str,
@@ -79,30 +107,12 @@ def launch_simulator(
     faults: tuple[str, ...],
     codes: list[str],
     insecure: bool,
-    faults_for: str,
-    site: Path | None,
-    connect: str,
+    mesh: "Mesh | None",
 ) -> None:
-    """Run a simulated controller.
-
-    Args:
-        faults_for: SITE/ROBOT that accepts fault requests on the mesh, with the site file's certificates;
-            empty: none.
-    """
+    """Run a simulated controller with the unit protocol."""
     from services.simulator import simulator
-    from services.simulator.fault_requests import Mesh
 
     service.log_to_stderr()
-    mesh = None
-    if faults_for:
-        site_name, slash, robot_name = faults_for.partition("/")
-        if not slash:
-            raise ControllerError(f"--for {faults_for}: SITE/ROBOT is right, as in demo/pt600")
-        mesh = Mesh(
-            site=check_name(site_name, "site"),
-            robot=check_name(robot_name, "robot"),
-            session=session_settings(site_file.load(site), connect, "simulator"),
-        )
     settings = simulator.Settings(
         robot=robot,
         listen=listen,
@@ -115,6 +125,34 @@ def launch_simulator(
         mesh=mesh,
     )
     service.run_until_signalled(simulator.serve(settings, ready=lambda line: print(line, flush=True)))
+
+
+def launch_rtde_simulator(
+    *,
+    robot: str,
+    listen: str,
+    primary: str,
+    demo: bool,
+    faults: tuple[str, ...],
+    insecure: bool,
+    mesh: "Mesh | None",
+) -> None:
+    """Run a simulated controller with RTDE and the primary interface."""
+    from services.simulator.universal_robots.service import UrSettings, serve_rtde
+    from services.site_file.listen_address import split_address
+
+    def ready(rtde_port: int, primary_port: int) -> None:
+        hosts = (split_address(each)[0] for each in (listen, primary))
+        rtde, monitors = (
+            f"{host}:{port}" for host, port in zip(hosts, (rtde_port, primary_port), strict=True)
+        )
+        print(f"listening on {rtde}, primary interface on {monitors}", flush=True)
+
+    service.log_to_stderr()
+    settings = UrSettings(
+        robot=robot, listen=listen, primary=primary, demo=demo, faults=faults, insecure=insecure, mesh=mesh
+    )
+    service.run_until_signalled(serve_rtde(settings, ready=ready))
 
 
 def _code(text: str) -> tuple[int, str]:
