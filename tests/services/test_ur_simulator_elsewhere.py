@@ -1,0 +1,97 @@
+"""The simulated controller with ur_rtde, a client of others; skipped without `pip install ur-rtde`."""
+
+import asyncio
+import contextlib
+import importlib.util
+import json
+import sys
+
+import pytest
+
+from robots.description import load
+from robots.joints import joints_of, violations
+from services.simulator.universal_robots.service import UrSettings, serve_rtde
+from tests.conftest import run
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(importlib.util.find_spec("rtde_receive") is None, reason="ur_rtde is not installed"),
+]
+
+# ur_rtde knows only port 30004, so each simulator has its own address of loopback.
+READ = """
+import json, sys, time
+from rtde_receive import RTDEReceiveInterface
+receive = RTDEReceiveInterface(sys.argv[1], 50.0)
+first = receive.getTimestamp()
+while receive.getTimestamp() < first + 0.2:
+    time.sleep(0.01)
+print(json.dumps({name: getattr(receive, "get" + name)() for name in sys.argv[2:]}))
+receive.disconnect()
+"""
+WRITE = """
+import json, sys, time
+from rtde_io import RTDEIOInterface
+from rtde_receive import RTDEReceiveInterface
+receive = RTDEReceiveInterface(sys.argv[1])
+io = RTDEIOInterface(sys.argv[1])
+io.setStandardDigitalOut(3, True)
+io.setSpeedSlider(0.5)
+while not (receive.getDigitalOutState(3) and receive.getTargetSpeedFraction() == 0.5):
+    time.sleep(0.01)
+try:
+    RTDEIOInterface(sys.argv[1])
+    print(json.dumps("the second client took the inputs"))
+except RuntimeError as error:
+    print(json.dumps(str(error)))
+"""
+
+
+async def client_of(address, program, *words):
+    """Return the last line that a program prints, read as JSON."""
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-c", program, address, *words), stdout=asyncio.subprocess.PIPE
+    )
+    output, _ = await process.communicate()
+    assert process.returncode == 0
+    return json.loads(output.splitlines()[-1])
+
+
+@contextlib.asynccontextmanager
+async def simulator(address):
+    ready = asyncio.get_running_loop().create_future()
+    settings = UrSettings(listen=f"{address}:30004", primary=f"{address}:0", demo=True)
+    task = asyncio.create_task(serve_rtde(settings, ready=lambda *ports: ready.set_result(ports)))
+    await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
+    if task.done():
+        await task
+    try:
+        yield
+    finally:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+
+
+def test_ur_rtde_reads_states():
+    async def main():
+        async with simulator("127.0.31.1"):
+            names = ("ActualQ", "ActualQd", "RobotMode", "SafetyMode", "RuntimeState", "RobotStatus")
+            names += ("SafetyStatusBits", "JointMode", "ActualTCPPose", "Payload", "JointTemperatures")
+            read = await client_of("127.0.31.1", READ, *names)
+        assert not violations(joints_of(load("puma560")), read["ActualQ"])
+        assert (read["RobotMode"], read["SafetyMode"], read["RuntimeState"]) == (7, 1, 2)
+        assert (read["RobotStatus"], read["SafetyStatusBits"], read["JointMode"]) == (3, 1, [253] * 6)
+        assert len(read["ActualTCPPose"]) == 6
+        assert read["Payload"] == 1.2
+        assert all(24.0 <= each < 36.0 for each in read["JointTemperatures"])
+
+    run(main())
+
+
+def test_ur_rtde_writes_outputs_and_a_second_one_finds_them_in_use():
+    async def main():
+        async with simulator("127.0.31.2"):
+            assert "already in use" in await client_of("127.0.31.2", WRITE)
+
+    run(main())
