@@ -408,8 +408,10 @@ def test_nonsense_is_answered_with_a_text_and_a_lost_stream_is_closed():
             assert (text.level, text.source) == (TextLevel.ERROR, "URControl")
             assert "type 122 with 2 bytes" in text.text
             assert "recipe" in (await client.ask(bytes.fromhex("0004 55 09"), TextReceived)).text
+            many = await client.ask(rtde.package(rtde.PackageType.SET_UP_INPUTS, b"," * 1000), TextReceived)
+            assert "1000 fields are too many" in many.text
             assert "frequency" in (await client.ask(bytes.fromhex("0004 4f 09"), TextReceived)).text
-            assert isinstance(await client.ask(rtde.request_controller_version(), ControllerVersion), object)
+            await client.ask(rtde.request_controller_version(), ControllerVersion)
             with pytest.raises((EOFError, ConnectionError)):
                 await client.ask(b"\xff\xff\xff", StartAnswered)
 

@@ -280,6 +280,10 @@ class RtdeClient(Connection):
         self._sending: asyncio.Task[None] | None = None
         self.inputs: set[str] = set()
 
+    def admitted(self) -> None:
+        """Read nothing while the controller is frozen."""
+        self.pause_reading("freeze" in self._server.active)
+
     def connection_lost(self, error: Exception | None) -> None:
         """Forget the connection and its inputs."""
         self._pause()
@@ -354,7 +358,7 @@ class RtdeClient(Connection):
         number = int(valid) if self._version > 1 else None
         if valid:
             self._recipe = Recipe(names, types, number)
-        self.write(messages.set_up(PackageType.SET_UP_OUTPUTS, number, types))
+        self._answer_set_up(PackageType.SET_UP_OUTPUTS, number, types)
 
     def _set_up_inputs(self, payload: bytes) -> None:
         names = _names(payload)
@@ -364,7 +368,15 @@ class RtdeClient(Connection):
             number = len(self._input_recipes) + 1
             self._input_recipes[number] = Recipe(names, types, number)
             self.inputs.update(names)
-        self.write(messages.set_up(PackageType.SET_UP_INPUTS, number, types))
+        self._answer_set_up(PackageType.SET_UP_INPUTS, number, types)
+
+    def _answer_set_up(self, kind: PackageType, number: int | None, types: list[str]) -> None:
+        try:
+            answer = messages.set_up(kind, number, types)
+        except ValueError as error:
+            self._complain(f"{len(types)} fields are too many: {error}")
+        else:
+            self.write(answer)
 
     def _write_inputs(self, payload: bytes) -> None:
         recipe = self._input_recipes.get(payload[0]) if payload else None
