@@ -7,16 +7,23 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from robomesh.session import SessionSettings
+from tests import warm
 from tests.conftest import free_port
 
 READY_S = 60.0
 PROGRAM = (sys.executable, "-m", "services.command_line.main")
+LEAN_UP = Path(__file__).with_name("lean_up.py")
+# As smooth to the eye as the 100 states a second of a real controller, and cheaper.
+RATE_HZ = 25.0
+# Besides router, gateway, kinematics and console, which every site has.
+EVERY_SERVICE = ("recorder", "player", "watch", "renderer", "store")
 
 
 @dataclass
@@ -57,13 +64,7 @@ class RunningSite:
 
 def robomesh(*arguments: str, timeout_s: float = 40.0, text: str = "") -> subprocess.CompletedProcess[str]:
     """Run `robomesh` to its end."""
-    return subprocess.run(
-        [*PROGRAM, *arguments],
-        capture_output=True,
-        text=True,
-        timeout=timeout_s,
-        input=text,
-    )
+    return warm.run(arguments, timeout_s=timeout_s, text=text)
 
 
 def site_file(
@@ -99,18 +100,46 @@ demo = true
 
 @contextmanager
 def running_site(
-    folder: Path, *, name: str = "test", robots: str = ONE_ARM, more: str = ""
+    folder: Path,
+    *,
+    name: str = "test",
+    robots: str = ONE_ARM,
+    more: str = "",
+    services: Sequence[str] = EVERY_SERVICE,
 ) -> Iterator[RunningSite]:
-    """Yield a running site; it ends, with all its processes, when the block ends."""
+    """Yield a running site; it ends, with all its processes, when the block ends.
+
+    Args:
+        folder: Of its file and all that it writes.
+        name: Name of the site.
+        robots: Tables of the site file.
+        more: More of the site file.
+        services: What the test needs of `EVERY_SERVICE`: each costs about a second of the processor.
+    """
     router, console = f"tcp/127.0.0.1:{free_port()}", f"127.0.0.1:{free_port()}"
     path = site_file(folder, name=name, robots=robots, router=router, console=console, more=more)
-    with running_file(path, router, console) as site:
+    with running_file(path, router, console, **lean(services)) as site:
         yield site
+
+
+def lean(services: Sequence[str] = EVERY_SERVICE) -> dict[str, Any]:
+    """Return the options of `running_file` for these services only, and for few states a second."""
+    return {
+        # Whoever reads its command line finds `robomesh up`.
+        "program": (sys.executable, "-P", str(LEAN_UP), "robomesh"),
+        "environment": {"TEST_SERVICES": ",".join(services), "TEST_RATE_HZ": f"{RATE_HZ:g}"},
+    }
 
 
 @contextmanager
 def running_file(
-    path: Path, router: str, console: str, *, program: Sequence[str] = PROGRAM, folder: Path | None = None
+    path: Path,
+    router: str,
+    console: str,
+    *,
+    program: Sequence[str] = PROGRAM,
+    environment: Mapping[str, str] | None = None,
+    folder: Path | None = None,
 ) -> Iterator[RunningSite]:
     """Run `robomesh up` with a site file; end it, with all its processes, when the block ends.
 
@@ -119,6 +148,7 @@ def running_file(
         router: The address of the site's router, as the file has it.
         console: HOST:PORT of the page, as the file has it.
         program: The words that start `robomesh`.
+        environment: Variables in addition to those of the tests.
         folder: Its current folder; None: that of the tests.
     """
     # The kernel interrupts the site when the tests' process dies, however it dies.
@@ -126,6 +156,7 @@ def running_file(
     process = subprocess.Popen(
         [*end_with_the_tests, *program, "up", str(path)],
         cwd=folder,
+        env={**os.environ, **(environment or {})},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

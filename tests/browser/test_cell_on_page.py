@@ -52,7 +52,7 @@ def plant(tmp_path_factory):
     if not CHROMIUM.exists():
         pytest.skip(f"no {CHROMIUM}: the page is not driven here")
     build_page.build()
-    with running_site(tmp_path_factory.mktemp("cell"), robots=SITE) as site:
+    with running_site(tmp_path_factory.mktemp("cell"), robots=SITE, services=()) as site:
         deadline = time.monotonic() + READY_S
         while "still starting" in (homed := site.command("send", "arm", "home")).stdout:
             assert time.monotonic() < deadline, homed.stdout

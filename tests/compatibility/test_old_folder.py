@@ -10,7 +10,7 @@ import pytest
 
 from tests.compatibility.earlier import PASSWORD, unpack
 from tests.conftest import free_port
-from tests.site import robomesh, running_file, wait_until
+from tests.site import lean, robomesh, running_file, wait_until
 
 pytestmark = pytest.mark.processes
 
@@ -44,7 +44,7 @@ def site(folder, audit_before, began_s):
         if alarm["shelved_until"]:
             alarm["shelved_until"] = LATER
     alarms.write_text(json.dumps(kept))
-    with running_file(file, router, console) as running:
+    with running_file(file, router, console, **lean(["recorder", "watch"])) as running:
         yield running
 
 

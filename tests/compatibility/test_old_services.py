@@ -12,7 +12,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from tests.compatibility.earlier import EarlierVersion, end, in_log, unpack
 from tests.conftest import free_port
 from tests.services.test_console import browse
-from tests.site import robomesh, wait_until
+from tests.site import RATE_HZ, robomesh, wait_until
 
 pytestmark = pytest.mark.processes
 
@@ -96,7 +96,8 @@ def plant(tmp_path_factory):
     with ExitStack() as running:
         start = running.enter_context
         for robot, port in made.controllers.items():
-            start(process(folder / f"simulate-{robot}.log", "simulate", "--listen", f"127.0.0.1:{port}"))
+            words = ("simulate", "--listen", f"127.0.0.1:{port}", "--rate", f"{RATE_HZ:g}")
+            start(process(folder / f"simulate-{robot}.log", *words))
         start(process(folder / "router.log", "router", "--site", files["now"]))
         connect = ("--connect", made.router)
         for service in ("gateway", "kinematics", "recorder", "console"):

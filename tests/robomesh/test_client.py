@@ -25,7 +25,7 @@ WAIT_S = 60.0
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    with running_site(tmp_path_factory.mktemp("client")) as running:
+    with running_site(tmp_path_factory.mktemp("client"), services=["recorder"]) as running:
         yield running
 
 

@@ -15,7 +15,7 @@ from robomesh.session import Session
 from robomesh.topics import Role
 from services.pki import Folder, authority
 from tests.conftest import free_port
-from tests.site import ONE_ARM, running_file, site_file, wait_until
+from tests.site import ONE_ARM, lean, running_file, site_file, wait_until
 from tests.site import robomesh as command
 
 pytestmark = pytest.mark.processes
@@ -42,7 +42,7 @@ def folder(tmp_path_factory):
         made = command("keys", *words)
         assert made.returncode == 0, made.stderr
     authority.issue(keys, "brief", Role.OPERATOR, lifetime=timedelta(seconds=1))
-    with running_file(path, f"tls/127.0.0.1:{port}", page):
+    with running_file(path, f"tls/127.0.0.1:{port}", page, **lean(())):
         yield keys
 
 

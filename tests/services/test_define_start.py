@@ -60,7 +60,7 @@ def descendants(pid: int) -> list[int]:
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    with running_site(tmp_path_factory.mktemp("site")) as running:
+    with running_site(tmp_path_factory.mktemp("site"), services=["recorder", "renderer"]) as running:
         yield running
 
 
@@ -99,7 +99,7 @@ def test_it_is_commanded_drawn_and_recorded_as_any_other(site, page, mine, tmp_p
 
     wait_until(recorded)
     counts = {topic["topic"].rsplit("/", 1)[-1]: topic["messages"] for topic in recorded()[0]["topics"]}
-    assert counts["joints"] > 50
+    assert counts["joints"] > 12
     assert robomesh("audit", "verify", str(site.folder / "audit" / "test" / "mine.jsonl")).returncode == 0
 
 
@@ -185,12 +185,12 @@ def test_it_is_there_at_the_next_up_and_nothing_is_left_after(site, page, mine, 
         (robots / "started.toml").write_text(
             'site = "test"\n[[robot]]\nname = "mine"\nmodel = "mine/robot.toml"\n'
         )
-        with running_site(folder) as second:
+        with running_site(folder, services=()) as second:
             other = Page(second.console.rstrip("/"), folder)
             other.post("/check", other.draft())
             wait_until(lambda: on_the_mesh(second).get("mine") == "up")
-            # 8 of the site, 3 of the robot, Define's worker, and each gateway's checker.
-            wait_until(lambda: len(descendants(second.process.pid)) >= 14)
+            # 5 of the site, 3 of the robot, Define's worker, and each gateway's checker.
+            wait_until(lambda: len(descendants(second.process.pid)) >= 11)
             everything = descendants(second.process.pid)
             begun = time.monotonic()
             second.process.send_signal(number)

@@ -461,7 +461,8 @@ def test_a_site_with_keys_runs_over_tls(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     authority.prepare(Folder(tmp_path / "keys"), "test", robots=[], border="open", routers=[])
     assert keys("issue", "mo", "--role", "monitor") == 0
-    with running_site(tmp_path, robots="", more='[keys]\nfolder = "keys"\n') as site:
+    more = '[keys]\nfolder = "keys"\n'
+    with running_site(tmp_path, robots="", more=more, services=["recorder"]) as site:
         router = site.router.replace("tcp/", "tls/")
         mo = str(tmp_path / "keys" / "people" / "mo.pem")
         listed = robomesh("list", "--json", "--connect", router, "--keys", mo)

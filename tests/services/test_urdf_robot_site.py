@@ -54,7 +54,7 @@ def test_a_urdf_with_a_gripper_is_homed_moved_and_drawn(tmp_path: Path) -> None:
     urdf = tmp_path / "arm.urdf"
     urdf.write_text(ARM)
     robots = f'[[robot]]\nname = "arm"\nmodel = "{urdf}"\ncontroller = "simulated"\n'
-    with running_site(tmp_path / "site", robots=robots) as site:
+    with running_site(tmp_path / "site", robots=robots, services=["renderer"]) as site:
         for words in (["home"], ["move", "60", "80", "40"]):
             done = site.command("send", "arm", *words)
             assert done.returncode == 0, done.stderr

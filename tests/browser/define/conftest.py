@@ -19,7 +19,7 @@ def plant(tmp_path_factory):
     cache = tmp_path_factory.mktemp("cache")
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(os.environ, "XDG_CACHE_HOME", str(cache))
-        with running_site(tmp_path_factory.mktemp("site"), robots="") as site:
+        with running_site(tmp_path_factory.mktemp("site"), robots="", services=()) as site:
             yield SimpleNamespace(
                 address=site.console.rstrip("/"),
                 robots=site.folder / "robots",

@@ -1,0 +1,80 @@
+"""Commands of `robomesh` in processes with its modules loaded, since loading is most of what a command costs.
+
+Each command is a process of its own, with its own exit status, output and signals.
+`tests/robomesh/test_wheel.py` and the sites of processes start `robomesh` from nothing.
+"""
+
+import io
+import multiprocessing
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import BinaryIO
+
+_LOADED = (
+    "tests.warm",
+    "services.command_line.main",
+    "services.command_line.commands",
+    "services.site_file.site",
+    "robomesh.session",
+    "robomesh.messages",
+    "numpy",
+    "zenoh",
+)
+_forks = multiprocessing.get_context("forkserver")
+_forks.set_forkserver_preload([*_LOADED])
+
+
+def run(arguments: tuple[str, ...], *, timeout_s: float, text: str) -> subprocess.CompletedProcess[str]:
+    """Run `robomesh` to its end.
+
+    Raises:
+        subprocess.TimeoutExpired: If it takes longer; it is killed.
+    """
+    sys.audit("subprocess.Popen", "robomesh", arguments, None, None)  # `--quick` refuses it
+    with (
+        tempfile.TemporaryFile() as given,
+        tempfile.TemporaryFile() as out,
+        tempfile.TemporaryFile() as errors,
+    ):
+        given.write(text.encode())
+        given.seek(0)
+        paths = tuple(f"/proc/{os.getpid()}/fd/{file.fileno()}" for file in (given, out, errors))
+        process = _forks.Process(target=_command, args=(arguments, paths, str(Path.cwd()), dict(os.environ)))
+        process.start()
+        process.join(timeout_s)
+        if process.exitcode is None:
+            process.kill()
+            process.join()
+            raise subprocess.TimeoutExpired(["robomesh", *arguments], timeout_s, _read(out), _read(errors))
+        status = process.exitcode
+        process.close()
+        return subprocess.CompletedProcess(["robomesh", *arguments], status, _read(out), _read(errors))
+
+
+def _read(file: BinaryIO) -> str:
+    file.seek(0)
+    return file.read().decode().replace("\r\n", "\n")
+
+
+def _command(
+    arguments: tuple[str, ...], paths: tuple[str, ...], folder: str, environment: dict[str, str]
+) -> None:
+    """Be `robomesh` with these arguments, in the folder and environment of the test."""
+    for number, path in enumerate(paths):
+        file = os.open(path, os.O_WRONLY | os.O_APPEND if number else os.O_RDONLY)
+        os.dup2(file, number)
+        os.close(file)
+    os.chdir(folder)
+    os.environ.clear()
+    os.environ.update(environment)
+    sys.argv = ["robomesh", *arguments]
+    sys.stdin, sys.stdout, sys.stderr = (
+        io.TextIOWrapper(io.FileIO(number, mode, closefd=False), "utf-8", line_buffering=number == 2)
+        for number, mode in enumerate("rww")
+    )
+    from services.command_line.main import main
+
+    main()
