@@ -22,6 +22,7 @@ from hypothesis import HealthCheck, settings
 from robomesh.endpoints import router_config
 from robomesh.publisher import Publisher
 from robomesh.session import Session, SessionSettings
+from tests.distribution import place
 
 T = TypeVar("T")
 
@@ -120,6 +121,19 @@ def shared() -> Path:
     return SHARED
 
 
+# ---------------------------------------------------- distribution to workers
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    if config.getoption("dist") != "loadfile":
+        return None
+    from tests.distribution import GroupScheduling
+
+    config.option.loadscopereorder = False  # by the number of tests
+    return GroupScheduling(config, log)
+
+
 # ------------------------------------------------------------------------ --quick
 
 # Tests that `--quick` omits, in words, by marker or fixture; the first match counts.
@@ -160,6 +174,7 @@ def pytest_runtest_call() -> Iterator[None]:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    items.sort(key=place)
     if not config.getoption("--quick"):
         return
     kept, dropped = [], []

@@ -5,10 +5,9 @@ import re
 import pytest
 from playwright.sync_api import expect
 
+from tests.browser.program.page import CHECKED_MS, PAGE, WAITS, write
 from tests.browser.robot_page import button, serious, take
-from tests.browser.test_program import CHECKED_MS, PAGE, WAITS, plant, write
 
-__all__ = ["plant"]  # the site's fixture
 pytestmark = pytest.mark.browser
 
 STORED_MS = 20_000

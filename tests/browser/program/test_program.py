@@ -2,33 +2,15 @@
 
 import json
 import re
-from types import SimpleNamespace
 
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.conftest import CHROMIUM
+from tests.browser.program.page import CHECKED_MS, PAGE, WAITS, write
 from tests.browser.robot_page import button, serious, take
-from tests.site import running_site
-from web import build_page
 
 pytestmark = pytest.mark.browser
 
-PAGE = "#/program/test/arm"
-# A post next to the arm: the forearm hits it between 0 and 60 degrees of the waist.
-SITE = """
-[[robot]]
-name = "arm"
-model = "pt600"
-cell = "a"
-check = "require"
-
-[[fixture]]
-cell = "a"
-name = "post"
-cylinder = [40.0, 900.0]
-pose = { xyz = [300.0, 200.0, 450.0], rpy = [0.0, 0.0, 0.0] }
-"""
 FREE = """home
 move_joints -20 90 -90 0 0
 wait 0.2
@@ -45,27 +27,6 @@ move_joints 14 90 -90 0 0
 wait 0.2
 move_joints 0 90 -90 0 0
 """
-# Runs until it is stopped, however slow the pages are.
-WAITS = """home
-wait 60
-home
-"""
-CHECKED_MS = 40_000  # a busy machine's worker starts slowly
-
-
-@pytest.fixture(scope="module")
-def plant(tmp_path_factory):
-    if not CHROMIUM.exists():
-        pytest.skip(f"no {CHROMIUM}: the page is not driven here")
-    build_page.build()
-    with running_site(tmp_path_factory.mktemp("site"), robots=SITE) as site:
-        yield SimpleNamespace(address=site.console.rstrip("/"), site=site)
-
-
-def write(page, text):
-    field = page.get_by_role("textbox", name="Program text")
-    expect(field).to_have_value(re.compile("move_joints"), timeout=CHECKED_MS)  # the example is there
-    field.fill(text)
 
 
 def verdict(page, ok):
