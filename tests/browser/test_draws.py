@@ -10,8 +10,7 @@ from tests.browser.robot_page import ARM, button
 pytestmark = pytest.mark.browser
 
 # So that the page's clock ticks, and joint states arrive, within each look at it.
-LOOK_MS = 3000
-LEVEL_S = 120.0  # the plot is level when it shows 60 s of rest
+LOOK_MS = 2000
 
 SCENE, PLOT = ".canvas-place canvas", ".plot"
 
@@ -38,10 +37,11 @@ def expect_drawn_after(page, place, do):
 
 
 def test_a_robot_at_rest_is_not_drawn_again(open_page, plant):
-    page = open_page(ARM)
+    # A plot of 10 s is level after 10 s of rest.
+    page = open_page(f"{ARM}?plot=10,joints")
     expect(page.locator(SCENE)).to_have_attribute("data-loaded", "true")
     wait_at_rest(page, SCENE)
-    wait_at_rest(page, PLOT, LEVEL_S)
+    wait_at_rest(page, PLOT)
     expect(page.locator(".joints .age")).to_have_count(0)  # the joint states are live
     expect_drawn_after(page, SCENE, lambda: page.locator(SCENE).press("ArrowLeft"))
     wait_at_rest(page, SCENE)

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.browser
 
 ROBOTS = ("arm",)
 BLOCK, BITS = 32, 16
-PRESSES = 100
+PRESSES = 30
 KEY_FRAME_EACH = 10
 # At each press: the number on the canvas, as the browser shows it to the operator.
 READ = """(canvas, block, bits) => {
