@@ -38,7 +38,8 @@ def demo_tour(description: RobotDescription) -> Iterator[FloatArray]:
         return float(min(links.min(initial=np.inf), tool_placement(model, positions)[2, 3]))
 
     candidates = _candidates(joints)
-    floor = _FLOOR * max([height(joints.home), *map(height, candidates)])
+    # An arm that lies flat at home is never above the floor there, so it may stay as low as at home.
+    floor = min(_FLOOR * max([height(joints.home), *map(height, candidates)]), height(joints.home))
 
     def reachable(begin: FloatArray, end: FloatArray) -> bool:
         path = np.linspace(begin, end, _STEPS)

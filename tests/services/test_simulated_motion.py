@@ -11,6 +11,7 @@ from protocol_gateway.core.records import AbsolutePositions, Command
 from robots.collision.cell import build_cell
 from robots.collision.distance import outside_clearance
 from robots.description import load
+from robots.example_robots import example_folder
 from robots.joints import joints_of, violations
 from robots.model import build_model, tool_placement
 from robots.motion import Motion
@@ -63,6 +64,14 @@ def test_the_demo_tours_several_poses_within_limits_and_above_the_floor(robot):
             assert not violations(joints, positions)
             assert tool_placement(model, positions)[2, 3] > 0.1
         now_s = motion.end_s
+
+
+@pytest.mark.skipif(example_folder() is None, reason="no example robots here")
+def test_the_demo_moves_an_arm_that_lies_flat_at_home():
+    description = load("ur5")
+    tour = list(itertools.islice(demo_tour(description), 10))
+    assert len({tuple(pose) for pose in tour}) > 2
+    assert not any(violations(joints_of(description), pose) for pose in tour)
 
 
 def test_the_built_in_site_moves_clear_of_its_workbench():
