@@ -1,8 +1,10 @@
-"""Time for one picture: drawing, overlay, H.264 and JPEG, for each size and anti-aliasing.
+"""Time for one picture: drawing, reading it back, overlay, H.264 and JPEG, for each size and anti-aliasing.
 
-    ./dev run python benchmarks/drawing.py [--robot pt600] [--device N] [--pictures 60] [--json]
+    ./dev run python benchmarks/drawing.py [--robot pt600] [--device N] [--triangles 20k|100k] [--pictures 60]
+        [--json]
 
-Runs on software OpenGL and on a GPU, and prints the device and the encoder.
+Runs on software OpenGL and on a GPU, and prints the device and the encoder. "draw" includes the time to read
+the picture back; "read" is that time alone, of a finished picture.
 """
 
 import argparse
@@ -19,11 +21,11 @@ if __name__ == "__main__":
     # Import from the root: a program in this folder has the same name as a package.
     sys.path[0] = str(Path(__file__).parents[1])
 
+from benchmarks.renderer import mesh_of
 from renderer.cameras import Camera, fitted
 from renderer.drawing import Drawing
 from renderer.encoder import jpeg, open_encoder
 from renderer.errors import RendererError
-from renderer.mesh import prepared
 from renderer.opengl import open_context
 from renderer.overlay import Overlay, Row, write_over
 from renderer.scene import Part, Scene
@@ -38,39 +40,38 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--robot", default="pt600")
     parser.add_argument("--device", type=int, default=None, help="number of the EGL device")
+    parser.add_argument("--triangles", choices=("20k", "100k"), default="20k")
     parser.add_argument("--pictures", type=int, default=60)
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     try:
-        result = measure(arguments.robot, arguments.device, arguments.pictures)
+        result = measure(arguments.robot, arguments.device, arguments.triangles, arguments.pictures)
     except RendererError as error:
         parser.exit(2, f"{error}\n")
     if arguments.json:
         print(json.dumps(result))
         return
     print(f"{result['robot']}, {result['triangles']} triangles; {result['device']}; {result['encoder']}")
-    print("size        samples   draw  overlay   h264   jpeg   all: ms (median; p90 of all)   kB/frame")
+    print("size        samples    draw (p10  p90)    read overl.   h264   jpeg    all    p90: ms; kB/frame")
     for row in result["rows"]:
         width, height = row["size"]
-        print(
-            f"{width:4} x {height:<4} {row['samples']:7} {row['draw']:7.1f} {row['overlay']:7.2f} "
-            f"{row['h264']:7.1f} {row['jpeg']:6.1f} {row['all']:6.1f} {row['all_p90']:8.1f} "
-            f"{row['kilobytes']:20.1f}"
-        )
+        draw = f"{row['draw']:7.2f} ({row['draw_p10']:.2f} {row['draw_p90']:.2f})"
+        rest = " ".join(f"{row[part]:6.2f}" for part in ("read", "overlay", "h264", "jpeg", "all", "all_p90"))
+        print(f"{width:4} x {height:<4} {row['samples']:7} {draw} {rest} {row['kilobytes']:8.1f}")
 
 
-def measure(robot: str, device: int | None, pictures: int) -> dict[str, Any]:
+def measure(robot: str, device: int | None, triangles: str, pictures: int) -> dict[str, Any]:
     """Return the medians [ms] of each step for each size and anti-aliasing."""
     description = load(robot)
     model = build_model(description)
-    meshes = {name: prepared(glb) for name, glb in link_meshes(description).items()}
+    meshes = {name: mesh_of(glb, triangles) for name, glb in link_meshes(description).items()}
     rows = []
     for size, samples in product(SIZES, (0, 4)):
         drawing = Drawing(open_context(device), size, samples=samples)
         for name, mesh in meshes.items():
             drawing.add(name, mesh)
         encoder = open_encoder(size, 30)
-        times, sizes = [], []
+        times, reads, sizes = [], [], []
         for number in range(pictures):
             positions = model.joints.home + 0.3 * np.sin(number / 15)
             placements = dict(zip(model.link_names, link_placements(model, positions), strict=True))
@@ -85,6 +86,7 @@ def measure(robot: str, device: int | None, pictures: int) -> dict[str, Any]:
             jpeg(picture)
             marks.append(time.perf_counter())
             times.append(np.diff(marks) * 1e3)
+            reads.append(read_back_ms(drawing))
         table = np.array(times)
         draw, write, h264, still = np.median(table, axis=0).tolist()
         total = table[:, :3].sum(axis=1)
@@ -93,6 +95,9 @@ def measure(robot: str, device: int | None, pictures: int) -> dict[str, Any]:
                 "size": size,
                 "samples": samples,
                 "draw": draw,
+                "draw_p10": float(np.percentile(table[:, 0], 10)),
+                "draw_p90": float(np.percentile(table[:, 0], 90)),
+                "read": float(np.median(reads)),
                 "overlay": write,
                 "h264": h264,
                 "jpeg": still,
@@ -103,14 +108,22 @@ def measure(robot: str, device: int | None, pictures: int) -> dict[str, Any]:
         )
         name = drawing.renderer_name
         drawing.close()
-    triangles = sum(len(mesh.triangles) for mesh in meshes.values())
+    count = sum(len(mesh.triangles) for mesh in meshes.values())
     return {
         "robot": robot,
-        "triangles": triangles,
+        "triangles": count,
         "device": name,
         "encoder": encoder.name,
         "rows": rows,
     }
+
+
+def read_back_ms(drawing: Drawing) -> float:
+    with drawing.context:
+        drawing.context.finish()
+        began = time.perf_counter()
+        drawing._final.read_into(drawing._picture, components=3)
+        return (time.perf_counter() - began) * 1e3
 
 
 def view(meshes, placements, size):

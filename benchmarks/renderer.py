@@ -1,12 +1,14 @@
-"""Pictures a second, compared with VTK, pyrender and mujoco: same meshes, cameras, sizes, software OpenGL.
+"""Pictures a second, compared with VTK, pyrender and mujoco: same meshes, cameras and sizes.
 
-    ./dev run python benchmarks/renderer.py [--peers-python PYTHON] [--rounds 3] [--turns 12] [--json]
+    ./dev run python benchmarks/renderer.py [--peers-python PYTHON] [--rounds 3] [--turns 12]
+        [--device N] [--json]
 
-PYTHON is a separate environment with vtk, pyrender and mujoco. Each program is a separate process, which
-draws and reads back to NumPy; they take turns, row by row, so that other load affects all of them. Ours draws
-more than the task for the peers: the floor and its grid, the arm's soft shadow, edges, dimmed hollows; its
-rows "full" add the lamp's shadow on the arm. Medians of all turns; the spread is from p10 to p90. On a
-machine with other load, pictures for a second of one core's time are a better measure than pictures a second.
+In software OpenGL, or on the EGL device with the number N. PYTHON is a separate environment with vtk,
+pyrender and mujoco. Each program is a separate process, which draws and reads back to NumPy; they take turns,
+row by row, so that other load affects all of them. Ours draws more than the task for the peers: the floor and
+its grid, the arm's soft shadow, edges, dimmed hollows; its rows "full" add the lamp's shadow on the arm.
+Medians of all turns; the spread is from p10 to p90. On a machine with other load, pictures for a second of
+one core's time are a better measure than pictures a second.
 """
 
 import argparse
@@ -42,6 +44,9 @@ FIELD_OF_VIEW = float(np.deg2rad(24.0))
 TARGET = np.array([0.0, 0.0, 0.45])
 EYES = TARGET + np.array([[1.9, -1.9, 0.9], [2.6, 0.6, 0.8], [-1.8, -2.0, 1.1], [0.2, -2.7, 0.6]])
 PEERS = ("vtk", "pyrender", "mujoco")
+SOFTWARE = {"LIBGL_ALWAYS_SOFTWARE": "1", "EGL_PLATFORM": "surfaceless"}
+# In which the peers look for the number of the device.
+DEVICE_VARIABLES = ("MUJOCO_EGL_DEVICE_ID", "EGL_DEVICE_ID")
 
 
 def main() -> None:
@@ -49,13 +54,14 @@ def main() -> None:
     parser.add_argument("--peers-python", default="", help="a Python that has the peers")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--turns", type=int, default=12)
+    parser.add_argument("--device", type=int, default=None, help="number of the EGL device; none: software")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--serve", default="", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.serve:
-        serve_ours(Path(arguments.serve))
+        serve_ours(Path(arguments.serve), arguments.device)
         return
-    result = measure(arguments.peers_python, arguments.rounds, arguments.turns)
+    result = measure(arguments.peers_python, arguments.rounds, arguments.turns, arguments.device)
     print(json.dumps(result)) if arguments.json else tell(result)
 
 
@@ -71,19 +77,19 @@ def rows() -> list[dict[str, Any]]:
     return some + more
 
 
-def measure(peers_python: str, rounds: int, turns: int) -> dict[str, Any]:
+def measure(peers_python: str, rounds: int, turns: int, device: int | None) -> dict[str, Any]:
     """Return the milliseconds of each row and program."""
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder) / "scene.npz"
         triangles = write_scene(scene)
         here = Path(__file__)
-        commands = {
-            name: [sys.executable, str(here), "--serve", str(scene)] for name in ("ours", "ours, full")
-        }
+        own = [sys.executable, str(here), "--serve", str(scene)]
+        own += [] if device is None else ["--device", str(device)]
+        commands = {"ours": own, "ours, full": own}
         if peers_python:
             peers = here.with_name("renderer_peers.py")
             commands |= {peer: [peers_python, str(peers), peer, str(scene)] for peer in PEERS}
-        servers = {name: Server(command) for name, command in commands.items()}
+        servers = {name: Server(command, device) for name, command in commands.items()}
         try:
             versions = {name: server.answer() for name, server in servers.items()}
             here_now = {name: server for name, server in servers.items() if "ready" in versions[name]}
@@ -122,6 +128,7 @@ def summary(answers: list[dict[str, Any]], views: int) -> dict[str, float]:
         "ms_p10": low,
         "ms_p90": high,
         "drawn": answers[0]["drawn"],
+        "device": answers[0]["device"],
         "rss_mib": max(answer["rss_mib"] for answer in answers),
     }
 
@@ -192,14 +199,16 @@ def subdivided(mesh: Mesh) -> Mesh:
     )
 
 
-def serve_ours(path: Path) -> None:
+def serve_ours(path: Path, device: int | None) -> None:
     """Answer rows as the peers do."""
     scene = dict(np.load(path))
     glbs = link_meshes(load(ROBOT))
     print(json.dumps({"ready": "robomesh"}), flush=True)
 
     def make(row: dict[str, Any]) -> Any:
-        drawing = Drawing(open_context(), tuple(row["size"]), samples=row["samples"], shading=row["shading"])
+        drawing = Drawing(
+            open_context(device), tuple(row["size"]), samples=row["samples"], shading=row["shading"]
+        )
         for name, glb in glbs.items():
             drawing.add(name, mesh_of(glb, row["count"]))
         cameras = [
@@ -210,7 +219,7 @@ def serve_ours(path: Path) -> None:
             parts = tuple(Part(name, placement) for name, placement in zip(glbs, placements, strict=True))
             return drawing.draw(Scene(parts, TARGET, 0.95), cameras[view])
 
-        return render, drawing.close
+        return render, drawing.close, drawing.renderer_name
 
     serve(make, scene)
 
@@ -218,8 +227,9 @@ def serve_ours(path: Path) -> None:
 class Server:
     """A process that answers each line with a line."""
 
-    def __init__(self, command: list[str]) -> None:
-        environment = {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1"}
+    def __init__(self, command: list[str], device: int | None) -> None:
+        chosen = SOFTWARE if device is None else {variable: str(device) for variable in DEVICE_VARIABLES}
+        environment = os.environ | chosen
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
         )
@@ -246,6 +256,7 @@ class Server:
 def tell(result: dict[str, Any]) -> None:
     names = [name for name in result["rows"][0] if name not in ("size", "samples", "count", "views")]
     print(f"{result['robot']}, {result['triangles']} triangles; {result['programs']}")
+    print("drawn with", {name: result["rows"][0][name]["device"] for name in names})
     print("pictures a core's second; by the clock (ms of a turn, p10 to p90; MiB)")
     for row in result["rows"]:
         width, height = row["size"]

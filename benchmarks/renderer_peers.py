@@ -4,7 +4,8 @@
 
 It imports no module of the project. Each line of standard input asks for one row in JSON. The answer is a
 line with the milliseconds of each turn (every view drawn and read back to NumPy), by the clock and of
-processor time of all threads; the share of the last picture that is not background; and the process's memory.
+processor time of all threads; the share of the last picture that is not background; OpenGL's name of the
+device; and the process's memory.
 Smooth normals, one light from the camera, no shadows, no reflections: the least that each can do.
 """
 
@@ -18,13 +19,12 @@ from typing import Any
 
 os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
 os.environ.setdefault("MUJOCO_GL", "egl")
-os.environ.setdefault("EGL_PLATFORM", "surfaceless")
 os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-os.environ["LIBGL_ALWAYS_SOFTWARE"] = "1"
 
 import numpy as np
 
 Render = Callable[[np.ndarray, int], np.ndarray]
+Stage = tuple[Render, Callable[[], None], str]
 
 BACKGROUND = (0.75, 0.78, 0.81)
 WARM_UP = 3
@@ -35,18 +35,18 @@ def main() -> None:
     try:
         make = {"vtk": vtk_, "pyrender": pyrender_, "mujoco": mujoco_}[peer]
         version = make(scene, None)
-    except ImportError as error:
+    except Exception as error:  # pyrender's window library fails with AttributeError without X.
         print(json.dumps({"missing": str(error)}), flush=True)
         return
     print(json.dumps({"ready": version}), flush=True)
     serve(lambda row: make(scene, row), scene)
 
 
-def serve(make: Callable[[dict[str, Any]], tuple[Render, Callable[[], None]]], scene: dict[str, Any]) -> None:
+def serve(make: Callable[[dict[str, Any]], Stage], scene: dict[str, Any]) -> None:
     """Answer rows until standard input ends."""
     for line in sys.stdin:
         row = json.loads(line)
-        render, close = make(row)
+        render, close, device = make(row)
         times, spent, picture = [], [], None
         for turn in range(row["turns"] + WARM_UP):
             placements = scene["placements"][turn % len(scene["placements"])]
@@ -62,6 +62,7 @@ def serve(make: Callable[[dict[str, Any]], tuple[Render, Callable[[], None]]], s
             "ms": times[WARM_UP:],
             "cpu_ms": spent[WARM_UP:],
             "drawn": float(drawn.mean()),
+            "device": device,
             "shape": picture.shape,
             "rss_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
         }
@@ -125,7 +126,12 @@ def vtk_(scene: dict[str, Any], row: dict[str, Any] | None) -> Any:
         window.GetPixelData(0, 0, width - 1, height - 1, 1, pixels, 0)
         return vtk_to_numpy(pixels).reshape(height, width, 3)[::-1].copy()
 
-    return render, window.Finalize
+    if "EGL_DEVICE_ID" in os.environ:
+        window.SetDeviceIndex(int(os.environ["EGL_DEVICE_ID"]))
+    window.Render()
+    lines = window.ReportCapabilities().splitlines()
+    name = next((line.partition(":")[2].strip() for line in lines if "renderer string" in line), "")
+    return render, window.Finalize, name
 
 
 def pyrender_(scene: dict[str, Any], row: dict[str, Any] | None) -> Any:
@@ -163,7 +169,8 @@ def pyrender_(scene: dict[str, Any], row: dict[str, Any] | None) -> Any:
         color, _ = renderer.render(stage)
         return color
 
-    return render, renderer.delete
+    renderer._platform.make_current()
+    return render, renderer.delete, device_name()
 
 
 def mujoco_(scene: dict[str, Any], row: dict[str, Any] | None) -> Any:
@@ -207,7 +214,14 @@ def mujoco_(scene: dict[str, Any], row: dict[str, Any] | None) -> Any:
         renderer.update_scene(data, camera)
         return renderer.render()
 
-    return render, renderer.close
+    renderer._gl_context.make_current()
+    return render, renderer.close, device_name()
+
+
+def device_name() -> str:
+    from OpenGL import GL
+
+    return GL.glGetString(GL.GL_RENDERER).decode()
 
 
 def looking(eye: np.ndarray, target: np.ndarray) -> np.ndarray:

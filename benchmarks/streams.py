@@ -1,9 +1,11 @@
 """The renderer's streams: the delay of the first picture, the picture rate, and the cost of each watcher.
 
-    ./dev run python benchmarks/streams.py [--size 1280x720] [--seconds 8] [--json]
+    ./dev run python benchmarks/streams.py [--size 1280x720] [--seconds 8] [--views 1,2,4] [--device N]
+        [--json]
 
 The program starts a site: router, a robot that moves at 100 Hz, kinematics, and the renderer in a separate
-process, whose CPU is measured. This process watches the streams.
+process, whose CPU is measured. This process watches the streams. More than four views are requested ones,
+around the robot.
 """
 
 import argparse
@@ -17,6 +19,7 @@ import statistics
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +32,8 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from renderer import service
 from robomesh.endpoints import router_config
-from robomesh.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
+from robomesh.quotas import DEFAULT_QUOTAS
+from robomesh.schemas.robomesh_pb2 import View, ViewAnswer, ViewRequest
 from robomesh.session import Session, SessionSettings, open_session
 from services import kinematics
 from tests.cells import single_arm
@@ -38,26 +42,38 @@ from tests.conftest import free_port
 JOINTS = ("waist", "shoulder", "elbow", "wrist", "roll")
 VIEWS = ("front", "top", "left", "free")
 ARM = "robomesh/hall/arm"
+# Requested views in full size and rate are an eighth of these.
+_MANY = 256
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--size", default="1280x720")
     parser.add_argument("--seconds", type=float, default=8.0, help="of each step")
+    parser.add_argument("--views", default="1,2,4", help="numbers of views, each with one watcher")
+    parser.add_argument("--device", type=int, default=None, help="number of the EGL device")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     width, height = (int(part) for part in arguments.size.split("x"))
     with tempfile.TemporaryDirectory() as folder:
         endpoint = f"tcp/127.0.0.1:{free_port()}"
         settings = SessionSettings(connect=(endpoint,), wait_s=10.0)
-        wanted = service.Settings(site="hall", size=(width, height), folder=Path(folder))
+        wanted = service.Settings(
+            site="hall",
+            size=(width, height),
+            folder=Path(folder),
+            device=arguments.device,
+            most_views=_MANY,
+            quotas=replace(DEFAULT_QUOTAS, views=_MANY),
+        )
         with zenoh.open(router_config((endpoint,))):
             process = multiprocessing.get_context("spawn").Process(
                 target=render, args=(settings, wanted), daemon=True
             )
             process.start()
             try:
-                result = asyncio.run(measure(settings, process.pid or 0, arguments.seconds))
+                steps = [(int(views), 1) for views in arguments.views.split(",")] + [(1, 2), (1, 4)]
+                result = asyncio.run(measure(settings, process.pid or 0, arguments.seconds, steps))
             finally:
                 process.terminate()
                 process.join(5)
@@ -73,7 +89,9 @@ def render(settings: SessionSettings, wanted: service.Settings) -> None:
     asyncio.run(serve())
 
 
-async def measure(settings: SessionSettings, renderer: int, seconds: float) -> dict[str, Any]:
+async def measure(
+    settings: SessionSettings, renderer: int, seconds: float, steps: list[tuple[int, int]]
+) -> dict[str, Any]:
     async with open_session(settings) as robot, open_session(settings) as monitor:
         arm = single_arm(simulated=True)
         tasks = [
@@ -90,7 +108,7 @@ async def measure(settings: SessionSettings, renderer: int, seconds: float) -> d
             result["first_ms"]["a view that was asked for"] = [
                 await asked_ms(monitor, number) for number in range(8)
             ]
-            for views, watchers in ((1, 1), (1, 2), (1, 4), (2, 1), (4, 1)):
+            for views, watchers in steps:
                 result["rates"].append(await rates(monitor, renderer, views, watchers, seconds))
             return result
         finally:
@@ -136,9 +154,11 @@ async def asked_ms(monitor: Session, number: int) -> float:
 
 async def rates(monitor: Session, renderer: int, views: int, watchers: int, seconds: float) -> dict[str, Any]:
     """Return pictures a second of each view, and the renderer's CPU as a share of a core."""
+    topics = [f"video/{view}" for view in VIEWS[:views]]
+    topics += [await requested(monitor, number) for number in range(views - len(topics))]
     watched = [
-        monitor.subscribe(f"{ARM}/video/{view}", newest=4, history=False)
-        for view in VIEWS[:views]
+        monitor.subscribe(f"{ARM}/{topic}", newest=4, history=False)
+        for topic in topics
         for _ in range(watchers)
     ]
     counts = [0] * len(watched)
@@ -167,6 +187,17 @@ async def rates(monitor: Session, renderer: int, views: int, watchers: int, seco
     }
 
 
+async def requested(monitor: Session, number: int) -> str:
+    """Return the topic of a view that was requested in the size and rate of the renderer's own."""
+    angle = number / 3.0
+    view = View(projection=View.PERSPECTIVE)
+    view.eye.x, view.eye.y, view.eye.z = 2.4 * math.cos(angle), 2.4 * math.sin(angle), 1.2
+    view.target.z = 0.45
+    answer = await monitor.ask(f"{ARM}/views/{monitor.own_name}", ViewRequest(view=view), timeout_s=5.0)
+    assert isinstance(answer, ViewAnswer)
+    return answer.topic
+
+
 def cpu_s(process: int) -> float:
     with contextlib.suppress(OSError, IndexError):
         fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
@@ -181,7 +212,7 @@ def words(result: dict[str, Any]) -> str:
         for what, times in result["first_ms"].items()
     ]
     for row in result["rates"]:
-        rate = ", ".join(f"{rate:.1f}" for rate in row["rates"])
+        rate = ", ".join(f"{rate:.1f}" for rate in sorted(row["rates"]))
         lines.append(
             f"{row['views']} views of {result['size']}, {row['watchers']} watchers each: {rate} pictures/s; "
             f"renderer {row['cores']:.2f} cores (load {row['load']:.0f})"

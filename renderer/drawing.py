@@ -18,7 +18,7 @@ from renderer.cameras import Camera, site_to_clip
 from renderer.lighting import LampShadow
 from renderer.mesh import Mesh
 from renderer.obstruction import contains, hides
-from renderer.opengl import Uploaded, columns, compile_programs, set_uniforms, upload
+from renderer.opengl import Uploaded, columns, compile_programs, device_name, set_uniforms, upload
 from renderer.ribbons import ribbons
 from renderer.scene import Finish, Line, Part, Scene
 from renderer.shadow import FloorShadow
@@ -61,7 +61,7 @@ class Drawing:
     """A drawing surface of one size with its meshes; used in the context's thread only.
 
     Attributes:
-        renderer_name: The OpenGL driver's name of the renderer.
+        renderer_name: The OpenGL driver's name of the device, and whether it draws in software.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class Drawing:
     ) -> None:
         self.context = context
         self.size = size
-        self.renderer_name = str(context.info["GL_RENDERER"])
+        self.renderer_name = device_name(context)
         samples = min(samples, context.max_samples)
         programs = compile_programs(context, samples=samples, full=Shading(shading) is Shading.FULL)
         self._programs = programs

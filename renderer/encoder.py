@@ -5,11 +5,15 @@ no B-frames, SPS and PPS with each key frame.
 """
 
 import logging
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Protocol
 
 import av
+import av.logging
 import cv2
 import numpy as np
 from av.error import FFmpegError
@@ -30,6 +34,18 @@ _ITU601, _LIMITED_RANGE = 6, 1
 # Rate buffer of a stream with a limited bit rate, in seconds: keeps key frames small.
 _BURST_S = 0.5
 _FEW_BITS_QUALITY = "28"
+
+# Why NVENC is missing, for the causes that FFmpeg names in the terms of its libraries.
+_CAUSES = {
+    "unsupported device": "this GPU has no NVENC",
+    "Cannot load libcuda": "there is no NVIDIA driver",
+    "Cannot load libnvidia-encode": (
+        "the NVIDIA driver's libnvidia-encode is missing; in a container NVIDIA_DRIVER_CAPABILITIES must "
+        "contain `video`"
+    ),
+}
+# PyAV's level of logging is the process's.
+_log_level = threading.Lock()
 
 # The first that works is used: the GPU's, then x264.
 _CODECS: dict[str, dict[str, str]] = {
@@ -86,6 +102,7 @@ class H264Encoder:
         """
         self.name = codec
         self._number = 0
+        lines: list[str] = []
         try:
             context = av.CodecContext.create(codec, "w")
             assert isinstance(context, VideoCodecContext)
@@ -100,9 +117,10 @@ class H264Encoder:
             context.options = _CODECS[codec] | _limit(codec, most_bits_per_s)
             # One thread: one slice per picture, and the other cores stay free for drawing.
             context.thread_count = 1
-            context.open()
+            with _ffmpeg_errors(lines):
+                context.open()
         except (FFmpegError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
+            reason = _reason(lines) or getattr(error, "strerror", None) or error
             raise NoEncoderError(f"{codec} cannot be opened: {reason}") from None
         self._context = context
 
@@ -125,6 +143,26 @@ class H264Encoder:
         if len(packets) != 1:
             raise NoEncoderError(f"{self.name} returned {len(packets)} packets for a picture instead of one")
         return Packet(bytes(packets[0]), bool(packets[0].is_keyframe))
+
+
+@contextmanager
+def _ffmpeg_errors(lines: list[str]) -> Iterator[None]:
+    """Add the errors that FFmpeg logs in this thread to `lines`; its exceptions hold only an errno."""
+    with _log_level, av.logging.Capture() as logs:
+        # Otherwise a second attempt with the same error has no reason.
+        av.logging.set_skip_repeated(False)
+        av.logging.set_level(av.logging.ERROR)
+        try:
+            yield
+        finally:
+            av.logging.set_level(None)
+            lines += [" ".join(text.split()) for _, _, text in logs]
+
+
+def _reason(lines: list[str]) -> str:
+    text = "; ".join(dict.fromkeys(filter(None, lines)))
+    cause = next((cause for sign, cause in _CAUSES.items() if sign in text), "")
+    return f"{cause} ({text})" if cause else text
 
 
 def _limit(codec: str, most_bits_per_s: float) -> dict[str, str]:
@@ -153,7 +191,7 @@ def best_codec(size: tuple[int, int], fps: float) -> str:
             reasons.append(str(error))
             continue
         for reason in reasons:
-            log.info("%s: %s is used instead", reason, codec)
+            log.info("%s; %s is used instead, on the processor", reason, codec)
         return codec
     raise NoEncoderError("no H.264 encoder works: " + "; ".join(reasons))
 

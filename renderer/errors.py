@@ -13,7 +13,7 @@ RendererError
     └── UnknownViewError    neither the description nor the renderer has the view
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
@@ -26,15 +26,16 @@ class RendererError(Exception):
 class NoOpenGLError(RendererError):
     """OpenGL cannot be used on this machine."""
 
-    def __init__(self, reason: str, *, device: int | None = None) -> None:
+    def __init__(self, reason: str, *, device: int | None = None, devices: Sequence[str] = ()) -> None:
         text = (
             f"OpenGL is not available ({reason}): install it with 'apt-get install libegl1 libgl1'; "
             "all other services run without it"
         )
         if device is not None:
+            known = "; ".join(f"{number}: {name}" for number, name in enumerate(devices))
             text = (
-                f"EGL device {device} cannot be used ({reason}): choose another (they count from 0), or none "
-                "for EGL's default; libegl1 and libgl1 must be installed"
+                f"EGL device {device} cannot be used ({reason}): choose another, or none for the first "
+                f"GPU that works; there is {known or 'none: libegl1 and libgl1 must be installed'}"
             )
         super().__init__(text)
 

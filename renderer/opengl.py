@@ -1,7 +1,9 @@
 """Off-screen OpenGL contexts, shader programs, and meshes on the GPU."""
 
 import ctypes
+import logging
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import moderngl
@@ -12,27 +14,102 @@ from renderer import body_shaders, shaders
 from renderer.errors import NoOpenGLError
 from renderer.mesh import VERTEX, Mesh
 
+log = logging.getLogger(__name__)
+
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
+# What Mesa calls its renderers that need no GPU.
+_SOFTWARE = ("llvmpipe", "softpipe", "swrast")
 
 
 def open_context(device: int | None = None) -> moderngl.Context:
     """Return an off-screen OpenGL context through EGL; it belongs to the thread that made it.
 
     Args:
-        device: Number of the EGL device, on a machine with several GPUs; None: EGL's default.
+        device: Number of the EGL device, on a machine with several; None: the first GPU that works, or
+            software.
 
     Raises:
         NoOpenGLError: If there is no EGL or OpenGL library, or no such device.
     """
     _keep_freed_memory()
-    options: dict[str, Any] = {"standalone": True, "backend": "egl", "require": 330}
-    if device is not None:
-        options["device_index"] = device
     try:
-        return moderngl.create_context(**options)
+        return _open(_best_device() if device is None else device)
+    except _CannotOpenError as error:
+        devices = () if device is None else tuple(device_names())
+        raise NoOpenGLError(str(error), device=device, devices=devices) from None
+
+
+def device_names() -> list[str]:
+    """Return what draws on each EGL device, by its number, or why it cannot be used."""
+    names = []
+    for number in range(_device_count()):
+        try:
+            context = _open(number)
+        except _CannotOpenError as error:
+            names.append(f"not usable ({error})")
+        else:
+            names.append(device_name(context))
+            context.release()
+    return names
+
+
+def device_name(context: moderngl.Context) -> str:
+    """Return the driver's name of the device that draws, and whether it draws in software."""
+    name = str(context.info["GL_RENDERER"]) or "a device without a name"
+    return f"{name}, in software" if _is_software(name) else name
+
+
+def _is_software(name: str) -> bool:
+    return name.startswith(_SOFTWARE)
+
+
+class _CannotOpenError(Exception):
+    """An EGL device without a usable OpenGL; the text is one line."""
+
+
+def _open(device: int) -> moderngl.Context:
+    options: dict[str, Any] = {"backend": "egl", "device_index": device}
+    try:
+        return moderngl.create_context(standalone=True, require=330, **options)
     except Exception as error:  # moderngl raises bare Exception, ImportError and OSError here.
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise NoOpenGLError(reason, device=device) from None
+        raise _CannotOpenError(" ".join(str(error).split()) or type(error).__name__) from None
+
+
+@cache
+def _best_device() -> int:
+    """Return the number of the first GPU that works, or else of software, and log which do not work.
+
+    A process can see a GPU that it may not use: in a container, or as a user without rights to its file.
+    """
+    count = _device_count()
+    if count < 2:
+        return 0
+    working = {}
+    for number in range(count):
+        try:
+            context = _open(number)
+        except _CannotOpenError as error:
+            log.warning("EGL device %d cannot be used: %s", number, error)
+        else:
+            working[number] = device_name(context)
+            context.release()
+    gpus = [number for number, name in working.items() if not _is_software(name)]
+    return next(iter([*gpus, *working]), 0)
+
+
+def _device_count() -> int:
+    """Return the number of EGL devices; 0 also without EGL."""
+    count = ctypes.c_int(0)
+    try:
+        egl = ctypes.CDLL("libEGL.so.1")
+        egl.eglGetProcAddress.restype = ctypes.c_void_p
+        address = egl.eglGetProcAddress(b"eglQueryDevicesEXT")
+    except (OSError, AttributeError):
+        return 0
+    if address:
+        query = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)(address)
+        query(0, None, ctypes.byref(count))
+    return count.value
 
 
 def _keep_freed_memory() -> None:

@@ -1,11 +1,10 @@
-"""Post-processing of a drawn picture: overlay and encoding, in a separate thread from drawing."""
+"""Post-processing of drawn pictures: overlay and encoding, in other threads than drawing."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 from renderer.cameras import Camera
 from renderer.clearance_line import ClearanceLine, draw_clearance_line
-from renderer.encoder import Packet, VideoEncoder, best_codec, jpeg, open_encoder
+from renderer.encoder import Packet, VideoEncoder, jpeg, open_encoder
 from renderer.errors import NoEncoderError
 from renderer.overlay import Overlay, Picture, write_over
 from renderer.requested_views import ViewSpec
@@ -43,19 +42,15 @@ class EncodedPicture:
 
 
 class PostProcessor:
-    """The encoders of all streams; every method runs in the encoding thread.
+    """The encoders of the streams of one encoding thread; every method runs in that thread."""
 
-    Attributes:
-        codec: FFmpeg's name of the encoder.
-    """
+    def __init__(self, codec: str) -> None:
+        """Open no encoder yet.
 
-    def __init__(self, size: tuple[int, int], fps: float) -> None:
-        """Find an encoder, so that a machine without one fails at the start.
-
-        Raises:
-            NoEncoderError: If no H.264 encoder works.
+        Args:
+            codec: FFmpeg's name of the preferred encoder.
         """
-        self.codec = best_codec(size, fps)
+        self._codec = codec
         self._encoders: dict[str, VideoEncoder] = {}
 
     def process(self, picture: Picture, camera: Camera, wanted: PictureJob) -> EncodedPicture:
@@ -77,16 +72,15 @@ class PostProcessor:
                 raise
         return EncodedPicture(packet, jpeg(picture) if wanted.image else None)
 
-    def end(self, streams: Iterable[str]) -> None:
-        """Release the encoders of streams."""
-        for stream in streams:
-            self._encoders.pop(stream, None)
+    def end(self, stream: str) -> None:
+        """Release a stream's encoder."""
+        self._encoders.pop(stream, None)
 
     def _encoder(self, stream: str, spec: ViewSpec) -> VideoEncoder:
         encoder = self._encoders.get(stream)
         if encoder is None:
             encoder = open_encoder(
-                spec.size, spec.fps, codec=self.codec, most_bits_per_s=spec.most_bits_per_s
+                spec.size, spec.fps, codec=self._codec, most_bits_per_s=spec.most_bits_per_s
             )
             self._encoders[stream] = encoder
         return encoder

@@ -11,8 +11,12 @@ from functools import partial
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
+import cv2
+
 from renderer.cache import cache_folder
 from renderer.composition import Composition
+from renderer.encoder import best_codec
+from renderer.encoding_threads import EncodingThread, EncodingThreads, thread_count
 from renderer.errors import NoRoomError, RendererError, UnknownViewError, ViewError
 from renderer.frame_scheduler import FrameScheduler, next_view
 from renderer.post_processing import EncodedPicture, PictureJob, PostProcessor
@@ -52,7 +56,7 @@ class Settings:
         fps: Highest rate of a view's video [1/s].
         samples: Samples per pixel for anti-aliasing; 0: none.
         shading: "fast" or "full".
-        device: Number of the EGL device; None: EGL's default.
+        device: Number of the EGL device; None: the first GPU that works, or software.
         most_views: Largest number of requested views, for all robots together.
         quotas: Quotas of each operator.
         folder: Cache folder of the meshes.
@@ -82,7 +86,11 @@ async def serve(session: Session, settings: Settings) -> None:
         raise RendererError(f"renderer size {width} x {height}: must be even numbers from 64 to 4096")
     if not 1.0 <= settings.fps <= 120.0:
         raise RendererError(f"renderer fps {settings.fps:g}: must be from 1 to 120")
-    with open_thread("drawing") as drawing, open_thread("encoding") as encoding:
+    # OpenCV's own threads wait actively: on 16 cores they took a third of the processor time, and saved none.
+    cv2.setNumThreads(1)
+    with contextlib.ExitStack() as threads:
+        drawing = threads.enter_context(open_thread("drawing"))
+        encoding = [threads.enter_context(open_thread(f"encoding-{n}")) for n in range(thread_count())]
         studio = await _in(
             drawing,
             Studio,
@@ -93,9 +101,10 @@ async def serve(session: Session, settings: Settings) -> None:
             folder=settings.folder,
         )
         try:
-            post_processor = await _in(encoding, PostProcessor, settings.size, settings.fps)
-            log.info("drawing with %s, encoding with %s", studio.renderer_name, post_processor.codec)
-            await _Renderer(session, settings, (drawing, studio), (encoding, post_processor)).run()
+            codec = await _in(encoding[0], best_codec, settings.size, settings.fps)
+            log.info("drawing with %s; encoding with %s", studio.renderer_name, codec)
+            encoders = EncodingThreads(EncodingThread(each, PostProcessor(codec)) for each in encoding)
+            await _Renderer(session, settings, (drawing, studio), encoders).run()
         finally:
             drawing.submit(studio.close)
 
@@ -115,11 +124,11 @@ class _Renderer:
         session: Session,
         settings: Settings,
         drawing: tuple[ThreadPoolExecutor, Studio],
-        encoding: tuple[ThreadPoolExecutor, PostProcessor],
+        encoders: EncodingThreads,
     ) -> None:
         self._session, self._settings = session, settings
         self._drawing, self._studio = drawing
-        self._encoding, self._post_processor = encoding
+        self._encoders = encoders
         self._robots = Robots(
             session,
             settings.site,
@@ -219,7 +228,7 @@ class _Renderer:
         )
 
     async def process(self, drawn: Drawn, job: PictureJob) -> EncodedPicture:
-        return await _in(self._encoding, self._post_processor.process, drawn.picture, drawn.camera, job)
+        return await self._encoders.of(job.stream).process(drawn.picture, drawn.camera, job)
 
     def _open(self, state: RobotState, spec: ViewSpec) -> Stream:
         stream = self._streams[state.name, spec.name] = Stream(self._session, state, spec, self)
@@ -230,7 +239,7 @@ class _Renderer:
         self._active.discard(stream)
         self._reset_if_unwatched()
         stream.close()
-        self._encoding.submit(self._post_processor.end, [stream.name])
+        self._encoders.end(stream.name)
 
     def _first_view(self, state: RobotState) -> str:
         """Return the view that provides the camera of the view for slow links."""
@@ -292,8 +301,7 @@ class _Renderer:
     # -------------------------------------------------------------- painting
 
     async def _paint_forever(self) -> None:
-        """Draw pictures of the newest state one by one; each is encoded while the next is drawn."""
-        encoding = asyncio.create_task(asyncio.sleep(0))
+        """Draw pictures of the newest state one by one; each is encoded while the next ones are drawn."""
         while True:
             self._wake.clear()
             stream, due_at = next_view(self._active, time.monotonic())
@@ -304,13 +312,7 @@ class _Renderer:
                         await self._wake.wait()
                 continue
             began = time.monotonic()
-            rest = await stream.draw(began)
-            try:
-                await encoding
-            except asyncio.CancelledError:
-                rest.close()  # avoids a warning: the coroutine is never started
-                raise
-            encoding = asyncio.create_task(rest)
+            await self._encoders.of(stream.name).start(await stream.draw(began))
             self._record_picture(began)
 
     def _record_picture(self, began: float) -> None:
@@ -355,7 +357,7 @@ class _Renderer:
         while True:
             await asyncio.sleep(_TIDY_EACH_S)
             now = time.monotonic()
-            silent = []
+            heard = {stream.name for stream in self._streams.values()}
             for key, stream in list(self._streams.items()):
                 # Catches missed notifications of a change of subscribers.
                 stream.update_watchers()
@@ -363,11 +365,11 @@ class _Renderer:
                     continue
                 unwatched_s = now - stream.unwatched_since
                 if unwatched_s > _NEXT_WATCHER_WITHIN_S:
-                    silent.append(stream.name)
+                    heard.discard(stream.name)
                 patience_s = _FIRST_WATCHER_WITHIN_S if stream.awaited else _NEXT_WATCHER_WITHIN_S
                 if stream.spec.requested and unwatched_s > patience_s:
                     self._close(key)
-            await _in(self._encoding, self._post_processor.end, silent)
+            self._encoders.keep(heard)
             await _in(
                 self._drawing,
                 self._studio.tidy,

@@ -85,7 +85,8 @@ class Renderer(BaseModel):
         fps: Pictures a second.
         anti_aliasing: Samples per pixel; 0: off.
         shading: `full` also draws shadows on robots and fixtures.
-        device: Number of the EGL device, on a machine with several GPUs; absent: EGL's own choice.
+        device: Number of the EGL device, on a machine with several GPUs; absent: the first GPU that
+            works, or software.
         most_views: Largest number of requested views, for all robots together.
     """
 

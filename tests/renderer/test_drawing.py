@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from renderer import opengl
 from renderer.cameras import Camera, pixels
 from renderer.drawing import Drawing
 from renderer.errors import NoOpenGLError
@@ -146,9 +147,42 @@ def test_a_released_or_unknown_mesh_is_not_drawn(drawing):
 @pytest.mark.slow
 def test_an_unknown_device_is_rejected_in_one_line():
     context_or_skip().release()
-    with pytest.raises(NoOpenGLError, match=r"EGL device 99 cannot be used .*count from 0") as caught:
+    with pytest.raises(NoOpenGLError, match=r"EGL device 99 cannot be used .*there is 0: ") as caught:
         open_context(device=99)
     assert "\n" not in str(caught.value)
+
+
+class Context:
+    def __init__(self, name):
+        self.info = {"GL_RENDERER": name}
+
+    def release(self):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("devices", "best"),
+    [
+        (["NVIDIA H100", "llvmpipe (LLVM 15)"], 0),
+        (["llvmpipe (LLVM 15)", "NVIDIA H100"], 1),
+        (["", "llvmpipe (LLVM 15)"], 1),
+        (["", ""], 0),
+    ],
+)
+def test_the_first_gpu_that_works_is_preferred_to_software(devices, best, monkeypatch, caplog):
+    def open_device(number):
+        if not devices[number]:
+            raise opengl._CannotOpenError("eglInitialize failed (0x3001)")
+        return Context(devices[number])
+
+    monkeypatch.setattr(opengl, "_device_count", lambda: len(devices))
+    monkeypatch.setattr(opengl, "_open", open_device)
+    assert opengl._best_device.__wrapped__() == best
+    unusable = [line for line in caplog.messages if "eglInitialize failed" in line]
+    assert len(unusable) == devices.count("")
+    assert [name.endswith(", in software") for name in opengl.device_names()] == [
+        name.startswith("llvmpipe") for name in devices
+    ]
 
 
 def test_a_ghost_is_blue_and_transparent(drawing):

@@ -127,6 +127,25 @@ def test_a_preferred_encoder_that_does_not_work_is_replaced():
     assert encoder.name in ("h264_nvenc", "libx264")
 
 
+@pytest.mark.parametrize("most_bits_per_s", [0.0, 250e3])
+def test_ffmpeg_knows_the_options_of_nvenc(most_bits_per_s):
+    """They are read before the driver is loaded, so this holds without a GPU too."""
+    reason = ""
+    try:
+        H264Encoder((640, 360), 30, codec="h264_nvenc", most_bits_per_s=most_bits_per_s)
+    except NoEncoderError as error:
+        reason = str(error)
+    assert "option" not in reason
+    assert not reason or any(cause in reason for cause in encoders._CAUSES.values())
+
+
+def test_the_reason_against_nvenc_is_in_plain_words():
+    lines = ["OpenEncodeSessionEx failed: unsupported device (2): (no details)", "No capable devices found"]
+    assert encoders._reason(lines) == f"this GPU has no NVENC ({'; '.join(lines)})"
+    assert encoders._reason(["Cannot load libnvidia-encode.so.1"]).startswith("the NVIDIA driver's libnvidia")
+    assert encoders._reason(["dimensions not set", "dimensions not set"]) == "dimensions not set"
+
+
 def test_the_reason_for_a_worse_encoder_is_logged(monkeypatch, caplog):
     monkeypatch.setattr(encoders, "_CODECS", {"h264_none": {}, "libx264": encoders._CODECS["libx264"]})
     with caplog.at_level("INFO"):

@@ -428,7 +428,8 @@ def test_a_robot_removed_while_it_is_drawn_leaves_no_encoder(mesh, tmp_path, mon
             # This picture is drawn and encoded after the other.
             await picture(monitor)
             video.close()
-            assert not [stream for stream in made[0]._encoders if stream.startswith("replay-x/")]
+            streams = [stream for each in made for stream in each._encoders]
+            assert not [stream for stream in streams if stream.startswith("replay-x/")]
 
     run(main())
 

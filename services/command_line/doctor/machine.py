@@ -78,16 +78,18 @@ def _open_gl() -> list[Finding]:
     fix = "apt-get install libegl1 libgl1; everything but the renderer runs without it"
     try:
         from renderer.errors import RendererError
-        from renderer.opengl import open_context
+        from renderer.opengl import device_name, device_names, open_context
     except ImportError as error:
         return [Finding("OpenGL", False, f"its packages are missing: {error}", fix)]
     try:
         context = open_context()
     except RendererError as error:
         return [Finding("OpenGL", False, str(error), fix)]
-    name = context.info["GL_RENDERER"]
+    name = device_name(context)
     context.release()
-    return [Finding("OpenGL", True, f"off screen, by {name or 'a device without a name'}")]
+    devices = device_names()
+    listed = "; ".join(f"device {number}: {each}" for number, each in enumerate(devices))
+    return [Finding("OpenGL", True, f"off screen, by {name}" + (f" ({listed})" if len(devices) > 1 else ""))]
 
 
 def _page() -> list[Finding]:
