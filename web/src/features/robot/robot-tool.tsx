@@ -112,11 +112,19 @@ export function RobotTool(props: {
     const speed = sign * (isTurn(axis) ? toRadians(about) : along / 1000);
     const jog = { frame: FRAME_OF[frame], axis: JogAxis[axis.toUpperCase() as keyof typeof JogAxis], speed };
     const number = ++jogs.current;
+    const what = jogName(axis, frame, sign);
     setJogging(true);
+    // Else the end of the last jog would look like the end of this one.
+    const starting: Notice = { kind: "busy", text: t("tool_step_checked", { what }) };
+    setNotice(starting);
     const tell = (told: Notice) => number === jogs.current && setNotice(told);
-    const pressed = startJog(robotKey, jog, jogName(axis, frame, sign), tell, lastJog.current);
+    const pressed = startJog(robotKey, jog, what, tell, lastJog.current);
     lastJog.current = pressed;
-    void pressed.over.finally(() => number === jogs.current && setJogging(false));
+    void pressed.over.finally(() => {
+      if (number !== jogs.current) return;
+      setJogging(false);
+      setNotice((shown) => (shown === starting ? null : shown));
+    });
     return pressed.release;
   };
   const why = whyNone || (queue.going || jogging ? "" : whyNoNewMotion(controller));
