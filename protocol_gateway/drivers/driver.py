@@ -1,12 +1,22 @@
 """Interface between a controller's own protocol and the gateway: another kind of controller is one more file.
 
-A driver does no I/O. It turns bytes into events and commands into bytes. Only the driver knows degrees,
-millimetres, words and codes: above it everything is SI.
+A driver does no I/O and reads no clock. It is told what happens on its channels, and returns effects, which
+the link performs in order:
+
+    told                                     effects
+    ---------------------------------------  ------------------------------------------------------
+    started, opened, received, skipped,      Open, Close: keep a channel connected, or end it
+      closed, timer_ended, command           Send: write whole bytes to a channel now
+                                             SetTimer: tell the driver when a time has come
+                                             Report: what the controller reported
+
+Only the driver knows degrees, millimetres, words and codes: above it everything is SI. Times are seconds on
+the gateway's monotonic clock, unless named as the controller's.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, Flag, auto
 from typing import Protocol, TypeAlias
 
 from robomesh.reasons import Reason
@@ -167,22 +177,103 @@ ControllerCommand: TypeAlias = (
 )
 
 
+# ------------------------------------------------------------------------ effects
+
+
+class Carries(Flag):
+    """What is lost while a channel is not open."""
+
+    READING = auto()
+    MOTION = auto()
+    STOP = auto()
+
+
+ALL = Carries.READING | Carries.MOTION | Carries.STOP
+"""All of it: a protocol with a single channel."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channel:
+    """One of a driver's connections to the controller.
+
+    Attributes:
+        carries: What needs it. The robot is shown as disconnected while no channel that carries READING is
+            open, so an addition to another channel carries nothing.
+        datagrams: UDP instead of TCP; `received` gets each datagram by itself.
+    """
+
+    name: str
+    carries: Carries
+    datagrams: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Open:
+    """Connect a channel, and connect it again after it was lost, with growing pauses, until `Close`.
+
+    Attributes:
+        port: Port of the controller's host; None: the site file's.
+    """
+
+    channel: Channel
+    port: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Close:
+    """End a channel, and do not connect it again."""
+
+    channel: Channel
+
+
+@dataclass(frozen=True, slots=True)
+class Send:
+    """Write whole bytes to a channel now. Nothing waits in the gateway, so nothing precedes a stop."""
+
+    channel: Channel
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class SetTimer:
+    """Call `timer_ended` at a time [s]; it replaces the timer before. None: clear the timer."""
+
+    at_s: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What the controller reported in the bytes of one read.
+
+    Attributes:
+        units: Number of well-formed units; one may give several events, or none.
+        refusals: Number of these units that hold only refusals, so do not show that the arm's state is
+            received.
+    """
+
+    events: Sequence[ControllerEvent]
+    units: int
+    refusals: int = 0
+
+
+Effect: TypeAlias = Open | Close | Send | SetTimer | Report
+Effects: TypeAlias = Sequence[Effect]
+
+
 class Driver(Protocol):
-    """Driver of a controller's protocol, without I/O. One driver serves consecutive connections."""
+    """Driver of a controller's protocol, without I/O."""
 
     @property
-    def units_received(self) -> int:
-        """Number of well-formed units so far; one unit may give several events, or none."""
-        ...
+    def requests_a_second(self) -> float:
+        """Most `Send` effects a second that are not the answer to `command`: greetings and questions.
 
-    @property
-    def refusals_received(self) -> int:
-        """Number of these units that hold only refusals, so do not show that the arm's state is received."""
+        The link sends no more: 0 means that nothing is ever sent unasked.
+        """
         ...
 
     @property
     def can_stop(self) -> bool:
-        """True if the driver has a stop unit for the controller; a test at the site proves that it works."""
+        """True if the driver has a stop for the controller; a test at the site proves that it works."""
         ...
 
     @property
@@ -193,12 +284,28 @@ class Driver(Protocol):
         """
         ...
 
-    def connected(self) -> None:
-        """Discard the unfinished unit, because a new connection begins or bytes were discarded."""
+    def started(self, now_s: float) -> Effects:
+        """Begin, usually with `Open`; called again after a failure of the gateway for this robot."""
         ...
 
-    def receive(self, data: bytes) -> Sequence[ControllerEvent]:
-        """Return the events of the next bytes, split anywhere; invalid bytes give a MalformedReceived."""
+    def opened(self, channel: Channel, now_s: float) -> Effects:
+        """Begin a new connection: discard unfinished units and open questions, and greet."""
+        ...
+
+    def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
+        """Read the next bytes, split anywhere, or a datagram; invalid ones give a MalformedReceived."""
+        ...
+
+    def skipped(self, channel: Channel, now_s: float) -> Effects:
+        """Go on after bytes were discarded, because the controller sent far too much."""
+        ...
+
+    def closed(self, channel: Channel, now_s: float) -> Effects:
+        """Note that a connection has ended, or that an attempt to connect failed."""
+        ...
+
+    def timer_ended(self, now_s: float) -> Effects:
+        """Do what the timer was set for."""
         ...
 
     def encode(self, *commands: ControllerCommand) -> bytes:
@@ -207,4 +314,8 @@ class Driver(Protocol):
         Raises:
             CommandError: If the protocol cannot express them (wrong joint count, number not finite).
         """
+        ...
+
+    def command(self, encoded: bytes, now_s: float) -> Effects:
+        """Send what `encode` returned."""
         ...

@@ -27,9 +27,12 @@ from protocol_gateway.core.records import (
 from protocol_gateway.core.scales import si_scales
 from protocol_gateway.core.stream import Malformed, Unit, UnitStream, printable
 from protocol_gateway.drivers.driver import (
+    ALL,
     Activity,
+    Channel,
     ControllerCommand,
     ControllerEvent,
+    Effects,
     Hold,
     Home,
     JointsReceived,
@@ -37,9 +40,12 @@ from protocol_gateway.drivers.driver import (
     Mode,
     MoveAbsolute,
     MoveRelative,
+    Open,
     Refused,
+    Report,
     Reset,
     Resume,
+    Send,
     Speed,
     StatusReceived,
     Stop,
@@ -50,6 +56,9 @@ from protocol_gateway.errors import CommandError, UnitFormatError
 from robomesh import reason_codes as codes
 from robomesh.texts import one_line
 from robots.joints import JointType
+
+UNITS = Channel(name="units", carries=ALL)
+"""The one connection, which carries everything."""
 
 _ACTIVITIES = {activity.value: activity for activity in Activity}
 _MODES = {mode.value: mode for mode in Mode}
@@ -94,9 +103,33 @@ class UnitDriver:
         """True if there are units to hold, and to give the held motion up."""
         return all(self._table.supports(_WORDS[each]) for each in (Hold, Reset))
 
-    def connected(self) -> None:
+    # Nothing is ever sent but an operator's command.
+    requests_a_second = 0.0
+
+    def started(self, now_s: float) -> Effects:
+        """Connect to the site file's port."""
+        return (Open(UNITS),)
+
+    def opened(self, channel: Channel, now_s: float) -> Effects:
         """Discard the unfinished unit of the previous connection."""
         self._stream = UnitStream(self._table)
+        return ()
+
+    skipped = opened
+
+    def closed(self, channel: Channel, now_s: float) -> Effects:
+        """Do nothing: the link connects again."""
+        return ()
+
+    def timer_ended(self, now_s: float) -> Effects:
+        """Do nothing: no timer is set."""
+        return ()
+
+    def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
+        """Report the events of the next bytes, split anywhere."""
+        units, refusals = self.units_received, self.refusals_received
+        events = self.receive(data)
+        return (Report(events, self.units_received - units, self.refusals_received - refusals),)
 
     def receive(self, data: bytes) -> Sequence[ControllerEvent]:
         """Return the events of the next bytes, split anywhere."""
@@ -119,6 +152,10 @@ class UnitDriver:
             return write_unit([self._record(command) for command in commands], self._table)
         except UnitFormatError as error:
             raise CommandError(codes.COMMAND_NOT_A_UNIT(detail=error)) from None
+
+    def command(self, encoded: bytes, now_s: float) -> Effects:
+        """Send a unit."""
+        return (Send(UNITS, encoded),)
 
     # -------------------------------------------------------------- from the controller
 

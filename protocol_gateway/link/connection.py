@@ -1,4 +1,4 @@
-"""One TCP connection to a controller: writes whole units immediately or fails, reads into a callback."""
+"""One connection to a controller, TCP or UDP: writes immediately or fails, reads into a callback."""
 
 import asyncio
 import contextlib
@@ -6,6 +6,7 @@ import os
 import socket
 import struct
 from collections.abc import Callable
+from typing import cast
 
 from protocol_gateway.errors import LinkCloggedError, LinkDownError
 from protocol_gateway.sockets import configure
@@ -93,11 +94,7 @@ class Connection(asyncio.BufferedProtocol):
     def pause(self, seconds: float) -> None:
         """Stop reading for some seconds; writing continues."""
         self._transport.pause_reading()
-        self.later(seconds, self._transport.resume_reading)
-
-    def later(self, seconds: float, call: Callable[[], None]) -> asyncio.TimerHandle:
-        """Schedule a call; an exception in it ends the link, as in `receive`."""
-        return asyncio.get_running_loop().call_later(seconds, self._call_or_fail, call)
+        asyncio.get_running_loop().call_later(seconds, self._call_or_fail, self._transport.resume_reading)
 
     @property
     def round_trip_s(self) -> float | None:
@@ -125,6 +122,77 @@ class Connection(asyncio.BufferedProtocol):
                 await asyncio.wait([self._closed], timeout=_FINAL_SEND_S)
         finally:
             self._transport.abort()
+        await self._closed
+
+    def _call_or_fail(self, call: Callable[[], None]) -> None:
+        """Make an exception of the callback end `run`; asyncio would only log it."""
+        try:
+            call()
+        except Exception as error:
+            if not self.lost.done():
+                self.lost.set_exception(error)
+            self._transport.abort()
+
+
+class Datagrams(asyncio.DatagramProtocol):
+    """One UDP socket, connected to the controller's address: the kernel drops datagrams of other senders."""
+
+    _transport: asyncio.DatagramTransport
+    round_trip_s = None
+
+    def __init__(self, on_connected: Callable[["Datagrams"], None], receive: Callable[[bytes], None]) -> None:
+        self._on_connected = on_connected
+        self._receive = receive
+        loop = asyncio.get_running_loop()
+        self.lost: asyncio.Future[Reason] = loop.create_future()
+        self._closed: asyncio.Future[None] = loop.create_future()
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Notify the link (called by asyncio)."""
+        # No assertion: before Python 3.12 asyncio's own class is not derived from it.
+        self._transport = cast("asyncio.DatagramTransport", transport)
+        self._call_or_fail(lambda: self._on_connected(self))
+
+    def datagram_received(self, data: bytes, address: object) -> None:
+        """Pass a datagram on (called by asyncio)."""
+        self._call_or_fail(lambda: self._receive(data))
+
+    def error_received(self, error: Exception) -> None:
+        """End the connection: the controller's host has no such port (called by asyncio)."""
+        reason = reason_of(error) if isinstance(error, OSError) else str(error)
+        if not self.lost.done():
+            self.lost.set_result(codes.OTHER(detail=reason))
+
+    def connection_lost(self, error: Exception | None) -> None:
+        """Note the end (called by asyncio)."""
+        if not self.lost.done():
+            self.lost.set_result(codes.LINK_CLOSED())
+        self._closed.set_result(None)
+
+    def write(self, data: bytes) -> None:
+        """Send one datagram immediately.
+
+        Raises:
+            LinkDownError: If the connection has ended.
+            LinkCloggedError: If the system does not take the datagram; the connection is then aborted.
+        """
+        if self.lost.done() or self._transport.is_closing():
+            raise LinkDownError(codes.LINK_JUST_ENDED())
+        self._transport.sendto(data)
+        if self.lost.done():
+            raise LinkDownError(codes.LINK_BROKE())
+        # Selector transports have it; the stubs do not.
+        if self._transport.get_write_buffer_size():  # type: ignore[attr-defined]
+            self._transport.abort()
+            raise LinkCloggedError(codes.LINK_CLOGGED())
+
+    def pause(self, seconds: float) -> None:
+        """Do nothing: the kernel drops datagrams that nobody reads in time."""
+
+    async def end(self) -> None:
+        """Close the socket."""
+        self._receive = _ignore
+        self._transport.abort()
         await self._closed
 
     def _call_or_fail(self, call: Callable[[], None]) -> None:

@@ -1,11 +1,10 @@
-"""Link to one controller: keeps a connection, reports its state, dispatches every event immediately.
+"""Link to one controller: keeps the driver's channels connected, and performs what the driver returns.
 
-    DOWN --connected--> SILENT --unit--> UP
+    DOWN --a channel that carries READING is connected--> SILENT --unit--> UP
     UP --no unit of use for stale_after_s--> SILENT --none for reconnect_after_s--> DOWN
-    any --connection lost--> DOWN --a pause, 0.2 s growing to 5 s--> reconnect
-                                  --a unit could not be sent--> reconnect immediately, then each 0.2 s
+    any --no such channel left--> DOWN, connecting again (`channel`)
 
-The socket is read continuously, because data waiting in the kernel's buffers would look new later. Of a
+The sockets are read continuously, because data waiting in the kernel's buffers would look new later. Of a
 flood, and of a burst after a gap, the newest of each kind is dispatched and the rest is counted (`flood`).
 The link is SILENT if the controller's units have another joint count, or if it sends over 2 MiB a second. It
 stays connected then, so that a stop can be sent.
@@ -14,25 +13,33 @@ Data is stamped once: with the time of the read, or earlier by the controller's 
 """
 
 import asyncio
-import contextlib
 import logging
-import random
+import math
 import time
 from collections import Counter
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
 
 from protocol_gateway.drivers.driver import (
+    Carries,
+    Close,
     ControllerEvent,
     Driver,
+    Effect,
+    Effects,
     JointsReceived,
     MalformedReceived,
+    Open,
     Refused,
+    Report,
+    Send,
+    SetTimer,
     StatusReceived,
     UnknownReceived,
 )
-from protocol_gateway.errors import LinkDownError
-from protocol_gateway.link.connection import READ_BYTES, Connection, reason_of
+from protocol_gateway.errors import LinkError
+from protocol_gateway.link.channel import KeptChannel
+from protocol_gateway.link.connection import READ_BYTES
 from protocol_gateway.link.flood import EventDispatcher, FloodDetector
 from protocol_gateway.link.health import Arrivals, LinkHealth, LossCounter, ResponseTimer
 from protocol_gateway.link.status import LinkState, LinkStatus
@@ -52,8 +59,6 @@ __all__ = [
 
 logger = logging.getLogger(__name__)
 
-_FIRST_PAUSE_S = 0.2
-_LONGEST_PAUSE_S = 5.0
 # Of a deluge, one chunk of 16 KiB is discarded this often: cheap, and its end is detected.
 _DELUGE_EACH_S = 0.01
 JOINT_COUNT = "controller.joint_count"
@@ -114,7 +119,12 @@ class ControllerLink:
         self._monotonic_s = monotonic_s
         self._wall_clock = WallClock()
         self._where = f"{settings.host}:{settings.port}"
-        self._connection: Connection | None = None
+        self._channels: dict[str, KeptChannel] = {}
+        self._tasks: dict[KeptChannel, asyncio.Task[None]] = {}
+        self._failed: asyncio.Future[None] | None = None
+        self._timer: asyncio.TimerHandle | None = None
+        self._unasked = UnaskedSends(driver.requests_a_second)
+        self._connected_s = self._units_at_connect = 0.0
         self._status = LinkStatus(LinkState.DOWN, codes.LINK_CONNECTING(where=self._where))
         self._counts: Counter[str] = Counter()
         self._last_received: Received | None = None
@@ -138,7 +148,6 @@ class ControllerLink:
     def counters(self) -> LinkCounters:
         """Counts so far."""
         return LinkCounters(
-            units_received=self._driver.units_received,
             units_lost=self._losses.lost,
             units_skipped=self._dispatcher.skipped,
             **self._counts,
@@ -159,49 +168,44 @@ class ControllerLink:
         """Health of the link."""
         return LinkHealth(
             jitter_s=self._arrivals.jitter_s(self._monotonic_s()),
-            network_round_trip_s=self._connection.round_trip_s if self._connection else None,
+            network_round_trip_s=next((each.round_trip_s for each in self._readable()), None),
             answer_s=self._response_timer.answer_s,
         )
 
     async def run(self) -> None:
-        """Keep the link connected until cancelled; then close the connection."""
-        pause_s = _FIRST_PAUSE_S
-        while True:
-            if await self._attempt():
-                pause_s = _FIRST_PAUSE_S
-            await self._rest(pause_s)
-            pause_s = min(pause_s * 2.0, _LONGEST_PAUSE_S)
+        """Keep the channels connected until cancelled; then close them."""
+        self._failed = asyncio.get_running_loop().create_future()
+        try:
+            self._tell(self._driver.started(self._monotonic_s()))
+            await self._failed
+        finally:
+            self._failed.cancel()
+            self._set_timer(None)
+            # The driver is not told of these ends, so it opens nothing.
+            self._channels.clear()
+            tasks = [*self._tasks.values()]
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
 
-    async def _rest(self, pause_s: float) -> None:
-        """Pause between two attempts; only briefly after a unit could not be sent."""
-        # Random spread, so that a restarted controller does not get all connections at the same time.
-        spread = random.uniform(0.8, 1.2)
-        if self._send_failed.is_set():
-            await asyncio.sleep(_FIRST_PAUSE_S * spread)
-            return
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(pause_s * spread):
-                await self._send_failed.wait()
+    def send(self, encoded: bytes) -> None:
+        """Send what the driver's `encode` returned to the controller immediately.
 
-    def send(self, data: bytes) -> None:
-        """Write a whole unit to the socket immediately. The link has no queue, so nothing precedes the unit.
-
-        On return the operating system has the whole unit. After an error it has not, and the unit will not be
-        sent later; until the next successful send, the link reconnects without long pauses. Works on a SILENT
-        link too, so that a stop can be tried.
+        On return the operating system has all of it. After an error it has not, and it will not be sent
+        later. Works on a SILENT link too, so that a stop can be tried.
 
         Raises:
             LinkDownError: If there is no connection.
             LinkCloggedError: If the socket does not take the whole unit; the connection is then aborted.
         """
-        self._send_failed.set()
-        if self._connection is None:
-            raise LinkDownError(self._status.reason)
-        self._connection.write(data)
-        self._send_failed.clear()
-        self._counts["units_sent"] += 1
-        self._counts["bytes_sent"] += len(data)
-        self._response_timer.command_sent(self._monotonic_s())
+        now = self._now()
+        for effect in self._driver.command(encoded, now.monotonic_s):
+            if isinstance(effect, Send):
+                self._channels[effect.channel.name].write(effect.data)
+                self._count_sent(effect)
+            else:
+                self._perform(effect, now)
+        self._response_timer.command_sent(now.monotonic_s)
 
     def defer_in_flood(self, kind: Hashable, call: Callable[[], None]) -> bool:
         """Defer a call in a flood, where only the newest of each kind is done; return whether deferred."""
@@ -209,78 +213,159 @@ class ControllerLink:
             self._dispatcher.defer(kind, call)
         return self._dispatcher.flood.active
 
-    async def _attempt(self) -> bool:
-        """Connect, and serve the connection to its end; return whether usable units were received."""
-        loop = asyncio.get_running_loop()
-        try:
-            async with asyncio.timeout(self._settings.connect_timeout_s):
-                _, connection = await loop.create_connection(
-                    lambda: Connection(self._on_connected, self._receive),
-                    self._settings.host,
-                    self._settings.port,
-                )
-        except TimeoutError:
-            self._set_status(LinkState.DOWN, codes.LINK_NO_ANSWER(where=self._where))
-            return False
-        except OSError as error:
-            self._set_status(LinkState.DOWN, codes.LINK_FAILED(where=self._where, detail=reason_of(error)))
-            return False
-        units_before = self._driver.units_received
-        reason = codes.LINK_CLOSED()
-        try:
-            reason = await self._watch(connection)
-        finally:
-            self._connection = None
-            self._dispatcher.forget()
-            await connection.end()
-            self._set_status(LinkState.DOWN, reason)
-        received = self._driver.units_received > units_before
-        return received and not self._refusal
+    # --------------------------------------------------------- effects of the driver
 
-    async def _watch(self, connection: Connection) -> Reason:
-        """Wait for the connection's end, reporting silence; return the reason of the end."""
-        connected_s = self._monotonic_s()
-        patience_s, limit_s = self._settings.stale_after_s, self._settings.reconnect_after_s
-        while not connection.lost.done():
-            now_s = self._monotonic_s()
-            last_s = self._last_received.monotonic_s if self._last_received else connected_s
-            quiet_s = now_s - max(last_s, connected_s)
-            mute_s = quiet_s if self._unusable is None else now_s - self._unusable[0]
-            if mute_s >= limit_s:
-                return codes.LINK_RECONNECTS(where=self._where)
-            if quiet_s >= patience_s and self._status.state is LinkState.UP:
-                self._fall_silent()
-            wait_s = patience_s - quiet_s if quiet_s < patience_s else limit_s - mute_s
-            await asyncio.wait([connection.lost], timeout=wait_s)
-        end = connection.lost.result()
-        if self._refusal:
-            return codes.LINK_REFUSED(where=self._where, detail=self._refusal)
-        return codes.LINK_LOST(end, where=self._where)
+    def _tell(self, effects: Effects) -> None:
+        """Perform what the driver returns when something happened."""
+        now = self._now()
+        for effect in effects:
+            self._perform(effect, now)
 
-    def _on_connected(self, connection: Connection) -> None:
-        self._driver.connected()
-        self._timestamper.connected()
-        self._losses.forget()
-        self._dispatcher.flood = FloodDetector()
-        self._unusable = None
-        self._connection = connection
-        self._refusal = ""
-        self._counts["connections"] += 1
-        self._set_status(LinkState.SILENT, codes.LINK_NO_UNIT(where=self._where))
+    def _perform(self, effect: Effect, now: Received) -> None:
+        match effect:
+            case Report():
+                self._report(effect, now)
+            case Send():
+                self._send_unasked(effect, now.monotonic_s)
+            case SetTimer(at_s):
+                self._set_timer(at_s)
+            case Open():
+                self._open(effect)
+            case Close(channel):
+                self._close(channel.name)
+
+    def _send_unasked(self, effect: Send, now_s: float) -> None:
+        if not self._unasked.allowed(now_s):
+            logger.error("%s: the driver sends more questions than it declares", self._where)
+            return
+        try:
+            self._channels[effect.channel.name].write(effect.data)
+        except LinkError as error:
+            # The driver hears of the connection's end, and asks again on the next one.
+            logger.debug("%s: %s", self._where, error)
+        else:
+            self._count_sent(effect)
+
+    def _count_sent(self, effect: Send) -> None:
+        self._counts["units_sent"] += 1
+        self._counts["bytes_sent"] += len(effect.data)
+
+    def _set_timer(self, at_s: float | None) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if at_s is not None:
+            self._timer = self._later(max(0.0, at_s - self._monotonic_s()), self._end_timer)
+
+    def _end_timer(self) -> None:
+        self._timer = None
+        self._tell(self._driver.timer_ended(self._monotonic_s()))
+
+    def _open(self, effect: Open) -> None:
+        self._close(effect.channel.name)
+        port = self._settings.port if effect.port is None else effect.port
+        kept = KeptChannel(
+            effect.channel, self._settings.host, port, self._settings.connect_timeout_s, listener=self
+        )
+        self._channels[effect.channel.name] = kept
+        task = self._tasks[kept] = asyncio.create_task(kept.run())
+        task.add_done_callback(lambda task: self._channel_ended(kept, task))
+
+    def _close(self, name: str) -> None:
+        kept = self._channels.pop(name, None)
+        if kept is not None:
+            self._tasks[kept].cancel()
+
+    def _channel_ended(self, kept: KeptChannel, task: asyncio.Task[None]) -> None:
+        del self._tasks[kept]
+        if not task.cancelled() and (error := task.exception()) is not None:
+            self._fail(error)
 
     def _later(self, seconds: float, call: Callable[[], None]) -> asyncio.TimerHandle:
-        assert self._connection is not None
-        return self._connection.later(seconds, call)
+        """Schedule a call; an exception in it ends `run`."""
 
-    def _receive(self, data: bytes) -> None:
+        def call_or_fail() -> None:
+            try:
+                call()
+            except Exception as error:
+                self._fail(error)
+
+        return asyncio.get_running_loop().call_later(seconds, call_or_fail)
+
+    def _fail(self, error: BaseException) -> None:
+        assert self._failed is not None
+        if not self._failed.done():
+            self._failed.set_exception(error)
+
+    # ------------------------------------------------------------------- connections
+
+    def on_opened(self, kept: KeptChannel) -> None:
+        """Begin a connection (called by the channel)."""
+        self._counts["connections"] += 1
+        reads = Carries.READING in kept.channel.carries
+        if reads:
+            self._timestamper.connected()
+            self._losses.forget()
+            self._dispatcher.flood = FloodDetector()
+            self._unusable = None
+            self._refusal = ""
+            self._connected_s = self._monotonic_s()
+            self._units_at_connect = self._counts["units_received"]
+        self._tell(self._driver.opened(kept.channel, self._monotonic_s()))
+        if reads:
+            self._set_status(LinkState.SILENT, codes.LINK_NO_UNIT(where=kept.where))
+
+    def on_ended(self, kept: KeptChannel) -> bool:
+        """Handle the end of a connection, or a failed attempt (called by the channel)."""
+        reads = Carries.READING in kept.channel.carries
+        if self._refusal and kept.reason.code == codes.LINK_LOST.name:
+            kept.reason = codes.LINK_REFUSED(where=kept.where, detail=self._refusal)
+        if reads and not any(self._readable()):
+            self._dispatcher.forget()
+            self._set_status(LinkState.DOWN, kept.reason)
+        if self._channels.get(kept.channel.name) is kept:
+            self._tell(self._driver.closed(kept.channel, self._monotonic_s()))
+        if not reads:
+            return False
+        return self._counts["units_received"] > self._units_at_connect and not self._refusal
+
+    def patience(self, kept: KeptChannel) -> float | Reason:
+        """Return how long to wait for units, or why to connect again; report silence."""
+        if Carries.READING not in kept.channel.carries:
+            return math.inf
+        now_s, connected_s = self._monotonic_s(), self._connected_s
+        patience_s, limit_s = self._settings.stale_after_s, self._settings.reconnect_after_s
+        last_s = self._last_received.monotonic_s if self._last_received else connected_s
+        quiet_s = now_s - max(last_s, connected_s)
+        mute_s = quiet_s if self._unusable is None else now_s - self._unusable[0]
+        if mute_s >= limit_s:
+            return codes.LINK_RECONNECTS(where=kept.where)
+        if quiet_s >= patience_s and self._status.state is LinkState.UP:
+            self._fall_silent()
+        return patience_s - quiet_s if quiet_s < patience_s else limit_s - mute_s
+
+    def _readable(self) -> Iterator[KeptChannel]:
+        """Yield the connected channels that carry READING."""
+        for kept in self._channels.values():
+            if kept.connection is not None and Carries.READING in kept.channel.carries:
+                yield kept
+
+    # ---------------------------------------------------------------- received bytes
+
+    def on_received(self, kept: KeptChannel, data: bytes) -> None:
+        """Hand received bytes to the driver (called by the channel)."""
         # Stamped before it is parsed, so that parsing does not count as age.
         now = self._now()
         self._counts["bytes_received"] += len(data)
-        if self._is_deluge(len(data), now.monotonic_s):
+        if self._is_deluge(kept, len(data), now.monotonic_s):
             return
-        units_before, refusals_before = self._driver.units_received, self._driver.refusals_received
-        events = self._driver.receive(data)
-        if units := self._driver.units_received - units_before:
+        for effect in self._driver.received(kept.channel, data, now.monotonic_s):
+            self._perform(effect, now)
+
+    def _report(self, report: Report, now: Received) -> None:
+        events, units = report.events, report.units
+        if units:
+            self._counts["units_received"] += units
             self._arrivals.count(units, now.monotonic_s)
         for event in events:
             self._count(event, now.monotonic_s)
@@ -293,7 +378,7 @@ class ControllerLink:
         for event in events:
             self._note_losses(event)
         dates = self._timestamper.timestamps(events, now)
-        if units > self._driver.refusals_received - refusals_before and not other_joints:
+        if units > report.refusals and not other_joints:
             self._refusal, self._unusable = "", None
             self._unit_received(max(dates, key=lambda date: date.monotonic_s, default=now), now)
         elif not units and self._unusable is not None and self._status.state is LinkState.SILENT:
@@ -303,18 +388,18 @@ class ControllerLink:
             self._set_status(self._status.state, self._status.reason, self._status.code)
         self._dispatcher.dispatch(events, dates, burst=self._timestamper.after_gap(now.monotonic_s))
 
-    def _is_deluge(self, length: int, now_s: float) -> bool:
+    def _is_deluge(self, kept: KeptChannel, length: int, now_s: float) -> bool:
         """Return whether bytes are discarded because they are far too many. Stops can still be sent."""
         before = self._dispatcher.flood.deluge
-        more_waits = length == READ_BYTES
+        more_waits = length == READ_BYTES and not kept.channel.datagrams
         self._dispatcher.flood.add_bytes(length, now_s, more_waits=more_waits)
         if self._dispatcher.flood.deluge:
-            assert self._connection is not None
-            self._connection.pause(_DELUGE_EACH_S)
+            assert kept.connection is not None
+            kept.connection.pause(_DELUGE_EACH_S)
             self._unusable = now_s, codes.LINK_DELUGE(where=self._where), "link.deluge"
             self._fall_silent()
         elif before:
-            self._driver.connected()
+            self._tell(self._driver.skipped(kept.channel, now_s))
             self._losses.forget()
         return before or self._dispatcher.flood.deluge
 
@@ -376,6 +461,23 @@ class ControllerLink:
         self._status = status
         logger.info("link %s: %s", state.value, reason)
         self._on_status(status)
+
+
+class UnaskedSends:
+    """Limit for what a driver sends by itself: as many a second as it declares, and that many at once."""
+
+    def __init__(self, most_a_second: float) -> None:
+        self._most = self._left = most_a_second
+        self._at_s = 0.0
+
+    def allowed(self, now_s: float) -> bool:
+        """Return whether one more may be sent now, and count it."""
+        self._left = min(self._most, self._left + (now_s - self._at_s) * self._most)
+        self._at_s = now_s
+        if self._left < 1.0:
+            return False
+        self._left -= 1.0
+        return True
 
 
 def _is_of_joints(event: ControllerEvent) -> bool:

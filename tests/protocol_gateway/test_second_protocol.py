@@ -12,14 +12,19 @@ import math
 import pytest
 
 from protocol_gateway.drivers.driver import (
+    ALL,
     Activity,
+    Channel,
     Home,
     JointsReceived,
     MalformedReceived,
     Mode,
     MoveAbsolute,
+    Open,
     Refused,
+    Report,
     Reset,
+    Send,
     StatusReceived,
     Stop,
 )
@@ -33,29 +38,47 @@ from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, u
 _WORDS = {Home: "home", Stop: "stop", Reset: "reset"}
 
 
+LINES = Channel(name="lines", carries=ALL)
+
+
 class JsonLines:
     """Driver of JSON lines (`protocol_gateway.drivers.driver.Driver`)."""
 
     can_stop, can_jog = True, False
+    requests_a_second = 0.0
 
     def __init__(self, joint_types, codes, *, relay):
         self._joints = len(joint_types)
-        self.units_received = self.refusals_received = 0
-        self.connected()
-
-    def connected(self):
         self._rest, self._offset = b"", 0
 
-    def receive(self, data):
+    def started(self, now_s):
+        return (Open(LINES),)
+
+    def opened(self, channel, now_s):
+        self._rest, self._offset = b"", 0
+        return ()
+
+    skipped = opened
+
+    def closed(self, channel, now_s):
+        return ()
+
+    def received(self, channel, data, now_s):
+        assert channel is LINES
         *lines, self._rest = (self._rest + data).split(b"\n")
-        return [event for line in lines for event in self._events(line)]
+        events = [event for line in lines for event in self._events(line)]
+        refusals = sum(isinstance(event, Refused) for event in events)
+        malformed = sum(isinstance(event, MalformedReceived) for event in events)
+        return (Report(events, len(lines) - malformed, refusals),)
+
+    def command(self, encoded, now_s):
+        return (Send(LINES, encoded),)
 
     def _events(self, line):
         offset, self._offset = self._offset, self._offset + len(line) + 1
         try:
             fields = json.loads(line)
             if "no" in fields:
-                self.refusals_received += 1
                 events = [Refused(0, fields["no"])]
             else:
                 if len(fields["q"]) != self._joints:
@@ -70,7 +93,6 @@ class JsonLines:
                 ]
         except (ValueError, KeyError, TypeError):
             return [MalformedReceived(offset, line[:80].decode("ascii", "backslashreplace"), "no state")]
-        self.units_received += 1
         return events
 
     def encode(self, *commands):

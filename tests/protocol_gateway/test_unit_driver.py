@@ -23,7 +23,7 @@ from protocol_gateway.drivers.driver import (
     Trace,
     UnknownReceived,
 )
-from protocol_gateway.drivers.unit import UnitDriver
+from protocol_gateway.drivers.unit import UNITS, UnitDriver
 from protocol_gateway.errors import CommandError
 from robots.joints import JointType
 
@@ -153,7 +153,7 @@ def test_a_unit_of_another_joint_count_is_rejected(unit):
 def test_a_new_connection_discards_an_unfinished_unit():
     fresh = driver()
     fresh.receive(b"1#ABSOLUTE.DEG*1;")
-    fresh.connected()
+    fresh.opened(UNITS, 0.0)
     assert fresh.receive(b"2@1#ABSOLUTE.DEG*0;0@")[1:] == [JointsReceived((0.0, 0.0))]
 
 

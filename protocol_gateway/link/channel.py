@@ -1,0 +1,152 @@
+"""One channel of a link: connects, serves the connection to its end, and connects again after a pause.
+
+attempt --connected--> serve --lost, or mute for too long--> a pause, 0.2 s growing to 5 s --> attempt
+                             --bytes could not be sent-----> immediately, then each 0.2 s
+"""
+
+import asyncio
+import contextlib
+import math
+import random
+from typing import Protocol
+
+from protocol_gateway.drivers.driver import Channel
+from protocol_gateway.errors import LinkDownError
+from protocol_gateway.link.connection import Connection, Datagrams, reason_of
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+
+_FIRST_PAUSE_S = 0.2
+_LONGEST_PAUSE_S = 5.0
+
+
+class Listener(Protocol):
+    """What a channel calls, on the event loop; an exception ends the channel's `run`."""
+
+    def on_opened(self, kept: "KeptChannel") -> None:
+        """Handle a new connection."""
+        ...
+
+    def on_received(self, kept: "KeptChannel", data: bytes) -> None:
+        """Handle the bytes of one read, or a datagram."""
+        ...
+
+    def on_ended(self, kept: "KeptChannel") -> bool:
+        """Handle the end of a connection, or a failed attempt; return whether the connection was of use."""
+        ...
+
+    def patience(self, kept: "KeptChannel") -> float | Reason:
+        """Return seconds until the next call, or why the connection must end now."""
+        ...
+
+
+class KeptChannel:
+    """A channel that is kept connected.
+
+    Attributes:
+        channel: The driver's channel.
+        where: Its address, for texts.
+        reason: Why it is not connected, or was not before.
+        connection: None: not connected.
+    """
+
+    def __init__(self, channel: Channel, host: str, port: int, timeout_s: float, listener: Listener) -> None:
+        self.channel = channel
+        self.where = f"{host}:{port}"
+        self.reason: Reason = codes.LINK_CONNECTING(where=self.where)
+        self.connection: Connection | Datagrams | None = None
+        self._host, self._port, self._timeout_s = host, port, timeout_s
+        self._listener = listener
+        self._send_failed = asyncio.Event()
+
+    async def run(self) -> None:
+        """Keep the channel connected until cancelled; then close the connection."""
+        pause_s = _FIRST_PAUSE_S
+        while True:
+            if await self._attempt():
+                pause_s = _FIRST_PAUSE_S
+            await self._rest(pause_s)
+            pause_s = min(pause_s * 2.0, _LONGEST_PAUSE_S)
+
+    def write(self, data: bytes) -> None:
+        """Write whole bytes to the socket immediately.
+
+        Until the next successful call the channel connects without long pauses.
+
+        Raises:
+            LinkDownError: If there is no connection.
+            LinkCloggedError: If the socket does not take all bytes; the connection is then aborted.
+        """
+        self._send_failed.set()
+        if self.connection is None:
+            raise LinkDownError(self.reason)
+        self.connection.write(data)
+        self._send_failed.clear()
+
+    @property
+    def round_trip_s(self) -> float | None:
+        """Round-trip time to the controller's host [s]; None: unknown."""
+        return None if self.connection is None else self.connection.round_trip_s
+
+    async def _rest(self, pause_s: float) -> None:
+        """Pause between two attempts; only briefly after bytes could not be sent."""
+        # Random spread, so that a restarted controller does not get all connections at the same time.
+        spread = random.uniform(0.8, 1.2)
+        if self._send_failed.is_set():
+            await asyncio.sleep(_FIRST_PAUSE_S * spread)
+            return
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(pause_s * spread):
+                await self._send_failed.wait()
+
+    async def _attempt(self) -> bool:
+        """Connect, and serve the connection to its end; return whether it was of use."""
+        try:
+            async with asyncio.timeout(self._timeout_s):
+                connection = await self._connect()
+        except TimeoutError:
+            self.reason = codes.LINK_NO_ANSWER(where=self.where)
+            return self._listener.on_ended(self)
+        except OSError as error:
+            self.reason = codes.LINK_FAILED(where=self.where, detail=reason_of(error))
+            return self._listener.on_ended(self)
+        of_use = False
+        self.reason = codes.LINK_CLOSED()
+        try:
+            self.reason = await self._serve(connection)
+        finally:
+            self.connection = None
+            try:
+                of_use = self._listener.on_ended(self)
+            finally:
+                await connection.end()
+        return of_use
+
+    async def _connect(self) -> Connection | Datagrams:
+        loop = asyncio.get_running_loop()
+        if self.channel.datagrams:
+            _, datagrams = await loop.create_datagram_endpoint(
+                lambda: Datagrams(self._on_connected, self._on_received),
+                remote_addr=(self._host, self._port),
+            )
+            return datagrams
+        _, connection = await loop.create_connection(
+            lambda: Connection(self._on_connected, self._on_received), self._host, self._port
+        )
+        return connection
+
+    async def _serve(self, connection: Connection | Datagrams) -> Reason:
+        """Wait for the connection's end; return its reason."""
+        while not connection.lost.done():
+            wait_s = self._listener.patience(self)
+            if isinstance(wait_s, Reason):
+                return wait_s
+            await asyncio.wait([connection.lost], timeout=None if wait_s == math.inf else wait_s)
+        return codes.LINK_LOST(connection.lost.result(), where=self.where)
+
+    def _on_connected(self, connection: Connection | Datagrams) -> None:
+        self.connection = connection
+        self._listener.on_opened(self)
+
+    def _on_received(self, data: bytes) -> None:
+        self._listener.on_received(self, data)

@@ -1,0 +1,256 @@
+"""Link with drivers of other shapes: several channels, datagrams, timers, questions; over real sockets."""
+
+import asyncio
+import contextlib
+
+import pytest
+
+from protocol_gateway.drivers.driver import (
+    ALL,
+    Carries,
+    Channel,
+    Close,
+    JointsReceived,
+    Open,
+    Report,
+    Send,
+    SetTimer,
+)
+from protocol_gateway.errors import LinkDownError
+from protocol_gateway.link.link import ControllerLink, LinkSettings, LinkState
+from tests.conftest import run
+from tests.protocol_gateway.test_link import Seen, controller, end, until
+
+READ = Channel(name="read", carries=Carries.READING)
+STOP = Channel(name="stop", carries=Carries.STOP)
+POLLED = Channel(name="polled", carries=ALL, datagrams=True)
+EVERY_S = 0.02
+STATE = Report((JointsReceived((0.1, 0.2)),), units=1)
+
+
+class Driver:
+    """Driver whose effects the test chooses; it notes what it is told."""
+
+    requests_a_second = 100.0
+    can_stop = can_jog = False
+
+    def __init__(self, **effects):
+        self.told = []
+        self._effects = effects
+
+    def _tell(self, what, *values):
+        self.told.append((what, *(each.name if isinstance(each, Channel) else each for each in values)))
+        effects = self._effects.get(what, ())
+        return effects(*values) if callable(effects) else effects
+
+    def started(self, now_s):
+        return self._tell("started")
+
+    def opened(self, channel, now_s):
+        return self._tell("opened", channel)
+
+    def received(self, channel, data, now_s):
+        return self._tell("received", channel, data)
+
+    def skipped(self, channel, now_s):
+        return self._tell("skipped", channel)
+
+    def closed(self, channel, now_s):
+        return self._tell("closed", channel)
+
+    def timer_ended(self, now_s):
+        return self._tell("timer_ended", now_s)
+
+    def command(self, encoded, now_s):
+        return self._tell("command", encoded)
+
+
+class Peer(asyncio.DatagramProtocol):
+    """UDP server that answers with the question."""
+
+    def __init__(self):
+        self.questions = []
+
+    def connection_made(self, transport):
+        self.transport = transport
+        self.port = transport.get_extra_info("sockname")[1]
+
+    def datagram_received(self, data, address):
+        self.questions.append(data)
+        self.asker = address
+        self.transport.sendto(data, address)
+
+
+@contextlib.asynccontextmanager
+async def peer(port=0):
+    loop = asyncio.get_running_loop()
+    transport, found = await loop.create_datagram_endpoint(Peer, local_addr=("127.0.0.1", port))
+    try:
+        yield found
+    finally:
+        transport.abort()
+
+
+@contextlib.asynccontextmanager
+async def link(driver, port, **settings):
+    seen = Seen()
+    arm_link = ControllerLink(
+        LinkSettings(host="127.0.0.1", port=port, **settings),
+        driver,
+        on_event=seen.event,
+        on_status=seen.statuses.append,
+    )
+    task = asyncio.create_task(arm_link.run())
+    try:
+        yield arm_link, seen
+    finally:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+
+
+def polling(**effects):
+    """Driver that asks every 20 ms over UDP."""
+    asked = {
+        "started": (Open(POLLED),),
+        "opened": lambda channel: (Send(POLLED, b"?"), SetTimer(0.0)),
+        "timer_ended": lambda now_s: (Send(POLLED, b"?"), SetTimer(now_s + EVERY_S)),
+        "received": (STATE,),
+    }
+    return Driver(**asked | effects)
+
+
+def test_a_driver_asks_over_udp_by_its_timer():
+    async def main():
+        driver = polling()
+        async with peer() as arm, link(driver, arm.port) as (arm_link, seen):
+            await until(lambda: len(seen.events) >= 20)
+            assert arm_link.status.state is LinkState.UP
+            assert arm_link.counters.units_sent >= 20
+            assert ("received", "polled", b"?") in driver.told
+        assert driver.told[0] == ("started",)
+        assert driver.told[1] == ("opened", "polled")
+
+    run(main())
+
+
+def test_datagrams_of_another_sender_are_not_read():
+    async def main():
+        driver = polling()
+        async with peer() as arm, peer() as other, link(driver, arm.port) as (_, seen):
+            await until(lambda: seen.events)
+            for _ in range(20):
+                other.transport.sendto(b"from elsewhere", arm.asker)
+                await asyncio.sleep(0.01)
+            assert {told[2] for told in driver.told if told[0] == "received"} == {b"?"}
+
+    run(main())
+
+
+def test_a_udp_port_that_nobody_has_is_down_and_comes_back():
+    async def main():
+        async with peer() as arm:
+            port = arm.port
+        async with link(polling(), port, reconnect_after_s=1.0) as (arm_link, seen):
+            await until(lambda: LinkState.SILENT in seen.states and seen.states[-1] is LinkState.DOWN)
+            assert "refused" in arm_link.status.text
+            async with peer(port):
+                await until(lambda: arm_link.status.state is LinkState.UP)
+
+    run(main())
+
+
+def test_a_driver_sends_no_more_questions_than_it_declares(caplog):
+    async def main():
+        driver = polling(timer_ended=lambda now_s: (Send(POLLED, b"?"),) * 50 + (SetTimer(now_s + EVERY_S),))
+        async with peer() as arm, link(driver, arm.port):
+            await until(lambda: arm.questions)
+            before = len(arm.questions)
+            await asyncio.sleep(1.0)
+            # 2,500 were wanted. A late timer gives no more than what a second holds.
+            assert len(arm.questions) - before <= 2.5 * driver.requests_a_second
+        assert "more questions than it declares" in caplog.text
+
+    run(main())
+
+
+def test_a_lost_stop_channel_is_no_lost_link_and_refuses_only_what_it_carries():
+    async def main():
+        async with controller() as reads, controller() as stops:
+            driver = Driver(
+                started=(Open(READ), Open(STOP, port=stops.port)),
+                received=(STATE,),
+                command=(Send(STOP, b"stop"),),
+            )
+            async with link(driver, reads.port) as (arm_link, seen):
+                _, read_writer = await reads.next()
+                reader, writer = await stops.next()
+                read_writer.write(b"state")
+                await until(lambda: arm_link.status.state is LinkState.UP)
+                arm_link.send(b"stop")
+                assert await reader.readexactly(4) == b"stop"
+                await end(writer)
+                await until(lambda: ("closed", "stop") in driver.told)
+                assert arm_link.status.state is LinkState.UP
+                assert seen.states == [LinkState.SILENT, LinkState.UP]
+                with pytest.raises(LinkDownError):
+                    arm_link.send(b"stop")
+                # It connects again by itself, at once after a failed stop.
+                reader, writer = await stops.next()
+                await until(lambda: driver.told.count(("opened", "stop")) == 2)
+                arm_link.send(b"stop")
+                assert await reader.readexactly(4) == b"stop"
+                await end(writer)
+                await end(read_writer)
+
+    run(main())
+
+
+def test_a_driver_moves_a_channel_to_another_port():
+    async def main():
+        async with controller() as first, controller() as second:
+            driver = Driver(
+                started=(Open(READ),),
+                received=lambda channel, data: (
+                    (Open(READ, port=second.port),) if data == b"elsewhere" else (STATE,)
+                ),
+            )
+            async with link(driver, first.port) as (arm_link, _):
+                _, writer = await first.next()
+                writer.write(b"elsewhere")
+                _, other = await second.next()
+                other.write(b"state")
+                await until(lambda: arm_link.status.state is LinkState.UP)
+                await end(other)
+                await end(writer)
+
+    run(main())
+
+
+def test_a_closed_channel_is_not_connected_again():
+    async def main():
+        async with controller() as arm:
+            driver = Driver(started=(Open(READ),), received=lambda channel, data: (STATE, Close(READ)))
+            async with link(driver, arm.port) as (_, seen):
+                _, writer = await arm.next()
+                writer.write(b"state")
+                await until(lambda: LinkState.UP in seen.states and seen.states[-1] is LinkState.DOWN)
+                await asyncio.sleep(0.6)
+                assert arm.connections.empty()
+                await end(writer)
+
+    run(main())
+
+
+def test_an_exception_at_a_timer_ends_the_link():
+    async def main():
+        def broken(now_s):
+            raise ZeroDivisionError
+
+        async with peer() as arm:
+            settings = LinkSettings(host="127.0.0.1", port=arm.port)
+            arm_link = ControllerLink(settings, polling(timer_ended=broken), on_event=Seen().event)
+            with pytest.raises(ZeroDivisionError):
+                await arm_link.run()
+
+    run(main())
