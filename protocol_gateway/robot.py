@@ -62,7 +62,8 @@ class Robot:
     """A robot on the mesh, from its controller's socket to its keys.
 
     Raises:
-        DescriptionError, CodeTableError, AuditError, KeyNameError: If its settings cannot be used.
+        DescriptionError, GatewaySettingsError, CodeTableError, AuditError, KeyNameError: If its settings
+            cannot be used.
     """
 
     def __init__(
@@ -79,7 +80,10 @@ class Robot:
     ) -> None:
         joints = joints_of(load(settings.description))
         relay = None if settings.legacy_clients is None else self._relay
-        driver = DRIVERS[settings.protocol](joints.types, settings.codes, relay=relay)
+        try:
+            driver = DRIVERS[settings.protocol](joints.types, settings.codes, relay=relay)
+        except GatewaySettingsError as error:
+            raise GatewaySettingsError(f"robot {settings.name}: {error}") from None
         self._settings = settings
         self._legacy: LegacyClients | None = None
         self._read_only = _why_read_only(settings, driver)
@@ -412,6 +416,8 @@ class Robot:
 
 def _why_read_only(settings: RobotSettings, driver: Driver) -> Reason | None:
     """Return why no command may be sent to the controller; None: commands may be sent."""
+    if driver.reads_only:
+        return codes.READS_ONLY()
     if not driver.can_stop:
         return codes.NO_STOP_CODE()
     return None if settings.stop_proven else codes.STOP_NOT_PROVEN()

@@ -7,11 +7,13 @@ from collections.abc import Callable
 
 from protocol_gateway.drivers.driver import (
     Activity,
+    AlarmReceived,
     ControllerEvent,
     JointsReceived,
     MalformedReceived,
     Mode,
     Refused,
+    Severity,
     StatusReceived,
     UnknownReceived,
 )
@@ -30,6 +32,7 @@ _SLOW_S = 0.1
 _FAULT = 9  # the protocol's ERROR number for a fault
 
 _S = Event.Severity
+_SEVERITIES = {Severity.INFO: _S.INFO, Severity.WARNING: _S.WARNING, Severity.ERROR: _S.ERROR}
 # Longer than the journal's rate limit of 5 s, which must not suppress the last event of a flapping state.
 _BACK_AFTER_S = 6.0
 
@@ -178,6 +181,10 @@ class Telemetry:
                 )
             case Refused(number, text):
                 self._on_refused(number, text)
+            case AlarmReceived(severity, text, number):
+                self._journal.report(
+                    _SEVERITIES[severity], "controller.alarm", f"the controller says: {text}", number=number
+                )
 
     def _on_controller_status(self, status: StatusReceived, now_s: float) -> None:
         changed = status.values != self._status.values

@@ -331,6 +331,7 @@ STOP_LATCHED = Code(
 
 ROBOT_READ_ONLY = Code("robot.read_only", "this robot is read-only: {cause}")
 READ_ONLY = Code("robot.is_read_only", "read-only: {cause}")
+READS_ONLY = Code("robot.reads_only", "the driver of its controller only reads", "move it from its own panel")
 NO_STOP_CODE = Code(
     "robot.no_stop_code",
     "the codes in the site file have no stop for its controller",

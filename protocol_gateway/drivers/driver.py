@@ -114,7 +114,31 @@ class UnknownReceived:
     controller_time_s: float | None = None
 
 
-ControllerEvent: TypeAlias = JointsReceived | StatusReceived | Refused | MalformedReceived | UnknownReceived
+class Severity(Enum):
+    """Severity of a controller's alarm or message."""
+
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmReceived:
+    """Alarm or message of the controller.
+
+    Attributes:
+        text: On one line, as the controller words it.
+        number: The controller's own number or code of it; empty: it has none.
+    """
+
+    severity: Severity
+    text: str
+    number: str = ""
+
+
+ControllerEvent: TypeAlias = (
+    JointsReceived | StatusReceived | Refused | MalformedReceived | UnknownReceived | AlarmReceived
+)
 
 # -------------------------------------------------------------- commands to a controller
 
@@ -221,9 +245,14 @@ class Open:
 
 @dataclass(frozen=True, slots=True)
 class Close:
-    """End a channel, and do not connect it again."""
+    """End a channel, and do not connect it again.
+
+    Attributes:
+        why: What is wrong with the controller's bytes, shown as the reason; empty: nothing.
+    """
 
     channel: Channel
+    why: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,6 +298,11 @@ class Driver(Protocol):
 
         The link sends no more: 0 means that nothing is ever sent unasked.
         """
+        ...
+
+    @property
+    def reads_only(self) -> bool:
+        """True if the driver has no command at all."""
         ...
 
     @property

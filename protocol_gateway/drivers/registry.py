@@ -5,6 +5,7 @@ from typing import Protocol
 
 from protocol_gateway.drivers.driver import Driver
 from protocol_gateway.drivers.unit import UnitDriver
+from protocol_gateway.drivers.universal_robots.driver import RtdeDriver
 from robots.joints import JointType
 
 
@@ -31,5 +32,5 @@ class DriverMaker(Protocol):
         ...
 
 
-DRIVERS: dict[str, DriverMaker] = {"unit": UnitDriver}
+DRIVERS: dict[str, DriverMaker] = {"unit": UnitDriver, "rtde": RtdeDriver}
 """Driver factories by the site file's `protocol`."""

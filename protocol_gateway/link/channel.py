@@ -111,7 +111,6 @@ class KeptChannel:
             self.reason = codes.LINK_FAILED(where=self.where, detail=reason_of(error))
             return self._listener.on_ended(self)
         of_use = False
-        self.reason = codes.LINK_CLOSED()
         try:
             self.reason = await self._serve(connection)
         finally:
@@ -146,6 +145,7 @@ class KeptChannel:
 
     def _on_connected(self, connection: Connection | Datagrams) -> None:
         self.connection = connection
+        self.reason = codes.LINK_CLOSED()
         self._listener.on_opened(self)
 
     def _on_received(self, data: bytes) -> None:

@@ -231,8 +231,8 @@ class ControllerLink:
                 self._set_timer(at_s)
             case Open():
                 self._open(effect)
-            case Close(channel):
-                self._close(channel.name)
+            case Close(channel, why):
+                self._close(channel.name, why)
 
     def _send_unasked(self, effect: Send, now_s: float) -> None:
         if not self._unasked.allowed(now_s):
@@ -271,9 +271,11 @@ class ControllerLink:
         task = self._tasks[kept] = asyncio.create_task(kept.run())
         task.add_done_callback(lambda task: self._channel_ended(kept, task))
 
-    def _close(self, name: str) -> None:
+    def _close(self, name: str, why: str = "") -> None:
         kept = self._channels.pop(name, None)
         if kept is not None:
+            if why:
+                kept.reason = codes.LINK_REFUSED(where=kept.where, detail=why)
             self._tasks[kept].cancel()
 
     def _channel_ended(self, kept: KeptChannel, task: asyncio.Task[None]) -> None:

@@ -28,7 +28,8 @@ class Robot(BaseModel):
         pose: Pose of its base in the site's frame.
         cell: Name of its cell; empty: alone in its cell. Robots of one cell are checked against each other.
         controller: `simulated`: `robomesh up` starts a simulator; otherwise `tcp://HOST:PORT`.
-        protocol: The controller's protocol: the name of a driver in `protocol_gateway/drivers/registry.py`.
+        protocol: The controller's protocol: `unit` (docs/controllers.md), or `rtde` to read a controller of
+            Universal Robots (docs/controllers/universal-robots.md).
         codes: Type codes of a controller that sends numbers, as in
             `{ 2 = "ABSOLUTE.DEG", 101 = "COMMAND:home" }`; they replace the default codes. Empty: the gateway
             sends types as names.

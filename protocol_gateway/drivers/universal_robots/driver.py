@@ -1,0 +1,178 @@
+"""Driver that reads a controller of Universal Robots by RTDE; it sends nothing but its greeting."""
+
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from types import MappingProxyType
+
+from protocol_gateway.drivers.driver import (
+    Activity,
+    AlarmReceived,
+    Carries,
+    Channel,
+    Close,
+    ControllerCommand,
+    ControllerEvent,
+    Effect,
+    Effects,
+    JointsReceived,
+    MalformedReceived,
+    Open,
+    Report,
+    Send,
+    SetTimer,
+    Severity,
+    StatusReceived,
+)
+from protocol_gateway.drivers.universal_robots.modes import RobotMode, RuntimeState, SafetyMode, TextLevel
+from protocol_gateway.drivers.universal_robots.packages import Malformed
+from protocol_gateway.drivers.universal_robots.rtde_messages import TextReceived
+from protocol_gateway.drivers.universal_robots.rtde_reader import Failed, RtdeReader
+from protocol_gateway.drivers.universal_robots.state import OUTPUTS, ControllerState
+from protocol_gateway.errors import CommandError, GatewaySettingsError
+from robomesh import reason_codes
+from robots.joints import JointType
+
+RTDE = Channel(name="rtde", carries=Carries.READING)
+FREQUENCY_HZ = 125.0
+"""States a second that are requested; every controller can send so many."""
+JOINTS = 6
+
+_FIELDS = (
+    "timestamp",
+    "actual_q",
+    "actual_qd",
+    "robot_mode",
+    "safety_mode",
+    "safety_status",
+    "runtime_state",
+)
+_RETRY_S = 2.0
+# A fault needs a restart of the controller's safety; a stop needs a person at the robot.
+_FAULTS = frozenset({SafetyMode.VIOLATION, SafetyMode.FAULT, SafetyMode.UNDEFINED})
+_MAY_MOVE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.RECOVERY})
+_HELD = frozenset({RuntimeState.PAUSING, RuntimeState.PAUSED})
+_AT_REST = frozenset({RuntimeState.STOPPED})
+_SEVERITIES: Mapping[int, Severity] = MappingProxyType(
+    {
+        TextLevel.EXCEPTION: Severity.ERROR,
+        TextLevel.ERROR: Severity.ERROR,
+        TextLevel.WARNING: Severity.WARNING,
+        TextLevel.INFO: Severity.INFO,
+    }
+)
+
+
+class RtdeDriver:
+    """Driver of RTDE (`protocol_gateway.drivers.driver.Driver`).
+
+    Raises:
+        GatewaySettingsError: If the model has not six rotary joints, or there are type codes.
+    """
+
+    reads_only = True
+    can_stop = can_jog = False
+    # A greeting takes at most seven requests.
+    requests_a_second = 10.0
+
+    def __init__(
+        self,
+        joint_types: Sequence[JointType],
+        codes: Mapping[int, str],
+        *,
+        relay: Callable[[bytes, bool, Hashable], None] | None = None,
+    ) -> None:
+        if [*joint_types] != [JointType.ROTARY] * JOINTS:
+            raise GatewaySettingsError(
+                f"protocol 'rtde': a robot of Universal Robots has {JOINTS} rotary joints, this model has "
+                f"{len(joint_types)} joints: choose its own model"
+            )
+        if codes:
+            raise GatewaySettingsError("protocol 'rtde' has no type codes: remove codes")
+        self._reader = RtdeReader(FREQUENCY_HZ, {name: OUTPUTS[name] for name in _FIELDS})
+
+    def started(self, now_s: float) -> Effects:
+        """Connect to the site file's port; a controller has 30004."""
+        return (Open(RTDE),)
+
+    def opened(self, channel: Channel, now_s: float) -> Effects:
+        """Greet."""
+        return (Send(RTDE, self._reader.connected()),)
+
+    def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
+        """Report the states in the next bytes, and go on with the greeting."""
+        events: list[ControllerEvent] = []
+        units = 0
+        failure = ""
+        for event in self._reader.receive(data):
+            match event:
+                case ControllerState():
+                    units += 1
+                    events += joints_of(event), status_of(event)
+                case TextReceived(level, text, source):
+                    severity = _SEVERITIES.get(level, Severity.WARNING)
+                    events.append(AlarmReceived(severity, f"{source}: {text}" if source else text))
+                case Malformed(offset, text, reason, fatal):
+                    events.append(MalformedReceived(offset, text, reason))
+                    failure = reason if fatal else failure
+                case Failed(reason):
+                    failure = reason
+                case _:
+                    pass
+        effects: list[Effect] = [Report(events, units)]
+        if asked := self._reader.to_send():
+            effects.append(Send(RTDE, asked))
+        if failure:
+            effects += Close(RTDE, failure), SetTimer(now_s + _RETRY_S)
+        return effects
+
+    def skipped(self, channel: Channel, now_s: float) -> Effects:
+        """Connect again: the stream cannot be read from its middle."""
+        return (Close(RTDE, "it sent far too much"), SetTimer(now_s + _RETRY_S))
+
+    def closed(self, channel: Channel, now_s: float) -> Effects:
+        """Do nothing: the link connects again."""
+        return ()
+
+    def timer_ended(self, now_s: float) -> Effects:
+        """Connect again after a failure."""
+        return (Open(RTDE),)
+
+    def encode(self, *commands: ControllerCommand) -> bytes:
+        """Refuse: nothing is ever commanded.
+
+        Raises:
+            CommandError: Always.
+        """
+        raise CommandError(reason_codes.READS_ONLY())
+
+    def command(self, encoded: bytes, now_s: float) -> Effects:
+        """Send nothing."""
+        return ()
+
+
+def joints_of(state: ControllerState) -> JointsReceived:
+    """Return the joint positions of a state."""
+    return JointsReceived(state.positions, state.velocities, state.timestamp_s)
+
+
+def status_of(state: ControllerState) -> StatusReceived:
+    """Return the status of a state. The encoders are absolute, so a homing motion is never needed."""
+    return StatusReceived(activity=activity_of(state), homed=True, controller_time_s=state.timestamp_s)
+
+
+def activity_of(state: ControllerState) -> Activity | None:
+    """Return what the arm does; None: unknown.
+
+    A program that plays may wait, and moves without notice, so it counts as motion.
+    """
+    if state.safety_mode in _FAULTS:
+        return Activity.FAULT
+    if state.safety_mode is not None and state.safety_mode not in _MAY_MOVE:
+        return Activity.STOPPED
+    if state.robot_mode is not None and state.robot_mode != RobotMode.RUNNING:
+        # Freedrive moves the arm by hand; without power, or with brakes on, somebody must act first.
+        return Activity.MOVING if state.robot_mode == RobotMode.BACKDRIVE else Activity.STOPPED
+    if state.runtime_state is None:
+        return None
+    if state.runtime_state in _HELD:
+        return Activity.HOLDING
+    return Activity.IDLE if state.runtime_state in _AT_REST else Activity.MOVING

@@ -1,0 +1,232 @@
+"""RTDE driver: stepped message by message, and in a gateway before the simulated controller."""
+
+import asyncio
+import contextlib
+import struct
+
+import pytest
+
+from protocol_gateway.drivers.driver import (
+    Activity,
+    AlarmReceived,
+    Close,
+    JointsReceived,
+    MalformedReceived,
+    MoveAbsolute,
+    Open,
+    Report,
+    Send,
+    SetTimer,
+    Severity,
+    StatusReceived,
+)
+from protocol_gateway.drivers.universal_robots.driver import RTDE, RtdeDriver, activity_of
+from protocol_gateway.drivers.universal_robots.modes import RobotMode, RuntimeState, SafetyMode
+from protocol_gateway.drivers.universal_robots.state import ControllerState
+from protocol_gateway.errors import CommandError, GatewaySettingsError
+from robots.joints import JointType
+from services.simulator.universal_robots.service import UrSettings, serve_rtde
+from tests.conftest import run
+from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
+
+SIX = (JointType.ROTARY,) * 6
+NOW_S = 100.0
+
+
+def package(kind, body=b""):
+    return struct.pack(">HB", 3 + len(body), ord(kind)) + body
+
+
+TYPES = b"DOUBLE,VECTOR6D,VECTOR6D,INT32,INT32,INT32,UINT32"
+GREETING = (
+    package("V", b"\x01"),
+    package("v", struct.pack(">4I", 5, 21, 0, 0)),
+    package("O", b"\x07" + TYPES),
+    package("S", b"\x01"),
+)
+
+
+def data(positions=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6), time_s=1.0, safety=1, runtime=1):
+    values = (time_s, *positions, *(0.0,) * 6, RobotMode.RUNNING, safety, safety, runtime)
+    return package("U", b"\x07" + struct.pack(">13d3iI", *values))
+
+
+def driver():
+    return RtdeDriver(SIX, {})
+
+
+def greeted():
+    """Return a driver whose controller has answered the greeting."""
+    arm = driver()
+    arm.opened(RTDE, NOW_S)
+    for answer in GREETING:
+        arm.received(RTDE, answer, NOW_S)
+    return arm
+
+
+def report(effects):
+    (found,) = [each for each in effects if isinstance(each, Report)]
+    return found
+
+
+def test_it_greets_step_by_step_and_then_sends_nothing():
+    arm = driver()
+    assert arm.started(NOW_S) == (Open(RTDE),)
+    sent = [*arm.opened(RTDE, NOW_S)]
+    for answer in GREETING:
+        sent += [each for each in arm.received(RTDE, answer, NOW_S) if isinstance(each, Send)]
+    assert [each.data[2:3] for each in sent] == [b"V", b"v", b"O", b"S"]
+    for number in range(100):
+        effects = arm.received(RTDE, data(time_s=1.0 + 0.008 * number), NOW_S)
+        assert [type(each) for each in effects] == [Report]
+
+
+def test_a_state_split_anywhere_gives_joints_and_status_of_the_same_time():
+    arm = greeted()
+    found = []
+    for byte in data(time_s=7.5):
+        found += report(arm.received(RTDE, bytes([byte]), NOW_S)).events
+    joints, status = found
+    assert joints == JointsReceived((0.1, 0.2, 0.3, 0.4, 0.5, 0.6), (0.0,) * 6, 7.5)
+    assert status == StatusReceived(Activity.IDLE, None, homed=True, controller_time_s=7.5)
+
+
+@pytest.mark.parametrize(
+    ("state", "activity"),
+    [
+        ({}, None),
+        ({"runtime_state": RuntimeState.STOPPED}, Activity.IDLE),
+        ({"runtime_state": RuntimeState.PLAYING}, Activity.MOVING),
+        ({"runtime_state": RuntimeState.STOPPING}, Activity.MOVING),
+        ({"runtime_state": RuntimeState.PAUSED}, Activity.HOLDING),
+        ({"runtime_state": RuntimeState.STOPPED, "robot_mode": RobotMode.POWER_OFF}, Activity.STOPPED),
+        ({"runtime_state": RuntimeState.STOPPED, "robot_mode": RobotMode.BACKDRIVE}, Activity.MOVING),
+        ({"runtime_state": RuntimeState.PLAYING, "safety_mode": SafetyMode.REDUCED}, Activity.MOVING),
+        ({"runtime_state": RuntimeState.PLAYING, "safety_mode": SafetyMode.SAFEGUARD_STOP}, Activity.STOPPED),
+        ({"runtime_state": RuntimeState.PAUSED, "safety_mode": SafetyMode.PROTECTIVE_STOP}, Activity.STOPPED),
+        ({"runtime_state": RuntimeState.STOPPED, "safety_mode": SafetyMode.FAULT}, Activity.FAULT),
+        # A value of newer software is never taken for one that allows motion.
+        ({"runtime_state": RuntimeState.STOPPED, "safety_mode": 99}, Activity.STOPPED),
+        ({"runtime_state": 77}, Activity.MOVING),
+    ],
+)
+def test_the_activity_forbids_motion_unless_every_word_allows_it(state, activity):
+    assert activity_of(ControllerState(timestamp_s=1.0, positions=(0.0,) * 6, **state)) is activity
+
+
+def test_a_text_of_the_controller_is_an_alarm():
+    body = b"\x05Wrist" + b"\x03arm" + b"\x01"
+    (event,) = report(greeted().received(RTDE, package("M", body), NOW_S)).events
+    assert event == AlarmReceived(Severity.ERROR, "arm: Wrist")
+
+
+def test_a_value_that_is_no_number_is_malformed_and_gives_no_joints():
+    effects = greeted().received(RTDE, data(positions=(float("nan"),) * 6), NOW_S)
+    assert [type(each) for each in report(effects).events] == [MalformedReceived]
+    assert report(effects).units == 0
+
+
+def test_a_controller_without_positions_is_left_and_tried_again_later():
+    arm = driver()
+    arm.opened(RTDE, NOW_S)
+    for answer in GREETING[:2]:
+        arm.received(RTDE, answer, NOW_S)
+    types = TYPES.replace(b"VECTOR6D", b"NOT_FOUND", 1)
+    effects = arm.received(RTDE, package("O", b"\x07" + types), NOW_S)
+    close, timer = effects[-2:]
+    assert close == Close(RTDE, "the controller has no field actual_q")
+    assert isinstance(timer, SetTimer)
+    assert timer.at_s > NOW_S + 1.0
+    assert arm.timer_ended(timer.at_s) == (Open(RTDE),)
+
+
+def test_it_refuses_other_robots_codes_and_every_command():
+    with pytest.raises(GatewaySettingsError, match="6 rotary joints, this model has 5"):
+        RtdeDriver(SIX[:5], {})
+    with pytest.raises(GatewaySettingsError, match="codes"):
+        RtdeDriver(SIX, {2: "ABSOLUTE.DEG"})
+    with pytest.raises(CommandError, match="only reads"):
+        driver().encode(MoveAbsolute((0.0,) * 6))
+
+
+# ------------------------------------------------------------------- in a gateway
+
+
+@contextlib.asynccontextmanager
+async def controller(**settings):
+    """Run a simulated controller; yield its port of RTDE."""
+    ready = asyncio.get_running_loop().create_future()
+    task = asyncio.create_task(
+        serve_rtde(UrSettings(**settings), ready=lambda rtde, primary: ready.set_result(rtde))
+    )
+    await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
+    try:
+        yield await ready
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+@contextlib.asynccontextmanager
+async def tap(port):
+    """Forward one connection to a port; yield the port of the tap, and all bytes that went there."""
+    sent = bytearray()
+
+    async def forward(reader, writer, copy=None):
+        with contextlib.suppress(OSError):
+            while data := await reader.read(65536):
+                if copy is not None:
+                    copy += data
+                writer.write(data)
+        writer.transport.abort()
+
+    async def joined(reader, writer):
+        there, back = await asyncio.open_connection("127.0.0.1", port)
+        await asyncio.gather(forward(reader, back, sent), forward(there, writer))
+
+    server = await asyncio.start_server(joined, "127.0.0.1", 0)
+    async with server:
+        yield server.sockets[0].getsockname()[1], sent
+        server.close()
+
+
+def test_a_controller_with_rtde_is_shown_and_never_commanded(mesh, tmp_path):
+    async def main():
+        async with (
+            controller(demo=True) as port,
+            tap(port) as (tapped, sent),
+            gateway(mesh, tmp_path, tapped, description="puma560", protocol="rtde") as site,
+        ):
+            await until(lambda: site.controller.activity == STATE.MOVING)
+            assert site.controller.homed == STATE.YES
+            assert site.controller.mode == STATE.MODE_UNKNOWN
+            await site.units(50)
+            first, last = (site.seen["joints"][at] for at in (0, -1))
+            assert len(last.joints) == 6
+            assert [joint.position for joint in first.joints] != [joint.position for joint in last.joints]
+            greeting = bytes(sent)
+            assert "only reads" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
+            assert "Not sent" in await refusal(site.command(C.HOME))
+            # A stop is asked for, and is not sent: the answer says so.
+            answer = await site.stop(by="wang")
+            assert not answer.sent
+            await site.units(50)
+            assert bytes(sent) == greeting
+            assert len(greeting) < 1000
+
+    run(main())
+
+
+def test_a_controller_that_restarts_is_shown_again(mesh, tmp_path):
+    async def main():
+        async with controller() as port:
+            gone = gateway(mesh, tmp_path, port, description="puma560", protocol="rtde")
+            site = await gone.__aenter__()
+        try:
+            await until(lambda: site.controller.link == STATE.DOWN)
+            async with controller(listen=f"127.0.0.1:{port}"):
+                await until(lambda: site.controller.link == STATE.UP)
+        finally:
+            await gone.__aexit__(None, None, None)
+
+    run(main())
