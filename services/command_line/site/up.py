@@ -115,8 +115,11 @@ def _simulator(robot: Robot, site: str, attach: tuple[str, ...]) -> tuple[Progra
     port = _free_port()
     demo = ("--demo",) if robot.demo else ()
     codes = (option for code, type_ in robot.codes.items() for option in ("--code", f"{code}={type_}"))
+    # The gateway does not read the primary interface, so its port is not needed.
+    protocol = () if robot.protocol == "unit" else ("--protocol", robot.protocol, "--primary", "127.0.0.1:0")
     for_ = ("--for", f"{site}/{robot.name}", *attach)
-    arguments = ("simulate", "--robot", robot.model, "--listen", f"127.0.0.1:{port}", *demo, *codes, *for_)
+    address = ("--robot", robot.model, "--listen", f"127.0.0.1:{port}")
+    arguments = ("simulate", *address, *demo, *codes, *protocol, *for_)
     return (
         Program(name=f"simulate {robot.name}", arguments=arguments, last=True),
         ("--controller", f"{robot.name}=tcp://127.0.0.1:{port}"),

@@ -494,7 +494,10 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ["robot.is_read_only", ["read-only: {cause}", "只读：{cause}"]],
   [
     "robot.reads_only",
-    ["the driver of its controller only reads: move it from its own panel", "其控制器的驱动只读：请在其自身的示教器上移动"],
+    [
+      "the driver of its controller only reads: move it from its own panel",
+      "其控制器的驱动只读：请在其自身的示教器上移动",
+    ],
   ],
   [
     "robot.no_stop_code",

@@ -346,6 +346,10 @@ const TEXTS = {
     "Read-only: no proven stop for this controller, so nothing is ever sent to it.",
     "只读：此控制器没有经验证的停止命令，不会发送任何命令。",
   ],
+  reads_only_text: [
+    "Read-only: robomesh reads this kind of controller and never sends it a command.",
+    "只读：robomesh 只读取这类控制器，不会发送任何命令。",
+  ],
   home: ["Home", "回零"],
   hold: ["Hold", "保持"],
   resume: ["Resume", "继续"],

@@ -49,6 +49,7 @@ const REPEAT_MS = 3000;
 export const DISOBEYED = "stop.disobeyed";
 const END_S = 0.01; // a recording's end, by its player's rounding
 const POSITIONS_STALE = "positions.stale";
+const READS_ONLY = "robot.reads_only";
 
 /** Return how long before a controller's report an event was [ms], by the gateway's clock. */
 export function msBefore(state: ControllerState, stamp: Timestamp | undefined): number {
@@ -128,7 +129,10 @@ export function stoppedByItself(state: ControllerState | undefined): boolean {
 /** Explain why nothing moves the robot now, not even RESUME, and what to do; empty: it can move, as far as is known. */
 export function whyNoMotion(state: ControllerState | undefined): string {
   if (!state) return "";
-  if (state.readOnly) return t("read_only_text");
+  if (state.readOnly) {
+    const causes = state.linkReasons.flatMap((reason) => reason.causes);
+    return causes.some(({ code }) => code === READS_ONLY) ? t("reads_only_text") : t("read_only_text");
+  }
   if (state.stop) return t("reset_needs");
   if (state.link !== Link.UP) return t("no_motion_link");
   if (state.mode === Mode.LOCAL) return t("no_motion_local");
