@@ -26,7 +26,7 @@ from protocol_gateway.control.jog import Jogs
 from protocol_gateway.control.program import Programs
 from protocol_gateway.control.robot_authority import RobotAuthority
 from protocol_gateway.core.codes import code_table
-from protocol_gateway.drivers.driver import Activity, Driver
+from protocol_gateway.drivers.driver import Activity, Channel, Driver
 from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.journal import Journal
@@ -84,6 +84,11 @@ class Robot:
             driver = DRIVERS[settings.protocol](joints.types, settings.codes, relay=relay)
         except GatewaySettingsError as error:
             raise GatewaySettingsError(f"robot {settings.name}: {error}") from None
+        if unknown := sorted(settings.ports.keys() - driver.ports.keys()):
+            raise GatewaySettingsError(
+                f"robot {settings.name}: ports {unknown[0]!r}: protocol {settings.protocol!r} has "
+                f"{', '.join(map(repr, driver.ports)) or 'no further ports'}"
+            )
         self._settings = settings
         self._legacy: LegacyClients | None = None
         self._read_only = _why_read_only(settings, driver)
@@ -111,13 +116,16 @@ class Robot:
             LinkSettings(
                 host=settings.host,
                 port=settings.port,
+                ports=settings.ports,
                 stale_after_s=_SHOWN_WITHIN * settings.stale_after_s,
                 reconnect_after_s=settings.reconnect_after_s,
             ),
             driver,
             on_event=self._telemetry.on_event,
             on_status=self._on_link,
+            on_channel=self._on_channel,
         )
+        self._missing_channels: set[str] = set()
         self._link_status = self._link.status
         self._audit = AuditLog(audit_path, on_written=self._on_written, rotate_bytes=rotate_bytes)
         self._audit_trail = AuditTrail(self._audit, self._journal)
@@ -348,6 +356,18 @@ class Robot:
             if before.state is LinkState.DOWN:
                 self._control.handle(events.LinkRestored())
         self._publish_state()
+
+    def _on_channel(self, channel: Channel, why: Reason | None) -> None:
+        """Report once that a channel was lost, and that it is back."""
+        name = channel.name
+        if why is not None and name not in self._missing_channels:
+            self._missing_channels.add(name)
+            text = f"the controller's {name} interface is not connected: {why}"
+            self._journal.report(_S.WARNING, "link.channel_lost", text, why=why, channel=name)
+        elif why is None and name in self._missing_channels:
+            self._missing_channels.discard(name)
+            text = f"the controller's {name} interface is connected again"
+            self._journal.report(_S.INFO, "link.channel_back", text, channel=name)
 
     def _on_controller_status(self) -> None:
         self._control.handle(events.StatusChanged())

@@ -30,6 +30,8 @@ class RobotSettings:
         name: The robot's name in keys.
         description: A library robot's name, or a path.
         host: Host of the controller, with `port`.
+        ports: Ports of the controller's other interfaces, where they are not the usual ones:
+            {"primary": 30011}.
         protocol: Protocol of the controller, by its name in `protocol_gateway.drivers.registry`.
         codes: Type codes, where the controller sends numbers: {2: "ABSOLUTE.DEG", 101: "COMMAND:home"}.
         accept_unknown: States that the controller never reports and that are not required: "mode", "homed".
@@ -48,6 +50,7 @@ class RobotSettings:
     description: str | Path
     host: str
     port: int
+    ports: Mapping[str, int] = field(default_factory=dict)
     protocol: str = "unit"
     codes: Mapping[int, str] = field(default_factory=dict)
     accept_unknown: frozenset[str] = frozenset()

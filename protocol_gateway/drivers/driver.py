@@ -14,7 +14,7 @@ Only the driver knows degrees, millimetres, words and codes: above it everything
 the gateway's monotonic clock, unless named as the controller's.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, Flag, auto
 from typing import Protocol, TypeAlias
@@ -214,6 +214,8 @@ class Carries(Flag):
 
 ALL = Carries.READING | Carries.MOTION | Carries.STOP
 """All of it: a protocol with a single channel."""
+NOTHING = Carries(0)
+"""An addition to another channel."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -221,6 +223,7 @@ class Channel:
     """One of a driver's connections to the controller.
 
     Attributes:
+        name: Its name in the site file's `ports`, and in events.
         carries: What needs it. The robot is shown as disconnected while no channel that carries READING is
             open, so an addition to another channel carries nothing.
         datagrams: UDP instead of TCP; `received` gets each datagram by itself.
@@ -236,7 +239,8 @@ class Open:
     """Connect a channel, and connect it again after it was lost, with growing pauses, until `Close`.
 
     Attributes:
-        port: Port of the controller's host; None: the site file's.
+        port: Port of the controller's host, unless the site file's `ports` has another one; None: that of
+            the site file's `controller`.
     """
 
     channel: Channel
@@ -291,6 +295,11 @@ Effects: TypeAlias = Sequence[Effect]
 
 class Driver(Protocol):
     """Driver of a controller's protocol, without I/O."""
+
+    @property
+    def ports(self) -> Mapping[str, int]:
+        """Channels with a port of their own, and the port that controllers have: {"primary": 30011}."""
+        ...
 
     @property
     def requests_a_second(self) -> float:

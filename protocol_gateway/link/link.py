@@ -17,11 +17,12 @@ import logging
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from dataclasses import dataclass, field
 
 from protocol_gateway.drivers.driver import (
     Carries,
+    Channel,
     Close,
     ControllerEvent,
     Driver,
@@ -69,6 +70,7 @@ class LinkSettings:
     """Address of the controller, and the link's timeouts.
 
     Attributes:
+        ports: Other ports than the driver's for its further channels, by the channel's name.
         stale_after_s: Without a unit for this long the link is SILENT.
         reconnect_after_s: Without a unit for this long the link reconnects.
         connect_timeout_s: Timeout of one attempt to connect.
@@ -76,6 +78,7 @@ class LinkSettings:
 
     host: str
     port: int
+    ports: Mapping[str, int] = field(default_factory=dict)
     stale_after_s: float = 1.0
     reconnect_after_s: float = 4.0
     connect_timeout_s: float = 3.0
@@ -100,8 +103,9 @@ class LinkCounters:
 class ControllerLink:
     """A link to one controller.
 
-    `on_event` and `on_status` are called on the event loop from the socket's callback: no queue, no task
-    switch. They must return soon, and an exception in them ends `run`.
+    `on_event`, `on_status` and `on_channel` are called on the event loop from the socket's callback: no
+    queue, no task switch. They must return soon, and an exception in them ends `run`. `on_channel` gets each
+    change of a channel that does not carry READING: why it is not connected; None: it is.
     """
 
     def __init__(
@@ -111,11 +115,13 @@ class ControllerLink:
         *,
         on_event: Callable[[ControllerEvent, Received], None],
         on_status: Callable[[LinkStatus], None] = lambda status: None,
+        on_channel: Callable[[Channel, Reason | None], None] = lambda channel, why: None,
         monotonic_s: Callable[[], float] = time.monotonic,
     ) -> None:
         self._settings = settings
         self._driver = driver
         self._on_status = on_status
+        self._on_channel = on_channel
         self._monotonic_s = monotonic_s
         self._wall_clock = WallClock()
         self._where = f"{settings.host}:{settings.port}"
@@ -264,6 +270,7 @@ class ControllerLink:
     def _open(self, effect: Open) -> None:
         self._close(effect.channel.name)
         port = self._settings.port if effect.port is None else effect.port
+        port = self._settings.ports.get(effect.channel.name, port)
         kept = KeptChannel(
             effect.channel, self._settings.host, port, self._settings.connect_timeout_s, listener=self
         )
@@ -316,6 +323,8 @@ class ControllerLink:
         self._tell(self._driver.opened(kept.channel, self._monotonic_s()))
         if reads:
             self._set_status(LinkState.SILENT, codes.LINK_NO_UNIT(where=kept.where))
+        else:
+            self._on_channel(kept.channel, None)
 
     def on_ended(self, kept: KeptChannel) -> bool:
         """Handle the end of a connection, or a failed attempt (called by the channel)."""
@@ -327,6 +336,8 @@ class ControllerLink:
             self._set_status(LinkState.DOWN, kept.reason)
         if self._channels.get(kept.channel.name) is kept:
             self._tell(self._driver.closed(kept.channel, self._monotonic_s()))
+            if not reads:
+                self._on_channel(kept.channel, kept.reason)
         if not reads:
             return False
         return self._counts["units_received"] > self._units_at_connect and not self._refusal

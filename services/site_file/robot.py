@@ -28,6 +28,8 @@ class Robot(BaseModel):
         pose: Pose of its base in the site's frame.
         cell: Name of its cell; empty: alone in its cell. Robots of one cell are checked against each other.
         controller: `simulated`: `robomesh up` starts a simulator; otherwise `tcp://HOST:PORT`.
+        ports: Ports of the controller's other interfaces, where they are not the usual ones, as in
+            `{ primary = 30011 }`.
         protocol: The controller's protocol: `unit` (docs/controllers.md), or `rtde` to read a controller of
             Universal Robots (docs/controllers/universal-robots.md).
         codes: Type codes of a controller that sends numbers, as in
@@ -56,6 +58,7 @@ class Robot(BaseModel):
     pose: Pose = Pose()
     cell: str = ""
     controller: str = "simulated"
+    ports: dict[str, Annotated[int, Field(gt=0, lt=65536)]] = Field(default_factory=dict)
     protocol: str = "unit"
     codes: dict[int, str] = Field(default_factory=dict)
     accept_unknown: tuple[Literal["mode", "homed"], ...] = ()

@@ -52,6 +52,12 @@ RULES: Mapping[str, Rule] = MappingProxyType(
             HIGH, "A device other than a controller sends there, or the controller is broken."
         ),
         "controller.joint_count": Rule(HIGH, "The site file names another model than the controller has."),
+        "link.channel_lost": Rule(
+            MEDIUM,
+            "Look at this port in the controller's services, in the site file and in firewalls.",
+            ended_by=("link.channel_back",),
+            each="channel",
+        ),
         "link.flooding": Rule(MEDIUM, "Lower the controller's rate; only the newest of it is published."),
         "controller.fault": Rule(HIGH, "Clear the fault at the controller, then reset."),
         "controller.local": Rule(LOW, "People at the controller move the robot: contact them."),

@@ -20,15 +20,16 @@ from protocol_gateway.drivers.driver import (
     Severity,
     StatusReceived,
 )
-from protocol_gateway.drivers.universal_robots.driver import RTDE, RtdeDriver, activity_of
+from protocol_gateway.drivers.universal_robots.driver import PRIMARY, RTDE, RtdeDriver, activity_of
 from protocol_gateway.drivers.universal_robots.modes import RobotMode, RuntimeState, SafetyMode
 from protocol_gateway.drivers.universal_robots.state import ControllerState
 from protocol_gateway.errors import CommandError, GatewaySettingsError
 from robots.joints import JointType
 from services.simulator.universal_robots.service import UrSettings, serve_rtde
-from tests.conftest import run
+from tests.conftest import free_port, run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
 
+UR = {"description": "puma560", "protocol": "rtde"}
 SIX = (JointType.ROTARY,) * 6
 NOW_S = 100.0
 
@@ -71,7 +72,7 @@ def report(effects):
 
 def test_it_greets_step_by_step_and_then_sends_nothing():
     arm = driver()
-    assert arm.started(NOW_S) == (Open(RTDE),)
+    assert arm.started(NOW_S) == (Open(RTDE), Open(PRIMARY, 30011))
     sent = [*arm.opened(RTDE, NOW_S)]
     for answer in GREETING:
         sent += [each for each in arm.received(RTDE, answer, NOW_S) if isinstance(each, Send)]
@@ -140,6 +141,51 @@ def test_a_controller_without_positions_is_left_and_tried_again_later():
     assert arm.timer_ended(timer.at_s) == (Open(RTDE),)
 
 
+def message(kind, payload):
+    body = struct.pack(">QbB", 1, -2, kind) + payload
+    return struct.pack(">iB", 5 + len(body), 20) + body
+
+
+@pytest.mark.parametrize(
+    ("data", "alarm"),
+    [
+        (
+            message(6, struct.pack(">iiiII", 153, 3, 3, 0, 7) + b"too hot"),
+            AlarmReceived(Severity.ERROR, "C153A3 too hot", "C153A3"),
+        ),
+        (
+            message(6, struct.pack(">iiiII", 40, 0, 1, 0, 0)),
+            AlarmReceived(Severity.INFO, "C40A0", "C40A0"),
+        ),
+        (
+            message(7, struct.pack(">ii", 0, 0) + b"\x13PROGRAM_XXX_STARTEDweld"),
+            AlarmReceived(Severity.INFO, "PROGRAM_XXX_STARTED weld"),
+        ),
+        (
+            message(10, struct.pack(">ii", 12, 4) + b"no such name"),
+            AlarmReceived(Severity.ERROR, "script, line 12, column 4: no such name"),
+        ),
+        # For UR's developers.
+        (message(6, struct.pack(">iiiII", 1, 0, 0, 0, 0) + b"debug"), None),
+    ],
+)
+def test_messages_of_the_primary_interface_are_alarms(data, alarm):
+    arm = greeted()
+    arm.opened(PRIMARY, NOW_S)
+    effects = [effect for byte in data for effect in arm.received(PRIMARY, bytes([byte]), NOW_S)]
+    assert effects == ([] if alarm is None else [Report([alarm], 0)])
+
+
+def test_a_broken_stream_of_alarms_is_left_alone_and_the_states_go_on():
+    arm = greeted()
+    arm.opened(PRIMARY, NOW_S)
+    report_, close, timer = arm.received(PRIMARY, b"\xff" * 64, NOW_S)
+    assert isinstance(report_.events[0], MalformedReceived)
+    assert close.channel is PRIMARY
+    assert report(arm.received(RTDE, data(), NOW_S)).units == 1
+    assert arm.timer_ended(timer.at_s) == (Open(PRIMARY, 30011),)
+
+
 def test_it_refuses_other_robots_codes_and_every_command():
     with pytest.raises(GatewaySettingsError, match="6 rotary joints, this model has 5"):
         RtdeDriver(SIX[:5], {})
@@ -154,10 +200,10 @@ def test_it_refuses_other_robots_codes_and_every_command():
 
 @contextlib.asynccontextmanager
 async def controller(**settings):
-    """Run a simulated controller; yield its port of RTDE."""
+    """Run a simulated controller; yield its ports of RTDE and of the primary interface."""
     ready = asyncio.get_running_loop().create_future()
     task = asyncio.create_task(
-        serve_rtde(UrSettings(**settings), ready=lambda rtde, primary: ready.set_result(rtde))
+        serve_rtde(UrSettings(**settings), ready=lambda *ports: ready.set_result(ports))
     )
     await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
     try:
@@ -193,9 +239,10 @@ async def tap(port):
 def test_a_controller_with_rtde_is_shown_and_never_commanded(mesh, tmp_path):
     async def main():
         async with (
-            controller(demo=True) as port,
+            controller(demo=True, faults=("fault@4",)) as (port, primary),
             tap(port) as (tapped, sent),
-            gateway(mesh, tmp_path, tapped, description="puma560", protocol="rtde") as site,
+            tap(primary) as (tapped_primary, sent_to_primary),
+            gateway(mesh, tmp_path, tapped, **UR, ports={"primary": tapped_primary}) as site,
         ):
             await until(lambda: site.controller.activity == STATE.MOVING)
             assert site.controller.homed == STATE.YES
@@ -213,20 +260,41 @@ def test_a_controller_with_rtde_is_shown_and_never_commanded(mesh, tmp_path):
             await site.units(50)
             assert bytes(sent) == greeting
             assert len(greeting) < 1000
+            alarm = await site.event("controller.alarm", -1)
+            assert alarm.values["number"] == "C153A0", alarm.text
+            await until(lambda: site.controller.activity == STATE.STOPPED)
+            assert not sent_to_primary
 
     run(main())
 
 
 def test_a_controller_that_restarts_is_shown_again(mesh, tmp_path):
     async def main():
-        async with controller() as port:
-            gone = gateway(mesh, tmp_path, port, description="puma560", protocol="rtde")
-            site = await gone.__aenter__()
-        try:
+        async with contextlib.AsyncExitStack() as before, contextlib.AsyncExitStack() as after:
+            port, primary = await before.enter_async_context(controller())
+            site = await after.enter_async_context(
+                gateway(mesh, tmp_path, port, **UR, ports={"primary": primary})
+            )
+            await before.aclose()
             await until(lambda: site.controller.link == STATE.DOWN)
-            async with controller(listen=f"127.0.0.1:{port}"):
-                await until(lambda: site.controller.link == STATE.UP)
-        finally:
-            await gone.__aexit__(None, None, None)
+            await site.event("link.channel_lost", -1)
+            addresses = {"listen": f"127.0.0.1:{port}", "primary": f"127.0.0.1:{primary}"}
+            await after.enter_async_context(controller(**addresses))
+            await until(lambda: site.controller.link == STATE.UP)
+            await site.event("link.channel_back", -1)
+
+    run(main())
+
+
+def test_without_its_alarms_a_controller_is_shown_and_a_port_of_no_interface_is_refused(mesh, tmp_path):
+    async def main():
+        async with controller() as (port, primary):
+            async with gateway(mesh, tmp_path / "a", port, **UR, ports={"primary": free_port()}) as site:
+                lost = await site.event("link.channel_lost", -1)
+                assert "primary" in lost.text
+                assert site.controller.link == STATE.UP
+            with pytest.raises(GatewaySettingsError, match=r"'primery'.*has 'primary'"):
+                async with gateway(mesh, tmp_path / "b", port, **UR, ports={"primery": primary}):
+                    pass
 
     run(main())

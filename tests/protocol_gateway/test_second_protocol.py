@@ -46,9 +46,11 @@ class JsonLines:
 
     can_stop, can_jog = True, False
     requests_a_second = 0.0
+    reads_only = False
 
     def __init__(self, joint_types, codes, *, relay):
         self._joints = len(joint_types)
+        self.ports = {}
         self._rest, self._offset = b"", 0
 
     def started(self, now_s):

@@ -1,9 +1,13 @@
-"""Driver that reads a controller of Universal Robots by RTDE; it sends nothing but its greeting."""
+"""Driver that reads a controller of Universal Robots; it sends nothing but the greeting of RTDE.
+
+RTDE has the state, the primary interface the alarms and messages. Neither takes a seat of another client.
+"""
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from types import MappingProxyType
 
 from protocol_gateway.drivers.driver import (
+    NOTHING,
     Activity,
     AlarmReceived,
     Carries,
@@ -22,8 +26,22 @@ from protocol_gateway.drivers.driver import (
     Severity,
     StatusReceived,
 )
-from protocol_gateway.drivers.universal_robots.modes import RobotMode, RuntimeState, SafetyMode, TextLevel
+from protocol_gateway.drivers.universal_robots.modes import (
+    ReportLevel,
+    RobotMode,
+    RuntimeState,
+    SafetyMode,
+    TextLevel,
+)
 from protocol_gateway.drivers.universal_robots.packages import Malformed
+from protocol_gateway.drivers.universal_robots.primary import (
+    Alarm,
+    KeyMessage,
+    Popup,
+    PrimaryEvent,
+    PrimaryStream,
+    RuntimeFault,
+)
 from protocol_gateway.drivers.universal_robots.rtde_messages import TextReceived
 from protocol_gateway.drivers.universal_robots.rtde_reader import Failed, RtdeReader
 from protocol_gateway.drivers.universal_robots.state import OUTPUTS, ControllerState
@@ -32,6 +50,9 @@ from robomesh import reason_codes
 from robots.joints import JointType
 
 RTDE = Channel(name="rtde", carries=Carries.READING)
+PRIMARY = Channel(name="primary", carries=NOTHING)
+PRIMARY_PORT = 30011
+"""Port of the primary interface for reading only: it takes no program."""
 FREQUENCY_HZ = 125.0
 """States a second that are requested; every controller can send so many."""
 JOINTS = 6
@@ -51,6 +72,16 @@ _FAULTS = frozenset({SafetyMode.VIOLATION, SafetyMode.FAULT, SafetyMode.UNDEFINE
 _MAY_MOVE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.RECOVERY})
 _HELD = frozenset({RuntimeState.PAUSING, RuntimeState.PAUSED})
 _AT_REST = frozenset({RuntimeState.STOPPED})
+# Of an alarm; messages for UR's own developers are left out.
+_LEVELS: Mapping[int, Severity] = MappingProxyType(
+    {
+        ReportLevel.INFO: Severity.INFO,
+        ReportLevel.WARNING: Severity.WARNING,
+        ReportLevel.VIOLATION: Severity.ERROR,
+        ReportLevel.FAULT: Severity.ERROR,
+        ReportLevel.CRITICAL_FAULT: Severity.ERROR,
+    }
+)
 _SEVERITIES: Mapping[int, Severity] = MappingProxyType(
     {
         TextLevel.EXCEPTION: Severity.ERROR,
@@ -62,12 +93,13 @@ _SEVERITIES: Mapping[int, Severity] = MappingProxyType(
 
 
 class RtdeDriver:
-    """Driver of RTDE (`protocol_gateway.drivers.driver.Driver`).
+    """Driver of RTDE and the primary interface (`protocol_gateway.drivers.driver.Driver`).
 
     Raises:
         GatewaySettingsError: If the model has not six rotary joints, or there are type codes.
     """
 
+    ports: Mapping[str, int] = MappingProxyType({PRIMARY.name: PRIMARY_PORT})
     reads_only = True
     can_stop = can_jog = False
     # A greeting takes at most seven requests.
@@ -88,17 +120,26 @@ class RtdeDriver:
         if codes:
             raise GatewaySettingsError("protocol 'rtde' has no type codes: remove codes")
         self._reader = RtdeReader(FREQUENCY_HZ, {name: OUTPUTS[name] for name in _FIELDS})
+        self._primary = PrimaryStream()
+        self._left: dict[str, Open] = {}
 
     def started(self, now_s: float) -> Effects:
-        """Connect to the site file's port; a controller has 30004."""
-        return (Open(RTDE),)
+        """Connect to the site file's port, which is 30004 on a controller, and to the primary interface."""
+        self._left = {}
+        return (Open(RTDE), Open(PRIMARY, PRIMARY_PORT))
 
     def opened(self, channel: Channel, now_s: float) -> Effects:
-        """Greet."""
+        """Greet by RTDE; the primary interface sends unasked."""
+        if channel is PRIMARY:
+            self._primary = PrimaryStream()
+            return ()
         return (Send(RTDE, self._reader.connected()),)
 
     def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
-        """Report the states in the next bytes, and go on with the greeting."""
+        """Report what the next bytes say, and go on with the greeting."""
+        return self._messages(data, now_s) if channel is PRIMARY else self._states(data, now_s)
+
+    def _states(self, data: bytes, now_s: float) -> Effects:
         events: list[ControllerEvent] = []
         units = 0
         failure = ""
@@ -121,12 +162,31 @@ class RtdeDriver:
         if asked := self._reader.to_send():
             effects.append(Send(RTDE, asked))
         if failure:
-            effects += Close(RTDE, failure), SetTimer(now_s + _RETRY_S)
+            effects += self._leave(RTDE, failure, now_s)
         return effects
+
+    def _messages(self, data: bytes, now_s: float) -> Effects:
+        events: list[ControllerEvent] = []
+        failure = ""
+        for event in self._primary.receive(data):
+            if isinstance(event, Malformed):
+                events.append(MalformedReceived(event.offset, event.text, event.reason))
+                failure = event.reason if event.fatal else failure
+            elif (alarm := alarm_of(event)) is not None:
+                events.append(alarm)
+        effects: list[Effect] = [Report(events, 0)] if events else []
+        if failure:
+            effects += self._leave(PRIMARY, failure, now_s)
+        return effects
+
+    def _leave(self, channel: Channel, why: str, now_s: float) -> Effects:
+        """End a connection that cannot be read any further, and connect again later."""
+        self._left[channel.name] = Open(PRIMARY, PRIMARY_PORT) if channel is PRIMARY else Open(RTDE)
+        return (Close(channel, why), SetTimer(now_s + _RETRY_S))
 
     def skipped(self, channel: Channel, now_s: float) -> Effects:
         """Connect again: the stream cannot be read from its middle."""
-        return (Close(RTDE, "it sent far too much"), SetTimer(now_s + _RETRY_S))
+        return self._leave(channel, "it sent far too much", now_s)
 
     def closed(self, channel: Channel, now_s: float) -> Effects:
         """Do nothing: the link connects again."""
@@ -134,7 +194,8 @@ class RtdeDriver:
 
     def timer_ended(self, now_s: float) -> Effects:
         """Connect again after a failure."""
-        return (Open(RTDE),)
+        left, self._left = self._left, {}
+        return tuple(left.values())
 
     def encode(self, *commands: ControllerCommand) -> bytes:
         """Refuse: nothing is ever commanded.
@@ -147,6 +208,24 @@ class RtdeDriver:
     def command(self, encoded: bytes, now_s: float) -> Effects:
         """Send nothing."""
         return ()
+
+
+def alarm_of(event: PrimaryEvent) -> AlarmReceived | None:
+    """Return an event of the primary interface as an alarm; None: it is none.
+
+    The safety mode also comes by RTDE.
+    """
+    match event:
+        case Alarm(level=level, text=text) if level in _LEVELS:
+            return AlarmReceived(_LEVELS[level], f"{event.name} {text}".rstrip(), event.name)
+        case KeyMessage(title=title, text=text):
+            return AlarmReceived(Severity.INFO, f"{title} {text}".rstrip())
+        case RuntimeFault(line=line, column=column, text=text):
+            return AlarmReceived(Severity.ERROR, f"script, line {line}, column {column}: {text}")
+        case Popup(title=title, text=text, warning=warning, error=error):
+            severity = Severity.ERROR if error else Severity.WARNING if warning else Severity.INFO
+            return AlarmReceived(severity, f"{title}: {text}" if title else text)
+    return None
 
 
 def joints_of(state: ControllerState) -> JointsReceived:

@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Sequence
 from itertools import combinations
+from typing import NamedTuple
 
 from protocol_gateway.legacy.settings import LegacySettings
 from services.errors import ServiceError
@@ -17,11 +18,19 @@ class ControllerError(ServiceError):
     """A controller's option or address is missing or invalid."""
 
 
-def controller_addresses(site: Site, options: Sequence[str]) -> dict[str, tuple[str, int]]:
-    """Return host and port of every robot's controller, from an option or the site file.
+class ControllerAddress(NamedTuple):
+    """Host and port of a controller, and the ports of its other interfaces by their names."""
+
+    host: str
+    port: int
+    ports: dict[str, int]
+
+
+def controller_addresses(site: Site, options: Sequence[str]) -> dict[str, ControllerAddress]:
+    """Return the address of every robot's controller, from an option or the site file.
 
     Args:
-        options: ROBOT=tcp://HOST:PORT each.
+        options: ROBOT=tcp://HOST:PORT each, or ROBOT=tcp://HOST:PORT,NAME=PORT with other interfaces.
 
     Raises:
         ControllerError: If an address is missing, names no robot of the site, or is used twice.
@@ -37,8 +46,10 @@ def controller_addresses(site: Site, options: Sequence[str]) -> dict[str, tuple[
             )
         given[name] = address
     addresses: dict[str, str] = {}
+    ports: dict[str, dict[str, int]] = {}
     for robot in site.robot:
-        address = given.get(robot.name, robot.controller)
+        address, *others = given.get(robot.name, robot.controller).split(",")
+        ports[robot.name] = robot.ports | dict(_other_port(robot.name, other) for other in others)
         if address == "simulated":
             raise ControllerError(
                 f"robot {robot.name}: its controller is simulated, at an unknown address: give "
@@ -55,7 +66,16 @@ def controller_addresses(site: Site, options: Sequence[str]) -> dict[str, tuple[
     for (what, address), (other, another) in combinations(taken, 2):
         if same_address(address, another):
             raise ControllerError(f"{another} is given twice, to {what} and to {other}: each needs its own")
-    return {name: split_address(address) for name, address in addresses.items()}
+    return {
+        name: ControllerAddress(*split_address(address), ports[name]) for name, address in addresses.items()
+    }
+
+
+def _other_port(robot: str, text: str) -> tuple[str, int]:
+    name, _, port = text.partition("=")
+    if not name or not port.isascii() or not port.isdecimal() or not 0 < int(port) < 65536:
+        raise ControllerError(f"--controller {robot}: {text!r}: NAME=PORT is right, as in primary=30011")
+    return name, int(port)
 
 
 def legacy_settings(robot: Robot) -> LegacySettings | None:

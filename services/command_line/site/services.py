@@ -66,8 +66,7 @@ def _gateway(site: "Site", options: Options) -> Any:
         RobotSettings(
             name=robot.name,
             description=robot.model,
-            host=addresses[robot.name][0],
-            port=addresses[robot.name][1],
+            **addresses[robot.name]._asdict(),
             protocol=robot.protocol,
             codes=robot.codes,
             accept_unknown=frozenset(robot.accept_unknown),

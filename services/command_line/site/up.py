@@ -115,14 +115,18 @@ def _simulator(robot: Robot, site: str, attach: tuple[str, ...]) -> tuple[Progra
     port = _free_port()
     demo = ("--demo",) if robot.demo else ()
     codes = (option for code, type_ in robot.codes.items() for option in ("--code", f"{code}={type_}"))
-    # The gateway does not read the primary interface, so its port is not needed.
-    protocol = () if robot.protocol == "unit" else ("--protocol", robot.protocol, "--primary", "127.0.0.1:0")
+    protocol: tuple[str, ...] = ()
+    controller = f"tcp://127.0.0.1:{port}"
+    if robot.protocol == "rtde":
+        primary = _free_port()
+        protocol = ("--protocol", "rtde", "--primary", f"127.0.0.1:{primary}")
+        controller += f",primary={primary}"
     for_ = ("--for", f"{site}/{robot.name}", *attach)
     address = ("--robot", robot.model, "--listen", f"127.0.0.1:{port}")
     arguments = ("simulate", *address, *demo, *codes, *protocol, *for_)
     return (
         Program(name=f"simulate {robot.name}", arguments=arguments, last=True),
-        ("--controller", f"{robot.name}=tcp://127.0.0.1:{port}"),
+        ("--controller", f"{robot.name}={controller}"),
     )
 
 
