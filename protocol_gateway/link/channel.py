@@ -32,7 +32,7 @@ class Listener(Protocol):
         ...
 
     def on_ended(self, kept: "KeptChannel") -> bool:
-        """Handle the end of a connection, or a failed attempt; return whether the connection was of use."""
+        """Handle the end of a connection, or a failed attempt; return whether a connection was of use."""
         ...
 
     def patience(self, kept: "KeptChannel") -> float | Reason:
@@ -68,6 +68,10 @@ class KeptChannel:
             await self._rest(pause_s)
             pause_s = min(pause_s * 2.0, _LONGEST_PAUSE_S)
 
+    def hurry(self) -> None:
+        """Connect without long pauses, until bytes were sent."""
+        self._send_failed.set()
+
     def write(self, data: bytes) -> None:
         """Write whole bytes to the socket immediately.
 
@@ -77,7 +81,7 @@ class KeptChannel:
             LinkDownError: If there is no connection.
             LinkCloggedError: If the socket does not take all bytes; the connection is then aborted.
         """
-        self._send_failed.set()
+        self.hurry()
         if self.connection is None:
             raise LinkDownError(self.reason)
         self.connection.write(data)
@@ -106,10 +110,12 @@ class KeptChannel:
                 connection = await self._connect()
         except TimeoutError:
             self.reason = codes.LINK_NO_ANSWER(where=self.where)
-            return self._listener.on_ended(self)
+            self._listener.on_ended(self)
+            return False
         except OSError as error:
             self.reason = codes.LINK_FAILED(where=self.where, detail=reason_of(error))
-            return self._listener.on_ended(self)
+            self._listener.on_ended(self)
+            return False
         of_use = False
         try:
             self.reason = await self._serve(connection)

@@ -38,7 +38,7 @@ from protocol_gateway.drivers.driver import (
     StatusReceived,
     UnknownReceived,
 )
-from protocol_gateway.errors import LinkError
+from protocol_gateway.errors import LinkDownError, LinkError
 from protocol_gateway.link.channel import KeptChannel
 from protocol_gateway.link.connection import READ_BYTES
 from protocol_gateway.link.flood import EventDispatcher, FloodDetector
@@ -127,6 +127,7 @@ class ControllerLink:
         self._where = f"{settings.host}:{settings.port}"
         self._channels: dict[str, KeptChannel] = {}
         self._tasks: dict[KeptChannel, asyncio.Task[None]] = {}
+        self._in_a_hurry: set[str] = set()
         self._failed: asyncio.Future[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._unasked = UnaskedSends(driver.requests_a_second)
@@ -207,8 +208,7 @@ class ControllerLink:
         now = self._now()
         for effect in self._driver.command(encoded, now.monotonic_s):
             if isinstance(effect, Send):
-                self._channels[effect.channel.name].write(effect.data)
-                self._count_sent(effect)
+                self._write(effect)
             else:
                 self._perform(effect, now)
         self._response_timer.command_sent(now.monotonic_s)
@@ -245,14 +245,18 @@ class ControllerLink:
             logger.error("%s: the driver sends more questions than it declares", self._where)
             return
         try:
-            self._channels[effect.channel.name].write(effect.data)
+            self._write(effect)
         except LinkError as error:
             # The driver hears of the connection's end, and asks again on the next one.
             logger.debug("%s: %s", self._where, error)
-        else:
-            self._count_sent(effect)
 
-    def _count_sent(self, effect: Send) -> None:
+    def _write(self, effect: Send) -> None:
+        name = effect.channel.name
+        if name not in self._channels:
+            # Before the driver has opened it: a stop that is latched since the last run of the gateway.
+            self._in_a_hurry.add(name)
+            raise LinkDownError(self._status.reason)
+        self._channels[name].write(effect.data)
         self._counts["units_sent"] += 1
         self._counts["bytes_sent"] += len(effect.data)
 
@@ -275,6 +279,9 @@ class ControllerLink:
             effect.channel, self._settings.host, port, self._settings.connect_timeout_s, listener=self
         )
         self._channels[effect.channel.name] = kept
+        if effect.channel.name in self._in_a_hurry:
+            self._in_a_hurry.discard(effect.channel.name)
+            kept.hurry()
         task = self._tasks[kept] = asyncio.create_task(kept.run())
         task.add_done_callback(lambda task: self._channel_ended(kept, task))
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import time
 
 import pytest
 
@@ -18,7 +19,7 @@ from protocol_gateway.drivers.driver import (
 )
 from protocol_gateway.errors import LinkDownError
 from protocol_gateway.link.link import ControllerLink, LinkSettings, LinkState
-from tests.conftest import run
+from tests.conftest import free_port, run
 from tests.protocol_gateway.test_link import Seen, controller, end, until
 
 READ = Channel(name="read", carries=Carries.READING)
@@ -238,6 +239,40 @@ def test_a_closed_channel_is_not_connected_again():
                 await asyncio.sleep(0.6)
                 assert arm.connections.empty()
                 await end(writer)
+
+    run(main())
+
+
+def test_a_command_before_the_link_runs_is_refused_and_makes_it_connect_without_long_pauses():
+    async def main():
+        driver = Driver(started=(Open(READ),), command=(Send(READ, b"stop"),))
+        settings = LinkSettings(host="127.0.0.1", port=free_port())
+        arm_link = ControllerLink(settings, driver, on_event=Seen().event)
+        with pytest.raises(LinkDownError):
+            arm_link.send(b"stop")
+        task = asyncio.create_task(arm_link.run())
+        begin = time.monotonic()
+        await until(lambda: driver.told.count(("closed", "read")) >= 8)
+        # With pauses that grow it would take 25 s.
+        assert time.monotonic() - begin < 15.0
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    run(main())
+
+
+def test_pauses_between_failed_attempts_grow_also_after_a_connection_of_use():
+    async def main():
+        driver = Driver(started=(Open(READ),), received=(STATE,))
+        async with controller() as arm, link(driver, arm.port) as (arm_link, _):
+            _, writer = await arm.next()
+            writer.write(b"state")
+            await until(lambda: arm_link.status.state is LinkState.UP)
+            arm.server.close()
+            await end(writer)
+            await asyncio.sleep(4.0)
+            # At 0, 0.2, 0.6, 1.4 and 3.0 s, a fifth earlier or later; with short pauses it would be 20.
+            assert 1 <= driver.told.count(("closed", "read")) <= 7
 
     run(main())
 

@@ -34,6 +34,7 @@ class Controller:
 async def controller(port=0):
     peer = Controller()
     server = await asyncio.start_server(peer.joined, "127.0.0.1", port)
+    peer.server = server
     peer.port = server.sockets[0].getsockname()[1]
     writers = []
     try:
