@@ -109,13 +109,9 @@ class KeptChannel:
             async with asyncio.timeout(self._timeout_s):
                 connection = await self._connect()
         except TimeoutError:
-            self.reason = codes.LINK_NO_ANSWER(where=self.where)
-            self._listener.on_ended(self)
-            return False
+            return self._attempt_failed(codes.LINK_NO_ANSWER(where=self.where))
         except OSError as error:
-            self.reason = codes.LINK_FAILED(where=self.where, detail=reason_of(error))
-            self._listener.on_ended(self)
-            return False
+            return self._attempt_failed(codes.LINK_FAILED(where=self.where, detail=reason_of(error)))
         of_use = False
         try:
             self.reason = await self._serve(connection)
@@ -126,6 +122,13 @@ class KeptChannel:
             finally:
                 await connection.end()
         return of_use
+
+    def _attempt_failed(self, reason: Reason) -> bool:
+        # It may have been connected in the moment when the time was over.
+        self.connection = None
+        self.reason = reason
+        self._listener.on_ended(self)
+        return False
 
     async def _connect(self) -> Connection | Datagrams:
         loop = asyncio.get_running_loop()

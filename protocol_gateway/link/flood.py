@@ -11,7 +11,13 @@ import asyncio
 from collections.abc import Callable, Hashable, Sequence
 from functools import partial
 
-from protocol_gateway.drivers.driver import ControllerEvent, JointsReceived, Refused, StatusReceived
+from protocol_gateway.drivers.driver import (
+    AlarmReceived,
+    ControllerEvent,
+    JointsReceived,
+    Refused,
+    StatusReceived,
+)
 from protocol_gateway.link.timestamping import Received
 
 # Limits for half a second: twice what the fastest controllers send (1,000 units a second, of 300 bytes).
@@ -135,5 +141,7 @@ def _kind(event: ControllerEvent) -> Hashable:
             return StatusReceived, activity, mode, homed, trace
         case Refused(number):
             return Refused, number
+        case AlarmReceived():
+            return event
         case _:
             return (type(event),)
