@@ -18,6 +18,7 @@ const CHINESE: Record<string, string> = {
   "link.up": "与控制器的连接正常。",
   "link.silent": "已连接控制器，尚未收到数据。",
   "link.flooding_ended": "控制器数据不再过载。",
+  "link.channel_back": "控制器的接口 {channel} 已重新连接。",
   "joints.back": "重新收到关节位置。",
   "status.back": "重新收到控制器状态。",
   "controller.remote": "控制器恢复远程模式。",
