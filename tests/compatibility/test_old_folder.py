@@ -77,7 +77,8 @@ def test_its_latched_stop_is_latched_until_the_holder_resets_it(command):
     assert refused.returncode == 1
     assert "stop 1 is latched" in refused.stdout
     assert command("send", "arm", "reset").returncode == 0
-    assert command("send", "arm", "home").returncode == 0
+    # The controller reports a moment later that it is no longer stopped.
+    wait_until(lambda: command("send", "arm", "home").returncode == 0)
 
 
 def test_its_audit_log_goes_on_and_is_unbroken(folder, audit_before, command, site):
