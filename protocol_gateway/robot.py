@@ -84,10 +84,10 @@ class Robot:
             driver = DRIVERS[settings.protocol](joints.types, settings.codes, relay=relay)
         except GatewaySettingsError as error:
             raise GatewaySettingsError(f"robot {settings.name}: {error}") from None
-        if unknown := sorted(settings.ports.keys() - driver.ports.keys()):
+        if unknown := sorted(settings.ports.keys() - driver.ports):
             raise GatewaySettingsError(
                 f"robot {settings.name}: ports {unknown[0]!r}: protocol {settings.protocol!r} has "
-                f"{', '.join(map(repr, driver.ports)) or 'no further ports'}"
+                f"{', '.join(map(repr, sorted(driver.ports))) or 'no further ports'}"
             )
         self._settings = settings
         self._legacy: LegacyClients | None = None

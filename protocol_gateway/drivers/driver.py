@@ -14,7 +14,7 @@ Only the driver knows degrees, millimetres, words and codes: above it everything
 the gateway's monotonic clock, unless named as the controller's.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, Flag, auto
 from typing import Protocol, TypeAlias
@@ -297,8 +297,8 @@ class Driver(Protocol):
     """Driver of a controller's protocol, without I/O."""
 
     @property
-    def ports(self) -> Mapping[str, int]:
-        """Channels with a port of their own, and the port that controllers have: {"primary": 30011}."""
+    def ports(self) -> frozenset[str]:
+        """Names of the channels with a port of their own, which the site file's `ports` may replace."""
         ...
 
     @property

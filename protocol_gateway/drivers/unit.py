@@ -103,7 +103,7 @@ class UnitDriver:
         """True if there are units to hold, and to give the held motion up."""
         return all(self._table.supports(_WORDS[each]) for each in (Hold, Reset))
 
-    ports: Mapping[str, int] = MappingProxyType({})
+    ports: frozenset[str] = frozenset()
     reads_only = False
     # Nothing is ever sent but an operator's command.
     requests_a_second = 0.0

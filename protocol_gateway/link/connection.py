@@ -6,7 +6,7 @@ import os
 import socket
 import struct
 from collections.abc import Callable
-from typing import cast
+from typing import Any, Self, cast
 
 from protocol_gateway.errors import LinkCloggedError, LinkDownError
 from protocol_gateway.sockets import configure
@@ -27,19 +27,47 @@ _FINAL_SEND_S = 0.1
 _ROUND_TRIP_AT = 68
 
 
-class Connection(asyncio.BufferedProtocol):
-    """One TCP connection; the future `lost` gets the reason when it has ended."""
+class _Socket(asyncio.BaseProtocol):
+    """What a TCP connection and a UDP socket share: the link's callbacks, and the future of the end."""
 
-    _transport: asyncio.Transport
+    _transport: asyncio.Transport | asyncio.DatagramTransport
 
-    def __init__(
-        self, on_connected: Callable[["Connection"], None], receive: Callable[[bytes], None]
-    ) -> None:
-        self._on_connected = on_connected
+    def __init__(self, on_connected: Callable[[Self], None], receive: Callable[[bytes], None]) -> None:
+        self._on_connected: Callable[[Any], None] = on_connected
         self._receive = receive
         loop = asyncio.get_running_loop()
         self.lost: asyncio.Future[Reason] = loop.create_future()
         self._closed: asyncio.Future[None] = loop.create_future()
+
+    def _end_with(self, reason: Reason) -> None:
+        self._lose(reason)
+        self._closed.set_result(None)
+
+    def _lose(self, reason: Reason) -> None:
+        if not self.lost.done():
+            self.lost.set_result(reason)
+
+    def _discard_received(self) -> None:
+        """Discard all further bytes."""
+        self._receive = lambda data: None
+
+    def _call_or_fail(self, call: Callable[[], None]) -> None:
+        """Make an exception of the callback end `run`; asyncio would only log it."""
+        try:
+            call()
+        except Exception as error:
+            if not self.lost.done():
+                self.lost.set_exception(error)
+            self._transport.abort()
+
+
+class Connection(_Socket, asyncio.BufferedProtocol):
+    """One TCP connection; the future `lost` gets the reason when it has ended."""
+
+    _transport: asyncio.Transport
+
+    def __init__(self, on_connected: Callable[[Self], None], receive: Callable[[bytes], None]) -> None:
+        super().__init__(on_connected, receive)
         # Own buffer: otherwise asyncio maps 256 KiB of memory for each read, which costs more than all
         # processing of a unit.
         self._buffer = bytearray(READ_BYTES)
@@ -69,9 +97,7 @@ class Connection(asyncio.BufferedProtocol):
         reason = codes.LINK_CLOSED_THERE()
         if isinstance(error, OSError):
             reason = codes.OTHER(detail=reason_of(error))
-        if not self.lost.done():
-            self.lost.set_result(reason)
-        self._closed.set_result(None)
+        self._end_with(reason)
 
     def write(self, data: bytes) -> None:
         """Write a whole unit to the socket immediately.
@@ -113,7 +139,7 @@ class Connection(asyncio.BufferedProtocol):
         Closing a socket that holds unread bytes resets it, and the controller may lose what it has not read
         yet. Therefore only the sending direction is closed first, and received bytes are read and discarded.
         """
-        self._receive = _ignore
+        self._discard_received()
         self._transport.resume_reading()
         try:
             if not self._transport.is_closing():
@@ -124,28 +150,12 @@ class Connection(asyncio.BufferedProtocol):
             self._transport.abort()
         await self._closed
 
-    def _call_or_fail(self, call: Callable[[], None]) -> None:
-        """Make an exception of the callback end `run`; asyncio would only log it."""
-        try:
-            call()
-        except Exception as error:
-            if not self.lost.done():
-                self.lost.set_exception(error)
-            self._transport.abort()
 
-
-class Datagrams(asyncio.DatagramProtocol):
+class Datagrams(_Socket, asyncio.DatagramProtocol):
     """One UDP socket, connected to the controller's address: the kernel drops datagrams of other senders."""
 
     _transport: asyncio.DatagramTransport
     round_trip_s = None
-
-    def __init__(self, on_connected: Callable[["Datagrams"], None], receive: Callable[[bytes], None]) -> None:
-        self._on_connected = on_connected
-        self._receive = receive
-        loop = asyncio.get_running_loop()
-        self.lost: asyncio.Future[Reason] = loop.create_future()
-        self._closed: asyncio.Future[None] = loop.create_future()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Notify the link (called by asyncio)."""
@@ -160,14 +170,11 @@ class Datagrams(asyncio.DatagramProtocol):
     def error_received(self, error: Exception) -> None:
         """End the connection: the controller's host has no such port (called by asyncio)."""
         reason = reason_of(error) if isinstance(error, OSError) else str(error)
-        if not self.lost.done():
-            self.lost.set_result(codes.OTHER(detail=reason))
+        self._lose(codes.OTHER(detail=reason))
 
     def connection_lost(self, error: Exception | None) -> None:
         """Note the end (called by asyncio)."""
-        if not self.lost.done():
-            self.lost.set_result(codes.LINK_CLOSED())
-        self._closed.set_result(None)
+        self._end_with(codes.LINK_CLOSED())
 
     def write(self, data: bytes) -> None:
         """Send one datagram immediately.
@@ -191,22 +198,9 @@ class Datagrams(asyncio.DatagramProtocol):
 
     async def end(self) -> None:
         """Close the socket."""
-        self._receive = _ignore
+        self._discard_received()
         self._transport.abort()
         await self._closed
-
-    def _call_or_fail(self, call: Callable[[], None]) -> None:
-        """Make an exception of the callback end `run`; asyncio would only log it."""
-        try:
-            call()
-        except Exception as error:
-            if not self.lost.done():
-                self.lost.set_exception(error)
-            self._transport.abort()
-
-
-def _ignore(data: bytes) -> None:
-    """Discard bytes received after the end."""
 
 
 def reason_of(error: OSError) -> str:

@@ -50,7 +50,7 @@ class JsonLines:
 
     def __init__(self, joint_types, codes, *, relay):
         self._joints = len(joint_types)
-        self.ports = {}
+        self.ports = frozenset()
         self._rest, self._offset = b"", 0
 
     def started(self, now_s):

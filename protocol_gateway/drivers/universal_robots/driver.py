@@ -51,8 +51,8 @@ from robots.joints import JointType
 
 RTDE = Channel(name="rtde", carries=Carries.READING)
 PRIMARY = Channel(name="primary", carries=NOTHING)
-PRIMARY_PORT = 30011
-"""Port of the primary interface for reading only: it takes no program."""
+# The port for reading only, which takes no program.
+_OPEN_PRIMARY = Open(PRIMARY, 30011)
 FREQUENCY_HZ = 125.0
 """States a second that are requested; every controller can send so many."""
 JOINTS = 6
@@ -99,7 +99,7 @@ class RtdeDriver:
         GatewaySettingsError: If the model has not six rotary joints, or there are type codes.
     """
 
-    ports: Mapping[str, int] = MappingProxyType({PRIMARY.name: PRIMARY_PORT})
+    ports = frozenset({PRIMARY.name})
     reads_only = True
     can_stop = can_jog = False
     # A greeting takes at most seven requests.
@@ -126,7 +126,7 @@ class RtdeDriver:
     def started(self, now_s: float) -> Effects:
         """Connect to the site file's port, which is 30004 on a controller, and to the primary interface."""
         self._left = {}
-        return (Open(RTDE), Open(PRIMARY, PRIMARY_PORT))
+        return (Open(RTDE), _OPEN_PRIMARY)
 
     def opened(self, channel: Channel, now_s: float) -> Effects:
         """Greet by RTDE; the primary interface sends unasked."""
@@ -181,7 +181,7 @@ class RtdeDriver:
 
     def _leave(self, channel: Channel, why: str, now_s: float) -> Effects:
         """End a connection that cannot be read any further, and connect again later."""
-        self._left[channel.name] = Open(PRIMARY, PRIMARY_PORT) if channel is PRIMARY else Open(RTDE)
+        self._left[channel.name] = _OPEN_PRIMARY if channel is PRIMARY else Open(RTDE)
         return (Close(channel, why), SetTimer(now_s + _RETRY_S))
 
     def skipped(self, channel: Channel, now_s: float) -> Effects:
