@@ -35,6 +35,7 @@ from protocol_gateway.link.link import JOINT_COUNT, ControllerLink, LinkSettings
 from protocol_gateway.link.status import transition_events
 from protocol_gateway.mesh_requests import MeshRequests
 from protocol_gateway.settings import RobotSettings
+from protocol_gateway.signals import Signals
 from protocol_gateway.state_messages import controller_state, lease_state, timestamp
 from protocol_gateway.telemetry import Telemetry
 from robomesh import reason_codes as codes
@@ -101,11 +102,13 @@ class Robot:
         self._audit_topic = publisher("audit")
         self._program_topic = publisher("program")
         self._journal = Journal(publisher("events"), settings.name)
+        self._signals = Signals(publisher("signals"), self._journal, joints.names)
         self._telemetry = Telemetry(
             joints,
             fast=publisher("joints"),
             slow=publisher("joints/slow"),
             raw=publisher("raw"),
+            signals=self._signals,
             journal=self._journal,
             stale_after_s=settings.stale_after_s,
             on_status=self._on_controller_status,

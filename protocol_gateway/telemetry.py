@@ -14,12 +14,14 @@ from protocol_gateway.drivers.driver import (
     Mode,
     Refused,
     Severity,
+    SignalsReceived,
     StatusReceived,
     UnknownReceived,
 )
 from protocol_gateway.journal import Journal
 from protocol_gateway.link.link import Received
 from protocol_gateway.motion import MotionDetector, is_moving
+from protocol_gateway.signals import Signals
 from protocol_gateway.state_messages import JointStatesMessage, raw_record
 from protocol_gateway.watchdog import STALE_S, Watchdog
 from robomesh import reason_codes as codes
@@ -73,6 +75,7 @@ class Telemetry:
         fast: Publisher,
         slow: Publisher,
         raw: Publisher,
+        signals: Signals,
         journal: Journal,
         stale_after_s: float,
         on_status: Callable[[], None],
@@ -83,6 +86,7 @@ class Telemetry:
         self._fast = fast
         self._slow = slow
         self._raw = raw
+        self._signals = signals
         self._journal = journal
         self._on_status = on_status
         self._on_activity = on_activity
@@ -103,6 +107,7 @@ class Telemetry:
         self._joints_notice, self._status_notice = _LossNotice(), _LossNotice()
         self.controller_time_s: float | None = None
         self.motion_detector.forget()
+        self._signals.forget()
 
     def forget_positions(self) -> None:
         """Mark the positions as stale: the controller may belong to another robot now."""
@@ -133,7 +138,11 @@ class Telemetry:
         return "" if self._status_watchdog.expired(now_s) else self._fault
 
     def check_timeouts(self, now_s: float) -> None:
-        """Report positions or status that expired or returned; call it repeatedly while the link is up."""
+        """Report positions or status that expired or returned, and publish signals that wait.
+
+        Call it repeatedly while the link is up.
+        """
+        self._signals.publish_due(now_s)
         before, self._lost = (
             self._lost,
             (bool(self.positions_stale(now_s)), self._status_watchdog.expired(now_s)),
@@ -167,6 +176,10 @@ class Telemetry:
                 if any(each is not None for each in event.values):  # not the time alone
                     self._status_watchdog.reset(event.values, received.monotonic_s)
                     self._on_controller_status(event, received.monotonic_s)
+            case SignalsReceived():
+                if event.controller_time_s is not None:
+                    self.controller_time_s = event.controller_time_s
+                self._signals.take(event, received)
             case UnknownReceived():
                 record = raw_record(event, received.wall_ns)
                 self._raw.put(record, source_time_ns=received.wall_ns, dated_by=received.clock)

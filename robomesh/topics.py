@@ -73,6 +73,16 @@ _TOPICS = (
         stale_after_s=3.0,
         publishers=_GATEWAY_OR_REPLAY,
     ),
+    # On change at most 10 Hz, of texts and booleans at most 50 Hz; otherwise once a second while the
+    # controller reports: `protocol_gateway/signals.py`.
+    Topic(
+        name="signals",
+        schema=schema.Signals,
+        rate_hz=10.0,
+        priority=Priority.DATA_HIGH,
+        stale_after_s=3.0,
+        publishers=_GATEWAY_OR_REPLAY,
+    ),
     Topic(name="raw", schema=schema.RawRecord, priority=Priority.DATA_LOW, publishers=_GATEWAY_OR_REPLAY),
     Topic(
         name="frames",

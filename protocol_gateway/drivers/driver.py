@@ -14,6 +14,7 @@ Only the driver knows degrees, millimetres, words and codes: above it everything
 the gateway's monotonic clock, unless named as the controller's.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, Flag, auto
@@ -136,8 +137,71 @@ class AlarmReceived:
     number: str = ""
 
 
+_SIGNAL_NAME = re.compile(r"[a-z][a-z0-9_]*(\.[a-z0-9_]+)*")
+_LONGEST_NAME = 64
+SignalValue: TypeAlias = float | bool | str
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """Name and unit of a signal: a value other than joints that a controller reports.
+
+    Drivers make one for each value once, not for each report.
+
+    Attributes:
+        name: Lower-case words with dots between them, from the list in docs/signals.md where it has one:
+            "io.digital_in.3", "payload.mass".
+        unit: SI unit as it is shown ("A", "°C", "N·m"); empty: none.
+        joint: Number of its joint from 0: the joint's name follows the first word, so "joint.current"
+            becomes "joint.waist.current". None: of no joint.
+
+    Raises:
+        ValueError: If the name is invalid.
+    """
+
+    name: str
+    unit: str = ""
+    joint: int | None = None
+
+    def __post_init__(self) -> None:
+        if len(self.name) > _LONGEST_NAME or not _SIGNAL_NAME.fullmatch(self.name):
+            raise ValueError(
+                f"signal {self.name!r}: lower-case words with dots between them are right, "
+                f"at most {_LONGEST_NAME} characters"
+            )
+
+    def __hash__(self) -> int:
+        # A string keeps its hash; the generated method would compute three for each look-up.
+        return hash(self.name)
+
+
+@dataclass(frozen=True, slots=True)
+class SignalsReceived:
+    """Values of signals: all or a part of them; the others keep their values.
+
+    The gateway publishes at most 10 messages a second, and changes of texts and booleans sooner. A driver of
+    a controller that sends faster reports no more often, except for such changes.
+
+    Attributes:
+        values: Numbers in the signal's unit, booleans, texts. None, or a number that is not finite: not
+            reported any longer.
+        controller_time_s: Seconds on the controller's own clock; None: not reported.
+        valid_for_s: Time after which a value that was not reported again is unknown [s].
+    """
+
+    values: Sequence[tuple[Signal, SignalValue | None]]
+    controller_time_s: float | None = None
+    valid_for_s: float = 3.0
+
+
 ControllerEvent: TypeAlias = (
-    JointsReceived | StatusReceived | Refused | MalformedReceived | UnknownReceived | AlarmReceived
+    JointsReceived
+    | StatusReceived
+    | Refused
+    | MalformedReceived
+    | UnknownReceived
+    | AlarmReceived
+    | SignalsReceived
 )
 
 # -------------------------------------------------------------- commands to a controller

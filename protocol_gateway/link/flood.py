@@ -16,6 +16,7 @@ from protocol_gateway.drivers.driver import (
     ControllerEvent,
     JointsReceived,
     Refused,
+    SignalsReceived,
     StatusReceived,
 )
 from protocol_gateway.link.timestamping import Received
@@ -129,8 +130,9 @@ class EventDispatcher:
 
 
 def _is_undated_state(event: ControllerEvent) -> bool:
-    """Return whether an event holds the arm's state without the controller's time."""
-    return isinstance(event, JointsReceived | StatusReceived) and event.controller_time_s is None
+    """Return whether an event holds the robot's state without the controller's time."""
+    states = JointsReceived | StatusReceived | SignalsReceived
+    return isinstance(event, states) and event.controller_time_s is None
 
 
 def _kind(event: ControllerEvent) -> Hashable:
@@ -143,5 +145,8 @@ def _kind(event: ControllerEvent) -> Hashable:
             return Refused, number
         case AlarmReceived():
             return event
+        case SignalsReceived(values):
+            # Other signals are not a newer report of these.
+            return SignalsReceived, tuple(signal for signal, _ in values)
         case _:
             return (type(event),)

@@ -23,6 +23,7 @@ from itertools import pairwise
 from protocol_gateway.drivers.driver import (
     ControllerEvent,
     JointsReceived,
+    SignalsReceived,
     StatusReceived,
     UnknownReceived,
 )
@@ -291,7 +292,7 @@ def _moments(events: Sequence[ControllerEvent]) -> tuple[list[int | None], list[
         match event:
             case JointsReceived() | UnknownReceived():
                 time_ns, published = _ns(event.controller_time_s), True
-            case StatusReceived():
+            case StatusReceived() | SignalsReceived():
                 time_ns = _ns(event.controller_time_s)
             case _:
                 pass

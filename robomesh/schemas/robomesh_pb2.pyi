@@ -224,6 +224,30 @@ class RawRecord(_message.Message):
     data: bytes
     def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., type: _Optional[str] = ..., items: _Optional[_Iterable[str]] = ..., data: _Optional[bytes] = ...) -> None: ...
 
+class Signals(_message.Message):
+    __slots__ = ("timestamp", "signals")
+    TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
+    SIGNALS_FIELD_NUMBER: _ClassVar[int]
+    timestamp: _timestamp_pb2.Timestamp
+    signals: _containers.RepeatedCompositeFieldContainer[Signal]
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., signals: _Optional[_Iterable[_Union[Signal, _Mapping]]] = ...) -> None: ...
+
+class Signal(_message.Message):
+    __slots__ = ("name", "unit", "number", "on", "text", "age_s")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    UNIT_FIELD_NUMBER: _ClassVar[int]
+    NUMBER_FIELD_NUMBER: _ClassVar[int]
+    ON_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    AGE_S_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    unit: str
+    number: float
+    on: bool
+    text: str
+    age_s: float
+    def __init__(self, name: _Optional[str] = ..., unit: _Optional[str] = ..., number: _Optional[float] = ..., on: _Optional[bool] = ..., text: _Optional[str] = ..., age_s: _Optional[float] = ...) -> None: ...
+
 class KinematicState(_message.Message):
     __slots__ = ("timestamp", "tool_to_base", "linear_velocity", "angular_velocity", "manipulability", "limit_margins", "clearance", "own_clearance", "singularity_margin", "not_counted")
     TIMESTAMP_FIELD_NUMBER: _ClassVar[int]

@@ -77,6 +77,7 @@ RULES: Mapping[str, Rule] = MappingProxyType(
         ),
         "unit.malformed": Rule(LOW, "If it goes on, look at the cable and the protocol.", (), _MINUTE_S),
         "controller.alarm": Rule(MEDIUM, "See the controller's own display.", (), 5 * _MINUTE_S),
+        "signals.too_many": Rule(LOW, "Let the controller's driver report fewer signals.", (), _MINUTE_S),
         "controller.refused": Rule(LOW, "See what was asked for, and its reason.", (), _MINUTE_S),
         "robot.read_only": _NONE,
         "stop.remembered": _NONE,  # the controller state reports it

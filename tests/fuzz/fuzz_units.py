@@ -28,6 +28,7 @@ from protocol_gateway.drivers.unit import UnitDriver
 from protocol_gateway.journal import Journal
 from protocol_gateway.legacy.requests import asks_for_more, asks_to_stop, requests_of
 from protocol_gateway.link.timestamping import Received, Timestamper
+from protocol_gateway.signals import Signals
 from protocol_gateway.telemetry import Telemetry
 from robots.description import load
 from robots.joints import joints_of
@@ -143,6 +144,7 @@ class Gateway:
             fast=Sink(),  # type: ignore[arg-type]
             slow=Sink(),  # type: ignore[arg-type]
             raw=Sink(),  # type: ignore[arg-type]
+            signals=Signals(Sink(), journal, JOINTS.names),  # type: ignore[arg-type]
             journal=journal,
             stale_after_s=1.0,
             on_status=lambda: None,

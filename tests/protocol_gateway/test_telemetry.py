@@ -5,6 +5,7 @@ from types import SimpleNamespace
 from protocol_gateway.drivers.driver import JointsReceived
 from protocol_gateway.journal import Journal
 from protocol_gateway.link.link import Received
+from protocol_gateway.signals import Signals
 from protocol_gateway.telemetry import Telemetry
 from robots.description import load
 from robots.joints import joints_of
@@ -22,6 +23,7 @@ class Desk:
             fast=publisher,
             slow=publisher,
             raw=publisher,
+            signals=Signals(publisher, Journal(self, "arm"), ["waist"]),
             journal=Journal(self, "arm", monotonic_s=lambda: self.now_s),
             stale_after_s=1.0,
             on_status=lambda: None,

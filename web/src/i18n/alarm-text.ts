@@ -20,6 +20,7 @@ const CHINESE: Record<string, readonly [title: string, advice: string]> = {
   "status.gone": ["没有控制器状态", "控制器不再发送状态，请检查控制器。"],
   "unit.malformed": ["收到无法读取的数据", "若持续出现，请检查线缆和协议。"],
   "controller.alarm": ["控制器报告警报", "请查看控制器自身的显示。"],
+  "signals.too_many": ["控制器信号过多", "请减少控制器驱动上报的信号。"],
   "controller.refused": ["控制器拒绝了命令", "查看所请求的内容及拒绝原因。"],
   "stop.not_sent": ["停止未送达控制器", "停止未送达控制器：请使用其急停。"],
   "stop.disobeyed": ["已要求停止但仍在运动", "机器人仍在运动：请使用其急停。"],

@@ -1,0 +1,179 @@
+"""Signals of a controller, which are its values other than joints: the newest of each, and their publication.
+
+One message has all of them, so that a late joiner, a recording and a plain Zenoh client need no earlier one.
+It is published when a report arrives, at most
+
+    10 times a second if a number has changed, 50 times a second if a text or a boolean has,
+    once a second if nothing has, so that a value that stays the same does not look stale.
+
+What a report changes too soon for this is published within 0.1 s. Without a report nothing is published.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from protocol_gateway.drivers.driver import Signal, SignalsReceived, SignalValue
+from protocol_gateway.journal import Journal
+from protocol_gateway.link.timestamping import Received
+from protocol_gateway.text_limits import LONGEST_TEXT
+from robomesh.publisher import Publisher
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.texts import one_line
+
+MOST_SIGNALS = 256
+"""Most signals of a robot; the rest is left out, and reported once a connection."""
+_NUMBERS_EACH_S, _CHANGES_EACH_S, _SAME_EACH_S = 0.1, 0.02, 1.0
+_S = schema.Event.Severity
+
+
+@dataclass(slots=True)
+class _Entry:
+    """Newest value of a signal; None: not reported."""
+
+    unit: str
+    row: schema.Signal
+    raw: SignalValue | None = None
+    value: SignalValue | None = None
+    received: Received = field(default_factory=lambda: Received(0.0, 0))
+    valid_until_s: float = 0.0
+
+    def set(self, raw: SignalValue | None) -> None:
+        self.raw = raw
+        match raw:
+            case str():
+                self.value = one_line(raw, LONGEST_TEXT)
+            case bool() | None:
+                self.value = raw
+            case _:
+                self.value = float(raw) if math.isfinite(raw) else None
+
+
+class Signals:
+    """Newest signals of one robot, and their publication.
+
+    Args:
+        joint_names: In the order of the driver's joint numbers.
+    """
+
+    def __init__(self, publisher: Publisher, journal: Journal, joint_names: Sequence[str]) -> None:
+        self._publisher, self._journal = publisher, journal
+        self._joint_names = joint_names
+        self.forget()
+
+    def forget(self) -> None:
+        """Drop all values after the link was lost: another controller may answer next."""
+        self._entries: dict[str, _Entry] = {}
+        self._by_signal: dict[Signal, _Entry] = {}
+        self._newest: Received | None = None
+        self._numbers_changed = self._states_changed = self._unpublished = False
+        self._next_s = self._next_change_s = self._next_same_s = float("-inf")
+        self._next_removal_s = float("-inf")
+        self._said_too_many = False
+
+    def take(self, report: SignalsReceived, received: Received) -> None:
+        """Take a report's values, and publish if it is time."""
+        valid_until_s = received.monotonic_s + report.valid_for_s
+        for signal, raw in report.values:
+            entry = self._by_signal.get(signal) or self._entry(signal, received.monotonic_s)
+            if entry is None:
+                continue
+            # 1 and True are equal, but one is a number.
+            if raw != entry.raw or type(raw) is not type(entry.raw):
+                before = entry.value
+                entry.set(raw)
+                if isinstance(before, float) and isinstance(entry.value, float):
+                    self._numbers_changed = True
+                elif entry.value != before or type(entry.value) is not type(before):
+                    self._states_changed = True
+            entry.received, entry.valid_until_s = received, valid_until_s
+        self._newest, self._unpublished = received, True
+        self.publish_due(received.monotonic_s)
+
+    def publish_due(self, now_s: float) -> None:
+        """Publish what was reported since the last message, if it is time; call it repeatedly."""
+        if not self._unpublished:
+            return
+        due_s = self._next_same_s
+        if self._states_changed:
+            due_s = self._next_change_s
+        elif self._numbers_changed:
+            due_s = self._next_s
+        if now_s >= due_s:
+            self._publish(now_s)
+
+    def current(self, now_s: float) -> dict[str, tuple[str, SignalValue]]:
+        """Return the unit and value of each signal that is known now, by its name."""
+        return {
+            name: (entry.unit, entry.value)
+            for name, entry in tuple(self._entries.items())
+            if entry.value is not None and now_s < entry.valid_until_s
+        }
+
+    def _entry(self, signal: Signal, now_s: float) -> _Entry | None:
+        """Return the entry of a signal that is seen for the first time; None: there are too many."""
+        name = self._name(signal)
+        entry = self._entries.get(name)
+        if entry is None and len(self._entries) >= MOST_SIGNALS:
+            self._remove_old(now_s)
+        if entry is None and len(self._entries) >= MOST_SIGNALS:
+            if not self._said_too_many:
+                self._said_too_many = True
+                text = (
+                    f"the controller reports more than {MOST_SIGNALS} signals: {name} and others are left "
+                    "out. Let its driver report fewer"
+                )
+                self._journal.report(_S.WARNING, "signals.too_many", text, signal=name, most=MOST_SIGNALS)
+            return None
+        if entry is None:
+            entry = _Entry(signal.unit, schema.Signal(name=name, unit=signal.unit))
+            self._entries[name] = entry
+            self._entries = dict(sorted(self._entries.items()))
+        elif entry.unit != signal.unit:
+            entry.unit = entry.row.unit = signal.unit
+            self._states_changed = True
+            self._by_signal = {each: own for each, own in self._by_signal.items() if own is not entry}
+        self._by_signal[signal] = entry
+        return entry
+
+    def _name(self, signal: Signal) -> str:
+        if signal.joint is None:
+            return signal.name
+        first, _, rest = signal.name.partition(".")
+        return f"{first}.{self._joint_names[signal.joint]}.{rest}"
+
+    def _remove_old(self, now_s: float) -> None:
+        """Make room once a second, so that thousands of names in each report stay cheap."""
+        if now_s < self._next_removal_s:
+            return
+        self._next_removal_s = now_s + 1.0
+        self._entries = {name: each for name, each in self._entries.items() if now_s < each.valid_until_s}
+        kept = {id(each) for each in self._entries.values()}
+        self._by_signal = {signal: each for signal, each in self._by_signal.items() if id(each) in kept}
+
+    def _publish(self, now_s: float) -> None:
+        newest = self._newest
+        assert newest is not None
+        self._unpublished = self._numbers_changed = self._states_changed = False
+        # On a fixed grid, so that 125 Hz gives 10 Hz and not 9.6; a gap restarts the grid.
+        self._next_s = max(self._next_s + _NUMBERS_EACH_S, now_s + _NUMBERS_EACH_S / 2)
+        self._next_change_s, self._next_same_s = now_s + _CHANGES_EACH_S, now_s + _SAME_EACH_S
+        message = schema.Signals()
+        message.timestamp.seconds, message.timestamp.nanos = divmod(newest.wall_ns, 1_000_000_000)
+        for entry in self._entries.values():
+            if entry.value is None or newest.monotonic_s >= entry.valid_until_s:
+                continue
+            row = entry.row
+            match entry.value:
+                case bool():
+                    row.on = entry.value
+                case str():
+                    row.text = entry.value
+                case _:
+                    row.number = entry.value
+            if entry.received is newest:
+                row.ClearField("age_s")
+            else:
+                row.age_s = max(newest.monotonic_s - entry.received.monotonic_s, 0.0)
+            message.signals.append(row)
+        self._publisher.put(message, source_time_ns=newest.wall_ns, dated_by=newest.clock)
