@@ -21,6 +21,35 @@ def button(page, name):
     return page.get_by_role("button", name=name, exact=True)
 
 
+def who_controls(page):
+    """Return who is in control, in words."""
+    return page.get_by_role("status", name="Who is in control", exact=True)
+
+
+def state_word(page):
+    """Return the robot's state, in a word."""
+    return page.get_by_role("status", name="State", exact=True)
+
+
+def control_notice(page):
+    """Return the outcome of the last command, or what to do first."""
+    return page.get_by_role("region", name="Control", exact=True).get_by_label("Outcome", exact=True)
+
+
+def joints_notice(page):
+    """Return the outcome of the last motion of a joint, or what to do first."""
+    return page.get_by_role("region", name="Joints", exact=True).get_by_label("Outcome", exact=True)
+
+
+def stop_button(page):
+    return page.get_by_role("button", name=re.compile("^(Stop request|Stop cannot be sent|停止请求)"))
+
+
+def stop_panel(page):
+    """Return why the robot is stopped; it is there only while it is."""
+    return page.get_by_role("group", name="Stopped", exact=True)
+
+
 def answer(page, name):
     """Press a button of a request for control, which ignores presses while it is new."""
     pressed = button(page, name)
@@ -59,7 +88,7 @@ def take(page, name="li", slow=True):
     """
     if slow:
         stand_still(page, 0.6)
-    holder = page.locator(".holder")
+    holder = who_controls(page)
     for _ in range(10):
         # The gateway refuses control while a busy disk takes longer than a second for the audit log.
         page.get_by_label("Your name").fill(name)
@@ -74,7 +103,7 @@ def ready(page, name="li"):
     """Acquire control, reset a latched stop, and home."""
     take(page, name)
     reset = page.get_by_role("button", name=re.compile("^Reset"))
-    home, notice = button(page, "Home"), page.locator(".control .notice")
+    home, notice = button(page, "Home"), control_notice(page)
     # The page shows the newest state that it received: a stop sent just before may still arrive.
     for _ in range(100):
         if reset.count() and reset.first.is_enabled():
@@ -88,14 +117,14 @@ def ready(page, name="li"):
         page.wait_for_timeout(200)
     expect(page.locator("[data-joint]")).to_have_text(HOME)
     expect(page.locator(".facts")).to_contain_text("· homed")
-    expect(page.locator(".headline .state")).to_have_text("Idle")
+    expect(state_word(page)).to_have_text("Idle")
 
 
 def sent(page, do):
     """Execute an action that sends a command; repeat it if a slow machine sends the command after its
     not_after.
     """
-    notice = page.locator(".control .notice")
+    notice = control_notice(page)
     for _ in range(20):
         do()
         expect(notice).to_have_text(re.compile("^(Sent|Done|Not sent)"))
@@ -116,12 +145,12 @@ def move_slowly(page):
     """Start one motion of more than half a minute, at 0.9 degrees a second."""
     set_speed(page, 1)
     wait_to_move(page, "waist", lambda: drag(page, "waist", 60))
-    expect(page.locator(".headline .state")).to_have_text("Moving")
+    expect(state_word(page)).to_have_text("Moving")
 
 
 def clear_stop(page):
     page.get_by_role("button", name="Reset stop").click()
-    expect(page.locator(".stopped")).to_have_count(0)
+    expect(stop_panel(page)).to_have_count(0)
     set_speed(page, 100)
     button(page, "Release").click()
 

@@ -5,7 +5,17 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.robot_page import ARM, button, fault, ready, serious, set_speed
+from tests.browser.robot_page import (
+    ARM,
+    button,
+    fault,
+    joints_notice,
+    ready,
+    serious,
+    set_speed,
+    stop_button,
+    stop_panel,
+)
 
 pytestmark = pytest.mark.browser
 
@@ -21,7 +31,7 @@ def test_an_arm_that_does_not_heed_its_stop_is_an_alarm_that_nothing_hides(open_
         page.get_by_role("slider", name="Target of waist").press(key)
     expect(page.locator(STATE)).to_have_text("Moving")
     with fault(plant, "deaf"):
-        page.locator("button.stop").click()
+        stop_button(page).click()
         for each in (page, phone):
             expect(each.locator(".alarm-band")).to_have_text(
                 "It moves although it was told to stop: use the emergency stop at the robot."
@@ -32,25 +42,23 @@ def test_an_arm_that_does_not_heed_its_stop_is_an_alarm_that_nothing_hides(open_
         phone.mouse.wheel(0, 2000)
         expect(phone.locator(".alarm-band")).to_be_in_viewport(ratio=1)
         expect(page.locator(STATE)).to_have_text("Does not stop")
-        expect(page.locator(".stopped")).to_contain_text(
-            re.compile(r"Stop sent by li at \S+: the arm still moves")
-        )
+        expect(stop_panel(page)).to_contain_text(re.compile(r"Stop sent by li at \S+: the arm still moves"))
         expect(page.locator("body")).not_to_contain_text("Stopped by")
         expect(page.get_by_role("button", name="Reset stop")).to_be_disabled()
-        expect(page.locator(".stopped")).to_contain_text("It can be reset when the arm rests")
+        expect(stop_panel(page)).to_contain_text("It can be reset when the arm rests")
         tile = fleet.locator(".tile").filter(has_text="arm")
         expect(tile.locator(".tile-problem.alarm")).to_contain_text("use the emergency stop at the robot")
         # Of the page that is not in control: the check may block a page for longer than control lasts.
         assert serious(phone) == []
     # The stop is sent again each 2 s; now it is heeded.
     expect(page.locator(STATE)).to_have_text("Stopped")
-    expect(page.locator(".stopped")).to_contain_text("Stopped by li")
+    expect(stop_panel(page)).to_contain_text("Stopped by li")
     past = page.locator(".alarm-band.past")
     expect(past).to_have_text(re.compile(r"At \S+ it moved on although it was told to stop"))
     button(past, "Dismiss").click()
     expect(past).to_have_count(0)
     page.get_by_role("button", name="Reset stop").click()
-    expect(page.locator(".stopped")).to_have_count(0)
+    expect(stop_panel(page)).to_have_count(0)
     set_speed(page, 100)
     button(page, "Release").click()
 
@@ -60,13 +68,13 @@ def test_a_controllers_own_fault_can_be_reset_and_nothing_else_is_offered(open_p
     ready(page)
     with fault(plant, "fault"):
         expect(page.locator(STATE)).to_have_text("Fault")
-        expect(page.locator(".stopped")).to_contain_text("The controller has a fault")
+        expect(stop_panel(page)).to_contain_text("The controller has a fault")
         expect(button(page, "Home")).to_be_disabled()
         expect(button(page, "waist +1°")).to_be_disabled()
-        expect(page.locator(".joints .notice")).to_have_text("See to it, then reset: no motion until then.")
+        expect(joints_notice(page)).to_have_text("See to it, then reset: no motion until then.")
         assert page.get_by_role("slider", name="Target of").count() == 0
     button(page, "Reset").click()
-    expect(page.locator(".stopped")).to_have_count(0)
+    expect(stop_panel(page)).to_have_count(0)
     expect(button(page, "Home")).to_be_enabled()
     # At the end, because the check may block the page for longer than control lasts.
     with fault(plant, "fault"):
@@ -78,7 +86,7 @@ def test_in_local_mode_the_page_says_so_and_offers_no_motion(open_page, plant):
     page = open_page(ARM, drawn=False)
     ready(page)
     with fault(plant, "local"):
-        expect(page.locator(".joints .notice")).to_contain_text("the controller is in local mode")
+        expect(joints_notice(page)).to_contain_text("the controller is in local mode")
         expect(button(page, "Home")).to_be_disabled()
     expect(button(page, "Home")).to_be_enabled()
     button(page, "Release").click()

@@ -11,7 +11,7 @@ from playwright.sync_api import expect
 
 from robomesh.session import open_session
 from tests.browser.conftest import CHROMIUM
-from tests.browser.robot_page import keep_picture, serious
+from tests.browser.robot_page import keep_picture, serious, stop_panel, who_controls
 from tests.conftest import last_value
 from tests.site import READY_S, running_site
 from web import build_page
@@ -138,5 +138,5 @@ def test_every_monitor_sees_the_line_of_the_program_that_runs_and_that_it_is_don
         expect(line).to_have_text(re.compile("to-and-fro: done"), timeout=SLOWLY_MS)
     # Its sender gave control back when the arm rested, and stopped nothing.
     assert sent.result().returncode == 0
-    expect(page.locator(".holder")).to_have_text("Nobody is in control")
-    expect(page.locator(".stopped")).to_have_count(0)
+    expect(who_controls(page)).to_have_text("Nobody is in control")
+    expect(stop_panel(page)).to_have_count(0)

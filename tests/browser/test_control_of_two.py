@@ -14,11 +14,16 @@ from tests.browser.robot_page import (
     audited,
     button,
     clear_stop,
+    control_notice,
     degrees,
+    joints_notice,
     move_slowly,
     ready,
     serious,
+    state_word,
+    stop_panel,
     take,
+    who_controls,
 )
 
 pytestmark = pytest.mark.browser
@@ -36,7 +41,7 @@ def ask(page, name, reason=""):
     button(page, "Ask for control").click()
     page.get_by_label("Reason").fill(reason)
     page.get_by_label("Reason").press("Enter")
-    expect(page.locator(".control .notice")).to_contain_text("is told that you ask")
+    expect(control_notice(page)).to_contain_text("is told that you ask")
 
 
 def take_over(page, name, loser, reason):
@@ -63,9 +68,9 @@ def test_one_asks_and_is_handed_control(open_arm):
     expect(bob.locator(".wish")).to_contain_text("alice offers you control.")
     assert serious(bob) == []
     answer(bob, "Accept")
-    expect(bob.locator(".holder")).to_have_text("You are in control")
-    expect(alice.locator(".holder")).to_have_text("bob is in control")
-    expect(alice.locator(".control .notice")).to_have_text("bob has accepted control.")
+    expect(who_controls(bob)).to_have_text("You are in control")
+    expect(who_controls(alice)).to_have_text("bob is in control")
+    expect(control_notice(alice)).to_have_text("bob has accepted control.")
     expect(button(alice, "Home")).to_be_disabled()
     button(bob, "Release").click()
 
@@ -79,7 +84,7 @@ def test_an_offer_can_be_put_off_and_withdrawn(open_arm):
     expect(bob.locator(".wish")).to_have_count(0)
     expect(alice.locator(".wish")).to_contain_text("Offered to bob, no answer yet")
     answer(alice, "Withdraw")
-    expect(alice.locator(".control .notice")).to_have_text("Offer withdrawn.")
+    expect(control_notice(alice)).to_have_text("Offer withdrawn.")
     # She has answered him: his request does not come back. He sees how long ago he asked.
     expect(alice.locator(".wish")).to_have_count(0)
     expect(bob.locator(".wish")).to_have_text(
@@ -99,11 +104,9 @@ def test_taking_over_needs_a_reason_which_the_loser_is_told(open_arm):
     bob.keyboard.press("Escape")
     expect(button(bob, "Take over…")).to_be_focused()
     take_over(bob, "bob", "alice", "smoke at the gripper")
-    expect(bob.locator(".holder")).to_have_text("You are in control")
-    expect(alice.locator(".control .notice")).to_have_text(
-        "Control ended: taken by bob: smoke at the gripper"
-    )
-    expect(alice.locator(".holder")).to_have_text("bob is in control")
+    expect(who_controls(bob)).to_have_text("You are in control")
+    expect(control_notice(alice)).to_have_text("Control ended: taken by bob: smoke at the gripper")
+    expect(who_controls(alice)).to_have_text("bob is in control")
     assert serious(alice) == []
     button(bob, "Release").click()
 
@@ -117,10 +120,10 @@ def test_a_question_stays_while_it_is_not_known_who_is_in_control(open_arm):
     button(bob, "Take over…").click()
     bob.get_by_label("Reason").fill("smoke at the gripper")
     answers["come"] = False
-    expect(bob.locator(".holder")).to_have_text("Who is in control is not known")
+    expect(who_controls(bob)).to_have_text("Who is in control is not known")
     expect(bob.get_by_label("Reason")).to_have_value("smoke at the gripper")
     answers["come"] = True
-    expect(bob.locator(".holder")).not_to_have_text("Who is in control is not known")
+    expect(who_controls(bob)).not_to_have_text("Who is in control is not known")
     expect(bob.get_by_label("Reason")).to_be_focused()
     bob.keyboard.press("Escape")
     expect(button(bob, "Take over…")).to_be_focused()
@@ -133,14 +136,12 @@ def test_a_running_motion_is_not_handed_over_but_stopped_by_a_take_over(open_arm
     ask(bob, "bob")
     answer(alice, "Hand over to bob")
     answer(bob, "Accept")
-    expect(bob.locator(".control .notice")).to_contain_text(
-        "Control not given: alice's motion is still running"
-    )
+    expect(control_notice(bob)).to_contain_text("Control not given: alice's motion is still running")
     button(bob, "Take over…").click()
     expect(bob.locator(".reason")).to_contain_text("alice's motion is running: it will be stopped")
     take_over(bob, "bob", "alice", "wrong way")
-    expect(bob.locator(".stopped")).to_contain_text("taken by bob: wrong way")
-    expect(bob.locator(".headline .state")).to_have_text("Stopped")
+    expect(stop_panel(bob)).to_contain_text("taken by bob: wrong way")
+    expect(state_word(bob)).to_have_text("Stopped")
     clear_stop(bob)
 
 
@@ -151,9 +152,9 @@ def test_a_killed_browser_loses_control_at_once_and_its_motion_is_stopped(open_a
     with pytest.raises(Error, match="crash"):
         alice.goto("chrome://crash")
     # Because its session is lost: its lease would have ended too, but later, and for another reason.
-    expect(bob.locator(".stopped")).to_contain_text("alice's page or program has disconnected")
-    expect(bob.locator(".holder")).to_have_text("Nobody is in control")
-    expect(bob.locator(".headline .state")).to_have_text("Stopped")
+    expect(stop_panel(bob)).to_contain_text("alice's page or program has disconnected")
+    expect(who_controls(bob)).to_have_text("Nobody is in control")
+    expect(state_word(bob)).to_have_text("Stopped")
     take(bob, "bob")
     clear_stop(bob)
 
@@ -162,12 +163,12 @@ def test_the_same_name_in_two_windows_is_in_control_in_one(open_arm):
     first, second = open_arm(), open_arm()
     take(first, "li")
     second.get_by_label("Your name").fill("li")
-    expect(second.locator(".holder")).to_have_text("You (li) are in control in another window")
+    expect(who_controls(second)).to_have_text("You (li) are in control in another window")
     expect(button(second, "Ask for control")).to_have_count(0)
     take_over(second, "li", "li", "I sit here now")
-    expect(second.locator(".holder")).to_have_text("You are in control")
-    expect(first.locator(".control .notice")).to_have_text("Control ended: taken by li: I sit here now")
-    expect(first.locator(".holder")).to_have_text("You (li) are in control in another window")
+    expect(who_controls(second)).to_have_text("You are in control")
+    expect(control_notice(first)).to_have_text("Control ended: taken by li: I sit here now")
+    expect(who_controls(first)).to_have_text("You (li) are in control in another window")
     button(second, "Release").click()
 
 
@@ -182,7 +183,7 @@ def test_each_press_is_one_step_in_order_none_lost_and_none_twice(open_arm, plan
             expect(page.locator('[data-joint="waist"]')).to_have_text(f"{waist + 3:.2f}°", timeout=15_000)
             break
         # On a busy machine the state is late at times: the page drops the steps that wait, and says so.
-        expect(page.locator(".joints .notice")).to_contain_text("not sent")
+        expect(joints_notice(page)).to_contain_text("not sent")
     expect(page.locator('[data-joint="waist"]')).to_have_text(f"{waist + 3:.2f}°")
     expect(page.locator('[data-joint="roll"]')).to_have_text(f"{roll - 1:.2f}°".replace("-", "−"))
     button(page.locator(".joints"), "0.1").click()
@@ -192,7 +193,7 @@ def test_each_press_is_one_step_in_order_none_lost_and_none_twice(open_arm, plan
         page.keyboard.down("Enter")
     page.keyboard.up("Enter")
     expect(page.locator('[data-joint="waist"]')).to_have_text(f"{waist + 2.9:.2f}°")
-    expect(page.locator(".headline .state")).to_have_text("Idle")
+    expect(state_word(page)).to_have_text("Idle")
     assert audited(plant, "MOVE_RELATIVE") == moves + 5
 
 
@@ -203,10 +204,10 @@ def test_a_step_beyond_a_limit_is_refused_at_its_row_with_value_and_limit(open_a
     for key in ("PageDown", "PageDown", "Enter"):
         handle.press(key)
     expect(page.locator('[data-joint="elbow"]')).to_have_text("−110.00°")
-    expect(page.locator(".headline .state")).to_have_text("Idle")
+    expect(state_word(page)).to_have_text("Idle")
     button(page.locator(".joints"), "5").click()
     button(page, "elbow −5°").click()
-    expect(page.locator(".joints .notice")).to_have_text(
+    expect(joints_notice(page)).to_have_text(
         "Not sent: joint elbow at −115.00° is beyond its limit −110.00°."
     )
     expect(page.locator(".limit.refused")).to_have_text("−110")
@@ -226,7 +227,7 @@ def test_space_on_a_step_button_stops_and_steps_nothing(open_arm, plant):
     moves = audited(plant, "MOVE_RELATIVE")
     button(page, "waist +1°").focus()
     page.keyboard.press("Space")
-    expect(page.locator(".headline .state")).to_have_text("Stopped")
+    expect(state_word(page)).to_have_text("Stopped")
     expect(button(page, "waist +1°")).to_be_disabled()
     assert audited(plant, "MOVE_RELATIVE") == moves
     page.get_by_role("button", name="Reset stop").click()

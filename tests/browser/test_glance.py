@@ -8,7 +8,7 @@ from playwright.sync_api import expect
 from protocol_gateway.authority import lease_rules
 from robomesh.keys import WHOLE_SITE
 from tests.browser.rendering import rendering
-from tests.browser.robot_page import ARM, button, take
+from tests.browser.robot_page import ARM, button, control_notice, take
 
 pytestmark = pytest.mark.browser
 
@@ -143,7 +143,7 @@ def test_a_request_for_control_that_expires_says_so_to_its_operator(open_page, m
     button(other, "Ask for control").click()
     other.get_by_label("Reason").press("Enter")
     expect(mine.locator(".wish")).to_contain_text("bob asks for control")
-    expect(other.locator(".control .notice")).to_contain_text("li did not answer your request")
+    expect(control_notice(other)).to_contain_text("li did not answer your request")
     expect(mine.locator(".wish")).to_have_count(0)
     button(mine, "Release").click()
 

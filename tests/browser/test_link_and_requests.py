@@ -9,7 +9,7 @@ from playwright.sync_api import expect
 
 from robomesh.errors import RefusedError
 from robomesh.schemas.robomesh_pb2 import LeaseRequest
-from tests.browser.robot_page import ARM, button, serious
+from tests.browser.robot_page import ARM, button, serious, state_word
 
 pytestmark = pytest.mark.browser
 
@@ -38,7 +38,7 @@ def test_old_clients_are_counted_where_they_may_attach(open_page, plant):
 
 def test_a_flooding_controller_is_told_in_words(open_page, plant):
     page = open_page(PT600, drawn=False)
-    expect(page.locator(".headline .state")).to_have_text(re.compile("Idle|Moving"))
+    expect(state_word(page)).to_have_text(re.compile("Idle|Moving"))
     port = plant.call(plant.stop_controller("pt600"))
     try:
         plant.call(plant.start_controller("pt600", port, demo=True, rate_hz=100.0, faults=("flood",)))

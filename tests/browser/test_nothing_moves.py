@@ -7,7 +7,16 @@ import pytest
 from playwright.sync_api import expect
 
 from robomesh.schemas.robomesh_pb2 import Event
-from tests.browser.robot_page import ARM, button, ready
+from tests.browser.robot_page import (
+    ARM,
+    button,
+    control_notice,
+    joints_notice,
+    ready,
+    stop_button,
+    stop_panel,
+    who_controls,
+)
 
 pytestmark = pytest.mark.browser
 
@@ -34,7 +43,7 @@ def page(request, open_page):
     ready(page)
     yield page
     button(page, "Release").click()
-    expect(page.locator(".holder")).to_have_text("Nobody is in control")
+    expect(who_controls(page)).to_have_text("Nobody is in control")
 
 
 def test_controls_keep_their_places_while_messages_come_and_go(page, open_page):
@@ -55,18 +64,18 @@ def test_controls_keep_their_places_while_messages_come_and_go(page, open_page):
     page.get_by_label(re.compile("^Type a target of waist: ")).click()
     page.get_by_label("Type a target of waist", exact=True).fill("179")
     page.keyboard.press("Enter")
-    expect(page.locator(".joints .notice")).to_contain_text("Not sent")
+    expect(joints_notice(page)).to_contain_text("Not sent")
     assert page.evaluate(PLACES) == before
 
 
 def test_controls_keep_their_places_when_stopped_and_without_a_connection(page):
     before = page.evaluate(PLACES)
-    page.locator("button.stop").click()
-    expect(page.locator(".stopped")).to_be_visible()
+    stop_button(page).click()
+    expect(stop_panel(page)).to_be_visible()
     stopped = page.evaluate(PLACES)
     assert stopped == {name: place for name, place in before.items() if name in stopped}
     page.get_by_role("button", name="Reset stop").click()
-    expect(page.locator(".stopped")).to_have_count(0)
+    expect(stop_panel(page)).to_have_count(0)
     assert page.evaluate(PLACES) == before
 
 
@@ -83,7 +92,7 @@ def test_a_press_on_a_control_that_has_just_moved_is_ignored(page):
     at_rest = waist.inner_text()
     x, y = page.evaluate(push, 30)
     page.mouse.click(x, y)
-    expect(page.locator(".control .notice")).to_contain_text("Not sent: the page had moved this button")
+    expect(control_notice(page)).to_contain_text("Not sent: the page had moved this button")
     page.evaluate(push, 0)
     page.wait_for_timeout(600)
     assert waist.inner_text() == at_rest

@@ -5,7 +5,22 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.robot_page import ARM, answers_of, button, move_slowly, ready, set_speed, stand_still, take
+from tests.browser.robot_page import (
+    ARM,
+    answers_of,
+    button,
+    control_notice,
+    joints_notice,
+    move_slowly,
+    ready,
+    set_speed,
+    stand_still,
+    state_word,
+    stop_button,
+    stop_panel,
+    take,
+    who_controls,
+)
 
 pytestmark = pytest.mark.browser
 
@@ -35,20 +50,20 @@ def test_everybody_sees_the_speed_that_was_set_and_a_low_one_stands_out(open_pag
 def test_what_was_sent_is_done_when_the_arm_is_there_and_gone_when_it_was_stopped(open_page):
     page = open_page(ARM, drawn=False)
     ready(page)
-    notice = page.locator(".joints .notice")
+    notice = joints_notice(page)
     handle = page.get_by_role("slider", name="Target of waist")
     handle.press("PageUp")
     handle.press("Enter")
     expect(notice).to_contain_text("Sent: waist")
     expect(notice).to_contain_text("Done: waist")
     button(page, "Home").click()
-    expect(page.locator(".control .notice")).to_have_text("Sent: Home")
-    expect(page.locator(".control .notice")).to_have_text("Done: Home")
+    expect(control_notice(page)).to_have_text("Sent: Home")
+    expect(control_notice(page)).to_have_text("Done: Home")
     handle.press("PageUp")
     handle.press("Enter")
-    expect(page.locator(".headline .state")).to_have_text("Moving")
-    page.locator("button.stop").click()
-    expect(page.locator(".headline .state")).to_have_text("Stopped")
+    expect(state_word(page)).to_have_text("Moving")
+    stop_button(page).click()
+    expect(state_word(page)).to_have_text("Stopped")
     expect(page.locator("main")).not_to_contain_text("Sent: ")
     expect(page.locator(".event-list")).to_contain_text(
         re.compile(r"li asked for a stop at \d\d:\d\d:\d\d\.")
@@ -63,13 +78,13 @@ def test_a_motion_that_another_goes_on_from_has_not_failed(open_page):
     button(page.locator(".joints"), "5").click()
     button(page, "waist +5°").click()
     expect(page.locator('[data-joint="waist"]')).to_have_text("5.00°")
-    expect(page.locator(".joints .notice")).to_contain_text("Done: waist")
+    expect(joints_notice(page)).to_contain_text("Done: waist")
     # The target is reached, but the gateway still waits for the arm to settle.
     button(page, "Home").click()
     expect(page.locator('[data-joint="waist"]')).to_have_text("0.00°")
     button(page, "waist +5°").click()
-    expect(page.locator(".joints .notice")).to_contain_text("Done: waist")
-    expect(page.locator(".headline .state")).to_have_text("Idle")
+    expect(joints_notice(page)).to_contain_text("Done: waist")
+    expect(state_word(page)).to_have_text("Idle")
     expect(page.locator("main")).not_to_contain_text("Ended before its target")
     page.wait_for_timeout(2000)  # longer than a message waits for news of its motion
     expect(page.locator("main")).not_to_contain_text("Ended before its target")
@@ -83,10 +98,10 @@ def test_a_loss_is_told_of_until_who_took_control_has_gone(open_page):
     button(bob, "Take over…").click()
     bob.get_by_label("Reason").fill("smoke")
     button(bob, "Take over from alice").click()
-    expect(alice.locator(".control .notice")).to_have_text("Control ended: taken by bob: smoke")
+    expect(control_notice(alice)).to_have_text("Control ended: taken by bob: smoke")
     button(bob, "Release").click()
-    expect(alice.locator(".holder")).to_have_text("Nobody is in control")
-    expect(alice.locator(".control .notice")).not_to_contain_text("Control ended")
+    expect(who_controls(alice)).to_have_text("Nobody is in control")
+    expect(control_notice(alice)).not_to_contain_text("Control ended")
 
 
 def test_a_window_that_is_closed_has_not_given_control_back(open_page):
@@ -94,7 +109,7 @@ def test_a_window_that_is_closed_has_not_given_control_back(open_page):
     ready(alice, "alice")
     move_slowly(alice)
     alice.close()
-    expect(bob.locator(".stopped")).to_contain_text(
+    expect(stop_panel(bob)).to_contain_text(
         re.compile("alice's page or program has disconnected|page was hidden or closed")
     )
     take(bob, "bob")
@@ -107,21 +122,21 @@ def test_a_browser_that_is_seen_to_be_slow_keeps_control_and_is_told_when_it_is_
     page, other = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
     answers = answers_of(page)
     page.reload()
-    expect(page.locator(".holder")).to_have_text("Nobody is in control")
+    expect(who_controls(page)).to_have_text("Nobody is in control")
     take(page, "alice")
-    expect(other.locator(".holder")).to_have_text("alice is in control")
+    expect(who_controls(other)).to_have_text("alice is in control")
     stand_still(page, 2.2)  # longer than the lease of a quick browser, shorter than its own
-    expect(other.locator(".holder")).to_have_text("alice is in control")
-    expect(page.locator(".holder")).to_have_text("You are in control")
+    expect(who_controls(other)).to_have_text("alice is in control")
+    expect(who_controls(page)).to_have_text("You are in control")
     # A renewal is asked for, and its answer comes too late.
     answers["come"] = False
     page.wait_for_timeout(1000)
     stand_still(page, 6.5)
     answers["come"] = True
-    expect(page.locator(".control .notice")).to_contain_text(
+    expect(control_notice(page)).to_contain_text(
         "Control ended: this browser was too slow to renew it in time."
     )
-    expect(other.locator(".holder")).to_have_text("Nobody is in control")
+    expect(who_controls(other)).to_have_text("Nobody is in control")
 
 
 def block(page, seconds):
@@ -133,7 +148,7 @@ def block(page, seconds):
 
 def test_a_busy_page_keeps_control_and_a_blocked_one_has_lost_it_after_five_seconds(open_page):
     page, other = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
-    mine, holder = page.locator(".holder"), other.locator(".holder")
+    mine, holder = who_controls(page), who_controls(other)
     for _ in range(5):  # a busy machine may delay the worker as well
         page.reload()  # a page that was seen to be slow gets longer leases
         expect(holder).to_have_text("Nobody is in control")
@@ -146,14 +161,14 @@ def test_a_busy_page_keeps_control_and_a_blocked_one_has_lost_it_after_five_seco
     expect(mine).to_have_text("You are in control")
     assert page.locator(".control .since").inner_text() == since
     block(page, 5)
-    expect(page.locator(".control .notice")).to_contain_text("too slow")
+    expect(control_notice(page)).to_contain_text("too slow")
     expect(holder).to_have_text("Nobody is in control")
 
 
 def test_an_exact_target_can_be_typed_and_what_is_none_is_refused_in_words(open_page):
     page = open_page(ARM, drawn=False)
     ready(page)
-    notice = page.locator(".joints .notice")
+    notice = joints_notice(page)
     value = page.get_by_label("Type a target of waist")
     value.click()
     value.fill("12,5")

@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.robot_page import ARM, button, clear_stop, take
+from tests.browser.robot_page import ARM, button, clear_stop, stop_button, take
 
 pytestmark = pytest.mark.browser
 
@@ -74,7 +74,7 @@ def test_a_line_that_died_in_silence_is_told_and_opened_anew_and_sleep_makes_not
 def test_a_stop_request_that_a_dead_line_swallowed_is_sent_by_another(open_page):
     page = open_idle(open_page)
     page.evaluate(DEAD)
-    page.locator("button.stop").click()
+    stop_button(page).click()
     page.evaluate("wall -= 60e3")  # it is recent, however slow this machine is
     until(page, "sockets[0].lost > 0 && sockets.length > 1")
     expect(page.locator(".stop-notice.done")).to_contain_text("Stop sent to hall/arm")
@@ -84,7 +84,7 @@ def test_a_stop_request_that_a_dead_line_swallowed_is_sent_by_another(open_page)
 
 def test_a_stop_that_cannot_be_sent_is_shown_so_and_sent_when_the_connection_returns(open_page, plant):
     page = open_idle(open_page)
-    stop, notice = page.locator("button.stop"), page.locator(".stop-notice")
+    stop, notice = stop_button(page), page.locator(".stop-notice")
     place = stop.bounding_box()
     with plant.standing_still():
         expect(stop).to_have_text("Stop cannot be sent: use the emergency stop")
@@ -106,7 +106,7 @@ def test_a_stop_that_cannot_be_sent_is_shown_so_and_sent_when_the_connection_ret
 
 def test_an_old_press_of_stop_is_offered_when_the_connection_returns(open_page, plant):
     page = open_idle(open_page)
-    stop, failed = page.locator("button.stop"), page.locator(".stop-notice.refused")
+    stop, failed = stop_button(page), page.locator(".stop-notice.refused")
     page.evaluate(DEAD)
     with plant.standing_still():
         stop.click()

@@ -8,7 +8,19 @@ import pytest
 from playwright.sync_api import expect, sync_playwright
 
 from tests.browser.conftest import ARGUMENTS, CHROMIUM, LAUNCH_MS, NO_WEBGL, PATIENCE_MS
-from tests.browser.robot_page import button, degrees, drag, ready, sent, take, wait_to_move
+from tests.browser.robot_page import (
+    button,
+    degrees,
+    drag,
+    ready,
+    sent,
+    state_word,
+    stop_button,
+    stop_panel,
+    take,
+    wait_to_move,
+    who_controls,
+)
 from tests.site import kill, robomesh, running_site, wait_until
 
 pytestmark = [pytest.mark.browser, pytest.mark.processes]
@@ -37,15 +49,15 @@ def test_home_trace_move_and_stop_from_the_page_reach_the_controller_and_the_rec
         wait_until(lambda: recordings(site) and recordings(site)[0]["topics"], what="no recording began")
         before = degrees(page, "waist")
         wait_to_move(page, "waist", lambda: drag(page, "waist", 60))
-        expect(page.locator(".headline .state")).to_have_text("Idle")
+        expect(state_word(page)).to_have_text("Idle")
         assert degrees(page, "waist") > before + 5
 
         drag(page, "waist", -120)
-        expect(page.locator(".headline .state")).to_have_text("Moving")
-        page.locator("button.stop").click()
-        expect(page.locator(".headline .state")).to_have_text("Stopped")
+        expect(state_word(page)).to_have_text("Moving")
+        stop_button(page).click()
+        expect(state_word(page)).to_have_text("Stopped")
         page.get_by_role("button", name="Reset stop").click()
-        expect(page.locator(".stopped")).to_have_count(0)
+        expect(stop_panel(page)).to_have_count(0)
         sent(page, button(page, "Trace off").click)
         wait_until(lambda: not recordings(site)[0]["open"], what="the recording did not close")
         button(page, "Release").click()
@@ -74,11 +86,11 @@ def test_a_gateway_that_answers_no_more_is_told_as_what_it_may_be(site):
             )
             expect(notice).to_contain_text("the arm may still be moving")
             expect(button(page, "Home")).to_be_disabled()
-            expect(page.locator(".holder")).to_have_text("Who is in control is not known")
+            expect(who_controls(page)).to_have_text("Who is in control is not known")
         finally:
             kill(gateway, signal.SIGCONT)
         expect(notice).to_contain_text(re.compile(r"not renewed within \d s"))
-        expect(page.locator(".holder")).to_have_text("Nobody is in control")
+        expect(who_controls(page)).to_have_text("Nobody is in control")
         browser.close()
 
 

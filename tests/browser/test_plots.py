@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.robot_page import ARM, button, serious
+from tests.browser.robot_page import ARM, button, serious, stop_button
 
 pytestmark = pytest.mark.browser
 
@@ -55,5 +55,5 @@ def test_an_invalid_layout_is_named_and_the_page_stays_whole(open_page):
     page.get_by_role("checkbox", name="Plots").uncheck()
     expect(page.get_by_role("region", name="Plot 1")).to_have_count(0)
     assert page.evaluate("location.hash") == f"{ARM}?hide=video,plots"
-    assert page.locator("button.stop").bounding_box() == stop
+    assert stop_button(page).bounding_box() == stop
     assert page.locator(".control").bounding_box() == control

@@ -5,7 +5,23 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.robot_page import ARM, HOME, audited, button, degrees, drag, ready, take, wait_to_move
+from tests.browser.robot_page import (
+    ARM,
+    HOME,
+    audited,
+    button,
+    control_notice,
+    degrees,
+    drag,
+    joints_notice,
+    ready,
+    state_word,
+    stop_button,
+    stop_panel,
+    take,
+    wait_to_move,
+    who_controls,
+)
 
 pytestmark = pytest.mark.browser
 
@@ -26,10 +42,10 @@ def test_a_moving_arm_is_drawn_as_it_moves(open_page):
 def test_control_needs_a_name_and_says_what_a_name_is(open_page):
     page = open_page(ARM, drawn=False)
     button(page, "Take control").click()
-    expect(page.locator(".control .notice")).to_contain_text("Enter your name first")
+    expect(control_notice(page)).to_contain_text("Enter your name first")
     page.get_by_label("Your name").fill("li wei/")
     button(page, "Take control").click()
-    expect(page.locator(".control .notice")).to_contain_text("“li wei/” cannot be used")
+    expect(control_notice(page)).to_contain_text("“li wei/” cannot be used")
 
 
 def test_without_control_nothing_on_the_page_can_move_the_arm(open_page, plant):
@@ -48,13 +64,11 @@ def test_a_slider_moves_the_joint_when_it_is_let_go_and_not_before(open_page, pl
     ready(page)
     moves, start = audited(plant, "MOVE_ABSOLUTE"), degrees(page, "waist")
     drag(page, "waist", 30, release=False)
-    expect(page.locator(".joints .notice")).to_contain_text("Target waist:")
+    expect(joints_notice(page)).to_contain_text("Target waist:")
     assert audited(plant, "MOVE_ABSOLUTE") == moves
     # Every link beyond the waist is shown where it would be.
     page.wait_for_selector('.canvas-place canvas[data-ghost="5"]')
-    wanted = float(
-        re.search(r"waist: (\S+)°", page.locator(".joints .notice").inner_text())[1].replace("−", "-")
-    )
+    wanted = float(re.search(r"waist: (\S+)°", joints_notice(page).inner_text())[1].replace("−", "-"))
     assert wanted > start + 5
     page.mouse.up()
     expect(page.locator('[data-joint="waist"]')).to_have_text(f"{wanted:.2f}°".replace("-", "−"))
@@ -73,10 +87,10 @@ def test_a_target_that_homing_left_behind_moves_no_joint_that_nobody_touched(ope
     wait_to_move(page, "waist", lambda: drag(page, "waist", 60))
     button(page, "Home").click()
     expect(page.locator("[data-joint]")).to_have_text(HOME)
-    expect(page.locator(".headline .state")).to_have_text("Idle")
+    expect(state_word(page)).to_have_text("Idle")
     home = degrees(page, "waist")
     wait_to_move(page, "wrist", lambda: drag(page, "wrist", 20))
-    expect(page.locator(".headline .state")).to_have_text("Idle")
+    expect(state_word(page)).to_have_text("Idle")
     assert degrees(page, "waist") == pytest.approx(home, abs=0.02)
 
 
@@ -87,7 +101,7 @@ def test_by_keys_a_target_is_set_and_enter_sends_it_and_escape_takes_it_back(ope
     handle = page.get_by_role("slider", name="Target of elbow")
     handle.focus()
     handle.press("ArrowRight")
-    expect(page.locator(".joints .notice")).to_contain_text("Target elbow:")
+    expect(joints_notice(page)).to_contain_text("Target elbow:")
     handle.press("Escape")
     assert audited(plant, "MOVE_ABSOLUTE") == moves
     start = degrees(page, "elbow")
@@ -103,18 +117,18 @@ def test_space_asks_for_a_stop_and_only_its_reset_lets_motion_go_on(open_page):
     drag(page, "waist", -60)
     page.keyboard.press("Space")
     expect(page.locator(".stop-notice")).to_contain_text("Stop sent to hall/arm")
-    expect(page.locator(".headline .state")).to_have_text("Stopped")
+    expect(state_word(page)).to_have_text("Stopped")
     expect(button(page, "Home")).to_be_disabled()
     page.get_by_role("button", name="Reset stop").click()
-    expect(page.locator(".stopped")).to_have_count(0)
+    expect(stop_panel(page)).to_have_count(0)
     expect(button(page, "Home")).to_be_enabled()
 
 
 def test_stop_works_without_control_and_names_who_asked(open_page):
     page = open_page(ARM, drawn=False)
     page.get_by_label("Your name").fill("wang")
-    page.locator("button.stop").click()
-    expect(page.locator(".stopped")).to_contain_text("Stopped by wang")
+    stop_button(page).click()
+    expect(stop_panel(page)).to_contain_text("Stopped by wang")
     expect(page.locator(".stopped p")).to_have_text("No motion until it is reset.")
     expect(page.get_by_role("button", name="Reset stop")).to_be_disabled()
 
@@ -123,17 +137,15 @@ def test_the_choice_of_a_program_says_where_it_is_and_its_stop_names_the_whole_f
     page = open_page("#/program", drawn=False)
     expect(page.locator(".crumbs")).to_contain_text("Go to a robot")
     expect(page.locator(".crumbs strong")).to_have_text("Program")
-    expect(page.locator("button.stop")).to_have_attribute(
-        "title", re.compile("^Asks all robots of the fleet")
-    )
+    expect(stop_button(page)).to_have_attribute("title", re.compile("^Asks all robots of the fleet"))
 
 
 def test_everybody_sees_who_is_in_control_and_when_nobody_is(open_page):
     mine, other = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
     take(mine, "li")
-    expect(other.locator(".holder")).to_have_text("li is in control")
+    expect(who_controls(other)).to_have_text("li is in control")
     button(mine, "Release").click()
-    expect(other.locator(".holder")).to_have_text("Nobody is in control")
+    expect(who_controls(other)).to_have_text("Nobody is in control")
 
 
 def test_a_hidden_page_gives_control_back(open_page):
@@ -143,19 +155,19 @@ def test_a_hidden_page_gives_control_back(open_page):
         "Object.defineProperty(document, 'hidden', {value: true, configurable: true});"
         "document.dispatchEvent(new Event('visibilitychange'))"
     )
-    expect(page.locator(".control .notice")).to_contain_text("this page was hidden")
-    expect(page.locator(".holder")).to_have_text("Nobody is in control")
+    expect(control_notice(page)).to_contain_text("this page was hidden")
+    expect(who_controls(page)).to_have_text("Nobody is in control")
     expect(page.locator(".event-list")).to_contain_text("li's page was hidden or closed")
 
 
 def test_going_to_another_page_gives_control_back(open_page):
     page, other = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
     take(page)
-    expect(other.locator(".holder")).to_have_text("li is in control")
+    expect(who_controls(other)).to_have_text("li is in control")
     given_back = other.locator(".event-list li", has_text="li released control")
     before = given_back.count()
     page.get_by_role("link", name="Fleet", exact=True).click()
-    expect(other.locator(".holder")).to_have_text("Nobody is in control")
+    expect(who_controls(other)).to_have_text("Nobody is in control")
     expect(given_back).to_have_count(before + 1)  # and not: its time was over
 
 
@@ -167,7 +179,7 @@ def test_when_the_controller_falls_silent_nothing_looks_live(open_page, plant):
     try:
         expect(page.locator(".scene-stale")).to_contain_text(re.compile(r"stale \d"))
         expect(page.locator('[data-joint="waist"]')).to_have_class(re.compile("stale"))
-        expect(page.locator(".headline .state")).to_have_text("No link")
+        expect(state_word(page)).to_have_text("No link")
         late = open_page("#/hall/pt600", drawn=False)  # a page that is opened now shows old values as old too
         expect(late.locator('[data-joint="waist"]')).to_have_class(re.compile("stale"))
         expect(late.locator(".scene-stale")).to_be_visible()
@@ -195,7 +207,7 @@ def test_a_phone_shows_one_column_with_stop_under_the_thumb(open_page):
         page.evaluate("path => (location.hash = path)", path)
         page.wait_for_selector(there)
         assert page.evaluate("document.documentElement.scrollWidth") == 360
-        stop = page.locator("button.stop").bounding_box()
+        stop = stop_button(page).bounding_box()
         assert stop["height"] >= 44
         assert stop["y"] + stop["height"] <= 740
         small = page.evaluate(
@@ -221,12 +233,12 @@ def test_a_control_room_sees_everything_of_a_robot_without_scrolling(open_page):
 
 def test_the_video_can_have_the_large_place_and_stop_stays_where_it_is(open_page):
     page = open_page(ARM, drawn=False)
-    stop = page.locator("button.stop").bounding_box()
+    stop = stop_button(page).bounding_box()
     place = page.get_by_label("Where the video stands")
     place.select_option("large")
     sizes = [page.locator(f".panel.{name}").bounding_box()["height"] for name in ("camera", "scene")]
     assert sizes[0] > 1.5 * sizes[1]
-    assert page.locator("button.stop").bounding_box() == stop
+    assert stop_button(page).bounding_box() == stop
     place.select_option("inset")
     video, scene = (page.locator(f".panel.{name}").bounding_box() for name in ("camera", "scene"))
     assert video["y"] > scene["y"]
@@ -238,8 +250,8 @@ def test_the_video_can_have_the_large_place_and_stop_stays_where_it_is(open_page
 def test_the_language_and_the_colours_can_be_switched_and_are_kept(open_page):
     page = open_page(ARM, drawn=False)
     button(page, "中文").click()
-    expect(page.locator("button.stop")).to_contain_text("停止请求")
+    expect(stop_button(page)).to_contain_text("停止请求")
     button(page, "浅色").click()
     page.reload()
-    expect(page.locator("button.stop")).to_contain_text("停止请求")
+    expect(stop_button(page)).to_contain_text("停止请求")
     assert page.evaluate("document.documentElement.dataset.theme") == "light"

@@ -10,7 +10,7 @@ from services.console.accounts import sessions
 from services.console.accounts.auth_service import change_account
 from services.console.accounts.file import AccountRole
 from tests.browser.conftest import NO_WEBGL, Plant, run_plant
-from tests.browser.robot_page import ARM, button, keep_picture, serious
+from tests.browser.robot_page import ARM, button, control_notice, keep_picture, serious, who_controls
 from tests.services.certificates import self_signed
 from tests.services.signing_in import PASSWORD, accounts_file
 from tests.site import wait_until
@@ -86,7 +86,7 @@ def test_an_operator_signs_in_has_control_in_its_own_name_and_signs_out_in_all_t
     expect(page.get_by_label("Your name")).to_have_value("li.hall")
     expect(page.get_by_label("Your name")).to_be_disabled()
     button(page, "Take control").click()
-    expect(page.locator(".holder")).to_have_text("You are in control")
+    expect(who_controls(page)).to_have_text("You are in control")
     assert "li.hall" in asked_by(plant, "ACQUIRE")
     second = open_tab()
     expect(signed_in(second)).to_contain_text("li")
@@ -98,7 +98,7 @@ def test_an_operator_signs_in_has_control_in_its_own_name_and_signs_out_in_all_t
         expect(tab.locator("[data-joint]")).to_have_count(0)
     # Control ended with the session: the next session finds none in control.
     sign_in(page, "li")
-    expect(page.locator(".holder")).to_have_text("Nobody is in control")
+    expect(who_controls(page)).to_have_text("Nobody is in control")
 
 
 def test_the_page_counts_the_seconds_until_the_next_attempt_and_shows_an_unknown_code_in_english(open_tab):
@@ -149,9 +149,9 @@ def test_who_becomes_a_monitor_is_told_so_and_so_is_everybody_else(open_tab, acc
     page = open_tab()
     sign_in(page, "li")
     button(page, "Take control").click()
-    expect(page.locator(".holder")).to_have_text("You are in control")
+    expect(who_controls(page)).to_have_text("You are in control")
     change_account(accounts, "role", "li", role=AccountRole.MONITOR)
-    expect(page.locator(".control .notice")).to_have_text("Control ended: li.hall is a monitor now")
+    expect(control_notice(page)).to_have_text("Control ended: li.hall is a monitor now")
     expect(page.locator(".event-list")).to_contain_text("control ended: li.hall is a monitor now")
     change_account(accounts, "role", "li", role=AccountRole.OPERATOR)
 
@@ -198,7 +198,7 @@ def test_the_right_to_command_that_rests_is_given_back_for_the_password(open_tab
     page.locator(".no-control").get_by_label("Password", exact=True).fill(PASSWORD)
     button(page, "Give the right back").click()
     button(page, "Take control").click()
-    expect(page.locator(".holder")).to_have_text("You are in control")
+    expect(who_controls(page)).to_have_text("You are in control")
 
 
 def test_on_a_phone_in_chinese_signing_in_fits_and_has_no_serious_finding(contexts, plant):

@@ -9,7 +9,7 @@ from robots.cells import Fixture
 from robots.schema import Pose
 from services.site_file.fixtures import Fixture as FixtureRow
 from services.site_file.fixtures import fixture_shape, fixture_to_site
-from tests.browser.robot_page import ARM, audited, button, drag, ready
+from tests.browser.robot_page import ARM, audited, button, drag, joints_notice, ready
 
 pytestmark = pytest.mark.browser
 
@@ -23,7 +23,7 @@ def test_a_target_that_would_collide_is_told_before_it_is_sent(open_page, plant)
     page = open_page(ARM, drawn=False)
     ready(page)
     before = audited(plant, "MOVE_ABSOLUTE")
-    notice = page.locator(".joints .notice")
+    notice = joints_notice(page)
     value = page.get_by_label("Type a target of waist")
     value.click()
     value.fill("45")

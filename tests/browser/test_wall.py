@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.rendering import rendering
-from tests.browser.robot_page import ARM, fault, serious, take
+from tests.browser.robot_page import ARM, fault, serious, state_word, take
 
 pytestmark = pytest.mark.browser
 
@@ -75,7 +75,7 @@ def test_a_tile_gives_only_the_reason_of_its_state(open_page, plant):
     page.evaluate("path => (location.hash = path)", ARM)
     take(page)
     page.get_by_role("button", name="Reset", exact=True).click()
-    expect(page.locator(".headline .state")).to_have_text("Idle")
+    expect(state_word(page)).to_have_text("Idle")
 
 
 def test_a_tile_asks_for_a_picture_of_its_size_which_moves_as_the_arm_does(open_page, rendered):

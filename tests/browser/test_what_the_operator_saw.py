@@ -11,7 +11,20 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from playwright.sync_api import expect
 
 from services import recorder
-from tests.browser.robot_page import ARM, button, clear_stop, degrees, fault, ready, serious, set_speed
+from tests.browser.robot_page import (
+    ARM,
+    button,
+    clear_stop,
+    control_notice,
+    degrees,
+    fault,
+    joints_notice,
+    ready,
+    serious,
+    set_speed,
+    state_word,
+    stop_button,
+)
 from tests.browser.test_video_panel import publisher_of, repeated
 from tests.site import wait_until
 
@@ -120,8 +133,8 @@ def test_a_frozen_video_lets_no_motion_start_until_it_is_live_or_off(open_page, 
     for name in ("Home", "waist +1°"):
         expect(button(page, name)).to_be_disabled()
     why = re.compile("^No new motion: the video “Front”.* is \\d+\\s*s old")
-    expect(page.locator(".control .notice")).to_have_text(why)
-    expect(page.locator(".joints .notice")).to_have_text(why)
+    expect(control_notice(page)).to_have_text(why)
+    expect(joints_notice(page)).to_have_text(why)
     expect(page.get_by_role("button", name="Stop request")).to_be_enabled()
     expect(button(page, "Hold")).to_be_enabled()
     with repeated(video.publish):
@@ -143,9 +156,9 @@ def test_a_video_that_freezes_ends_a_jog_but_no_motion(open_page, video):
         before = degrees(page, "waist")
         for _ in range(3):
             button(page, "waist +5°").click()
-        expect(page.locator(".headline .state")).to_have_text("Moving")
+        expect(state_word(page)).to_have_text("Moving")
     expect(button(page, "waist +5°")).to_be_disabled()
-    expect(page.locator(".headline .state")).to_have_text("Idle", timeout=60_000)
+    expect(state_word(page)).to_have_text("Idle", timeout=60_000)
     page.wait_for_timeout(1000)
     # The step that had begun, and none of those that waited.
     assert degrees(page, "waist") == pytest.approx(before + 5, abs=0.1)
@@ -162,7 +175,7 @@ def test_a_step_of_the_tool_is_followed_to_its_end_although_the_video_freezes(op
         button(tool, "Base").click()
         button(tool, "20").click()
         button(tool, "Base X +20\u202fmm").click()
-        expect(page.locator(".headline .state")).to_have_text("Running · moving")
+        expect(state_word(page)).to_have_text("Running · moving")
     expect(button(tool, "Base X +20\u202fmm")).to_be_disabled()
     expect(tool.locator(".notice")).to_contain_text("Done: Base X +20")
     button(page, "Release").click()
@@ -173,7 +186,7 @@ def test_a_frozen_state_lets_no_motion_start(open_page, plant):
     ready(page)
     with fault(plant, "burst"):
         expect(button(page, "Home")).to_be_disabled()
-        expect(page.locator(".control .notice")).to_have_text(re.compile("^No (new )?motion: "))
+        expect(control_notice(page)).to_have_text(re.compile("^No (new )?motion: "))
         expect(page.get_by_role("button", name="Stop request")).to_be_enabled()
     expect(button(page, "Home")).to_be_enabled(timeout=60_000)
     button(page, "Release").click()
@@ -190,12 +203,10 @@ def test_a_drawing_that_stands_still_while_the_arm_moves_lets_no_motion_start(op
     page.wait_for_timeout(1500)
     expect(button(page, "waist +5°")).to_be_enabled()
     button(page, "waist +5°").click()
-    expect(page.locator(".headline .state")).to_have_text("Moving")
-    expect(page.locator(".joints .notice")).to_have_text(
-        re.compile("^No new motion: the 3-D picture is .* old")
-    )
+    expect(state_word(page)).to_have_text("Moving")
+    expect(joints_notice(page)).to_have_text(re.compile("^No new motion: the 3-D picture is .* old"))
     expect(button(page, "waist +5°")).to_be_disabled()
-    page.locator("button.stop").click()
+    stop_button(page).click()
     clear_stop(page)
 
 

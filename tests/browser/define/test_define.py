@@ -25,7 +25,7 @@ from tests.browser.define.page import (
     tab,
     tools,
 )
-from tests.browser.robot_page import serious
+from tests.browser.robot_page import serious, who_controls
 from tests.robots.test_dh import KUKA_LIKE
 from tests.site import wait_until
 
@@ -91,10 +91,10 @@ def test_an_arm_of_dropped_files_gets_rows_and_limits_is_saved_started_and_moves
     page = open_page(f"#{path}", drawn=False)  # drawn by the processor here, it would leave a lease no time
     # The robot is starting: no gateway can grant control yet.
     expect(page.locator(".headline .facts")).to_contain_text("remote · not homed")
-    expect(page.locator(".holder")).to_have_text("Nobody is in control")
+    expect(who_controls(page)).to_have_text("Nobody is in control")
     page.get_by_label("Your name").fill("li")
     button(page, "Take control").click()
-    expect(page.locator(".holder")).to_have_text("You are in control")
+    expect(who_controls(page)).to_have_text("You are in control")
     button(page, "Home").click()
     expect(page.locator(".headline .facts")).to_contain_text("remote · homed")
     handle = page.get_by_role("slider", name="Target of elbow")

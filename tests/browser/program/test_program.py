@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.program.page import CHECKED_MS, PAGE, WAITS, write
-from tests.browser.robot_page import button, serious, take
+from tests.browser.robot_page import button, control_notice, serious, stop_button, take
 
 pytestmark = pytest.mark.browser
 
@@ -119,7 +119,7 @@ def test_a_program_runs_or_is_stopped_and_everybody_sees_how_far_it_is_and_what_
         expect(seen.locator(".headline .state.motion")).to_have_text("Running · waits 60\u202fs")
     expect(page.locator(".editor-band.running")).to_have_count(1, timeout=CHECKED_MS)
     # Only what the gateway would accept can be pressed.
-    expect(page.locator(".control .notice")).to_contain_text("A program runs")
+    expect(control_notice(page)).to_contain_text("A program runs")
     for refused in (button(page, "Home"), page.get_by_label("Speed"), page.locator("button.run")):
         expect(refused).to_be_disabled()
     expect(button(page, "Hold")).to_be_enabled()
@@ -131,9 +131,9 @@ def test_a_program_runs_or_is_stopped_and_everybody_sees_how_far_it_is_and_what_
     button(page, "Hold").click()
     for seen in (page, other):
         expect(seen.locator(".headline .state.warning")).to_have_text("Holding")
-    expect(page.locator(".control .notice")).to_contain_text("Resume first")
+    expect(control_notice(page)).to_contain_text("Resume first")
     expect(button(page, "Resume")).to_be_enabled()
-    page.locator("button.stop").click()
+    stop_button(page).click()
     for seen in (page, other):
         progress(seen, "ENDED", "stopped by li")
     page.get_by_role("button", name=re.compile("Reset stop")).click(timeout=CHECKED_MS)

@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.program.page import CHECKED_MS, PAGE, WAITS, write
-from tests.browser.robot_page import button, serious, take
+from tests.browser.robot_page import button, serious, stop_button, take
 
 pytestmark = pytest.mark.browser
 
@@ -148,7 +148,7 @@ def test_an_audit_entry_opens_the_text_that_ran_although_it_was_never_saved(open
     expect(page.locator('.progress[data-outcome="RUNNING"]')).to_contain_text(
         "unsaved run", timeout=CHECKED_MS
     )
-    page.locator("button.stop").click()
+    stop_button(page).click()
     expect(page.locator('.progress[data-outcome="ENDED"]')).to_be_visible(timeout=CHECKED_MS)
     page.get_by_role("button", name=re.compile("Reset stop")).click(timeout=CHECKED_MS)
     page.evaluate("location.hash = '#/events'")

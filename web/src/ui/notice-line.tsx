@@ -6,8 +6,9 @@ import type { Notice } from "../mesh/control";
 /** The outcome of an action, next to the action; it keeps its height when empty. */
 export function NoticeLine({ notice, idle }: { notice: Notice | null; idle?: string }) {
   const bad = notice?.kind === "refused" || notice?.kind === "lost";
+  const live = { role: bad ? "alert" : "status", "aria-label": t("outcome") } as const;
   return (
-    <p class={`notice ${notice?.kind ?? "idle"}`} role={bad ? "alert" : "status"}>
+    <p class={`notice ${notice?.kind ?? "idle"}`} {...live}>
       {bad && <span class="shape warning" aria-hidden="true" />}
       {notice?.text ?? idle ?? "\u00a0"}
       {notice?.warning && (

@@ -6,9 +6,9 @@ import type { StateWord } from "../mesh/robot-state";
 import { stateText } from "../mesh/robot-state";
 
 /** A state with the shape and colour of its level; of several, their number. */
-export function State({ state, count }: { state: StateWord; count?: number }) {
+export function State({ state, count, told }: { state: StateWord; count?: number; told?: boolean }) {
   return (
-    <span class={`state ${state.level}`}>
+    <span class={`state ${state.level}`} {...(told && { role: "status", "aria-label": t("state") })}>
       <span class={`shape ${state.level}`} aria-hidden="true" />
       {count === undefined ? stateText(state) : `${count} ${t(state.word)}`}
     </span>

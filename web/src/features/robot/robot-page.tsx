@@ -207,7 +207,7 @@ function Headline(props: {
       <div class="glance">
         <div class="who">
           <h1 title={props.name}>{props.name}</h1>
-          <State state={state} />
+          <State state={state} told />
         </div>
         <span class="facts dim">{facts.join(" · ")}</span>
         {description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}

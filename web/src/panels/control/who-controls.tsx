@@ -39,7 +39,11 @@ export function Holder(props: { robotKey: string; holder: string | null; lease: 
         : t(elsewhere ? "elsewhere" : "somebody", { name: holder });
   return (
     <>
-      <span class={`holder ${mine ? "mine" : holder === null ? "dim" : ""}`}>
+      <span
+        class={`holder ${mine ? "mine" : holder === null ? "dim" : ""}`}
+        role="status"
+        aria-label={t("who_controls")}
+      >
         {mine && <span class="shape mine" aria-hidden="true" />}
         {who}
       </span>
