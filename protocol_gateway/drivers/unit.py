@@ -90,8 +90,6 @@ class UnitDriver:
         self._stream = UnitStream(self._table)
         self._scales = si_scales(joint_types)
         self._relay = relay
-        self.units_received = 0
-        self.refusals_received = 0
 
     @property
     def can_stop(self) -> bool:
@@ -129,20 +127,22 @@ class UnitDriver:
 
     def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
         """Report the events of the next bytes, split anywhere."""
-        units, refusals = self.units_received, self.refusals_received
-        events = self.receive(data)
-        return (Report(events, self.units_received - units, self.refusals_received - refusals),)
+        return (self.read(data),)
 
-    def receive(self, data: bytes) -> Sequence[ControllerEvent]:
-        """Return the events of the next bytes, split anywhere."""
+    def read(self, data: bytes) -> Report:
+        """Return what the next bytes report, split anywhere."""
         events: list[ControllerEvent] = []
+        units = refusals = 0
         for received in self._stream.receive(data):
             match received:
                 case Unit():
-                    self._read_unit(received, events)
+                    answer = self._read_unit(received, events)
+                    if answer is not None:
+                        units += 1
+                        refusals += answer
                 case Malformed(offset, text, reason):
                     events.append(MalformedReceived(offset, text, reason))
-        return events
+        return Report(events, units, refusals)
 
     def encode(self, *commands: ControllerCommand) -> bytes:
         """Encode commands as one unit, a record each.
@@ -161,7 +161,8 @@ class UnitDriver:
 
     # -------------------------------------------------------------- from the controller
 
-    def _read_unit(self, unit: Unit, events: list[ControllerEvent]) -> None:
+    def _read_unit(self, unit: Unit, events: list[ControllerEvent]) -> bool | None:
+        """Append a unit's events; return whether it holds only refusals; None: it cannot be used."""
         positions: list[tuple[float, ...]] = []
         velocities: list[tuple[float, ...]] = []
         time_s: float | None = None
@@ -172,16 +173,14 @@ class UnitDriver:
                     # All or nothing: one record of the wrong length rejects the whole unit.
                     if len(values) != len(self._scales):
                         events.append(self._wrong_count(values, unit))
-                        return
+                        return None
                     si = tuple(map(mul, values, self._scales))
                     (positions if isinstance(record, AbsolutePositions) else velocities).append(si)
                 case Time(seconds):
                     time_s = seconds
                 case _:
                     others.append(record)
-        self.units_received += 1
         answer = bool(others) and all(isinstance(record, Error) for record in unit.records)
-        self.refusals_received += answer
         if self._relay is not None:
             self._relay(unit.data + TERMINATOR, answer, frozenset(map(type, unit.records)))
         for si, velocity in zip_longest(positions, velocities[: len(positions)]):
@@ -190,6 +189,7 @@ class UnitDriver:
             _append_event(record, unit, time_s, events)
         if time_s is not None and not positions and not others:
             events.append(StatusReceived(controller_time_s=time_s))
+        return answer
 
     def _wrong_count(self, values: Sequence[float], unit: Unit) -> MalformedReceived:
         reason = codes.JOINT_VALUES(count=len(values), joints=len(self._scales))

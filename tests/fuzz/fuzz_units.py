@@ -155,7 +155,7 @@ class Gateway:
     def controller_sends(self, data: bytes, pieces: Sequence[bytes]) -> str:
         """Return the problem on the link's side; empty: none."""
         self._now_s += 0.01
-        events = [event for piece in pieces for event in self._driver.receive(piece)]
+        events = [event for piece in pieces for event in self._driver.read(piece).events]
         now = Received(self._now_s, int(self._now_s * 1e9))
         for event, received in zip(events, self._timestamper.timestamps(events, now), strict=True):
             if received.wall_ns > now.wall_ns:

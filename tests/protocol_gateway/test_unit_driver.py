@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 
 from protocol_gateway.drivers.driver import (
     Activity,
-    Driver,
     Hold,
     Home,
     JointsReceived,
@@ -43,7 +42,7 @@ COMMANDS = [
 ]
 
 
-def driver(**settings) -> Driver:
+def driver(**settings) -> UnitDriver:
     return UnitDriver((R, P), **settings)
 
 
@@ -81,19 +80,20 @@ def test_an_inexpressible_command_is_refused(command):
 
 
 def test_positions_are_si_with_velocities_and_time():
-    (joints, status) = driver().receive(
+    report = driver().read(
         b"4#ABSOLUTE.DEG*180.00;1000.00&VELOCITY.DEG*90.00;10.00&STATUS*moving;remote;homed&TIME*1.50@"
     )
+    joints, status = report.events
     assert joints == JointsReceived((math.pi, 1.0), (math.pi / 2, 0.01), 1.5)
     assert status == StatusReceived(Activity.MOVING, Mode.REMOTE, True, False, 1.5)
 
 
 def test_the_papers_controllers_send_positions_only():
-    assert driver().receive(b"1#ABSOLUTE.DEG*180;0@") == [JointsReceived((math.pi, 0.0), None, None)]
+    assert driver().read(b"1#ABSOLUTE.DEG*180;0@").events == [JointsReceived((math.pi, 0.0), None, None)]
 
 
 def test_a_status_without_activity_or_mode_leaves_them_unknown():
-    assert driver().receive(b"1#STATUS*trace@") == [StatusReceived(None, None, False, True, None)]
+    assert driver().read(b"1#STATUS*trace@").events == [StatusReceived(None, None, False, True, None)]
 
 
 @pytest.mark.parametrize(
@@ -109,13 +109,13 @@ def test_a_status_without_activity_or_mode_leaves_them_unknown():
     ],
 )
 def test_of_contradictory_words_the_one_that_forbids_motion_counts(words, activity, mode):
-    (status,) = driver().receive(f"1#STATUS*{words}@".encode())
+    (status,) = driver().read(f"1#STATUS*{words}@".encode()).events
     assert (status.activity, status.mode) == (activity, mode)
 
 
 def test_unknown_words_and_types_are_passed_on_raw():
     unit = b"4#STATUS*idle;sleepy&FORCE*1;2&COMMAND*home&RELATIVE.DEG*1.00;2.00"
-    events = driver().receive(unit + b"@")
+    events = driver().read(unit + b"@").events
     assert [event.type for event in events if isinstance(event, UnknownReceived)] == [
         "STATUS",
         "FORCE",
@@ -127,13 +127,12 @@ def test_unknown_words_and_types_are_passed_on_raw():
 
 
 def test_units_of_refusals_are_counted_separately():
-    fresh = driver()
-    fresh.receive(b"2#ERROR*5;a&ERROR*5;b@" + b"2#STATUS*idle&ERROR*5@" + b"1#TIME*1@" + b"x@")
-    assert (fresh.units_received, fresh.refusals_received) == (3, 1)
+    report = driver().read(b"2#ERROR*5;a&ERROR*5;b@" + b"2#STATUS*idle&ERROR*5@" + b"1#TIME*1@" + b"x@")
+    assert (report.units, report.refusals) == (3, 1)
 
 
 def test_a_refusal_comes_with_its_number_and_text():
-    assert driver().receive(b"1#ERROR*5;joint waist@") == [Refused(5, "joint waist")]
+    assert driver().read(b"1#ERROR*5;joint waist@").events == [Refused(5, "joint waist")]
 
 
 @pytest.mark.parametrize(
@@ -141,30 +140,30 @@ def test_a_refusal_comes_with_its_number_and_text():
     [b"1#ABSOLUTE.DEG*1;2;3@", b"2#ABSOLUTE.DEG*1;2&VELOCITY.DEG*1@", b"2#STATUS*idle&ABSOLUTE.DEG*1@"],
 )
 def test_a_unit_of_another_joint_count_is_rejected(unit):
-    fresh = driver()
-    (event,) = fresh.receive(b"1#TIME*1.00@" + unit)[1:]
+    report = driver().read(b"1#TIME*1.00@" + unit)
+    (event,) = report.events[1:]
     assert isinstance(event, MalformedReceived)
     assert event.offset == 12
     assert "the description has 2" in event.reason
     assert event.joint_count
-    assert fresh.units_received == 1
+    assert report.units == 1
 
 
 def test_a_new_connection_discards_an_unfinished_unit():
     fresh = driver()
-    fresh.receive(b"1#ABSOLUTE.DEG*1;")
+    fresh.read(b"1#ABSOLUTE.DEG*1;")
     fresh.opened(UNITS, 0.0)
-    assert fresh.receive(b"2@1#ABSOLUTE.DEG*0;0@")[1:] == [JointsReceived((0.0, 0.0))]
+    assert fresh.read(b"2@1#ABSOLUTE.DEG*0;0@").events[1:] == [JointsReceived((0.0, 0.0))]
 
 
 @given(st.binary(max_size=300))
 def test_any_bytes_give_events_but_no_invented_joints(data):
-    for event in driver().receive(data):
+    for event in driver().read(data).events:
         assert not isinstance(event, JointsReceived) or b"ABSOLUTE.DEG" in data or b"2" in data
 
 
 @given(st.lists(st.floats(-360, 360), min_size=2, max_size=2).map(tuple))
 def test_positions_survive_a_round_trip(positions):
     fresh = driver()
-    (joints,) = fresh.receive(fresh.encode(MoveAbsolute(positions)))
+    (joints,) = fresh.read(fresh.encode(MoveAbsolute(positions))).events
     assert joints.positions == pytest.approx(positions, abs=1e-10)
