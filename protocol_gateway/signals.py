@@ -27,19 +27,21 @@ _NUMBERS_EACH_S, _CHANGES_EACH_S, _SAME_EACH_S = 0.1, 0.02, 1.0
 _S = schema.Event.Severity
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class _Entry:
     """Newest value of a signal; None: not reported."""
 
+    name: str
     unit: str
-    row: schema.Signal
+    row: schema.Signal = field(default_factory=schema.Signal)
+    changed: bool = True
     raw: SignalValue | None = None
     value: SignalValue | None = None
     received: Received = field(default_factory=lambda: Received(0.0, 0))
     valid_until_s: float = 0.0
 
-    def set(self, raw: SignalValue | None) -> None:
-        self.raw = raw
+    def take(self, raw: SignalValue | None) -> None:
+        self.raw, self.changed = raw, True
         match raw:
             case str():
                 self.value = one_line(raw, LONGEST_TEXT)
@@ -47,6 +49,17 @@ class _Entry:
                 self.value = raw
             case _:
                 self.value = float(raw) if math.isfinite(raw) else None
+
+    def write(self) -> None:
+        """Write the value into the row of the message."""
+        self.changed = False
+        match self.value:
+            case bool():
+                self.row.on = self.value
+            case str():
+                self.row.text = self.value
+            case float():
+                self.row.number = self.value
 
 
 class Signals:
@@ -65,6 +78,8 @@ class Signals:
         """Drop all values after the link was lost: another controller may answer next."""
         self._entries: dict[str, _Entry] = {}
         self._by_signal: dict[Signal, _Entry] = {}
+        self._message = schema.Signals()
+        self._shown: list[_Entry] = []  # the entries of its rows
         self._newest: Received | None = None
         self._numbers_changed = self._states_changed = self._unpublished = False
         self._next_s = self._next_change_s = self._next_same_s = float("-inf")
@@ -81,7 +96,7 @@ class Signals:
             # 1 and True are equal, but one is a number.
             if raw != entry.raw or type(raw) is not type(entry.raw):
                 before = entry.value
-                entry.set(raw)
+                entry.take(raw)
                 if isinstance(before, float) and isinstance(entry.value, float):
                     self._numbers_changed = True
                 elif entry.value != before or type(entry.value) is not type(before):
@@ -126,12 +141,12 @@ class Signals:
                 self._journal.report(_S.WARNING, "signals.too_many", text, signal=name, most=MOST_SIGNALS)
             return None
         if entry is None:
-            entry = _Entry(signal.unit, schema.Signal(name=name, unit=signal.unit))
+            entry = _Entry(name, signal.unit)
             self._entries[name] = entry
             self._entries = dict(sorted(self._entries.items()))
         elif entry.unit != signal.unit:
-            entry.unit = entry.row.unit = signal.unit
-            self._states_changed = True
+            entry.unit = signal.unit
+            self._shown, self._states_changed = [], True
             self._by_signal = {each: own for each, own in self._by_signal.items() if own is not entry}
         self._by_signal[signal] = entry
         return entry
@@ -158,22 +173,24 @@ class Signals:
         # On a fixed grid, so that 125 Hz gives 10 Hz and not 9.6; a gap restarts the grid.
         self._next_s = max(self._next_s + _NUMBERS_EACH_S, now_s + _NUMBERS_EACH_S / 2)
         self._next_change_s, self._next_same_s = now_s + _CHANGES_EACH_S, now_s + _SAME_EACH_S
-        message = schema.Signals()
+        shown = [
+            entry
+            for entry in self._entries.values()
+            if entry.value is not None and newest.monotonic_s < entry.valid_until_s
+        ]
+        message = self._message
         message.timestamp.seconds, message.timestamp.nanos = divmod(newest.wall_ns, 1_000_000_000)
-        for entry in self._entries.values():
-            if entry.value is None or newest.monotonic_s >= entry.valid_until_s:
-                continue
-            row = entry.row
-            match entry.value:
-                case bool():
-                    row.on = entry.value
-                case str():
-                    row.text = entry.value
-                case _:
-                    row.number = entry.value
-            if entry.received is newest:
-                row.ClearField("age_s")
-            else:
-                row.age_s = max(newest.monotonic_s - entry.received.monotonic_s, 0.0)
-            message.signals.append(row)
+        if shown != self._shown:
+            # New rows take eight times as long as other values in the same ones.
+            del message.signals[:]
+            for entry in shown:
+                entry.row, entry.changed = message.signals.add(name=entry.name, unit=entry.unit), True
+            self._shown = shown
+        for entry in shown:
+            if entry.changed:
+                entry.write()
+            if entry.received is not newest:
+                entry.row.age_s = max(newest.monotonic_s - entry.received.monotonic_s, 0.0)
+            elif entry.row.HasField("age_s"):
+                entry.row.ClearField("age_s")
         self._publisher.put(message, source_time_ns=newest.wall_ns, dated_by=newest.clock)

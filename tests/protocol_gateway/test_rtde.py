@@ -114,6 +114,15 @@ RECIPE = Recipe(["timestamp", "actual_q"], ["DOUBLE", "VECTOR6D"], 1)
 DATA = b"\x01" + struct.pack(">7d", 1.0, *Q)
 
 
+def test_only_needed_values_have_to_be_finite():
+    recipe = Recipe(["actual_q", "payload"], ["VECTOR6D", "DOUBLE"], 1, needed=["actual_q"])
+    payload = b"\x01" + struct.pack(">7d", *Q, float("nan"))
+    assert decoded(packed(b"U", payload), recipe=recipe) == [DataReceived({"actual_q": Q})]
+    payload = b"\x01" + struct.pack(">7d", *Q[:5], float("nan"), 1.0)
+    (event,) = decoded(packed(b"U", payload), recipe=recipe)
+    assert event.reason == "actual_q is not finite"
+
+
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
@@ -301,7 +310,7 @@ def test_all_fields_fit_into_a_recipe_and_give_a_state():
     assert state.robot_status == RobotStatus.POWER_ON | RobotStatus.PROGRAM_RUNNING
     assert state.safety_status == SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.STOPPED_DUE_TO_SAFETY
     assert state.analog_inputs == (0.5, 1.5)
-    assert state.analog_outputs is None
+    assert state.analog_outputs == (None, None)
     assert state.safety_mode == 3
 
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import re
 import struct
 
 import pytest
@@ -18,11 +19,20 @@ from protocol_gateway.drivers.driver import (
     Send,
     SetTimer,
     Severity,
+    SignalsReceived,
     StatusReceived,
 )
+from protocol_gateway.drivers.signal_names import BOOLEAN, SHARED, TEXT
 from protocol_gateway.drivers.universal_robots.driver import PRIMARY, RTDE, RtdeDriver, activity_of
-from protocol_gateway.drivers.universal_robots.modes import RobotMode, RuntimeState, SafetyMode
-from protocol_gateway.drivers.universal_robots.state import ControllerState
+from protocol_gateway.drivers.universal_robots.modes import (
+    RobotMode,
+    RobotStatus,
+    RuntimeState,
+    SafetyMode,
+    SafetyStatus,
+)
+from protocol_gateway.drivers.universal_robots.signals import signals_of
+from protocol_gateway.drivers.universal_robots.state import OUTPUTS, ControllerState
 from protocol_gateway.errors import CommandError, GatewaySettingsError
 from robots.joints import JointType
 from services.simulator.universal_robots.service import UrSettings, serve_rtde
@@ -38,18 +48,42 @@ def package(kind, body=b""):
     return struct.pack(">HB", 3 + len(body), ord(kind)) + body
 
 
-TYPES = b"DOUBLE,VECTOR6D,VECTOR6D,INT32,INT32,INT32,UINT32"
-GREETING = (
-    package("V", b"\x01"),
-    package("v", struct.pack(">4I", 5, 21, 0, 0)),
-    package("O", b"\x07" + TYPES),
-    package("S", b"\x01"),
-)
+OFFERED = [
+    "timestamp",
+    "actual_q",
+    "actual_qd",
+    "robot_mode",
+    "safety_mode",
+    "safety_status",
+    "runtime_state",
+    "actual_digital_input_bits",
+    "payload",
+]
+VERSION = (package("V", b"\x01"), package("v", struct.pack(">4I", 5, 21, 0, 0)))
 
 
-def data(positions=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6), time_s=1.0, safety=1, runtime=1):
-    values = (time_s, *positions, *(0.0,) * 6, RobotMode.RUNNING, safety, safety, runtime)
-    return package("U", b"\x07" + struct.pack(">13d3iI", *values))
+def types(sent, offered=OFFERED):
+    """Return the answer of a controller that has only these fields to a set-up of outputs."""
+    names = sent.data[11:].decode().split(",")
+    found = [OUTPUTS[name] if name in offered else "NOT_FOUND" for name in names]
+    return package("O", b"\x07" + ",".join(found).encode())
+
+
+def greeting(arm):
+    """Let a controller answer the greeting; return what the driver sends."""
+    sent = [*arm.opened(RTDE, NOW_S)]
+    for answer in VERSION:
+        sent += [each for each in arm.received(RTDE, answer, NOW_S) if isinstance(each, Send)]
+    while sent[-1].data[2:3] == b"O":
+        sent += [each for each in arm.received(RTDE, types(sent[-1]), NOW_S) if isinstance(each, Send)]
+    arm.received(RTDE, package("S", b"\x01"), NOW_S)
+    return sent
+
+
+def data(positions=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6), time_s=1.0, safety=1, runtime=1, inputs=0, payload=1.5):
+    modes = (RobotMode.RUNNING, safety, safety, runtime)
+    values = (time_s, *positions, *(0.0,) * 6, *modes, inputs, payload)
+    return package("U", b"\x07" + struct.pack(">13d3iIQd", *values))
 
 
 def driver():
@@ -59,9 +93,7 @@ def driver():
 def greeted():
     """Return a driver whose controller has answered the greeting."""
     arm = driver()
-    arm.opened(RTDE, NOW_S)
-    for answer in GREETING:
-        arm.received(RTDE, answer, NOW_S)
+    greeting(arm)
     return arm
 
 
@@ -73,10 +105,8 @@ def report(effects):
 def test_it_greets_step_by_step_and_then_sends_nothing():
     arm = driver()
     assert arm.started(NOW_S) == (Open(RTDE), Open(PRIMARY, 30011))
-    sent = [*arm.opened(RTDE, NOW_S)]
-    for answer in GREETING:
-        sent += [each for each in arm.received(RTDE, answer, NOW_S) if isinstance(each, Send)]
-    assert [each.data[2:3] for each in sent] == [b"V", b"v", b"O", b"S"]
+    sent = greeting(arm)
+    assert [each.data[2:3] for each in sent] == [b"V", b"v", b"O", b"O", b"S"]
     for number in range(100):
         effects = arm.received(RTDE, data(time_s=1.0 + 0.008 * number), NOW_S)
         assert [type(each) for each in effects] == [Report]
@@ -87,7 +117,8 @@ def test_a_state_split_anywhere_gives_joints_and_status_of_the_same_time():
     found = []
     for byte in data(time_s=7.5):
         found += report(arm.received(RTDE, bytes([byte]), NOW_S)).events
-    joints, status = found
+    joints, status, signals = found
+    assert signals.controller_time_s == 7.5
     assert joints == JointsReceived((0.1, 0.2, 0.3, 0.4, 0.5, 0.6), (0.0,) * 6, 7.5)
     assert status == StatusReceived(Activity.IDLE, None, homed=True, controller_time_s=7.5)
 
@@ -127,13 +158,83 @@ def test_a_value_that_is_no_number_is_malformed_and_gives_no_joints():
     assert report(effects).units == 0
 
 
+def signals(effects):
+    """Return the signals that a report has, by their names; None: no report of signals."""
+    found = [each for each in report(effects).events if isinstance(each, SignalsReceived)]
+    return {signal.name: value for signal, value in found[0].values} if found else None
+
+
+def test_only_the_outputs_that_the_controller_has_are_signals():
+    found = signals(greeted().received(RTDE, data(inputs=1 << 3 | 1 << 17), NOW_S))
+    inputs = {name for name, value in found.items() if name.startswith("io.") and value is True}
+    assert inputs == {"io.digital_in.3", "io.tool_in.1"}
+    modes = {"program.state": "stopped", "robot.mode": "running", "safety.mode": "normal"}
+    assert {name: found[name] for name in modes} == modes
+    assert found["payload.mass"] == 1.5
+    assert len(found) == 18 + len(modes) + 1
+
+
+def test_signals_are_reported_ten_times_a_second_and_with_each_changed_mode_or_input():
+    arm = greeted()
+    reported = [
+        number
+        for number in range(126)
+        if signals(arm.received(RTDE, data(time_s=number * 0.008), NOW_S)) is not None
+    ]
+    assert len(reported) == 10
+    assert signals(arm.received(RTDE, data(time_s=1.016, inputs=1), NOW_S))["io.digital_in.0"] is True
+    assert signals(arm.received(RTDE, data(time_s=1.024, inputs=1), NOW_S)) is None
+    assert signals(arm.received(RTDE, data(time_s=1.032, inputs=1, safety=3), NOW_S)) is not None
+    # The controller has restarted.
+    assert signals(arm.received(RTDE, data(time_s=0.008, inputs=1, safety=3), NOW_S)) is not None
+
+
+def test_a_payload_that_is_no_number_is_unknown_and_the_joints_are_shown():
+    effects = greeted().received(RTDE, data(payload=float("nan")), NOW_S)
+    assert "payload.mass" not in signals(effects)
+    assert report(effects).units == 1
+
+
+def test_every_signal_has_a_shared_name_and_its_unit():
+    types, pair = 0b1101, (0.01, 2.0)
+    state = ControllerState(
+        timestamp_s=1.0,
+        positions=(0.0,) * 6,
+        **dict.fromkeys(("currents_a", "target_torques", "temperatures_c", "tool_force"), (1.0,) * 6),
+        tool_offset=(0.1,) * 6,
+        payload_centre_m=(0.1,) * 3,
+        joint_modes=(253,) * 6,
+        **dict.fromkeys(("robot_mode", "safety_mode", "runtime_state"), 1),
+        **dict.fromkeys(("digital_inputs", "digital_outputs"), 0),
+        **dict.fromkeys(("analog_inputs", "analog_outputs", "tool_analog_inputs"), pair),
+        **dict.fromkeys(("analog_types", "tool_analog_types"), types),
+        **dict.fromkeys(("tool_voltage_v", "script_line"), 12),
+        **dict.fromkeys(("tool_current_a", "tool_temperature_c", "payload_kg", "robot_voltage_v"), 1.0),
+        **dict.fromkeys(("speed_scaling", "target_speed_fraction", "robot_current_a"), 0.5),
+        robot_status=RobotStatus.POWER_ON,
+        safety_status=SafetyStatus.NORMAL_MODE,
+    )
+    found = signals_of(state)
+    patterns = {re.compile(name.replace(".", "[.]").replace("*", "[0-9]+")): name for name in SHARED}
+    for signal, value in found:
+        name = signal.name if signal.joint is None else signal.name.replace(".", f".{signal.joint}.")
+        (shared,) = (name_ for pattern, name_ in patterns.items() if pattern.fullmatch(name))
+        kind = {str: TEXT, bool: BOOLEAN}.get(type(value))
+        if kind is None:
+            assert signal.unit in SHARED[shared].split(" or "), name
+        else:
+            assert (kind, signal.unit) == (SHARED[shared], ""), name
+    units = {signal.name: signal.unit for signal, _ in found}
+    assert (units["io.analog_in.0"], units["io.analog_in.1"], units["io.analog_out.1"]) == ("V", "A", "V")
+    assert len(found) == len({(signal.name, signal.joint) for signal, _ in found}) == 98
+
+
 def test_a_controller_without_positions_is_left_and_tried_again_later():
     arm = driver()
     arm.opened(RTDE, NOW_S)
-    for answer in GREETING[:2]:
-        arm.received(RTDE, answer, NOW_S)
-    types = TYPES.replace(b"VECTOR6D", b"NOT_FOUND", 1)
-    effects = arm.received(RTDE, package("O", b"\x07" + types), NOW_S)
+    for answer in VERSION:
+        (*_, asked) = arm.received(RTDE, answer, NOW_S)
+    effects = arm.received(RTDE, types(asked, ["timestamp", "actual_qd"]), NOW_S)
     close, timer = effects[-2:]
     assert close == Close(RTDE, "the controller has no field actual_q")
     assert isinstance(timer, SetTimer)

@@ -8,8 +8,10 @@ import sys
 
 import pytest
 
+from protocol_gateway.drivers.driver import Report, Send, SignalsReceived
+from protocol_gateway.drivers.universal_robots.driver import RTDE, RtdeDriver
 from robots.description import load
-from robots.joints import joints_of, violations
+from robots.joints import JointType, joints_of, violations
 from services.simulator.universal_robots.service import UrSettings, serve_rtde
 from tests.conftest import run
 
@@ -57,6 +59,29 @@ async def client_of(address, program, *words):
     return json.loads(output.splitlines()[-1])
 
 
+async def signals_of(address, port):
+    """Return the signals that the gateway's driver reports first, by name; a joint's by its number."""
+    driver = RtdeDriver((JointType.ROTARY,) * 6, {})
+    reader, writer = await asyncio.open_connection(address, port)
+    try:
+        effects = driver.opened(RTDE, 0.0)
+        while True:
+            for effect in effects:
+                if isinstance(effect, Send):
+                    writer.write(effect.data)
+                for event in effect.events if isinstance(effect, Report) else ():
+                    if isinstance(event, SignalsReceived):
+                        return {
+                            signal.name
+                            if signal.joint is None
+                            else signal.name.replace(".", f".{signal.joint}.", 1): value
+                            for signal, value in event.values
+                        }
+            effects = driver.received(RTDE, await reader.read(4096), 0.0)
+    finally:
+        writer.close()
+
+
 @contextlib.asynccontextmanager
 async def simulator(address):
     ready = asyncio.get_running_loop().create_future()
@@ -66,7 +91,7 @@ async def simulator(address):
     if task.done():
         await task
     try:
-        yield
+        yield ready.result()
     finally:
         task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
@@ -85,6 +110,44 @@ def test_ur_rtde_reads_states():
         assert len(read["ActualTCPPose"]) == 6
         assert read["Payload"] == 1.2
         assert all(24.0 <= each < 36.0 for each in read["JointTemperatures"])
+
+    run(main())
+
+
+def test_ur_rtde_and_the_gateway_s_driver_read_the_same_signals():
+    # What changes between two reads is compared by its range only.
+    names = ("TargetMoment", "ActualCurrent", "JointTemperatures", "Payload", "PayloadCog", "ActualTCPForce")
+    names += ("SpeedScaling", "TargetSpeedFraction", "RobotMode", "SafetyMode", "RuntimeState")
+    names += ("StandardAnalogInput0", "StandardAnalogInput1", "StandardAnalogOutput0")
+    names += ("ActualRobotVoltage", "ActualDigitalOutputBits", "ActualDigitalInputBits")
+
+    async def main():
+        async with simulator("127.0.31.3") as (rtde, _):
+            theirs = await client_of("127.0.31.3", READ, *names)
+            ours = await signals_of("127.0.31.3", rtde)
+        assert ours["payload.mass"] == theirs["Payload"] == 1.2
+        assert [ours[f"payload.{axis}"] for axis in "xyz"] == theirs["PayloadCog"]
+        assert [ours[f"tool.force.{axis}"] for axis in "xyz"] == theirs["ActualTCPForce"][:3]
+        assert ours["speed.scaling"] == 100 * theirs["SpeedScaling"]
+        assert ours["speed.override"] == 100 * theirs["TargetSpeedFraction"]
+        modes = [ours[name] for name in ("robot.mode", "safety.mode", "program.state")]
+        assert modes == ["running", "normal", "playing"]
+        assert [theirs[name] for name in ("RobotMode", "SafetyMode", "RuntimeState")] == [7, 1, 2]
+        assert ours["io.analog_in.0"] == theirs["StandardAnalogInput0"] == 2.5
+        assert ours["io.analog_in.1"] == theirs["StandardAnalogInput1"] == 0.012
+        assert ours["robot.voltage"] == theirs["ActualRobotVoltage"] == 48.0
+        assert theirs["ActualDigitalOutputBits"] == 0
+        assert not any(value for name, value in ours.items() if name.startswith("io.digital_out."))
+        for joint in range(6):
+            assert ours[f"joint.{joint}.temperature"] == pytest.approx(
+                theirs["JointTemperatures"][joint], abs=1
+            )
+            # What holds the arm is proportional to the motor's current, in both readers.
+            for moment, current in (
+                (ours[f"joint.{joint}.target_torque"], ours[f"joint.{joint}.current"]),
+                (theirs["TargetMoment"][joint], theirs["ActualCurrent"][joint]),
+            ):
+                assert 9.0 * abs(current) - 1e-9 <= abs(moment) <= 12.0 * abs(current) + 1e-9
 
     run(main())
 

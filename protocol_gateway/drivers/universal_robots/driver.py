@@ -44,6 +44,7 @@ from protocol_gateway.drivers.universal_robots.primary import (
 )
 from protocol_gateway.drivers.universal_robots.rtde_messages import TextReceived
 from protocol_gateway.drivers.universal_robots.rtde_reader import Failed, RtdeReader
+from protocol_gateway.drivers.universal_robots.signals import SignalReports
 from protocol_gateway.drivers.universal_robots.state import OUTPUTS, ControllerState
 from protocol_gateway.errors import CommandError, GatewaySettingsError
 from robomesh import reason_codes
@@ -57,15 +58,9 @@ FREQUENCY_HZ = 125.0
 """States a second that are requested; every controller can send so many."""
 JOINTS = 6
 
-_FIELDS = (
-    "timestamp",
-    "actual_q",
-    "actual_qd",
-    "robot_mode",
-    "safety_mode",
-    "safety_status",
-    "runtime_state",
-)
+# The arm follows its targets closely, and robomesh computes the tool's pose and speed itself.
+_NOT_READ = frozenset({"target_q", "actual_TCP_pose", "actual_TCP_speed", "tool_mode"})
+_FIELDS = {name: kind for name, kind in OUTPUTS.items() if name not in _NOT_READ}
 _RETRY_S = 2.0
 # A fault needs a restart of the controller's safety; a stop needs a person at the robot.
 _FAULTS = frozenset({SafetyMode.VIOLATION, SafetyMode.FAULT, SafetyMode.UNDEFINED})
@@ -119,8 +114,9 @@ class RtdeDriver:
             )
         if codes:
             raise GatewaySettingsError("protocol 'rtde' has no type codes: remove codes")
-        self._reader = RtdeReader(FREQUENCY_HZ, {name: OUTPUTS[name] for name in _FIELDS})
+        self._reader = RtdeReader(FREQUENCY_HZ, _FIELDS)
         self._primary = PrimaryStream()
+        self._signals = SignalReports()
         self._left: dict[str, Open] = {}
 
     def started(self, now_s: float) -> Effects:
@@ -133,6 +129,7 @@ class RtdeDriver:
         if channel is PRIMARY:
             self._primary = PrimaryStream()
             return ()
+        self._signals = SignalReports()
         return (Send(RTDE, self._reader.connected()),)
 
     def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
@@ -148,6 +145,8 @@ class RtdeDriver:
                 case ControllerState():
                     units += 1
                     events += joints_of(event), status_of(event)
+                    if (signals := self._signals.of(event)) is not None:
+                        events.append(signals)
                 case TextReceived(level, text, source):
                     severity = _SEVERITIES.get(level, Severity.WARNING)
                     events.append(AlarmReceived(severity, f"{source}: {text}" if source else text))

@@ -16,7 +16,7 @@ unknown name, and IN_USE for an input that another client writes.
 
 import math
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import accumulate
@@ -161,7 +161,7 @@ class TextReceived:
 
 @dataclass(frozen=True, slots=True)
 class DataReceived:
-    """Values of a recipe, all finite, by the names of the fields."""
+    """Values of a recipe by the names of the fields; all are finite."""
 
     values: Mapping[str, Value]
 
@@ -186,12 +186,20 @@ class Recipe:
         names: Names of the fields.
         types: One a name, keys of `FORMATS`.
         recipe_id: Number in the packages; None with version 1.
+        needed: Names whose values must be finite; others are left out if they are not. None: all.
 
     Raises:
         ValueError: If the numbers of names and types differ, or a type is unknown.
     """
 
-    def __init__(self, names: Sequence[str], types: Sequence[str], recipe_id: int | None) -> None:
+    def __init__(
+        self,
+        names: Sequence[str],
+        types: Sequence[str],
+        recipe_id: int | None,
+        *,
+        needed: Collection[str] | None = None,
+    ) -> None:
         if len(names) != len(types):
             raise ValueError(f"{len(types)} types for {len(names)} fields")
         if unknown := [each for each in types if each not in FORMATS]:
@@ -199,6 +207,7 @@ class Recipe:
         self.names = tuple(names)
         self.types = tuple(types)
         self.recipe_id = recipe_id
+        self._needed = frozenset(names if needed is None else needed)
         self._values = struct.Struct(">" + "".join(FORMATS[each] for each in types))
         counts = [int(FORMATS[each][:-1] or 1) for each in types]
         self._places = tuple(zip(names, accumulate(counts, initial=0), counts, strict=False))
@@ -208,7 +217,7 @@ class Recipe:
         """Return the values of a data package's payload.
 
         Raises:
-            ValueError: If size or number of the recipe differ, or a value is not finite.
+            ValueError: If size or number of the recipe differ, or a needed value is not finite.
         """
         if self.recipe_id is not None and payload[:1] != bytes([self.recipe_id]):
             number = payload[0] if payload else "none"
@@ -216,16 +225,17 @@ class Recipe:
         if len(payload) != self._size:
             raise ValueError(f"{len(payload)} bytes of data, the recipe has {self._size}")
         flat = self._values.unpack_from(payload, self._size - self._values.size)
+        places = self._places
         if not all(map(math.isfinite, flat)):
-            name = next(
-                name
-                for name, begin, count in self._places
-                if not all(map(math.isfinite, flat[begin : begin + count]))
+            places = tuple(
+                (name, begin, count)
+                for name, begin, count in places
+                if all(map(math.isfinite, flat[begin : begin + count]))
             )
-            raise ValueError(f"{name} is not finite")
+            if missing := self._needed.difference(name for name, _, _ in places):
+                raise ValueError(f"{min(missing)} is not finite")
         return {
-            name: flat[begin] if count == 1 else flat[begin : begin + count]
-            for name, begin, count in self._places
+            name: flat[begin] if count == 1 else flat[begin : begin + count] for name, begin, count in places
         }
 
     def write(self, values: Mapping[str, Value]) -> bytes:

@@ -169,7 +169,7 @@ class RtdeReader:
             self._names = tuple(name for name in self._names if name not in unknown)
             self._set_up()
             return None
-        self._stream.recipe = Recipe(self._names, answer.types, answer.recipe_id)
+        self._stream.recipe = Recipe(self._names, answer.types, answer.recipe_id, needed=REQUIRED)
         self._to_send += rtde.start()
         return None
 

@@ -1,7 +1,8 @@
 """Model of the simulated controller: arm, program, modes and measured values. No I/O; time is an argument.
 
-The program is the demo's tour. Currents, voltages, temperatures and signals are invented: they have
-a plausible magnitude and follow the motion, but no dynamics stand behind them.
+The program is the demo's tour. The motors hold a mass at the tool against gravity and accelerate the joints;
+currents follow from these torques. Temperatures rise with time. Mass, inertias, voltages and inputs are
+invented.
 """
 
 import math
@@ -28,7 +29,7 @@ from protocol_gateway.drivers.universal_robots.primary import (
 from protocol_gateway.drivers.universal_robots.rtde_messages import Value
 from robots.description import RobotDescription
 from robots.joints import FloatArray, joints_of
-from robots.model import build_model, tool_jacobian, tool_placement
+from robots.model import build_model, link_placements, tool_jacobian, tool_placement
 from robots.motion import Motion
 from services.simulator.errors import SimulatorError
 from services.simulator.fault_table import LEAP
@@ -41,6 +42,16 @@ _SPEED = 0.6
 _REST_S = 0.4
 _LOWEST_SPEED = 0.01
 _WARM_UP_S = 1800.0
+_PAYLOAD_KG = 1.2
+# Of the arm's own links, as if they were at the tool.
+_ARM_KG = 4.0
+_GRAVITY = 9.81
+# Of each joint: inertia [kg m2], friction [N m s], torque of the motor's current behind its gear [N m/A].
+_INERTIAS = np.array((1.5, 1.5, 0.8, 0.05, 0.05, 0.02))
+_FRICTIONS = np.array((9.0, 9.0, 6.0, 2.0, 2.0, 1.5))
+_TORQUES_A = np.array((12.0, 12.0, 11.0, 9.0, 9.0, 9.0))
+# Analog types: 0 current, 1 voltage; only input 1 is a current, of a sensor with 4 to 20 mA.
+_ANALOG_TYPES, _SENSOR_A = 0b1101, 0.012
 _CONTROLLER, _BASE = -2, 0
 _ALARM_CODE, _ALARM_ARGUMENT = 153, 0
 
@@ -76,6 +87,9 @@ class UrController:
             )
         self._model = build_model(description)
         self._motion = Motion(self._joints, self._joints.home.copy())
+        flange_to_base = link_placements(self._model, self._joints.home)[-1]
+        tool_to_base = tool_placement(self._model, self._joints.home)
+        self._tool_offset = _pose(np.linalg.inv(flange_to_base) @ tool_to_base)
         self._tour = tour
         self._announce = announce
         self._boot_s = now_s
@@ -233,16 +247,20 @@ class UrController:
     def _measured(
         self, positions: FloatArray, velocities: FloatArray, accelerations: FloatArray, now_s: float
     ) -> dict[str, Value]:
-        """Return the invented values."""
+        """Return what sensors measure."""
         on = 1.0 if self._powered else 0.0
         warm = 1.0 - math.exp(-self.uptime_s(now_s) / _WARM_UP_S)
-        size = np.array((1.0, 1.0, 0.7, 0.3, 0.3, 0.2))
-        currents = on * size * (0.4 * np.sin(positions) + 0.8 * velocities + 0.3 * accelerations)
+        # Row 2: height of the tool per joint; on a vertical axis gravity has no torque.
+        lift = tool_jacobian(self._model, positions)[2]
+        torques = on * (
+            (_PAYLOAD_KG + _ARM_KG) * _GRAVITY * lift + _INERTIAS * accelerations + _FRICTIONS * velocities
+        )
+        currents = torques / _TORQUES_A
         return {
             "actual_current": _tuple(currents),
             "target_current": _tuple(currents),
             "joint_control_output": _tuple(currents),
-            "target_moment": _tuple(currents * 10.0),
+            "target_moment": _tuple(torques),
             "joint_temperatures": _tuple(24.0 + on * warm * np.array((6.0, 8.0, 8.0, 10.0, 10.0, 11.0))),
             "actual_joint_voltage": (48.0 * on,) * JOINTS,
             "actual_tool_accelerometer": (0.0, 0.0, 9.81),
@@ -251,11 +269,15 @@ class UrController:
             "actual_robot_voltage": 48.0 * on,
             "actual_robot_current": on * (0.4 + 0.3 * float(np.abs(currents).sum())),
             "standard_analog_input0": 2.5,
+            "standard_analog_input1": _SENSOR_A,
+            "analog_io_types": _ANALOG_TYPES,
+            "tool_analog_input_types": 0b11,
+            "tcp_offset": self._tool_offset,
             "tool_mode": 253 if self._powered else 255,
             "tool_output_voltage": 24 if self._powered else 0,
             "tool_output_current": 0.02 * on,
             "tool_temperature": 24.0 + on * warm * 9.0,
-            "payload": 1.2,
+            "payload": _PAYLOAD_KG,
             "payload_cog": (0.0, 0.0, 0.05),
         }
 
