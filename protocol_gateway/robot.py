@@ -26,7 +26,7 @@ from protocol_gateway.control.jog import Jogs
 from protocol_gateway.control.program import Programs
 from protocol_gateway.control.robot_authority import RobotAuthority
 from protocol_gateway.core.codes import code_table
-from protocol_gateway.drivers.driver import Activity, Channel, Driver
+from protocol_gateway.drivers.driver import Activity, Carries, Channel, Driver, Stop
 from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.journal import Journal
@@ -92,6 +92,7 @@ class Robot:
             )
         self._settings = settings
         self._legacy: LegacyClients | None = None
+        self._capabilities = driver.capabilities
         self._read_only = _why_read_only(settings, driver)
 
         def publisher(topic: str) -> Publisher:
@@ -169,7 +170,7 @@ class Robot:
             joints=joints,
             journal=self._journal,
             controller=self._controller,
-            can_jog=driver.can_jog,
+            can_jog=driver.capabilities.jogs,
             tool_speed=settings.jog_speed,
         )
         if settings.legacy_clients is not None:
@@ -371,6 +372,7 @@ class Robot:
             self._missing_channels.discard(name)
             text = f"the controller's {name} interface is connected again"
             self._journal.report(_S.INFO, "link.channel_back", text, channel=name)
+        self._publish_state()
 
     def _on_controller_status(self) -> None:
         self._control.handle(events.StatusChanged())
@@ -405,6 +407,8 @@ class Robot:
             positions=self._telemetry.positions(now_s),
             positions_stale=self._telemetry.positions_stale(now_s),
             read_only=self._read_only,
+            capabilities=self._capabilities,
+            stop_arrives=self._link.carries(Carries.STOP),
             accept_unknown=self._settings.accept_unknown,
         )
 
@@ -439,8 +443,8 @@ class Robot:
 
 def _why_read_only(settings: RobotSettings, driver: Driver) -> Reason | None:
     """Return why no command may be sent to the controller; None: commands may be sent."""
-    if driver.reads_only:
+    if not driver.capabilities.commands:
         return codes.READS_ONLY()
-    if not driver.can_stop:
+    if Stop not in driver.capabilities.commands:
         return codes.NO_STOP_CODE()
     return None if settings.stop_proven else codes.STOP_NOT_PROVEN()

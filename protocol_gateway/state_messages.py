@@ -7,9 +7,9 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from protocol_gateway.authority.lease_rules import Authority, Lease, Now, Stop
-from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.authority.preconditions import Controller, commands_of
 from protocol_gateway.checking.policy import Policy
-from protocol_gateway.drivers.driver import Activity, JointsReceived, Mode, UnknownReceived
+from protocol_gateway.drivers.driver import Activity, JointsReceived, Mode, StopEnds, UnknownReceived
 from protocol_gateway.link.health import LinkHealth
 from protocol_gateway.link.link import LinkCounters, LinkState
 from robomesh import reason_codes as codes
@@ -21,6 +21,7 @@ _S = schema.ControllerState
 _LINKS = {LinkState.DOWN: _S.DOWN, LinkState.UP: _S.UP, LinkState.SILENT: _S.SILENT}
 _MODES = {None: _S.MODE_UNKNOWN, Mode.REMOTE: _S.REMOTE, Mode.LOCAL: _S.LOCAL}
 _CHECKS = {Policy.OFF: _S.OFF, Policy.WARN: _S.WARN, Policy.REQUIRE: _S.REQUIRE}
+_STOPS = {StopEnds.OURS: schema.Capabilities.OURS, StopEnds.ANY: schema.Capabilities.ANY}
 _KNOWN = {None: _S.UNKNOWN, True: _S.YES, False: _S.NO}
 _ACTIVITIES = {
     None: _S.ACTIVITY_UNKNOWN,
@@ -110,6 +111,7 @@ def controller_state(
         check_starting=check_starting,
         program=program,
         jog=jog,
+        capabilities=_capabilities(controller),
         counters=schema.LinkCounters(
             units_received=counters.units_received,
             units_malformed=counters.units_malformed,
@@ -141,6 +143,19 @@ def controller_state(
             )
         )
     return state
+
+
+def _capabilities(controller: Controller) -> schema.Capabilities:
+    capabilities = controller.capabilities
+    stops = _STOPS[capabilities.stop_ends] if controller.stop_arrives else schema.Capabilities.NOT_NOW
+    if controller.read_only is not None:
+        return schema.Capabilities(stops=schema.Capabilities.NONE, absolute=capabilities.absolute)
+    return schema.Capabilities(
+        stops=stops,
+        commands=commands_of(capabilities),
+        absolute=capabilities.absolute,
+        dies_with_link=_KNOWN[capabilities.dies_with_link],
+    )
 
 
 def _health(health: LinkHealth, *, flooding: bool) -> schema.LinkHealth:

@@ -297,6 +297,7 @@ COMMAND_TWO_UNITS = Code(
 COMMAND_PROGRAM_RUNS = Code(
     "command.program_runs", "program {name} is running", "stop it, or wait until it has ended"
 )
+COMMAND_NOT_THERE = Code("command.not_there", "this controller has no {command}")
 COMMAND_HELD = Code("command.held", "HOLD arrived before it could be sent")
 COMMAND_CONTROL_ENDED = Code("command.control_ended", "control ended")
 COMMAND_CONTROL_ENDED_MEANWHILE = Code(
@@ -342,6 +343,9 @@ STOP_NOT_PROVEN = Code(
     "its stop is not proven",
     "test the stop unit on its controller (see docs/safety.md), then set stop_proven = true for this robot "
     "in the site file",
+)
+ROBOT_HOMED_BY_NATURE = Code(
+    "robot.homed_by_nature", "its encoders are absolute: it is always homed", "move it to its home position"
 )
 ROBOT_NOT_HOMED = Code("robot.not_homed", "the robot is not homed", "home it first (HOME)")
 ROBOT_HOMED_UNKNOWN = Code(

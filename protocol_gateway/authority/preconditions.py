@@ -11,14 +11,18 @@
     JOG                         x     x     x               x          x
     MOVE_ABSOLUTE MOVE_RELATIVE x     x     x               x          x      x
 
-HOLD can only slow a robot down, so an unknown mode does not forbid it.
+A command that the driver does not have is refused before. HOLD can only slow a robot down, so an unknown
+mode does not forbid it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, not_sent
 from protocol_gateway.drivers.driver import (
+    COMMANDS,
     Activity,
+    Capabilities,
     ControllerCommand,
     Hold,
     Home,
@@ -39,6 +43,22 @@ from robots.joints import Joints, violations
 
 _C = CommandRequest.Command
 _MOVES = frozenset({_C.MOVE_ABSOLUTE, _C.MOVE_RELATIVE})
+_KINDS: dict[CommandRequest.Command, type[ControllerCommand]] = {
+    _C.HOME: Home,
+    _C.HOLD: Hold,
+    _C.RESUME: Resume,
+    _C.RESET: Reset,
+    _C.TRACE_ON: Trace,
+    _C.TRACE_OFF: Trace,
+    _C.SPEED: Speed,
+    _C.MOVE_ABSOLUTE: MoveAbsolute,
+    _C.MOVE_RELATIVE: MoveRelative,
+    # The gateway sends the steps of these as motions.
+    _C.RUN_PROGRAM: MoveAbsolute,
+    _C.JOG: MoveAbsolute,
+}
+
+_EVERYTHING = Capabilities(commands=COMMANDS, jogs=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +69,8 @@ class Controller:
         positions: Joint positions [rad] or [m]; None: none received, or stale.
         positions_stale: Reason if positions are stale; None: they are current, or none were received.
         read_only: Reason why nothing is sent to it; None: commands may be sent.
+        capabilities: What its driver can do.
+        stop_arrives: What carries its stop is connected.
         accept_unknown: States that it never reports and the site file does not require: "mode", "homed".
     """
 
@@ -58,6 +80,8 @@ class Controller:
     positions: tuple[float, ...] | None = None
     positions_stale: Reason | None = None
     read_only: Reason | None = None
+    capabilities: Capabilities = _EVERYTHING
+    stop_arrives: bool = True
     accept_unknown: frozenset[str] = frozenset()
 
 
@@ -65,6 +89,7 @@ def obstacle(request: CommandRequest, controller: Controller, joints: Joints) ->
     """Return the refusal of a command that cannot be sent now; None: it can."""
     found = (
         _link_obstacle(controller)
+        or _ability_obstacle(request, controller.capabilities)
         or _mode_obstacle(request, controller)
         or _state_obstacle(request, controller)
         or _value_obstacle(request, controller, joints)
@@ -82,6 +107,23 @@ def _link_obstacle(controller: Controller) -> Reason | None:
             return codes.LINK_SILENT(controller.link.reason)
         case LinkState.UP:
             return None
+
+
+def _ability_obstacle(request: CommandRequest, capabilities: Capabilities) -> Reason | None:
+    if _KINDS.get(request.command) in capabilities.commands:
+        return None
+    if request.command == _C.HOME and capabilities.absolute:
+        return codes.ROBOT_HOMED_BY_NATURE()
+    return codes.COMMAND_NOT_THERE(command=_C.Name(request.command))
+
+
+def commands_of(capabilities: Capabilities) -> Sequence[CommandRequest.Command]:
+    """Return the commands of the mesh that can be executed with a driver."""
+    return [
+        command
+        for command, kind in _KINDS.items()
+        if kind in capabilities.commands and (command != _C.JOG or capabilities.jogs)
+    ]
 
 
 def _mode_obstacle(request: CommandRequest, controller: Controller) -> Reason | None:

@@ -18,7 +18,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, Flag, auto
-from typing import Protocol, TypeAlias
+from typing import Protocol, TypeAlias, get_args
 
 from robomesh.reasons import Reason
 
@@ -264,6 +264,37 @@ ControllerCommand: TypeAlias = (
     Home | Hold | Resume | Reset | Stop | Trace | Speed | MoveAbsolute | MoveRelative
 )
 
+COMMANDS: frozenset[type[ControllerCommand]] = frozenset(get_args(ControllerCommand))
+"""All of them."""
+
+
+class StopEnds(Enum):
+    """Motion that a driver's `Stop` ends."""
+
+    OURS = "ours"
+    ANY = "any"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Capabilities:
+    """What a driver can do with its controller. The rest is refused with a code, and not offered.
+
+    Attributes:
+        commands: Commands that `encode` takes; empty: the driver only reads.
+        stop_ends: Whose motion `Stop` ends; a test at the site proves that it works.
+        jogs: `Reset` gives a held motion up without a latch, and a new target replaces a running motion: the
+            arm goes on smoothly from where it is, without a stop between the targets.
+        absolute: The arm has absolute encoders: it is homed by nature.
+        dies_with_link: Whether the controller itself ends a motion when the gateway or its link is gone;
+            None: unknown.
+    """
+
+    commands: frozenset[type[ControllerCommand]]
+    stop_ends: StopEnds = StopEnds.ANY
+    jogs: bool = False
+    absolute: bool = False
+    dies_with_link: bool | None = None
+
 
 # ------------------------------------------------------------------------ effects
 
@@ -374,21 +405,8 @@ class Driver(Protocol):
         ...
 
     @property
-    def reads_only(self) -> bool:
-        """True if the driver has no command at all."""
-        ...
-
-    @property
-    def can_stop(self) -> bool:
-        """True if the driver has a stop for the controller; a test at the site proves that it works."""
-        ...
-
-    @property
-    def can_jog(self) -> bool:
-        """True if `Reset` gives a held motion up without a latch, and a new target replaces a running motion.
-
-        The arm must go on smoothly from where it is, without a stop between the targets.
-        """
+    def capabilities(self) -> Capabilities:
+        """What the driver can do with the controller; it stays the same."""
         ...
 
     def started(self, now_s: float) -> Effects:

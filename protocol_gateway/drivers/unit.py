@@ -28,7 +28,9 @@ from protocol_gateway.core.scales import si_scales
 from protocol_gateway.core.stream import Malformed, Unit, UnitStream, printable
 from protocol_gateway.drivers.driver import (
     ALL,
+    COMMANDS,
     Activity,
+    Capabilities,
     Channel,
     ControllerCommand,
     ControllerEvent,
@@ -62,7 +64,15 @@ UNITS = Channel(name="units", carries=ALL)
 
 _ACTIVITIES = {activity.value: activity for activity in Activity}
 _MODES = {mode.value: mode for mode in Mode}
-_WORDS = {Home: "home", Hold: "hold", Resume: "resume", Reset: "reset", Stop: "stop"}
+_WORDS: dict[type[ControllerCommand], tuple[str, ...]] = {
+    Home: ("home",),
+    Hold: ("hold",),
+    Resume: ("resume",),
+    Reset: ("reset",),
+    Stop: ("stop",),
+    Trace: ("trace", "untrace"),
+    Speed: ("speed",),
+}
 _NO_CODES: Mapping[int, str] = MappingProxyType({})
 
 
@@ -90,19 +100,11 @@ class UnitDriver:
         self._stream = UnitStream(self._table)
         self._scales = si_scales(joint_types)
         self._relay = relay
-
-    @property
-    def can_stop(self) -> bool:
-        """True if there is a stop unit: a controller that knows only codes needs a code for `stop`."""
-        return self._table.supports(_WORDS[Stop])
-
-    @property
-    def can_jog(self) -> bool:
-        """True if there are units to hold, and to give the held motion up."""
-        return all(self._table.supports(_WORDS[each]) for each in (Hold, Reset))
+        # Of a controller that knows only codes, those that have one.
+        without = {kind for kind, words in _WORDS.items() if not all(map(self._table.supports, words))}
+        self.capabilities = Capabilities(commands=COMMANDS - without, jogs=not without & {Hold, Reset})
 
     ports: frozenset[str] = frozenset()
-    reads_only = False
     # Nothing is ever sent but an operator's command.
     requests_a_second = 0.0
 
@@ -208,7 +210,7 @@ class UnitDriver:
             case Trace(on):
                 return Command(("trace" if on else "untrace",))
             case _:
-                return Command((_WORDS[type(command)],))
+                return Command(_WORDS[type(command)])
 
     def _protocol_values(self, values: Sequence[float]) -> tuple[float, ...]:
         if len(values) != len(self._scales):

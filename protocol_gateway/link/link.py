@@ -213,6 +213,10 @@ class ControllerLink:
                 self._perform(effect, now)
         self._response_timer.command_sent(now.monotonic_s)
 
+    def carries(self, what: Carries) -> bool:
+        """Return whether a channel that carries it is connected."""
+        return any(kept.connection and what in kept.channel.carries for kept in self._channels.values())
+
     def defer_in_flood(self, kind: Hashable, call: Callable[[], None]) -> bool:
         """Defer a call in a flood, where only the newest of each kind is done; return whether deferred."""
         if self._dispatcher.flood.active:

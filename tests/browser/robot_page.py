@@ -42,7 +42,9 @@ def joints_notice(page):
 
 
 def stop_button(page):
-    return page.get_by_role("button", name=re.compile("^(Stop request|Stop cannot be sent|停止请求)"))
+    return page.get_by_role(
+        "button", name=re.compile("^(Stop request|Stop cannot|No stop from here|停止请求)")
+    )
 
 
 def stop_panel(page):

@@ -180,6 +180,7 @@ def test_when_the_controller_falls_silent_nothing_looks_live(open_page, plant):
         expect(page.locator(".scene-stale")).to_contain_text(re.compile(r"stale \d"))
         expect(page.locator('[data-joint="waist"]')).to_have_class(re.compile("stale"))
         expect(state_word(page)).to_have_text("No link")
+        expect(stop_button(page)).to_have_text("Stop cannot arrive: use the emergency stop")
         late = open_page("#/hall/pt600", drawn=False)  # a page that is opened now shows old values as old too
         expect(late.locator('[data-joint="waist"]')).to_have_class(re.compile("stale"))
         expect(late.locator(".scene-stale")).to_be_visible()

@@ -5,8 +5,17 @@ from math import radians
 
 import pytest
 
-from protocol_gateway.authority.preconditions import Controller, controller_command, obstacle
-from protocol_gateway.drivers.driver import Activity, Mode, MoveAbsolute, Speed, StatusReceived, Trace
+from protocol_gateway.authority.preconditions import Controller, commands_of, controller_command, obstacle
+from protocol_gateway.drivers.driver import (
+    Activity,
+    Capabilities,
+    Mode,
+    MoveAbsolute,
+    Speed,
+    StatusReceived,
+    Stop,
+    Trace,
+)
 from protocol_gateway.link.link import LinkState, LinkStatus
 from protocol_gateway.motion import MotionDetector, has_arrived, is_moving, motion_may_be_held
 from robomesh import reason_codes as codes
@@ -46,6 +55,9 @@ SITUATIONS = {
     "link down": linked(LinkState.DOWN),
     "silent": linked(LinkState.SILENT),
     "read only": replace(READY, read_only=codes.STOP_NOT_PROVEN()),
+    "stops and moves only": replace(
+        READY, capabilities=Capabilities(commands=frozenset({Stop, MoveAbsolute}), absolute=True)
+    ),
     "local": in_state(mode=Mode.LOCAL),
     "mode unknown": in_state(mode=None),
     "mode unknown, accepted": replace(in_state(mode=None), accept_unknown=frozenset({"mode"})),
@@ -80,6 +92,7 @@ AT_REST = [name for name in ALL if name != "RESUME"]
         ("link down", []),
         ("silent", []),
         ("read only", []),
+        ("stops and moves only", ["MOVE_ABSOLUTE"]),
         ("local", []),
         ("mode unknown", ["HOLD"]),
         ("mode unknown, accepted", AT_REST),
@@ -123,6 +136,13 @@ def test_allowed_commands_in_each_state_of_the_controller(situation, allowed):
 )
 def test_a_refused_value_is_named_with_the_allowed_ones(asked, words):
     assert words in obstacle(asked, READY, JOINTS).text
+
+
+def test_what_the_driver_does_not_have_is_refused_in_words():
+    few = SITUATIONS["stops and moves only"]
+    assert "this controller has no MOVE_RELATIVE" in obstacle(command(C.MOVE_RELATIVE), few, JOINTS).text
+    assert "its encoders are absolute" in obstacle(command(C.HOME), few, JOINTS).text
+    assert set(commands_of(few.capabilities)) == {C.MOVE_ABSOLUTE, C.RUN_PROGRAM}
 
 
 def test_a_robot_without_positions_is_homed_but_not_moved():

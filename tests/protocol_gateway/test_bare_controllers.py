@@ -1,5 +1,6 @@
 """Controllers that report little, or only unknown records, or have no proven stop."""
 
+from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, measured, refusal, simulator, until
 from tests.protocol_gateway.scripted_controller import repeated, scripted_controller
@@ -59,6 +60,8 @@ def test_a_controller_without_a_proven_stop_is_read_only(mesh, tmp_path):
             # No stop is latched, because it could never be reset, and none is shown.
             assert not site.controller.HasField("stop")
             assert site.controller.counters.units_sent == 0
+            assert site.controller.capabilities.stops == schema.Capabilities.NONE
+            assert not site.controller.capabilities.commands
 
     run(main())
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import SessionSettings
 from services.simulator.errors import SimulatorError
 from services.simulator.fault_requests import Mesh
@@ -31,6 +32,7 @@ def test_a_frozen_controller_is_silent_within_a_second_and_reconnected(mesh, tmp
             assert "sends nothing" in (await site.event("link.silent", -1)).text
             joints = len(site.seen["joints"])
             await until(lambda: site.controller.link == STATE.DOWN)
+            assert site.controller.capabilities.stops == schema.Capabilities.NOT_NOW
             assert "sends nothing; connecting again" in (await site.event("link.down", -1)).text
             assert len(site.seen["joints"]) == joints
             await fault("freeze", off=True)

@@ -8,6 +8,7 @@ import pytest
 
 from protocol_gateway.drivers.driver import (
     ALL,
+    Capabilities,
     Carries,
     Channel,
     Close,
@@ -33,7 +34,7 @@ class Driver:
     """Driver whose effects the test chooses; it notes what it is told."""
 
     requests_a_second = 100.0
-    can_stop = can_jog = False
+    capabilities = Capabilities(commands=frozenset())
 
     def __init__(self, **effects):
         self.told = []

@@ -10,7 +10,6 @@ import numpy as np
 import pinocchio
 import pytest
 
-from protocol_gateway.drivers.unit import UnitDriver
 from robomesh.errors import RefusedError
 from robomesh.messages import reason_message
 from robomesh.schemas import robomesh_pb2 as schema
@@ -360,13 +359,16 @@ def test_what_cannot_be_jogged_is_refused_in_words(mesh, tmp_path):
 
 @pytest.mark.parametrize(
     ("settings", "code"),
-    [({"jog_speed": 0.0}, "jog.forbidden"), ({"stop_proven": False}, None), ({}, "jog.no_driver")],
+    [
+        ({"jog_speed": 0.0}, "jog.forbidden"),
+        ({"stop_proven": False}, None),
+        ({"codes": {2: "ABSOLUTE.DEG", 5: "STATUS", 102: "COMMAND:stop"}}, "jog.no_driver"),
+    ],
 )
-def test_a_robot_that_may_not_be_jogged_says_why(mesh, tmp_path, monkeypatch, settings, code):
+def test_a_robot_that_may_not_be_jogged_says_why(mesh, tmp_path, settings, code):
     async def main():
-        if not settings:
-            monkeypatch.setattr(UnitDriver, "can_jog", False)
-        async with simulator(demo=True) as port, gateway(mesh, tmp_path, port, **settings) as site:
+        coded = simulator(demo=True, codes=settings.get("codes", {}))
+        async with coded as port, gateway(mesh, tmp_path, port, **settings) as site:
             if code is None:
                 assert "read-only" in await refusal(site.lease(A.ACQUIRE))
                 return

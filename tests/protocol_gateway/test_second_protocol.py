@@ -14,6 +14,7 @@ import pytest
 from protocol_gateway.drivers.driver import (
     ALL,
     Activity,
+    Capabilities,
     Channel,
     Home,
     JointsReceived,
@@ -30,6 +31,7 @@ from protocol_gateway.drivers.driver import (
 )
 from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.errors import CommandError
+from robomesh.schemas import robomesh_pb2 as schema
 from services.errors import SiteFileError
 from services.site_file.site import load
 from tests.conftest import run
@@ -44,9 +46,8 @@ LINES = Channel(name="lines", carries=ALL)
 class JsonLines:
     """Driver of JSON lines (`protocol_gateway.drivers.driver.Driver`)."""
 
-    can_stop, can_jog = True, False
+    capabilities = Capabilities(commands=frozenset({Home, Stop, Reset, MoveAbsolute}))
     requests_a_second = 0.0
-    reads_only = False
 
     def __init__(self, joint_types, codes, *, relay):
         self._joints = len(joint_types)
@@ -152,12 +153,15 @@ def test_a_robot_of_another_protocol_is_shown_commanded_and_stopped_like_any_oth
             # Positions and state are two topics.
             await until(lambda: site.controller.mode == STATE.REMOTE)
             assert site.controller.homed == STATE.YES
+            able = site.controller.capabilities
+            assert able.stops == schema.Capabilities.ANY
+            assert set(able.commands) == {C.HOME, C.RESET, C.MOVE_ABSOLUTE, C.RUN_PROGRAM}
             await site.lease(A.ACQUIRE, ttl_s=5)
             target = [0.2, 1.0, -0.5, 0.1, 0.3]
             await site.command(C.MOVE_ABSOLUTE, joint_positions=target)
             await until(lambda: site.joints == target)
             await site.lease(A.ACQUIRE, lease=site.secret, ttl_s=5)  # a busy machine may have taken over 5 s
-            assert "knows no Trace" in await refusal(site.command(C.TRACE_ON))
+            assert "this controller has no TRACE_ON" in await refusal(site.command(C.TRACE_ON))
             far = [math.radians(170.0), *target[1:]]
             assert "waist" in await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=far))
             stop = await site.stop(by="wang")

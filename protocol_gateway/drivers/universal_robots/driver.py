@@ -10,6 +10,7 @@ from protocol_gateway.drivers.driver import (
     NOTHING,
     Activity,
     AlarmReceived,
+    Capabilities,
     Carries,
     Channel,
     Close,
@@ -95,8 +96,7 @@ class RtdeDriver:
     """
 
     ports = frozenset({PRIMARY.name})
-    reads_only = True
-    can_stop = can_jog = False
+    capabilities = Capabilities(commands=frozenset(), absolute=True)
     # A greeting takes at most seven requests.
     requests_a_second = 10.0
 

@@ -21,6 +21,7 @@ from services.command_line.live.listing_text import listing_text
 from services.command_line.live.monitor_text import replay_record
 
 _State = schema.ControllerState
+_Stops, _Command = schema.Capabilities.Stops, schema.CommandRequest.Command
 _Alarm = schema.Alarm
 # Requests per process, of which the quickest counts; requests in parallel; timeout.
 _CLOCKS, _CLOCKS_AT_ONCE, _CLOCK_S = 3, 8, 0.7
@@ -178,6 +179,8 @@ async def _row(session: Session, site: str, robot: str) -> dict[str, Any]:
         "state": activity_words(state),
         "stop_id": state.stop.id if state.HasField("stop") else None,
         "read_only": state.read_only,
+        "stops": _Stops.Name(state.capabilities.stops).lower() if state.HasField("capabilities") else None,
+        "commands": [_Command.Name(each) for each in state.capabilities.commands],
         "rate_hz": state.rate_hz if state.HasField("rate_hz") else None,
         "age_s": state.last_unit_age_s if state.HasField("last_unit_age_s") else None,
         "holder": lease.holder if isinstance(lease, schema.Lease) else "",
@@ -195,6 +198,8 @@ def _row_without_gateway(site: str, robot: str, link: str) -> dict[str, Any]:
         "state": "unknown",
         "stop_id": None,
         "read_only": False,
+        "stops": None,
+        "commands": [],
         "rate_hz": None,
         "age_s": None,
         "holder": "",

@@ -160,4 +160,8 @@ def _state(row: dict[str, Any]) -> str:
         words.append(f"stop {row['stop_id']} latched")
     if row["read_only"]:
         words.append("read-only")
+    elif row["stops"] == "not_now" and row["link"] == "up":
+        words.append("a stop cannot be sent now")
+    elif row["stops"] == "ours":
+        words.append("a stop ends our motions only")
     return ", ".join(words)

@@ -5,15 +5,18 @@ import type { ComponentType } from "preact";
 import { useEffect } from "preact/hooks";
 import { SignIn } from "../features/account/sign-in";
 import { FleetPage } from "../features/fleet/fleet-page";
+import { ControllerStateSchema } from "../gen/robomesh_pb";
 import { a } from "../i18n/account";
 import { timeOfDay } from "../i18n/format";
-import { language, t } from "../i18n/texts";
+import { language, type TextName, t } from "../i18n/texts";
 import { mustSignIn } from "../mesh/account";
 import { hello, lostAt, reachable } from "../mesh/connection";
 import { controlNotice, heldLease, release } from "../mesh/control";
 import { fleetRobots } from "../mesh/known-robots";
 import { canBe, isReplay } from "../mesh/robot-name";
+import { stopRequestText } from "../mesh/robot-state";
 import { dismissStop, stop, stopAgain, stopNotice, unsentStop } from "../mesh/stop";
+import { useTopic } from "../mesh/topics";
 import { RobotNotFound } from "../panels/robot-not-found";
 import { guardMovedControls } from "../ui/moved-controls";
 import { NoticeLine } from "../ui/notice-line";
@@ -82,7 +85,7 @@ export function App() {
     <>
       <SkipLink />
       <Bar>
-        <StopButton robots={mustSignIn.value ? [] : robots} />
+        <StopPlace robots={mustSignIn.value ? [] : robots} />
       </Bar>
       <Banners />
       <main id="page" tabIndex={-1} lang={language.value === "zh" ? "zh-Hans" : "en"}>
@@ -134,10 +137,9 @@ function Page({ route, robotKey }: { route: Route; robotKey: string }) {
   }
 }
 
-function StopButton({ robots }: { robots: readonly string[] }) {
+function StopPlace({ robots }: { robots: readonly string[] }) {
   const named = robotOf(route.value);
   const robot = named && canBe(named) && !isReplay(named.robot) ? named.robot : "";
-  const one = robot !== "";
   return (
     <div class="stop-place">
       {stopNotice.value && (
@@ -153,17 +155,42 @@ function StopButton({ robots }: { robots: readonly string[] }) {
           </button>
         </div>
       )}
-      <button
-        class={`stop ${reachable.value ? "" : "unreachable"}`}
-        disabled={robots.length === 0}
-        onClick={() => void stop(robots)}
-        title={mustSignIn.value ? a("no_stop") : one ? t("stop_hint", { robot }) : t("stop_all_hint")}
-      >
-        <span class="stop-shape" aria-hidden="true" />
-        <span>{t(!reachable.value ? "stop_unreachable" : one ? "stop" : "stop_all")}</span>
-        {reachable.value && heldLease.value && <kbd>{t("stop_space")}</kbd>}
-      </button>
+      {robot && robots[0] ? (
+        <RobotStop robot={robot} robotKey={robots[0]} />
+      ) : (
+        <StopButton robots={robots} text="stop_all" hint={t("stop_all_hint")} />
+      )}
     </div>
+  );
+}
+
+function RobotStop({ robot, robotKey }: { robot: string; robotKey: string }) {
+  const text = stopRequestText(useTopic(ControllerStateSchema, `${robotKey}/controller`));
+  return (
+    <StopButton
+      robots={[robotKey]}
+      text={text}
+      hint={t(text === "stop_ours" ? "stop_ours_hint" : "stop_hint", { robot })}
+    />
+  );
+}
+
+/** It can always be pressed, also where its request does not arrive now: then it says so. */
+function StopButton(props: { robots: readonly string[]; text: TextName; hint: string }) {
+  const { robots } = props;
+  const text = reachable.value ? props.text : "stop_unreachable";
+  const arrives = text === "stop" || text === "stop_all" || text === "stop_ours";
+  return (
+    <button
+      class={`stop ${arrives ? "" : "unreachable"} ${text === "stop_none" ? "none" : ""}`}
+      disabled={robots.length === 0}
+      onClick={() => void stop(robots)}
+      title={mustSignIn.value ? a("no_stop") : props.hint}
+    >
+      <span class="stop-shape" aria-hidden="true" />
+      <span>{t(text)}</span>
+      {arrives && heldLease.value && <kbd>{t("stop_space")}</kbd>}
+    </button>
   );
 }
 

@@ -455,6 +455,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     "command.program_runs",
     ["program {name} is running: stop it, or wait until it has ended", "程序 {name} 正在运行：请停止它，或等待其结束"],
   ],
+  ["command.not_there", ["this controller has no {command}", "此控制器没有 {command}"]],
   ["command.held", ["HOLD arrived before it could be sent", "保持命令先到，未发送"]],
   ["command.control_ended", ["control ended", "控制权已结束"]],
   ["command.control_ended_meanwhile", ["control ended before the command was sent", "命令发出前控制权已结束"]],
@@ -488,6 +489,13 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     [
       "stop {id} is latched ({by}: {reason}): remove the cause, then send RESET with stop_id {id}",
       "停止 {id} 已锁定（{by}：{reason}）：请排除原因，再以 stop_id {id} 复位",
+    ],
+  ],
+  [
+    "robot.homed_by_nature",
+    [
+      "its encoders are absolute: it is always homed: move it to its home position",
+      "其编码器为绝对式，始终已回零：请将其移到原位",
     ],
   ],
   ["robot.read_only", ["this robot is read-only: {cause}", "此机器人只读：{cause}"]],

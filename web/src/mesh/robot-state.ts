@@ -5,9 +5,11 @@ import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { ControllerState, ControllerState_Program, Event, ReplayState } from "../gen/robomesh_pb";
 import {
   ControllerState_Activity as Activity,
+  CommandRequest_Command as Command,
   ControllerState_Known as Known,
   ControllerState_Link as Link,
   ControllerState_Mode as Mode,
+  Capabilities_Stops as Stops,
 } from "../gen/robomesh_pb";
 import { stampTime } from "../i18n/format";
 import { reasonsText, reasonText } from "../i18n/reasons";
@@ -153,6 +155,30 @@ export function whyNoNewMotion(state: ControllerState | undefined): string {
 /** Explain why no joint has a target; a robot that is not homed can still be homed. */
 export function whyNoTarget(state: ControllerState | undefined): string {
   return whyNoMotion(state) || (state?.homed === Known.NO ? t("no_motion_unhomed") : "");
+}
+
+/** Return what a stop request can do now, as the name of the button's text. */
+export function stopRequestText(
+  controller: Latest<ControllerState> | undefined,
+): "stop" | "stop_ours" | "stop_not_now" | "stop_none" {
+  if (!controller) return "stop"; // not known yet
+  switch (controller.message.capabilities?.stops) {
+    case Stops.NONE:
+      return "stop_none";
+    case Stops.NOT_NOW:
+      return "stop_not_now";
+    case Stops.OURS:
+      return isStale("controller", ageOf(controller)) ? "stop_not_now" : "stop_ours";
+    default:
+      return isStale("controller", ageOf(controller)) ? "stop_not_now" : "stop";
+  }
+}
+
+/** Explain why a command is never sent to the robot; empty: it can be. */
+export function whyNoCommand(state: ControllerState | undefined, command: Command): string {
+  const { capabilities } = state ?? {};
+  if (!capabilities || state?.readOnly || capabilities.commands.includes(command)) return "";
+  return t(command === Command.HOME && capabilities.absolute ? "homed_by_nature" : "no_such_command");
 }
 
 /** Return whether the controller reports motion. */

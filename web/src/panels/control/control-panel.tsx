@@ -10,7 +10,7 @@ import { reachable } from "../../mesh/connection";
 import { controlNotice, holds } from "../../mesh/control";
 import type { Motion } from "../../mesh/notice-expiry";
 import { useNoticeExpiry } from "../../mesh/notice-expiry";
-import { stoppedByItself, whyNoMotion, whyNoNewMotion } from "../../mesh/robot-state";
+import { stoppedByItself, whyNoCommand, whyNoMotion, whyNoNewMotion } from "../../mesh/robot-state";
 import { whyFrozen } from "../../mesh/sight";
 import type { Latest } from "../../mesh/topics";
 import { now } from "../../mesh/topics";
@@ -37,6 +37,7 @@ export function ControlPanel(props: {
   const frozen = whyFrozen(robotKey, now.value);
   const why = reachable.value ? whyNoNewMotion(state) || frozen : t("no_connection");
   const canSend = mine && reachable.value && !state?.stop && !state?.readOnly;
+  const lacks = (name: Command) => whyNoCommand(state, name);
   const send = (name: Command, what: string, values?: CommandValues, positions?: number[]) =>
     void command(robotKey, name, what, values, undefined, positions);
   const home = () =>
@@ -58,7 +59,13 @@ export function ControlPanel(props: {
       <WhoControls robotKey={robotKey} holder={holder} lease={props.lease} readOnly={state?.readOnly ?? false} />
       {isMonitor.value || (
         <div class="command-row">
-          <button class="action" data-moves disabled={!mine || !!why} title={mine ? why : ""} onClick={home}>
+          <button
+            class="action"
+            data-moves
+            disabled={!mine || !!why || !!lacks(Command.HOME)}
+            title={mine ? lacks(Command.HOME) || why : ""}
+            onClick={home}
+          >
             {t("home")}
           </button>
           {holding ? (
@@ -71,13 +78,20 @@ export function ControlPanel(props: {
               {t("resume")}
             </button>
           ) : (
-            <button class="action" data-moves disabled={!canSend} onClick={() => send(Command.HOLD, t("hold"))}>
+            <button
+              class="action"
+              data-moves
+              disabled={!canSend || !!lacks(Command.HOLD)}
+              title={lacks(Command.HOLD)}
+              onClick={() => send(Command.HOLD, t("hold"))}
+            >
               {t("hold")}
             </button>
           )}
           <button
             class="action"
-            disabled={!mine || !reachable.value || state?.readOnly}
+            disabled={!mine || !reachable.value || state?.readOnly || !!lacks(Command.TRACE_ON)}
+            title={lacks(Command.TRACE_ON)}
             aria-pressed={tracing}
             onClick={() => (tracing ? send(Command.TRACE_OFF, t("trace_off")) : send(Command.TRACE_ON, t("trace_on")))}
           >
@@ -92,7 +106,7 @@ export function ControlPanel(props: {
           isMonitor.value || (
             <Speed
               percent={state?.speedPercent}
-              enabled={canSend && !state?.program}
+              enabled={canSend && !state?.program && !lacks(Command.SPEED)}
               send={(value) => command(robotKey, Command.SPEED, t("what_speed", { value }), { speedPercent: value })}
             />
           )
