@@ -14,11 +14,18 @@ ARM = "#/hall/arm"
 # A picture of every page at each of these widths, for a person to look through.
 PICTURES = Path(__file__).resolve().parents[2] / ".pictures"
 PICTURE_SIZES = ((1440, 900), (360, 740))
+# A position with its unit; a dash if it is not known.
+POSITION = re.compile(r"^\s*(−?\d+\.\d+|–)\s*(°|mm)\s*$")
+TOOL_VALUE = re.compile(r"^\s*(−?\d+\.\d+|–)\s*(mm|°|mm/s)?\s*$")
 HOME = ["0.00°", "90.00°", "−90.00°", "0.00°", "0.00°"]
 
 
 def button(page, name):
     return page.get_by_role("button", name=name, exact=True)
+
+
+def region(page, name):
+    return page.get_by_role("region", name=name, exact=True)
 
 
 def who_controls(page):
@@ -33,12 +40,27 @@ def state_word(page):
 
 def control_notice(page):
     """Return the outcome of the last command, or what to do first."""
-    return page.get_by_role("region", name="Control", exact=True).get_by_label("Outcome", exact=True)
+    return region(page, "Control").get_by_label("Outcome", exact=True)
 
 
 def joints_notice(page):
     """Return the outcome of the last motion of a joint, or what to do first."""
-    return page.get_by_role("region", name="Joints", exact=True).get_by_label("Outcome", exact=True)
+    return region(page, "Joints").get_by_label("Outcome", exact=True)
+
+
+def joint_value(page, joint):
+    """Return where a joint is, with its unit."""
+    return page.get_by_role("group", name=joint, exact=True).get_by_text(POSITION)
+
+
+def joint_values(page):
+    """Return where each joint is, with its unit."""
+    return region(page, "Joints").get_by_text(POSITION)
+
+
+def tool_values(page):
+    """Return the tool's pose, speed and manipulability, with their units."""
+    return region(page, "Tool").get_by_role("definition").get_by_text(TOOL_VALUE)
 
 
 def stop_button(page):
@@ -117,8 +139,8 @@ def ready(page, name="li"):
             if not notice.inner_text().startswith("Not sent"):
                 break
         page.wait_for_timeout(200)
-    expect(page.locator("[data-joint]")).to_have_text(HOME)
-    expect(page.locator(".facts")).to_contain_text("· homed")
+    expect(joint_values(page)).to_have_text(HOME)
+    expect(page.get_by_text("· homed")).to_be_visible()
     expect(state_word(page)).to_have_text("Idle")
 
 
@@ -169,7 +191,7 @@ def fault(plant, name):
 
 
 def degrees(page, joint):
-    text = page.locator(f'[data-joint="{joint}"]').inner_text()
+    text = joint_value(page, joint).inner_text()
     return float(text.replace("°", "").replace("−", "-"))
 
 
@@ -178,7 +200,7 @@ def wait_to_move(page, joint, do):
 
     It is done again where the joint does not move: a busy machine may send it after its not_after.
     """
-    position = page.locator(f'[data-joint="{joint}"]')
+    position = joint_value(page, joint)
     before = position.inner_text()
     for _ in range(5):
         do()

@@ -14,18 +14,29 @@ from robots.glb import link_meshes
 from robots.urdf.write import to_urdf
 from tests.browser.define.page import (
     SHAPES,
-    button,
+    chain_row,
+    chain_rows,
+    checks,
     choose,
+    done,
+    drawing,
     drop,
     field,
+    missing_files,
     opened,
     paste,
+    problems,
+    refusal,
+    robots,
+    save_state,
     settled,
     shape,
     tab,
+    table,
+    table_rows,
     tools,
 )
-from tests.browser.robot_page import serious, who_controls
+from tests.browser.robot_page import button, joint_value, region, serious, tool_values, who_controls
 from tests.robots.test_dh import KUKA_LIKE
 from tests.site import wait_until
 
@@ -43,24 +54,28 @@ ROWS = [
 
 def test_an_arm_of_dropped_files_gets_rows_and_limits_is_saved_started_and_moves(open_page, plant):
     page = open_page("#/define")
-    for name in ("pt500", "pt600", "puma560"):
-        expect(page.locator(f'.robot-card[href="#/define/{name}"]')).to_be_visible()
+    for name, title in (("pt500", "Pt500"), ("pt600", "Pt600"), ("puma560", "Puma 560")):
+        expect(robots(page).filter(has_text=title)).to_have_attribute("href", f"#/define/{name}")
     drop(page, *map(shape, ("base.wrl", "column.3ds", "forearm.3ds", "upper_arm.wrl", "wrist.wrl")))
-    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "5")
+    expect(drawing(page)).to_have_attribute("data-shapes", "5")
     expect(page.get_by_role("list", name="What was found in the files")).to_contain_text(
         "Order guessed from the names: base → column → upper_arm → forearm → wrist."
     )
     # A button gives the flange its own joint.
     button(page, "+ Add joint").click()
-    page.locator(".mesh-row input[type=file]").set_input_files(SHAPES / "flange.3ds")
-    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "6")
-    assert page.locator(".chain-words .dim").all_inner_texts()[1:6] == [
+    page.get_by_label("Choose a file…", exact=True).set_input_files(SHAPES / "flange.3ds")
+    expect(drawing(page)).to_have_attribute("data-shapes", "6")
+    shapes = (
         "column · column.3ds",
         "upper_arm · upper_arm.wrl",
         "forearm · forearm.3ds",
         "wrist · wrist.wrl",
         "flange.3ds",
-    ]
+    )
+    for number, words in enumerate(shapes):
+        expect(
+            chain_row(page, number).get_by_role("button", name=f"joint{number + 1} {words} ")
+        ).to_be_visible()
     for number, (name, a, alpha, d, theta, limits) in enumerate(ROWS):
         choose(page, number)
         field(page, f"joint/{number}/name").fill(name)
@@ -85,26 +100,26 @@ def test_an_arm_of_dropped_files_gets_rows_and_limits_is_saved_started_and_moves
         path.name for path in SHAPES.iterdir()
     )
 
-    expect(page.locator(".headline h1")).to_have_text("five")
+    expect(page.get_by_role("heading", level=1)).to_have_text("five")
     path = page.url.partition("/#")[2]
     page.close()
     page = open_page(f"#{path}", drawn=False)  # drawn by the processor here, it would leave a lease no time
     # The robot is starting: no gateway can grant control yet.
-    expect(page.locator(".headline .facts")).to_contain_text("remote · not homed")
+    expect(page.get_by_text("remote · not homed")).to_be_visible()
     expect(who_controls(page)).to_have_text("Nobody is in control")
     page.get_by_label("Your name").fill("li")
     button(page, "Take control").click()
     expect(who_controls(page)).to_have_text("You are in control")
     button(page, "Home").click()
-    expect(page.locator(".headline .facts")).to_contain_text("remote · homed")
+    expect(page.get_by_text("remote · homed")).to_be_visible()
     handle = page.get_by_role("slider", name="Target of elbow")
     handle.focus()
     handle.press("PageUp")
     handle.press("Enter")
-    expect(page.locator('[data-joint="elbow"]')).to_have_text("10.00°")
+    expect(joint_value(page, "elbow")).to_have_text("10.00°")
     # Rows of the table: tool 0.1 m on from an elbow at 10°, base 0.3 m up, two links of 0.25 m.
     reach = 250 + 350 * math.cos(math.radians(10))
-    expect(page.locator(".tool .number").first).to_have_text(f"{reach:.1f}mm")
+    expect(tool_values(page).first).to_have_text(f"{reach:.1f}mm")
     button(page, "Release").click()
     page.goto(f"{plant.address}/#/define/five")
     button(page, "End simulation").click()
@@ -133,10 +148,10 @@ def test_the_arm_is_drawn_where_the_server_says_that_it_is(open_page):
 def test_a_wrong_limit_is_told_marked_and_found_again_by_a_click(open_page):
     page = opened(open_page, "pt500", drawn=False)
     settled(page)
-    expect(page.locator(".check-list")).to_have_text("Nothing is wrong with it.")
+    expect(checks(page)).to_contain_text("Nothing is wrong with it.")
     choose(page, 2)
     field(page, "joint/2/limits/0").fill("120")
-    expect(page.locator(".problem")).to_contain_text(
+    expect(problems(page)).to_contain_text(
         "joint 'elbow' limits = [120, 110]: the lower must be below the upper"
     )
     expect(page.get_by_role("list", name="Problems in the table")).to_contain_text("lower must be below")
@@ -146,10 +161,10 @@ def test_a_wrong_limit_is_told_marked_and_found_again_by_a_click(open_page):
     expect(field(page, "joint/2/limits/1")).to_have_attribute("aria-invalid", "true")
     expect(field(page, "joint/2/home")).to_have_attribute("aria-invalid", "false")
     tab(page, "Robot")
-    page.locator(".problem").click()
+    problems(page).click()
     expect(field(page, "joint/2/limits/0")).to_be_focused()
     field(page, "joint/2/limits/0").fill("-110")
-    expect(page.locator(".problem")).to_have_count(0)
+    expect(problems(page)).to_have_count(0)
 
 
 def test_what_is_no_number_stays_marked_and_is_not_saved(open_page):
@@ -160,11 +175,11 @@ def test_what_is_no_number_stays_marked_and_is_not_saved(open_page):
         cell.blur()
         expect(cell).to_have_value(typed)
         expect(cell).to_have_attribute("aria-invalid", "true")
-        expect(page.locator(".checks")).to_contain_text("is no number: write it as 1234.5")
+        expect(checks(page)).to_contain_text("is no number: write it as 1234.5")
         button(page, "Save").click()
         expect(cell).to_be_focused()
         page.keyboard.press("Escape")
-        expect(page.locator(".checks")).to_contain_text("Nothing is wrong with it.")
+        expect(checks(page)).to_contain_text("Nothing is wrong with it.")
         expect(cell).to_have_attribute("aria-invalid", "false")
 
 
@@ -189,21 +204,21 @@ def test_a_pasted_table_is_shown_as_it_is_read_fills_the_rows_and_is_undone(open
     button(dialog.get_by_role("group", name="Lengths without a unit"), "m").click()
     assert serious(page) == []
     button(dialog, "Fill the table").click()
-    expect(page.locator(".outcome")).to_contain_text("5 rows of the pasted table were read")
+    expect(done(page)).to_contain_text("5 rows of the pasted table were read")
     paths = ("a", "alpha", "d", "limits/0", "limits/1")
     values = [field(page, f"joint/1/{path}").input_value() for path in paths]
     assert values == ["250", "0", "1500", "−30", "120"]
-    expect(page.locator(".dh-table tbody tr")).to_have_count(6)
+    expect(table_rows(page)).to_have_count(6)
     button(page, "Undo").click()
-    expect(page.locator(".dh-table tbody tr")).to_have_count(5)
+    expect(table_rows(page)).to_have_count(5)
     expect(field(page, "joint/1/limits/1")).to_have_value("130")
 
 
 def test_a_shape_in_the_wrong_unit_is_told(open_page):
     page = opened(open_page, "pt500", drawn=False)
     choose(page, 0)
-    page.locator(".scale-row").get_by_role("button", name="m", exact=True).click()
-    expect(page.locator(".checks")).to_contain_text("column.3ds is 242 m large: is the file’s unit right?")
+    page.get_by_role("group", name="The file’s unit").get_by_role("button", name="m", exact=True).click()
+    expect(checks(page)).to_contain_text("column.3ds is 242 m large: is the file’s unit right?")
 
 
 def test_checks_go_on_when_the_console_is_there_again(open_page):
@@ -211,9 +226,9 @@ def test_checks_go_on_when_the_console_is_there_again(open_page):
     settled(page)
     page.route("**/define/check", lambda route: route.abort())
     field(page, "joint/1/a").fill("260")
-    expect(page.locator(".checks")).to_contain_text("Not checked: this page has no connection to the console")
+    expect(checks(page)).to_contain_text("Not checked: this page has no connection to the console")
     page.unroute("**/define/check")
-    expect(page.locator(".checks")).to_contain_text("Nothing is wrong with it.")
+    expect(checks(page)).to_contain_text("Nothing is wrong with it.")
 
 
 def test_each_change_is_one_step_of_undo_and_comes_back_by_redo(open_page):
@@ -224,16 +239,16 @@ def test_each_change_is_one_step_of_undo_and_comes_back_by_redo(open_page):
         page.keyboard.type(text)
     choose(page, 4)
     button(page, "Remove").click()
-    expect(page.locator(".dh-table tbody tr")).to_have_count(4)
+    expect(table_rows(page)).to_have_count(4)
     page.keyboard.press("Control+z")
-    expect(page.locator(".dh-table tbody tr")).to_have_count(5)
+    expect(table_rows(page)).to_have_count(5)
     button(page, "Undo").click()
     expect(field(page, "joint/1/a")).to_have_value("250")
     expect(field(page, "joint/0/d")).to_have_value("4125")
     button(page, "Undo").click()
     expect(field(page, "joint/0/d")).to_have_value("300")
     expect(button(page, "Undo")).to_be_disabled()
-    expect(page.locator(".save-state")).to_have_text("No changes")
+    expect(save_state(page)).to_have_text("No changes")
     page.keyboard.press("Control+Shift+z")
     button(page, "Redo").click()
     expect(field(page, "joint/0/d")).to_have_value("4125")
@@ -242,36 +257,36 @@ def test_each_change_is_one_step_of_undo_and_comes_back_by_redo(open_page):
 
 def test_joints_are_reordered_by_dragging_and_removed_by_the_keyboard(open_page):
     page = opened(open_page, "pt500", drawn=False)
-    names = page.locator(".chain-words strong")
-    page.locator('.chain-row[data-part="3"]').drag_to(page.locator('.chain-row[data-part="0"]'))
+    names = chain_rows(page).get_by_role("strong")
+    chain_row(page, 3).drag_to(chain_row(page, 0))
     expect(names).to_have_text(["Base", "wrist", "waist", "shoulder", "elbow", "roll", "Tool"])
-    expect(page.locator('.chain [aria-current="true"]')).to_contain_text("wrist")
+    expect(chain_row(page, 0).get_by_role("button")).to_have_attribute("aria-current", "true")
     page.keyboard.press("Control+z")
     expect(names).to_have_text(["Base", "waist", "shoulder", "elbow", "wrist", "roll", "Tool"])
-    page.locator('.chain-row[data-part="1"]').focus()
+    chain_row(page, 1).get_by_role("button").focus()
     page.keyboard.press("Delete")
     expect(names).to_have_text(["Base", "waist", "elbow", "wrist", "roll", "Tool"])
-    expect(page.locator('.chain-row[data-part="1"]')).to_be_focused()
+    expect(chain_row(page, 1).get_by_role("button")).to_be_focused()
     choose(page, 1)
     button(page, "Insert").click()
     expect(names).to_have_text(["Base", "waist", "joint2", "elbow", "wrist", "roll", "Tool"])
     # A name that the page gave follows the joint's place, one that was typed stays.
-    page.locator('.chain-row[data-part="1"]').press("Alt+ArrowDown")
+    chain_row(page, 1).get_by_role("button").press("Alt+ArrowDown")
     expect(names).to_have_text(["Base", "waist", "elbow", "joint3", "wrist", "roll", "Tool"])
-    expect(page.locator(".chain").get_by_role("status")).to_have_text("joint3 is joint 3 of 5.")
+    expect(region(page, "Chain").get_by_role("status")).to_have_text("joint3 is joint 3 of 5.")
     field(page, "joint/2/name").fill("joint9")
-    page.locator('.chain-row[data-part="2"]').press("Alt+ArrowUp")
+    chain_row(page, 2).get_by_role("button").press("Alt+ArrowUp")
     expect(names).to_have_text(["Base", "waist", "joint9", "elbow", "wrist", "roll", "Tool"])
     # A link on the base becomes the base.
-    page.locator('.chain-row[data-part="2"]').drag_to(page.locator('.chain-row[data-part="base"]'))
-    expect(page.locator(".chain-words .dim")).to_contain_text(
+    chain_row(page, 2).drag_to(chain_row(page, "base"))
+    expect(chain_rows(page)).to_contain_text(
         ["forearm.3ds", "base.wrl", "column.3ds", "no shape", "wrist.wrl"]
     )
 
 
 def test_a_shape_is_dragged_to_its_place_in_one_step(open_page):
     page = opened(open_page, "pt500")
-    canvas = page.locator(".define-scene canvas")
+    canvas = drawing(page)
     expect(canvas).to_have_attribute("data-shapes", "6")
     choose(page, "base")
     button(page, "Top").click()
@@ -296,7 +311,7 @@ def test_a_shape_is_dragged_to_its_place_in_one_step(open_page):
 def test_a_reload_keeps_unsaved_work_and_says_so_until_it_is_discarded(open_page):
     page = open_page("#/define")
     drop(page, shape("base.wrl"), shape("column.3ds"))
-    canvas = page.locator(".define-scene canvas")
+    canvas = drawing(page)
     expect(canvas).to_have_attribute("data-shapes", "2")
     field(page, "joint/0/d").fill("312.5")
     page.reload()
@@ -313,7 +328,7 @@ def test_a_reload_keeps_unsaved_work_and_says_so_until_it_is_discarded(open_page
 def test_files_that_the_server_forgot_are_sent_again(open_page, plant):
     page = open_page("#/define", refused=True)
     drop(page, shape("base.wrl"), shape("wrist.wrl"))
-    canvas = page.locator(".define-scene canvas")
+    canvas = drawing(page)
     expect(canvas).to_have_attribute("data-shapes", "2")
     settled(page)
     for folder in ("files", "drafts"):
@@ -321,7 +336,7 @@ def test_files_that_the_server_forgot_are_sent_again(open_page, plant):
             shutil.rmtree(path) if path.is_dir() else path.unlink()
     field(page, "joint/0/d").fill("77")
     settled(page)
-    expect(page.locator(".check-list")).to_have_text("Nothing is wrong with it.")
+    expect(checks(page)).to_contain_text("Nothing is wrong with it.")
     page.reload()
     expect(canvas).to_have_attribute("data-shapes", "2")
 
@@ -330,20 +345,20 @@ def test_a_file_that_another_refers_to_is_asked_for_by_name(open_page):
     page = open_page("#/define", drawn=False)
     outer = b'#VRML V2.0 utf8\nInline { url "part.wrl" }\nShape { geometry Box { } }\n'
     drop(page, ("outer.wrl", outer))
-    missing = page.locator(".missing-files")
+    missing = missing_files(page)
     expect(missing).to_contain_text("meshes/outer.wrl refers to part.wrl")
     drop(page, ("part.wrl", b"#VRML V2.0 utf8\nShape { geometry Sphere { } }\n"))
     expect(missing).to_have_count(0)
     # It is a part of the base, not a link.
-    expect(page.locator(".chain-row")).to_have_count(2)
+    expect(chain_rows(page)).to_have_count(2)
 
 
 def test_a_file_that_cannot_be_read_is_refused_by_name_and_the_others_are_taken(open_page):
     page = open_page("#/define", drawn=False, refused=True)
     drop(page, shape("base.wrl"), ("bad.3ds", b"MM\x00"))
-    expect(page.locator(".outcome.refused")).to_contain_text("bad.3ds")
-    expect(page.locator(".chain-row")).to_have_count(2)
-    expect(page.locator(".chain-row").first).to_contain_text("base.wrl")
+    expect(refusal(page)).to_contain_text("bad.3ds")
+    expect(chain_rows(page)).to_have_count(2)
+    expect(chain_rows(page).first).to_contain_text("base.wrl")
 
 
 def test_a_urdf_and_its_shapes_become_rows(open_page, tmp_path):
@@ -351,10 +366,10 @@ def test_a_urdf_and_its_shapes_become_rows(open_page, tmp_path):
     shapes = link_meshes(description, cache=tmp_path)
     page = open_page("#/define")
     drop(page, ("pt500.urdf", to_urdf(description).encode()))
-    expect(page.locator(".missing-files")).to_contain_text("meshes/column.glb")
+    expect(missing_files(page)).to_contain_text("meshes/column.glb")
     drop(page, *((f"{link}.glb", glb) for link, glb in shapes.items()))
-    expect(page.locator(".dh-table tbody tr")).to_have_count(5)
-    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "6")
+    expect(table_rows(page)).to_have_count(5)
+    expect(drawing(page)).to_have_attribute("data-shapes", "6")
     drawn, reported = tools(page)
     # The home of a URDF is zero: the arm stretched out.
     assert np.allclose(drawn[:3, 3], [0.6, 0.0, 0.3], atol=1e-6)
@@ -393,13 +408,13 @@ def test_a_urdf_and_files_of_one_name_are_read_in_one_drop_and_unused_ones_are_n
     urdf = SAME_NAMES.format(base=shapes_of("base"), arm=shapes_of("arm")).encode()
     links = [(f"{link}.stl", stl(count)) for link in ("base", "arm") for count in (7, 31)]
     drop(page, ("two.urdf", urdf), *links, ("spare.stl", stl(3)), ("notes.txt", b"by hand"))
-    notices = page.locator(".file-notices")
+    notices = page.get_by_role("list", name="What was found in the files")
     expect(notices).to_contain_text("two.urdf read: 4 of its 4 mesh files found.")
     expect(notices).to_contain_text("Not used by this robot: spare.stl, notes.txt.")
-    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "2")
+    expect(drawing(page)).to_have_attribute("data-shapes", "2")
     # The finer one is what is seen.
     choose(page, 0)
-    expect(page.locator(".define")).to_contain_text("31 triangles")
+    expect(page.get_by_role("main")).to_contain_text("31 triangles")
 
 
 def test_found_and_missing_files_of_a_urdf_are_counted(open_page):
@@ -407,24 +422,24 @@ def test_found_and_missing_files_of_a_urdf_are_counted(open_page):
     urdf = SAME_NAMES.format(base=shapes_of("base"), arm=shapes_of("arm")).encode()
     drop(page, ("two.urdf", urdf), ("base.stl", stl(7)))
     # Without a second file, the one serves both.
-    expect(page.locator(".missing-files")).to_contain_text("2 mesh files found, 2 missing.")
+    expect(missing_files(page)).to_contain_text("2 mesh files found, 2 missing.")
     drop(page, ("arm.stl", stl(7)))
-    expect(page.locator(".define")).to_contain_text("two.urdf read: 4 of its 4 mesh files found.")
-    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "2")
+    expect(page.get_by_role("main")).to_contain_text("two.urdf read: 4 of its 4 mesh files found.")
+    expect(drawing(page)).to_have_attribute("data-shapes", "2")
 
 
 def test_a_xacro_file_is_refused_with_what_to_do(open_page):
     page = open_page("#/define")
     drop(page, ("arm.urdf.xacro", b"<robot/>"), ("base.stl", stl(7)))
-    expect(page.locator("main")).to_contain_text("arm.urdf.xacro is a template, not a URDF.")
-    expect(page.locator(".chain-row")).to_have_count(0)
+    expect(page.get_by_role("main")).to_contain_text("arm.urdf.xacro is a template, not a URDF.")
+    expect(chain_rows(page)).to_have_count(0)
 
 
 def test_a_urdf_whose_first_axis_points_down_keeps_its_base_frame(open_page, plant):
     page = open_page("#/define")
     drop(page, ("down.urdf", KUKA_LIKE.encode()))
-    expect(page.locator(".dh-table tbody tr")).to_have_count(6)
-    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "7")
+    expect(table_rows(page)).to_have_count(6)
+    expect(drawing(page)).to_have_attribute("data-shapes", "7")
     drawn, reported = tools(page)
     # The URDF's chain at position zero, in its base frame.
     assert np.allclose(drawn[:3, 3], [0.1 + 0.025 + 0.56 + 0.515, 0.2, 0.4 + 0.035 + 0.3], atol=1e-6)
@@ -439,12 +454,12 @@ def test_a_urdf_whose_first_axis_points_down_keeps_its_base_frame(open_page, pla
     assert np.allclose(drawn[2, 3], 0.735 + 0.1, atol=1e-6)
     assert np.allclose(drawn, reported, atol=1e-9)
     button(page, "Save").click()
-    expect(page.locator(".save-state")).to_have_text("Saved")
+    expect(save_state(page)).to_have_text("Saved")
     saved = plant.robots / "down" / "robot.toml"
     assert tomllib.loads(saved.read_text())["base"]["pose"]["xyz"] == [0.0, 0.0, 0.1]
     choose(page, "base")
     page.reload()
-    expect(page.locator(".dh-table tbody tr")).to_have_count(6)
+    expect(table_rows(page)).to_have_count(6)
     choose(page, "base")
     expect(field(page, "base/pose/xyz/2")).to_have_value("0.1")
 
@@ -467,9 +482,9 @@ def test_a_robot_of_openhrp_is_chosen_as_one(open_page, tmp_path):
     file = tmp_path / "arm.wrl"
     file.write_bytes(OPENHRP)
     page = open_page("#/define")
-    page.get_by_label("From a URDF").locator("input[type=file]").set_input_files(file)
-    expect(page.locator(".dh-table tbody tr")).to_have_count(1)
-    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "2")
+    page.get_by_role("region", name="From a URDF").get_by_label("Choose files…").set_input_files(file)
+    expect(table_rows(page)).to_have_count(1)
+    expect(drawing(page)).to_have_attribute("data-shapes", "2")
     choose(page, 0)
     limits = [field(page, f"joint/0/limits/{which}").input_value() for which in (0, 1)]
     # 1.5 rad
@@ -490,7 +505,7 @@ def test_saving_over_a_robot_is_asked_first(open_page, plant):
             expect(page.get_by_role("alertdialog")).to_contain_text("Save over it?")
             assert load(plant.robots / "twice").title == "First"
             button(page, "Save over it").click()
-        expect(page.locator(".save-state")).to_have_text("Saved")
+        expect(save_state(page)).to_have_text("Saved")
         expect(page).to_have_url(f"{plant.address}/#/define/twice")
     assert load(plant.robots / "twice").title == "Second"
 
@@ -508,8 +523,8 @@ def test_a_zip_holds_the_description_and_its_shapes(open_page, tmp_path):
     assert len(list(text.parent.glob("meshes/*"))) == 6
     again = open_page("#/define")
     drop(again, ("pt500-copy.zip", download.value.path().read_bytes()))
-    expect(again.locator(".dh-table")).to_contain_text("shoulder")
-    expect(again.locator('.define-scene canvas[data-shapes="6"]')).to_have_count(1)
+    expect(table(again)).to_contain_text("shoulder")
+    expect(drawing(again)).to_have_attribute("data-shapes", "6")
     drawn, reported = tools(again)
     assert np.allclose(drawn, reported, atol=1e-9)
 
@@ -533,7 +548,7 @@ def test_ignored_pairs_frames_constraints_and_views_are_kept(open_page, plant):
     field(page, "name").fill("kept")
     settled(page)
     button(page, "Save").click()
-    expect(page.locator(".save-state")).to_have_text("Saved")
+    expect(save_state(page)).to_have_text("Saved")
     saved = load(plant.robots / "kept")
     assert [(frame.name, frame.link, frame.xyz) for frame in saved.frames] == [
         ("camera", "column", (0, 100, 0))
@@ -563,9 +578,9 @@ TOUCHING = """<robot name="touching">
 def test_each_pair_of_links_shows_how_it_is_checked_or_why_it_is_ignored(open_page):
     page = open_page("#/define")
     drop(page, ("touching.urdf", TOUCHING.encode()))
-    expect(page.locator(".dh-table")).to_have_count(1)
+    expect(table(page)).to_be_visible()
     tab(page, "Collisions")
-    state = page.locator(".plan-state")
+    state = page.get_by_role("tabpanel").get_by_role("status")
     expect(state).to_contain_text("One checked pair touches at home", timeout=190_000)
     expect(state).to_contain_text("Pairs checked: 1, ignored: 2")
 
@@ -573,7 +588,7 @@ def test_each_pair_of_links_shows_how_it_is_checked_or_why_it_is_ignored(open_pa
         return page.get_by_label(f"Ignore {one} and {other}")
 
     def row(one, other):
-        return page.locator(".pairs tr", has=tick(one, other))
+        return page.get_by_role("row").filter(has=tick(one, other))
 
     # Links one joint apart are ignored by rule: nothing is there to tick.
     expect(tick("base", "arm")).to_be_checked()
@@ -592,7 +607,7 @@ def test_each_pair_of_links_shows_how_it_is_checked_or_why_it_is_ignored(open_pa
     expect(state).to_contain_text("At home no checked pair touches.", timeout=190_000)
     expect(row("base", "hand")).to_contain_text("Convex hulls.")
     button(page, "中文").click()
-    expect(page.locator(".pairs")).to_contain_text("两者仅隔一个关节")
+    expect(page.get_by_role("table", name="碰撞")).to_contain_text("两者仅隔一个关节")
 
 
 def test_a_plan_of_pairs_that_failed_says_why_and_is_asked_for_again(open_page):
@@ -602,10 +617,14 @@ def test_a_plan_of_pairs_that_failed_says_why_and_is_asked_for_again(open_page):
         lambda route: route.fulfill(status=422, content_type="text/plain", body="this took too long"),
     )
     tab(page, "Collisions")
-    expect(page.locator(".plan-state")).to_contain_text("could not be worked out: this took too long")
+    expect(page.get_by_role("tabpanel").get_by_role("alert")).to_contain_text(
+        "could not be worked out: this took too long"
+    )
     page.unroute("**/define/collisions")
     button(page, "Try again").click()
-    expect(page.locator(".plan-state")).to_contain_text("Pairs checked: 10, ignored: 5", timeout=190_000)
+    expect(page.get_by_role("tabpanel").get_by_role("status")).to_contain_text(
+        "Pairs checked: 10, ignored: 5", timeout=190_000
+    )
 
 
 def test_renaming_a_joint_and_a_link_leaves_nothing_that_names_the_old(open_page):
@@ -619,7 +638,7 @@ def test_renaming_a_joint_and_a_link_leaves_nothing_that_names_the_old(open_page
     choose(page, 1)
     field(page, "joint/1/name").fill("lift")
     settled(page)
-    expect(page.locator(".check-list")).to_have_text("Nothing is wrong with it.")
+    expect(checks(page)).to_contain_text("Nothing is wrong with it.")
     tab(page, "Frames")
     expect(field(page, "frame/0/link")).to_have_value("plate")
     tab(page, "Constraints")
@@ -640,7 +659,7 @@ def test_other_units_say_the_same_robot(open_page):
 
 def test_a_robot_that_is_not_here_is_said(open_page):
     page = open_page("#/define/nobody", drawn=False, refused=True)
-    expect(page.locator(".outcome.refused")).to_contain_text("nobody cannot be opened: there is no robot")
+    expect(refusal(page)).to_contain_text("nobody cannot be opened: there is no robot")
     page.evaluate("localStorage.setItem('robomesh.language', 'zh')")
     page.reload()
-    expect(page.locator(".outcome.refused")).to_contain_text("无法打开 nobody：此处没有机器人“nobody”")
+    expect(refusal(page)).to_contain_text("无法打开 nobody：此处没有机器人“nobody”")

@@ -1,5 +1,6 @@
 """Define's drafts: a late answer, or one from another tab, changes no other draft."""
 
+import re
 import shutil
 
 import pytest
@@ -9,16 +10,23 @@ from robots.description import load
 from tests.browser.conftest import NO_WEBGL
 from tests.browser.define.page import (
     SHAPES,
-    button,
+    chain_row,
     choose,
+    done,
+    drawing,
     drop,
     field,
     held,
     opened,
+    problems,
+    refusal,
+    save_state,
     settled,
     shape,
     tab,
+    table_rows,
 )
+from tests.browser.robot_page import button
 
 pytestmark = pytest.mark.browser
 
@@ -33,23 +41,23 @@ def save_new(page, name, title):
     field(page, "name").fill(name)
     field(page, "title").fill(title)
     button(page, "Save").click()
-    expect(page.locator(".save-state")).to_have_text("Saved")
+    expect(save_state(page)).to_have_text("Saved")
 
 
 def test_a_file_that_is_read_late_is_not_put_into_the_robot_opened_meanwhile(open_page):
     page = opened(open_page, "pt500")
-    expect(page.locator('.define-scene canvas[data-shapes="6"]')).to_have_count(1)
+    expect(drawing(page)).to_have_attribute("data-shapes", "6")
     with held(page, "**/define/mesh"):
         with page.expect_request("**/define/mesh"):
             drop(page, ("late.wrl", shape("base.wrl")[1]))
         go(page, "puma560")
-        expect(page.locator(".dh-table tbody tr")).to_have_count(6)
+        expect(table_rows(page)).to_have_count(6)
     # One drop is read after the other: once this one is there, the first is done with.
     drop(page, ("own.wrl", shape("base.wrl")[1]))
-    expect(page.locator(".dh-table tbody tr")).to_have_count(7)
-    assert page.locator(".chain-words .dim").all_inner_texts()[7] == "own · own.wrl"
+    expect(table_rows(page)).to_have_count(7)
+    expect(chain_row(page, 6).get_by_role("button", name="own · own.wrl")).to_be_visible()
     button(page, "Undo").click()
-    expect(page.locator(".save-state")).to_have_text("No changes")
+    expect(save_state(page)).to_have_text("No changes")
 
 
 def test_a_robot_that_is_answered_late_does_not_replace_the_one_opened_meanwhile(open_page):
@@ -58,9 +66,9 @@ def test_a_robot_that_is_answered_late_does_not_replace_the_one_opened_meanwhile
         go(page, "pt500")
         expect(page.get_by_text("Loading…")).to_be_visible()
         go(page, "puma560")
-        expect(page.locator(".dh-table tbody tr")).to_have_count(6)
+        expect(table_rows(page)).to_have_count(6)
     settled(page)
-    expect(page.locator(".dh-table tbody tr")).to_have_count(6)
+    expect(table_rows(page)).to_have_count(6)
 
 
 def test_two_shapes_chosen_in_a_row_are_both_kept(open_page):
@@ -73,8 +81,8 @@ def test_two_shapes_chosen_in_a_row_are_both_kept(open_page):
     network.send("Network.emulateNetworkConditions", slow)
     for part, name in (("base", "base.wrl"), (0, "column.3ds")):
         choose(page, part)
-        page.locator(".mesh-row input[type=file]").set_input_files(SHAPES / name)
-    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "2")
+        page.get_by_label("Choose a file…", exact=True).set_input_files(SHAPES / name)
+    expect(drawing(page)).to_have_attribute("data-shapes", "2")
 
 
 def test_a_save_that_is_answered_late_leaves_the_robot_opened_meanwhile_as_it_is(open_page, plant):
@@ -84,19 +92,19 @@ def test_a_save_that_is_answered_late_leaves_the_robot_opened_meanwhile_as_it_is
     field(page, "name").fill("slow")
     with held(page, "**/define/save"):
         button(page, "Save").click()
-        expect(page.locator(".save-state")).to_have_text("Saving…")
+        expect(save_state(page)).to_have_text("Saving…")
         go(page, "pt500")
-        expect(page.locator(".dh-table tbody tr")).to_have_count(5)
-    expect(page.locator(".outcome.done")).to_contain_text("slow is saved in")
+        expect(table_rows(page)).to_have_count(5)
+    expect(done(page)).to_contain_text("slow is saved in")
     assert load(plant.robots / "slow").title == ""
     expect(page).to_have_url(f"{plant.address}/#/define/pt500")
-    expect(page.locator(".save-state")).to_have_text("No changes")
+    expect(save_state(page)).to_have_text("No changes")
     # The site does not have it: it must be saved first.
     expect(button(page, "Save and start simulated")).to_have_count(1)
     # A saved draft is no longer listed as unsaved.
     page.get_by_role("link", name="New", exact=True).click()
     expect(page.get_by_text("From link files")).to_be_visible()
-    expect(page.locator(".start-draft")).to_have_count(0)
+    expect(page.get_by_role("button", name=re.compile("^Continue "))).to_have_count(0)
 
 
 def test_what_somebody_else_saved_meanwhile_is_asked_about_and_ones_own_is_not(open_page, plant):
@@ -104,7 +112,7 @@ def test_what_somebody_else_saved_meanwhile_is_asked_about_and_ones_own_is_not(o
     save_new(page, "shared", "First")
     field(page, "title").fill("Own")
     button(page, "Save").click()
-    expect(page.locator(".save-state")).to_have_text("Saved")
+    expect(save_state(page)).to_have_text("Saved")
     assert load(plant.robots / "shared").title == "Own"
 
     (plant.robots / "shared" / "README.md").write_text("Ours.")
@@ -118,7 +126,7 @@ def test_what_somebody_else_saved_meanwhile_is_asked_about_and_ones_own_is_not(o
     button(page, "Save").click()
     field(page, "title").fill("Mine after all")
     button(page, "Save over it").click()
-    expect(page.locator(".save-state")).to_have_text("Saved")
+    expect(save_state(page)).to_have_text("Saved")
     assert load(plant.robots / "shared").title == "Mine after all"
 
 
@@ -138,12 +146,12 @@ def test_every_tab_has_a_new_draft_of_its_own_and_another_tab_offers_them_all(op
         field(page, "title").fill(f"Arm {number}")
     for number, page in enumerate(tabs):
         page.reload()
-        expect(page.locator(".toolbar h1")).to_have_text(f"Arm {number}")
+        expect(page.get_by_role("heading", level=1)).to_have_text(f"Arm {number}")
     other = beside()
     other.goto(f"{plant.address}/#/define")
-    expect(other.locator(".start-draft")).to_have_count(2)
+    expect(other.get_by_role("button", name=re.compile("^Continue "))).to_have_count(2)
     other.get_by_role("button", name="Continue Arm 0").click()
-    expect(other.locator(".toolbar h1")).to_have_text("Arm 0")
+    expect(other.get_by_role("heading", level=1)).to_have_text("Arm 0")
 
 
 def test_a_shape_that_cannot_be_read_is_among_the_problems(open_page, plant):
@@ -154,23 +162,21 @@ def test_a_shape_that_cannot_be_read_is_among_the_problems(open_page, plant):
     (folder / "robot.toml").write_text(text)
     (folder / "meshes" / "column.3ds").write_bytes(b"MM\x00")
     page = open_page("#/define/broken", drawn=False, refused=True)
-    expect(page.locator(".problem")).to_have_count(1)
-    expect(page.locator(".problem")).to_contain_text("column.3ds")
-    page.locator(".problem").click()
+    expect(problems(page)).to_have_count(1)
+    expect(problems(page)).to_contain_text("column.3ds")
+    problems(page).click()
     expect(field(page, "joint/0/link/mesh")).to_be_focused()
-    expect(page.locator(".tab-panel .problem-word")).to_have_count(1)
+    expect(page.get_by_role("tabpanel").get_by_text(re.compile(r"^\S*column\.3ds: "))).to_have_count(1)
     field(page, "joint/0/d").fill("301")
     settled(page)
-    expect(page.locator(".problem")).to_have_count(1)
+    expect(problems(page)).to_have_count(1)
 
 
 def test_files_of_which_nothing_can_be_made_are_said(open_page):
     page = open_page("#/define", drawn=False, refused=True)
     drop(page, ("notes.txt", b"none"))
-    expect(page.locator(".outcome.refused")).to_have_text(
-        "There is no mesh file, URDF or zip among them.Dismiss"
-    )
+    expect(refusal(page)).to_have_text("There is no mesh file, URDF or zip among them.Dismiss")
     for name in ("part.off", "part.wrl.gz"):
         drop(page, (name, b"OFF\n0 0 0\n"))
-        expect(page.locator(".outcome.refused")).to_contain_text(f"{name}: ")
-        expect(page.locator(".outcome.refused")).to_contain_text("is not supported")
+        expect(refusal(page)).to_contain_text(f"{name}: ")
+        expect(refusal(page)).to_contain_text("is not supported")

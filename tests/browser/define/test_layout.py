@@ -8,8 +8,16 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.define.page import button, choose, opened, settled, tab
-from tests.browser.robot_page import keep_picture, serious
+from tests.browser.define.page import (
+    choose,
+    drawing,
+    opened,
+    robots,
+    settled,
+    tab,
+    table,
+)
+from tests.browser.robot_page import button, keep_picture, serious
 
 pytestmark = pytest.mark.browser
 
@@ -19,7 +27,7 @@ LARGEST_BYTES = 400_000
 
 def go(page, path):
     page.evaluate("path => (location.hash = path)", path)
-    expect(page.locator(".dh-table").first).to_be_attached()
+    expect(table(page).first).to_be_attached()
 
 
 def small(page):
@@ -33,7 +41,7 @@ def small(page):
 
 def test_a_phone_shows_one_column_that_scrolls_one_way(open_page):
     page = open_page("#/define", width=360, height=740, drawn=False)
-    expect(page.locator(".robot-card").first).to_be_attached()
+    expect(robots(page).first).to_be_attached()
     assert page.evaluate("document.documentElement.scrollWidth") == 360
     assert small(page) == []
     go(page, "#/define/puma560")
@@ -57,7 +65,7 @@ def test_on_a_desk_only_lists_scroll(open_page):
 
 def test_axe_finds_nothing_serious_in_define(open_page):
     page = open_page("#/define", drawn=False)
-    expect(page.locator(".robot-card").first).to_be_attached()
+    expect(robots(page).first).to_be_attached()
     found = {"start": serious(page)}
     keep_picture(page, "define-start")
     button(page, "Light").click()
@@ -89,15 +97,13 @@ def test_the_arm_and_its_frames_are_drawn(open_page):
     page = opened(open_page, "pt500")
     choose(page, 2)
     settled(page)
-    expect(page.locator('.define-scene canvas[data-shapes="6"]')).to_have_count(1)
+    expect(drawing(page)).to_have_attribute("data-shapes", "6")
     keep_picture(page, "define")
     picture = page.screenshot()
     if os.environ.get("ROBOMESH_PICTURES") == "1":
         PICTURE.write_bytes(picture)
         assert len(picture) < LARGEST_BYTES
-    scene = cv2.imdecode(
-        np.frombuffer(page.locator(".define-scene canvas").screenshot(), np.uint8), cv2.IMREAD_COLOR
-    ).astype(int)
+    scene = cv2.imdecode(np.frombuffer(drawing(page).screenshot(), np.uint8), cv2.IMREAD_COLOR).astype(int)
     blue, green, red = scene.transpose(2, 0, 1)
     painted = ((blue > 90) & (blue - red > 60)).sum()
     normals = ((red > 180) & (green > 110) & (blue < 110)).sum()

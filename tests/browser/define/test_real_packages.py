@@ -3,7 +3,7 @@
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.define.page import drop
+from tests.browser.define.page import drawing, drop
 
 pytestmark = pytest.mark.browser
 
@@ -22,5 +22,5 @@ def test_a_real_package_dropped_in_one_go_is_read_whole(open_page, shared, packa
     read = page.get_by_role("list", name="What was found in the files")
     expect(read).to_contain_text(f"{urdf} read: {meshes} of its {meshes} mesh files found.")
     expect(read).to_contain_text("package.xml")
-    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", str(joints + 1))
-    assert page.locator(".define-scene").bounding_box()["height"] > 250
+    expect(drawing(page)).to_have_attribute("data-shapes", str(joints + 1))
+    assert drawing(page).bounding_box()["height"] > 250

@@ -97,6 +97,7 @@ const TEXTS = {
   ],
 
   chain: ["Chain", "运动链"],
+  chain_tools: ["Chosen joint", "所选关节"],
   chain_hint: [
     "Drag a joint to its place, or onto the base to make it the base. Alt+↑ and Alt+↓ move it; Delete removes it.",
     "将关节拖到所需位置，或拖到基座上使其成为基座。Alt+↑/↓ 移动关节，Delete 删除。",
@@ -398,6 +399,8 @@ const TEXTS = {
   view_set: ["Set from the camera", "按当前视角设定"],
   view_reset: ["Back to automatic", "恢复自动"],
   view_look: ["Look", "查看"],
+  view_look_at: ["Look: {view}", "查看：{view}"],
+  view_set_of: ["Set from the camera: {view}", "按当前视角设定：{view}"],
   view_auto: ["automatic", "自动"],
   view_own: ["set", "已设定"],
   view_new: ["Name of a new view", "新视图名称"],

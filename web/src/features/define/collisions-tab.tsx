@@ -58,7 +58,7 @@ export function CollisionsTab() {
       </div>
       <PlanState rows={rows} />
       {rows.length > 0 && (
-        <table class="pairs" aria-busy={planning.value}>
+        <table class="pairs" aria-label={d("collisions")} aria-busy={planning.value}>
           <thead>
             <tr>
               <th scope="col">{d("ignore")}</th>

@@ -148,7 +148,7 @@ export function KinematicChain() {
           + {d("add_joint")}
         </button>
       </div>
-      <ol class="chain-list" title={d("chain_hint")}>
+      <ol class="chain-list" aria-label={d("chain")} title={d("chain_hint")}>
         <Row
           part="base"
           mark="0"
@@ -200,7 +200,7 @@ export function KinematicChain() {
       <p class="chain-said" role="status">
         {announced.value}
       </p>
-      <div class="chain-tools" role="group" aria-label={d("chain")}>
+      <div class="chain-tools" role="group" aria-label={d("chain_tools")}>
         <button
           class="quiet"
           disabled={selected === null}

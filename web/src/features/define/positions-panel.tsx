@@ -113,7 +113,7 @@ function ToolAt() {
         class={`tool-at ${checking.value || checkError.value ? "waiting" : ""}`}
         aria-label={d("tool_at")}
         data-tool={tool ? JSON.stringify(tool) : ""}
-        data-checking={checking.value}
+        aria-busy={checking.value}
       >
         {["x", "y", "z"].map((label, index) => number(label, pose?.xyz[index], 1, "mm"))}
         {[d("roll"), d("pitch"), d("yaw")].map((label, index) => number(label, pose?.rpy[index], 2, "°"))}

@@ -4,6 +4,7 @@ import { useState } from "preact/hooks";
 import { d } from "../../i18n/define";
 import { timeOfDay } from "../../i18n/format";
 import { t } from "../../i18n/texts";
+import { outcomeRole } from "../../ui/notice-line";
 import { robotLink } from "../../ui/route";
 import {
   canRedo,
@@ -110,7 +111,11 @@ export function Outcomes() {
           )}
         </div>
       )}
-      {storageError.value && <p class="outcome refused">{d("not_kept", { text: storageError.value })}</p>}
+      {storageError.value && (
+        <p class="outcome refused" {...outcomeRole(true)}>
+          {d("not_kept", { text: storageError.value })}
+        </p>
+      )}
       {done?.kind === "exists" && (
         <div class="outcome" role="alertdialog" aria-label={d("save_over")}>
           <span class="shape warning" aria-hidden="true" />
@@ -124,7 +129,7 @@ export function Outcomes() {
         </div>
       )}
       {done?.kind === "started" && (
-        <div class="outcome done" role="status">
+        <div class="outcome done" {...outcomeRole(false)}>
           <span>{d("started", { name: done.robot })}</span>
           <a class="action small-action" href={robotLink(done.site, done.robot)}>
             {d("watch_it")}
@@ -133,7 +138,7 @@ export function Outcomes() {
         </div>
       )}
       {(done?.kind === "done" || done?.kind === "refused") && (
-        <div class={`outcome ${done.kind}`} role={done.kind === "refused" ? "alert" : "status"}>
+        <div class={`outcome ${done.kind}`} {...outcomeRole(done.kind === "refused")}>
           {done.kind === "refused" && <span class="shape warning" aria-hidden="true" />}
           <span>{done.text}</span>
           <Close />
@@ -150,7 +155,7 @@ function FileNotices() {
   const others = fileNotices.value.filter(({ kind }) => kind !== "refused");
   if (fileNotices.value.length === 0) return null;
   return (
-    <div class={`outcome ${refused.length ? "refused" : "done"}`} role={refused.length ? "alert" : "status"}>
+    <div class={`outcome ${refused.length ? "refused" : "done"}`} {...outcomeRole(refused.length > 0)}>
       {refused.length > 0 && <span class="shape warning" aria-hidden="true" />}
       <ul class="file-notices" tabIndex={0} aria-label={d("about_files")}>
         {[...refused, ...others].map(({ text }) => (

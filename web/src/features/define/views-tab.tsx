@@ -32,10 +32,19 @@ export function ViewsTab() {
               <strong>{viewText(name)}</strong>
               <span class="dim small">{d(given[name] ? "view_own" : "view_auto")}</span>
             </span>
-            <button class="quiet" onClick={() => (requestedView.value = { name })}>
+            <button
+              class="quiet"
+              aria-label={d("view_look_at", { view: viewText(name) })}
+              onClick={() => (requestedView.value = { name })}
+            >
               {d("view_look")}
             </button>
-            <button class="quiet" disabled={!currentCamera.value} onClick={() => setFromCamera(name)}>
+            <button
+              class="quiet"
+              aria-label={d("view_set_of", { view: viewText(name) })}
+              disabled={!currentCamera.value}
+              onClick={() => setFromCamera(name)}
+            >
               {d("view_set")}
             </button>
             {given[name] && (

@@ -176,7 +176,12 @@ export function JointsPanel(props: {
               />
             );
           return (
-            <div key={joint.name} class={`joint-row ${beyond ? "beyond" : ""}`}>
+            <div
+              key={joint.name}
+              class={`joint-row ${beyond ? "beyond" : ""}`}
+              role="group"
+              aria-label={jointTitle(joint)}
+            >
               <span class="joint-name" title={joint.name}>
                 {jointTitle(joint)}
               </span>
