@@ -18,6 +18,7 @@ log = logging.getLogger(__name__)
 # Token bucket for each kind: a burst of 5, then one each 5 s.
 _BURST = 5.0
 _REFILL_S = 5.0
+_MOST_APART = 16
 
 _LEVELS = {
     Event.Severity.DEBUG: logging.DEBUG,
@@ -30,7 +31,7 @@ _LEVELS = {
 
 @dataclass
 class _Kind:
-    """Token bucket of one event code: `tokens` at the time `at_s`."""
+    """Token bucket of one kind of event: `tokens` at the time `at_s`."""
 
     at_s: float
     tokens: float = _BURST
@@ -46,7 +47,7 @@ class Journal:
         self._publisher = publisher
         self._robot = robot
         self._monotonic_s = monotonic_s
-        self._kinds: dict[str, _Kind] = {}
+        self._kinds: dict[tuple[str, str], _Kind] = {}
 
     def report(
         self,
@@ -54,19 +55,21 @@ class Journal:
         code: str,
         text: str,
         *,
+        apart: object = "",
         why: Reason | None = None,
         **values: object,
     ) -> None:
-        """Publish an event; of a flood of one code, publish one each 5 s with the count of the others.
+        """Publish an event; of a flood of one kind, publish one each 5 s with the count of the others.
 
         Args:
             code: Stable code for programs: "unit.malformed".
             text: Sentence for people.
+            apart: Events of one code with another value are another kind: 16 such kinds at a time.
             why: The reason that the text contains.
             values: Further values of the event.
         """
         now_s = self._monotonic_s()
-        kind = self._kinds.setdefault(code, _Kind(now_s))
+        kind = self._kind(code, str(apart), now_s)
         kind.tokens = min(kind.tokens + (now_s - kind.at_s) / _REFILL_S, _BURST)
         kind.at_s = now_s
         if kind.tokens < 1.0:
@@ -86,3 +89,13 @@ class Journal:
             event.values[name] = one_line(str(value))
         self._publisher.put(event)
         log.log(_LEVELS[severity], "%s: %s", self._robot, text)
+
+    def _kind(self, code: str, apart: str, now_s: float) -> _Kind:
+        if apart and (code, apart) not in self._kinds:
+            full_again_s = now_s - _BURST * _REFILL_S
+            self._kinds = {
+                key: kind for key, kind in self._kinds.items() if kind.at_s > full_again_s or kind.suppressed
+            }
+            if sum(bool(other) for _, other in self._kinds) >= _MOST_APART:
+                apart = ""
+        return self._kinds.setdefault((code, apart), _Kind(now_s))

@@ -196,7 +196,11 @@ class Telemetry:
                 self._on_refused(number, text)
             case AlarmReceived(severity, text, number):
                 self._journal.report(
-                    _SEVERITIES[severity], "controller.alarm", f"the controller says: {text}", number=number
+                    _SEVERITIES[severity],
+                    "controller.alarm",
+                    f"the controller says: {text}",
+                    apart=number or text,
+                    number=number,
                 )
 
     def _on_controller_status(self, status: StatusReceived, now_s: float) -> None:

@@ -44,3 +44,20 @@ def test_after_a_pause_the_burst_is_allowed_again():
         journal.report(Event.INFO, "link.up", "up")
     assert len(heard.events) == 10
     assert heard.events[5].values["left_out"] == "5"
+
+
+def test_alarms_of_different_numbers_are_all_published_and_a_flood_of_numbers_is_limited():
+    heard, now_s = Heard(), 100.0
+    journal = Journal(heard, "arm", monotonic_s=lambda: now_s)
+
+    def alarms(*numbers):
+        for number in numbers:
+            journal.report(Event.WARNING, "controller.alarm", "servo", apart=str(number), number=number)
+
+    alarms(*range(20))
+    assert len(heard.events) == 20
+    alarms(*range(20, 100_000))
+    assert len(heard.events) == 21
+    now_s += 60.0  # other numbers than a minute ago
+    alarms(*range(20, 36))
+    assert len(heard.events) == 37
