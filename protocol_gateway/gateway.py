@@ -13,6 +13,7 @@ from protocol_gateway.checking.policy import Policy
 from protocol_gateway.link.metrics import measure_links
 from protocol_gateway.robot import Robot
 from protocol_gateway.settings import RobotSettings, Settings, check
+from protocol_gateway.signals import measure_signals
 from robomesh.quotas import Quota
 from robomesh.session import Session
 
@@ -56,6 +57,7 @@ async def serve(session: Session, settings: Settings) -> None:
             log.info("%s: controller at %s:%d", each.name, each.host, each.port)
         by_name = {robot.name: each for robot, each in zip(settings.robots, robots, strict=True)}
         measure_links(session, {name: each.link for name, each in by_name.items()})
+        measure_signals(session, {name: each.signals for name, each in by_name.items()})
         _measure_robots(session, by_name)
         content = CellsOfGateway(
             session, settings.site, _cells(session, settings, by_name, cells, (checkers, planners))

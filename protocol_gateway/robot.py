@@ -228,6 +228,11 @@ class Robot:
         return self._link
 
     @property
+    def signals(self) -> Signals:
+        """Signals that the controller reports."""
+        return self._signals
+
+    @property
     def stopped(self) -> bool:
         """True while a stop is latched."""
         return self._control.authority.stop is not None

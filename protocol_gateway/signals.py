@@ -10,7 +10,8 @@ What a report changes too soon for this is published within 0.1 s. Without a rep
 """
 
 import math
-from collections.abc import Sequence
+import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from protocol_gateway.drivers.driver import Signal, SignalsReceived, SignalValue
@@ -19,6 +20,7 @@ from protocol_gateway.link.timestamping import Received
 from protocol_gateway.text_limits import LONGEST_TEXT
 from robomesh.publisher import Publisher
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
 from robomesh.texts import one_line
 
 MOST_SIGNALS = 256
@@ -60,6 +62,26 @@ class _Entry:
                 self.row.text = self.value
             case float():
                 self.row.number = self.value
+
+
+def measure_signals(session: Session, robots: Mapping[str, "Signals"]) -> None:
+    """Register a metric of the robots' signals that are numbers and booleans.
+
+    Args:
+        robots: Signals by robot name.
+    """
+
+    def read() -> dict[tuple[str, ...], float]:
+        now_s = time.monotonic()
+        return {
+            (robot, name, unit): float(value)
+            for robot, signals in robots.items()
+            for name, (unit, value) in signals.current(now_s).items()
+            if not isinstance(value, str)
+        }
+
+    text = "Signals of the controller that are current: numbers in their unit, booleans as 1 and 0"
+    session.measure("signal", text, read, labels=("robot", "name", "unit"))
 
 
 class Signals:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from robomesh.client.recording import AsyncRecording, RecordedSample
     from robomesh.client.recording_list import RecordedTopic, RecordingInfo
     from robomesh.client.robot import AsyncRobot, CheckResult, InverseResult, Violation
-    from robomesh.client.samples import Alarm, Event, JointState, Sample
+    from robomesh.client.samples import Alarm, Event, JointState, Sample, SignalState
     from robomesh.client.streams import AsyncStream, StaleError, Stream
     from robomesh.errors import (
         BusyError,
@@ -50,7 +50,7 @@ _MODULES = {
     "client.recording": ("AsyncRecording", "RecordedSample"),
     "client.recording_list": ("RecordedTopic", "RecordingInfo"),
     "client.robot": ("AsyncRobot", "CheckResult", "InverseResult", "Violation"),
-    "client.samples": ("Alarm", "Event", "JointState", "Sample"),
+    "client.samples": ("Alarm", "Event", "JointState", "Sample", "SignalState"),
     "client.streams": ("AsyncStream", "StaleError", "Stream"),
     "errors": (
         "RobomeshError",
@@ -106,6 +106,7 @@ __all__ = [
     "Sample",
     "Service",
     "SessionError",
+    "SignalState",
     "StaleError",
     "StopResult",
     "Stream",

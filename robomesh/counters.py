@@ -21,14 +21,14 @@ class Measure:
     Attributes:
         name: Prometheus name without `robomesh_`: "browsers"; a counter's name ends in "_total".
         text: Help text for people.
-        read: Returns the current value, or one for each label's value; called on any thread.
-        label: Name of the label of several values.
+        read: Returns the current value, or one for each value of the labels; called on any thread.
+        labels: Names of the labels of several values.
     """
 
     name: str
     text: str
-    read: Callable[[], float | Mapping[str, float]]
-    label: str = "robot"
+    read: Callable[[], float | Mapping[str, float] | Mapping[tuple[str, ...], float]]
+    labels: tuple[str, ...] = ("robot",)
 
 
 @dataclass

@@ -156,9 +156,9 @@ def _own(measure: Measure) -> Metric:
     family = CounterMetricFamily if measure.name.endswith("_total") else GaugeMetricFamily
     if not isinstance(value, Mapping):
         return family(f"robomesh_{measure.name}", measure.text, value=value)
-    metric = family(f"robomesh_{measure.name}", measure.text, labels=[measure.label])
-    for label, number in sorted(value.items()):
-        metric.add_metric([label], number)
+    metric = family(f"robomesh_{measure.name}", measure.text, labels=measure.labels)
+    for labels, number in sorted(value.items()):
+        metric.add_metric([labels] if isinstance(labels, str) else labels, number)
     return metric
 
 

@@ -246,12 +246,12 @@ class Session:
         self,
         name: str,
         text: str,
-        read: Callable[[], float | Mapping[str, float]],
+        read: Callable[[], float | Mapping[str, float] | Mapping[tuple[str, ...], float]],
         *,
-        label: str = "robot",
+        labels: tuple[str, ...] = ("robot",),
     ) -> None:
         """Add a number to the health and the metrics of this process; see `Measure`."""
-        self.measures.append(Measure(name, text, read, label))
+        self.measures.append(Measure(name, text, read, labels))
 
     def counters(self) -> Counters:
         """Return the counters of everything sent, received and answered so far; on any thread."""

@@ -27,7 +27,7 @@ _SECTIONS = {
     "Connections": ("connect", "connect_async", "Service"),
     "Robots and control": ("Robot", "Arm", "CommandResult", "JogResult", "StopResult"),
     "Kinematics": ("CheckResult", "Violation", "InverseResult"),
-    "Streams": ("Stream", "JointState", "Sample", "Event", "Alarm", "Note"),
+    "Streams": ("Stream", "JointState", "SignalState", "Sample", "Event", "Alarm", "Note"),
     "Recordings": (
         "open_recording",
         "Recording",

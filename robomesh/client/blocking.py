@@ -20,7 +20,7 @@ from robomesh.client.recording import AsyncRecording, RecordedSample
 from robomesh.client.recording_list import RecordingInfo
 from robomesh.client.recording_source import DiskSource
 from robomesh.client.robot import AsyncRobot, CheckResult, InverseResult, Matrix
-from robomesh.client.samples import Alarm, Event, JointState, Sample
+from robomesh.client.samples import Alarm, Event, JointState, Sample, SignalState
 from robomesh.client.streams import AsyncStream, OnStale, Stream
 from robomesh.endpoints import DEFAULT_ROUTER
 from robomesh.errors import SessionError
@@ -177,6 +177,14 @@ class Robot:
                 last state again, once, with `stale` true.
         """
         return self._stream(self._robot.joints, slow=slow, buffer=buffer, on_stale=on_stale)
+
+    def signals(self, *, buffer: int = 1, on_stale: OnStale = "raise") -> Stream[SignalState]:
+        """Return what the controller reports in addition to joints; `next(robot.signals())` is present.
+
+        Args:
+            buffer, on_stale: As for `joints`.
+        """
+        return self._stream(self._robot.signals, buffer=buffer, on_stale=on_stale)
 
     def topic(self, name: str, *, buffer: int = 1, on_stale: OnStale = "raise") -> Stream[Sample]:
         """Return the messages of a topic, the newest first: "controller", "kinematics", "lease", ...

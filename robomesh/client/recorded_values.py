@@ -13,7 +13,8 @@ from google.protobuf.message import Message
 from robomesh.client.samples import PRISMATIC, ROTARY
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.publisher_time import PublisherTimes, Recorded
-from robomesh.recordings.values import unit_of, values_of
+from robomesh.recordings.values import signal_units, unit_of, values_of
+from robomesh.schemas.robomesh_pb2 import Signals
 
 if TYPE_CHECKING:
     import numpy as np
@@ -229,11 +230,14 @@ class ValuesCollector:
     def __init__(self, topic: str, names: Iterable[str], *, start_ns: int) -> None:
         self._topic = topic
         self._all_times = _Times(start_ns)
+        self._signal_units: dict[str, str] = {}
         self._wanted = {name: (_Times(start_ns), array("d")) for name in names}
 
     def add(self, message: Recorded, decoded: Message) -> None:
         """Add a message's values."""
         since_start_s = self._all_times.since_start_s(message)
+        if isinstance(decoded, Signals):
+            self._signal_units |= signal_units(decoded)
         for own, value in values_of(decoded.DESCRIPTOR.full_name, decoded):
             if (wanted := self._wanted.get(f"{self._topic}/{own}")) is not None:
                 times, values = wanted
@@ -251,7 +255,10 @@ class ValuesCollector:
         prismatic = {joint for joint, kind in types.items() if kind == PRISMATIC}
         return {
             name: RecordedValues(
-                **times.arrays(), name=name, unit=unit_of(name, prismatic), values=np.asarray(values)
+                **times.arrays(),
+                name=name,
+                unit=unit_of(name, prismatic, self._signal_units),
+                values=np.asarray(values),
             )
             for name, (times, values) in self._wanted.items()
         }

@@ -21,6 +21,7 @@ from robomesh.client.samples import (
     Event,
     JointState,
     Sample,
+    SignalState,
     event_of,
     in_degrees,
     joint_types,
@@ -137,6 +138,14 @@ class AsyncRobot:
         states = self.topic("joints/slow" if slow else "joints", buffer=buffer, on_stale=on_stale)
         return cast("AsyncStream[JointState]", states)
 
+    def signals(self, *, buffer: int = 1, on_stale: OnStale = "raise") -> AsyncStream[SignalState]:
+        """Return what the controller reports in addition to joints, the newest first.
+
+        Args:
+            buffer, on_stale: As for `joints`.
+        """
+        return cast("AsyncStream[SignalState]", self.topic("signals", buffer=buffer, on_stale=on_stale))
+
     def topic(self, name: str, *, buffer: int = 1, on_stale: OnStale = "raise") -> AsyncStream[Sample]:
         """Return the messages of a topic, the newest first: "controller", "kinematics", "lease", ...
 
@@ -148,10 +157,14 @@ class AsyncRobot:
         """
         subscription = self._subscribe(name, buffer, on_stale)
         of_joints = subscription.topic.schema is JointStates
+        of_signals = subscription.topic.schema is schema.Signals
 
         def convert(sample: RawSample, stale: bool, skipped: int) -> Iterator[Sample]:
             fields = sample_fields(sample, sample.message(), stale=stale, skipped=skipped)
-            yield JointState(**fields, types=self._types) if of_joints else Sample(**fields)
+            if of_joints:
+                yield JointState(**fields, types=self._types)
+            else:
+                yield SignalState(**fields) if of_signals else Sample(**fields)
 
         limit_s = subscription.topic.stale_after_s
         reading = Reading(subscription, convert, limit_s=limit_s, on_stale=on_stale)

@@ -112,6 +112,32 @@ class JointState(Sample):
         return self.message.joints
 
 
+@dataclass(frozen=True, kw_only=True, repr=False)
+class SignalState(Sample):
+    """Signals of a robot: what its controller reports in addition to joints; see docs/signals.md."""
+
+    def __repr__(self) -> str:
+        return f"<{len(self.values)} signals of {self.site}/{self.robot} at {self.time:%H:%M:%S.%f}>"
+
+    @cached_property
+    def values(self) -> Mapping[str, float | bool | str]:
+        """Numbers in their unit, booleans and texts, by name; an unknown signal is absent."""
+        found = ((each.name, each.WhichOneof("value"), each) for each in self.message.signals)
+        return {name: getattr(each, kind) for name, kind, each in found if kind is not None}
+
+    @cached_property
+    def units(self) -> Mapping[str, str]:
+        """Units by name: "A"; empty: none."""
+        return {each.name: each.unit for each in self.message.signals}
+
+    def __getitem__(self, name: str) -> float | bool | str:
+        """Return the value of a signal."""
+        try:
+            return self.values[name]
+        except KeyError:
+            raise KeyError(f"no signal {name!r}; there are {', '.join(self.values) or 'none'}") from None
+
+
 @dataclass(frozen=True, kw_only=True)
 class Event:
     """An event of a robot or service.

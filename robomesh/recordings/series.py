@@ -1,9 +1,10 @@
 """Values over time, downsampled without losing peaks: the minimum and maximum of each interval."""
 
+import contextlib
 import itertools
 import logging
 from collections import OrderedDict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,8 +16,15 @@ from robomesh.recordings.channel_names import robot_channels, topic_name
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordingFile
-from robomesh.recordings.values import has_values, prismatic_joints, topic_of, unit_of, values_of
-from robomesh.schemas.robomesh_pb2 import Description
+from robomesh.recordings.values import (
+    has_values,
+    prismatic_joints,
+    signal_units,
+    topic_of,
+    unit_of,
+    values_of,
+)
+from robomesh.schemas.robomesh_pb2 import Description, Signals
 
 POINTS, MOST_POINTS = 1000, 10_000
 MOST_VALUES = 64
@@ -112,13 +120,13 @@ class SeriesReader:
                 there = ", ".join(f"{topic}/..." for topic in topics) or "none"
                 raise RecordingError(codes.RECORDING_NO_VALUE(file=file.path.name, name=name, topics=there))
             wanted.setdefault(topic, []).append(name)
-        prismatic = sliding_joints(file, names)
+        unit = units_of(file, names)
         found: dict[str, Series] = {}
         for topic, own in wanted.items():
             pieces = self._pieces(file, topic, topics[topic], start_ns, end_ns, points, frozenset(own))
             for name in own:
                 combined = _combined(name, pieces, file.layout.start_ns, start_ns, end_ns, points)
-                found[name] = replace(combined, unit=unit_of(name, prismatic))
+                found[name] = replace(combined, unit=unit(name))
         return [found[name] for name in names]
 
     def _pieces(
@@ -180,7 +188,30 @@ def known_values(file: RecordingFile) -> list[str]:
     return list(known)
 
 
-def sliding_joints(file: RecordingFile, names: Sequence[str]) -> frozenset[str]:
+def units_of(file: RecordingFile, names: Sequence[str]) -> Callable[[str], str]:
+    """Return the function that returns the unit of one of these values of a recording."""
+    prismatic, signals = _sliding_joints(file, names), _units_of_signals(file, names)
+    return lambda name: unit_of(name, prismatic, signals)
+
+
+def _units_of_signals(file: RecordingFile, names: Sequence[str]) -> dict[str, str]:
+    """Return the units of signals, by the last message, or the first one that has the signal."""
+    key = topics_of_values(file).get("signals")
+    wanted = {name for name in names if name.startswith("signals/")}
+    if key is None or not wanted:
+        return {}
+    found: dict[str, str] = {}
+    last = file.newest(key, file.layout.end_ns)
+    looked = itertools.islice(file.messages([key]), _LOOKED_AT)
+    for message in itertools.chain(() if last is None else (last,), looked):
+        with contextlib.suppress(DecodeError):
+            found = signal_units(Signals.FromString(message.data)) | found
+        if found.keys() >= wanted:
+            break
+    return found
+
+
+def _sliding_joints(file: RecordingFile, names: Sequence[str]) -> frozenset[str]:
     """Return the prismatic joints (unit: metre)."""
     description = robot_channels(file.layout.messages, file.path.name).get("description")
     if not any(name.startswith(_OF_JOINTS) for name in names) or description is None:

@@ -1,20 +1,23 @@
 """Numbers in recorded messages by name: "joints/waist/position", "kinematics/tool/x", ...
 
 A name is the topic below its robot, then the fields; repeated messages are identified by their `name` field.
+A signal has its own name: "signals/joint.waist.current". Booleans are 0 and 1; texts have no number.
 """
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import lru_cache
 from math import atan2, hypot
+from types import MappingProxyType
 from typing import Any
 
 from google.protobuf.descriptor import FieldDescriptor as Field
 
-from robomesh.schemas.robomesh_pb2 import Description
+from robomesh.schemas.robomesh_pb2 import Description, Signals
 from robomesh.topics import TOPICS, History
 
 _JOINT_UNITS = {"position": "", "velocity": "/s", "acceleration": "/s²"}
 _MARGIN = "kinematics/margin/"
+_SIGNALS = "signals/"
 _ANGLES = ("roll", "pitch", "yaw")
 _VERTICAL = 1e-6  # least horizontal length of a tool's x axis that has a direction
 _NUMBERS = frozenset(
@@ -74,6 +77,13 @@ def values_of(schema: str, message: Any) -> Iterator[tuple[str, float]]:
                 yield effort, joint.effort
     elif schema == "robomesh.KinematicState":
         yield from _kinematics(message)
+    elif schema == "robomesh.Signals":
+        for signal in message.signals:
+            kind = signal.WhichOneof("value")
+            if kind == "number":
+                yield signal.name, signal.number
+            elif kind == "on":
+                yield signal.name, float(signal.on)
     else:
         yield from _fields(message, "", _DEEPEST)
 
@@ -94,12 +104,22 @@ def prismatic_joints(description: Description | None) -> frozenset[str]:
     return frozenset(joint.name for joint in joints if joint.type == Description.Joint.PRISMATIC)
 
 
-def unit_of(name: str, prismatic: Collection[str] = ()) -> str:
+def signal_units(message: Signals) -> dict[str, str]:
+    """Return the unit of each signal by the name of its value."""
+    return {f"{_SIGNALS}{each.name}": each.unit for each in message.signals}
+
+
+def unit_of(
+    name: str, prismatic: Collection[str] = (), signals: Mapping[str, str] = MappingProxyType({})
+) -> str:
     """Return the unit of a value by its name; empty: no unit, or unknown.
 
     Args:
         prismatic: Names of the robot's prismatic joints.
+        signals: Units of its signals, from `signal_units`.
     """
+    if name.startswith(_SIGNALS):
+        return signals.get(name, "")
     first, *between, last = name.split("/")
     if first == "joints":
         slides = "/".join(between) in prismatic

@@ -41,6 +41,10 @@ COMMANDS = {
     "ros2": Row("bridges", "Publish the robots to ROS 2 nodes with rmw_zenoh."),
     "list": Row("live.app", "List sites, robots and services, with monitors, control, ages and round trips."),
     "monitor": Row("live.app", "Watch a robot in the terminal."),
+    "signals": Row(
+        "live.app",
+        "Print what a robot's controller reports in addition to joints: I/O, currents, program, modes.",
+    ),
     "send": Row("live.app", "Send a command to a robot and wait until it ends; Ctrl-C stops the robot."),
     "fault": Row("live.app", "Make a simulated controller misbehave: freeze, flood, jump, ..."),
     "snapshot": Row("live.app", "Save a rendered picture of a robot."),

@@ -29,9 +29,20 @@ _OF_A_ROBOT = (
     "recording",
     "audit",
     "raw",
+    "signals",
     "description",
 )
-_OF_A_REPLAY = ("joints", "frames", "kinematics", "controller", "lease", "program", "replay", "description")
+_OF_A_REPLAY = (
+    "joints",
+    "frames",
+    "kinematics",
+    "controller",
+    "lease",
+    "program",
+    "signals",
+    "replay",
+    "description",
+)
 _OF_A_SITE = ("mesh", "alarms")
 # Views that the renderer offers in addition to those of a description.
 _VIEWS = ("free", "close")

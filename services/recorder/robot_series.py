@@ -26,10 +26,10 @@ from robomesh.recordings.series import (
     FloatArray,
     Pieces,
     cut,
-    sliding_joints,
     topics_of_values,
+    units_of,
 )
-from robomesh.recordings.values import topic_of, unit_of
+from robomesh.recordings.values import topic_of
 from robomesh.schemas import robomesh_pb2 as schema
 from services.recorder.flight import FOLDER
 
@@ -152,7 +152,7 @@ class RobotSeries:
             if span[0] > span[1] or reading.covers(span):
                 return
             topics = topics_of_values(file)
-            prismatic = sliding_joints(file, reading.names)
+            unit = units_of(file, reading.names)
             count = min(max((last - first) // _INTERVAL_NS, 1), _MOST_INTERVALS)
             coarse_ns = _LEAST_RATIO * (last - first) / count
             whole = (
@@ -166,7 +166,7 @@ class RobotSeries:
                     pieces = Pieces(names, reading.start_ns, reading.end_ns - 1, reading.points)
                     cut(file, topic, topics[topic], pieces)
                 for name in names:
-                    reading.add(name, unit_of(name, prismatic), pieces)
+                    reading.add(name, unit(name), pieces)
             reading.add_span(span)
 
     def _whole(self, file: RecordingFile, topic: str, key: str, names: frozenset[str], count: int) -> Pieces:

@@ -85,7 +85,7 @@ class _Watch:
             "alarms_active",
             "Alarms that are active and not shelved",
             self._registry.alarms.active_by_priority,
-            label="priority",
+            labels=("priority",),
         )
         session.measure(
             "clock_off_seconds",

@@ -28,6 +28,7 @@ CONTRACT = {
     "simulate": ("--robot", "--listen", "--rate", "--max-clients", "--demo", "--fault"),
     "list": ("--json",),
     "monitor": ("--json",),
+    "signals": ("--follow", "--json"),
     "send": ("--json",),
     "robot check": ("--json",),
     "robot show": ("--json",),

@@ -75,7 +75,7 @@ def test_prometheus_reads_counts_ages_latencies_and_the_services_own(mesh):
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
             gateway.measure("units_received_total", "of each robot", lambda: {"arm": 12.0})
             gateway.measure("captures", "of its own", lambda: 3)
-            gateway.measure("alarms_active", "by priority", lambda: {"high": 2}, label="priority")
+            gateway.measure("alarms_active", "by priority", lambda: {"high": 2}, labels=("priority",))
             url = serve_metrics(gateway, "127.0.0.1", 0, {"service": "gateway"})
             monitored = serve_metrics(monitor, "127.0.0.1", 0, {"service": "monitor"})
             async with present(gateway, GATEWAY):

@@ -8,7 +8,7 @@ import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from robomesh.messages import decode
-from robomesh.recordings.values import live_topics, prismatic_joints, unit_of, values_of
+from robomesh.recordings.values import live_topics, prismatic_joints, signal_units, unit_of, values_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.topics import SCHEMAS
 from tests import page_modules
@@ -87,6 +87,12 @@ def messages():
     controller.program.held = True
     lease = schema.Lease(holder="li", motion=True)
     lease.asked_by.add(operator="wang")
+    signals = schema.Signals()
+    signals.signals.add(name="payload.mass", unit="kg", number=0.0)
+    signals.signals.add(name="io.digital_in.3", on=False)
+    signals.signals.add(name="io.digital_in.4", on=True)
+    signals.signals.add(name="program.name", text="weld")
+    signals.signals.add(name="joint.waist.current", unit="A", number=-1.5, age_s=2.0)
     program = schema.ProgramState(outcome=1, line=7, left_s=3.5)
     return [
         ("joints", joints),
@@ -95,6 +101,7 @@ def messages():
         ("controller", schema.ControllerState()),
         ("lease", lease),
         ("program", program),
+        ("signals", signals),
     ]
 
 
@@ -114,8 +121,9 @@ def test_the_page_reads_the_same_numbers_as_the_recorder_with_the_same_names_and
     for (topic, message), found in zip(sent, answers, strict=True):
         name = message.DESCRIPTOR.full_name
         read = decode(SCHEMAS[name], message.SerializeToString())
+        signals = signal_units(message) if topic == "signals" else {}
         expected = [
-            (f"{topic}/{own}", pytest.approx(value, abs=1e-12), unit_of(f"{topic}/{own}", slides))
+            (f"{topic}/{own}", pytest.approx(value, abs=1e-12), unit_of(f"{topic}/{own}", slides, signals))
             for own, value in values_of(name, read)
         ]
         assert [tuple(each) for each in found] == expected
@@ -124,10 +132,12 @@ def test_the_page_reads_the_same_numbers_as_the_recorder_with_the_same_names_and
     assert units["joints/rail/left/position"] == units["kinematics/margin/rail/left"] == "m"
     assert units["kinematics/tool/pitch"] == "rad"
     assert units["controller/health/jitter_s"] == "s"
+    assert units["signals/joint.waist.current"] == "A"
+    assert "signals/program.name" not in units
 
 
 def test_every_topic_of_a_robot_that_has_numbers_can_be_plotted():
-    assert set(live_topics()) >= {"joints", "kinematics", "controller", "lease", "program"}
+    assert set(live_topics()) >= {"joints", "kinematics", "controller", "lease", "program", "signals"}
     assert not {"frames", "joints/slow", "raw", "events", "description", "mesh"} & set(live_topics())
 
 

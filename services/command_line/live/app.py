@@ -42,6 +42,23 @@ def monitor(
     command.run(robot, connect, as_json, count)
 
 
+@app.command()
+def signals(
+    robot: Robot,
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME...]", help='Start of names, also with *: "io.", "joint.*.current".'),
+    ] = None,
+    follow: Annotated[bool, typer.Option("--follow", help="Repeat with each message until Ctrl-C.")] = False,
+    connect: Connect = DEFAULT_ROUTER,
+    as_json: Json = False,
+) -> None:
+    """Print what a robot's controller reports in addition to joints: I/O, currents, program, modes."""
+    from services.command_line.live import signals as command
+
+    command.run(robot, names or [], connect, as_json, follow)
+
+
 @app.command(context_settings={"ignore_unknown_options": True})
 def send(
     robot: Robot,

@@ -24,8 +24,8 @@ from robomesh.h264 import is_key_frame
 from robomesh.keys import parse_key
 from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
-from robomesh.recordings.series import known_values
-from robomesh.recordings.values import prismatic_joints, unit_of, values_of
+from robomesh.recordings.series import known_values, units_of
+from robomesh.recordings.values import values_of
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.meshes import recorded_mesh
@@ -38,11 +38,12 @@ from services.command_line.recordings.tables import description_of
 
 if TYPE_CHECKING:
     import rerun as rr
+    from google.protobuf.message import Message
 
 # Rows of an entity that are sent together. Rerun recommends chunks of a few thousand rows, at most 12 MiB.
 _ROWS, _BYTES = 4096, 4 << 20
 _TOOL_AXES_M = 0.1
-_VALUES = {"joints": "foxglove.JointStates", "kinematics": "robomesh.KinematicState"}
+_VALUES = {"joints": JointStates, "kinematics": schema.KinematicState, "signals": schema.Signals}
 _ABOUT = ("site", "robot", "name", "started_by", "cause", "part", "recovered")
 _REPORT_EACH = 5000
 _SEVERITY = schema.Event.Severity
@@ -122,13 +123,14 @@ class _Export:
         key = parse_key(next(iter(topics.values())))
         self._site, self._robot = key.site, key.robot
         self._description = description_of(file)
-        self._panels = panels_of(known_values(file))
+        known = known_values(file)
+        self._panels = panels_of(known)
         self._colors = {
             value: COLORS[number % len(COLORS)]
             for panel in self._panels
             for number, value in enumerate(panel.values)
         }
-        self._prismatic = prismatic_joints(self._description)
+        self._unit = units_of(file, known)
         self._rows: dict[str, _Rows] = {}
         self._counts: Counter[str] = Counter()
 
@@ -234,11 +236,14 @@ class _Export:
     def _take_values(
         self, name: str, at_ns: int, message: RecordedMessage, appearance: Appearance | None
     ) -> None:
-        """Add joints or tool; with an appearance, which a recording without frames needs, also the links."""
-        kind = JointStates if name == "joints" else schema.KinematicState
-        if (state := decoded(kind, message.data)) is None:
+        """Add joints, tool or signals.
+
+        With an appearance, which a recording without frames needs, add also the links.
+        """
+        state: Message | None = decoded(_VALUES[name], message.data)
+        if state is None:
             return
-        for value, number in values_of(_VALUES[name], state):
+        for value, number in values_of(state.DESCRIPTOR.full_name, state):
             self._add(f"{name}/{value}".split("/"), at_ns, message, number, self._scalar_columns)
         if isinstance(state, JointStates):
             self._counts["states"] += 1
@@ -348,7 +353,7 @@ class _Export:
 
     def _legend(self, value: str) -> str:
         """Return a value's name in a plot, with its unit."""
-        unit = unit_of(value, self._prismatic)
+        unit = self._unit(value)
         kind, *words = value.split("/")
         if kind == "joints" and words[-1] == "position":
             words.pop()

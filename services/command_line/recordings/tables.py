@@ -1,10 +1,12 @@
-"""Export of joints and tool as CSV: a row for each recorded state, with its publisher's time."""
+"""Export of joints, tool and signals as CSV: a row for each recorded state, with its publisher's time."""
 
 import csv
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TypeVar
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from google.protobuf.message import Message
 
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.table import Table, is_due, table_of
@@ -15,6 +17,8 @@ from services.command_line.recordings.span import Span, decoded, needed, topics_
 
 _REPORT_EACH = 5000
 
+AnyMessage = TypeVar("AnyMessage", bound=Message)
+
 
 def write_table(file: RecordingFile, span: Span, target: Path) -> int:
     """Write the table and return the number of rows.
@@ -23,16 +27,19 @@ def write_table(file: RecordingFile, span: Span, target: Path) -> int:
         ExportError: If the span has no joints.
         RecordingError: If the file is damaged.
     """
-    joints, kinematics = needed(file, "joints"), topics_of(file).get("kinematics")
-    first = next((state for _, state in _states(file, joints, span)), None)
+    needed(file, "joints")
+    first = next((state for _, state in _decoded(file, "joints", JointStates, span)), None)
     if first is None:
         raise ExportError(f"{file.path.name}: no state of joints in that time")
-    table = table_of(first, description_of(file), start_ns=file.layout.start_ns)
+    units: dict[str, str] = {}
+    for _, signals in _decoded(file, "signals", schema.Signals, span):
+        units |= {each.name: each.unit for each in signals.signals}
+    table = table_of(first, description_of(file), units, start_ns=file.layout.start_ns)
     rows = 0
     with target.open("w", newline="", encoding="utf-8") as stream, progress("table") as report:
         writer = csv.writer(stream)
         writer.writerow(table.header)
-        for message, state in _with_tool(table, file, joints, kinematics, span):
+        for message, state in _with_others(table, file, span):
             writer.writerow(table.row(state, message))
             rows += 1
             if rows % _REPORT_EACH == 0:
@@ -40,27 +47,33 @@ def write_table(file: RecordingFile, span: Span, target: Path) -> int:
     return rows
 
 
-def _states(file: RecordingFile, joints: str, span: Span) -> Iterator[tuple[RecordedMessage, JointStates]]:
-    """Yield the states of a span; skip invalid messages."""
-    for message in file.messages((joints,), start_ns=span.start_ns, end_ns=span.end_ns + 1):
-        if (state := decoded(JointStates, message.data)) is not None:
-            yield message, state
-
-
-def _with_tool(
-    table: Table, file: RecordingFile, joints: str, kinematics: str | None, span: Span
+def _with_others(
+    table: Table, file: RecordingFile, span: Span
 ) -> Iterator[tuple[RecordedMessage, JointStates]]:
-    """Yield the states of a span, after the table has taken the tool's pose at each."""
-    tools: Iterator[RecordedMessage] = iter(())
-    if kinematics is not None:
-        tools = file.messages((kinematics,), start_ns=span.start_ns, end_ns=span.end_ns + 1)
-    tool = next(tools, None)
-    for message, state in _states(file, joints, span):
-        while tool is not None and is_due(tool, message):
-            if (known := decoded(schema.KinematicState, tool.data)) is not None:
-                table.take_tool(known, tool)
+    """Yield the states of a span, after the table has taken the tool's pose and the signals at each."""
+    tools = _decoded(file, "kinematics", schema.KinematicState, span)
+    signals = _decoded(file, "signals", schema.Signals, span)
+    tool, signal = next(tools, None), next(signals, None)
+    for message, state in _decoded(file, "joints", JointStates, span):
+        while tool is not None and is_due(tool[0], message):
+            table.take_tool(tool[1], tool[0])
             tool = next(tools, None)
+        while signal is not None and is_due(signal[0], message):
+            table.take_signals(signal[1], signal[0])
+            signal = next(signals, None)
         yield message, state
+
+
+def _decoded(
+    file: RecordingFile, topic: str, kind: type[AnyMessage], span: Span
+) -> Iterator[tuple[RecordedMessage, AnyMessage]]:
+    """Yield the messages of a topic in a span; skip invalid ones."""
+    key = topics_of(file).get(topic)
+    if key is None:
+        return
+    for message in file.messages((key,), start_ns=span.start_ns, end_ns=span.end_ns + 1):
+        if (state := decoded(kind, message.data)) is not None:
+            yield message, state
 
 
 def description_of(file: RecordingFile) -> schema.Description | None:

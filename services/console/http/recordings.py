@@ -178,8 +178,15 @@ async def _lines(
     if "description" in topics:
         async for message in _messages(file, topics["description"], Span()):
             description = _decoded(schema.Description, message.data) or description
+    units: dict[str, str] = {}
+    if "signals" in topics:
+        async for message in _messages(file, topics["signals"], span):
+            if (signals := _decoded(schema.Signals, message.data)) is not None:
+                units |= {each.name: each.unit for each in signals.signals}
     tools = _messages(file, topics["kinematics"], span) if "kinematics" in topics else None
     tool = None if tools is None else await anext(tools, None)
+    others = _messages(file, topics["signals"], span) if "signals" in topics else None
+    other = None if others is None else await anext(others, None)
     table: Table | None = None
     text = io.StringIO()
     writer = csv.writer(text)
@@ -188,12 +195,16 @@ async def _lines(
         if state is None:
             continue
         if table is None:
-            table = table_of(state, description, start_ns=start_ns)
+            table = table_of(state, description, units, start_ns=start_ns)
             writer.writerow(table.header)
         while tools is not None and tool is not None and is_due(tool, message):
             if (kinematics := _decoded(schema.KinematicState, tool.data)) is not None:
                 table.take_tool(kinematics, tool)
             tool = await anext(tools, None)
+        while others is not None and other is not None and is_due(other, message):
+            if (signals := _decoded(schema.Signals, other.data)) is not None:
+                table.take_signals(signals, other)
+            other = await anext(others, None)
         writer.writerow(table.row(state, message))
         if text.tell() > _SENT_BYTES:
             yield text.getvalue().encode()

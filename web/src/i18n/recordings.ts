@@ -134,6 +134,7 @@ const TEXTS = {
 
   joints: ["Joints", "关节"],
   tool_and_margins: ["Tool and distances", "工具与距离"],
+  signals: ["Signals", "信号"],
   controller: ["Controller", "控制器"],
   control: ["Control", "控制权"],
   program: ["Program", "程序"],

@@ -1,4 +1,4 @@
-// Numbers in messages by name, as the recorder names them: "joints/waist/position", "kinematics/tool/x", ...
+// Numbers in messages by name, as the recorder names them: "joints/waist/position", "signals/payload.mass", ...
 
 import type { DescMessage, Message } from "@bufbuild/protobuf";
 import { createRegistry, fromBinary, ScalarType } from "@bufbuild/protobuf";
@@ -6,7 +6,7 @@ import type { ReflectMessage } from "@bufbuild/protobuf/reflect";
 import { reflect } from "@bufbuild/protobuf/reflect";
 import { FeatureSet_FieldPresence as Presence } from "@bufbuild/protobuf/wkt";
 import { file_foxglove_JointStates, type JointStates } from "../gen/foxglove/JointStates_pb";
-import type { Description, KinematicState } from "../gen/robomesh_pb";
+import type { Description, KinematicState, Signals } from "../gen/robomesh_pb";
 import { file_robomesh, Description_Joint_Type as JointType } from "../gen/robomesh_pb";
 import { rollPitchYaw } from "../i18n/format";
 import { hello } from "./connection";
@@ -20,6 +20,10 @@ const JOINT_NUMBERS = ["position", "velocity", "acceleration", "effort"] as cons
 const RATES: Record<string, string> = { position: "", velocity: "/s", acceleration: "/s²" };
 const ANGLES = ["roll", "pitch", "yaw"] as const;
 const MARGIN = "kinematics/margin/";
+const SIGNALS = "signals";
+// Only the messages have the units of signals. A name means the same for every robot, and is kept with its last unit.
+const signalUnits = new Map<string, string>();
+const MOST_UNITS = 5000;
 const ENDINGS = [
   ["_s", "s"],
   ["_m", "m"],
@@ -61,6 +65,7 @@ export function valuesOf(schema: DescMessage, message: Message, take: Take): voi
         if (value !== undefined) take(`${joint.name}/${name}`, value);
       }
   } else if (schema.typeName === "robomesh.KinematicState") kinematics(message as KinematicState, take);
+  else if (schema.typeName === "robomesh.Signals") signals(message as Signals, take);
   else fields(reflect(schema, message), "", DEEPEST, take);
 }
 
@@ -77,6 +82,20 @@ function kinematics(message: KinematicState, take: Take): void {
   if (message.clearance) take("clearance", message.clearance.distance);
   if (message.ownClearance) take("own_clearance", message.ownClearance.distance);
   for (const { name, lower, upper } of message.limitMargins) take(`margin/${name}`, Math.min(lower, upper));
+}
+
+function signals(message: Signals, take: Take): void {
+  for (const { name, unit, value } of message.signals) {
+    if (unit) learnUnit(`${SIGNALS}/${name}`, unit);
+    if (value.case === "number") take(name, value.value);
+    else if (value.case === "on") take(name, Number(value.value));
+  }
+}
+
+/** Keep the unit of a signal, as a message or a recording has it. */
+export function learnUnit(name: string, unit: string): void {
+  if (unit && name.startsWith(`${SIGNALS}/`) && (signalUnits.has(name) || signalUnits.size < MOST_UNITS))
+    signalUnits.set(name, unit);
 }
 
 function fields(message: ReflectMessage, prefix: string, deepest: number, take: Take): void {
@@ -110,6 +129,7 @@ function isNumber(scalar: ScalarType): boolean {
 /** Return the unit of a value by its name; empty: no unit, or unknown. */
 export function unitOf(name: string, description: Description | undefined): string {
   const [first = "", ...rest] = name.split("/");
+  if (first === SIGNALS) return signalUnits.get(name) ?? "";
   const last = rest.pop() ?? first;
   const slides = (joint: string) =>
     description?.joints.some(({ name: own, type }) => own === joint && type === JointType.PRISMATIC) ?? false;

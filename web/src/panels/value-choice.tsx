@@ -10,6 +10,7 @@ import "./value-choice.css";
 const GROUPS: Partial<Record<string, RecordingsText>> = {
   joints: "joints",
   kinematics: "tool_and_margins",
+  signals: "signals",
   controller: "controller",
   lease: "control",
   program: "program",

@@ -8,7 +8,7 @@ import { ageClock } from "../../mesh/age-clock";
 import { AskError, ask, inOwnName, presence, watch } from "../../mesh/connection";
 import { reasonOf } from "../../mesh/control";
 import { staleAfter } from "../../mesh/topics";
-import { readerOf, topicOf, topicsOfValues } from "../../mesh/values";
+import { learnUnit, readerOf, topicOf, topicsOfValues } from "../../mesh/values";
 import { Buckets } from "./plot-buckets";
 
 /** The page always keeps so much of each plotted value [s]. */
@@ -152,7 +152,8 @@ export class PlotFeed {
     const key = inOwnName(`robomesh/${site}/-/recordings/series`);
     const answer = await patiently(() => ask(key, SeriesRequestSchema, request, SeriesAnswerSchema, TIMEOUT_S));
     const zero = (Math.round(startMs) + offset) / 1000;
-    for (const { name: own, timesS, lowest, highest } of answer.series) {
+    for (const { name: own, unit, timesS, lowest, highest } of answer.series) {
+      learnUnit(own, unit);
       const buckets = this.buckets(own, span);
       if (buckets?.span === span)
         for (const [i, time] of timesS.entries()) buckets.take(zero + time, lowest[i] ?? 0, highest[i] ?? 0);
