@@ -6,7 +6,6 @@ A reader may raise only the documented errors, within seconds and a bounded memo
 the run with exit status 1 and its input in the folder.
 """
 
-import argparse
 import faulthandler
 import random
 import resource
@@ -19,6 +18,9 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
+
+if __name__ == "__main__":
+    sys.path[0] = str(Path(__file__).parents[2])
 
 import numpy as np
 
@@ -34,6 +36,7 @@ from robots.meshes.vrml.read import read_vrml
 from robots.meshes.vrml.write import write_vrml
 from robots.meshes.write_glb import glb_of
 from robots.meshes.write_others import write_obj, write_ply, write_stl
+from tests.fuzz.fuzzing import Finding, keep, options
 
 TESTDATA = Path(__file__).resolve().parents[2].parent / "shared" / "testdata"
 SECONDS_AN_INPUT = 10
@@ -45,26 +48,13 @@ _TOKENS = (b"{", b"}", b"[", b"]", b"USE x", b"DEF x", b"IS", b"PROTO x [] {", b
 _COUNTS = (0, 1, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF)
 
 
-@dataclass(frozen=True)
-class Finding:
-    """Input that a reader cannot process."""
-
-    reader: str
-    data: bytes
-    problem: str
-
-
 class HangError(BaseException):
     """Timeout of a reader; no Exception, because a reader may catch those."""
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--inputs", type=int, default=1_000_000)
-    parser.add_argument("--seconds", type=float, default=600.0)
-    parser.add_argument("--seed", type=int, default=1)
+    parser = options(__doc__, inputs=1_000_000, seconds=600.0)
     parser.add_argument("--reader", choices=sorted(READERS), default=None)
-    parser.add_argument("--keep", type=Path, default=Path(tempfile.gettempdir()) / "robomesh-fuzz")
     arguments = parser.parse_args()
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     faulthandler.enable()
@@ -77,10 +67,7 @@ def main() -> None:
         count += done
         print(f"{name}: {done} inputs, {done / max(time.monotonic() - start, 1e-9):.0f} a second so far")
         if finding is not None:
-            arguments.keep.mkdir(parents=True, exist_ok=True)
-            path = arguments.keep / f"seed{arguments.seed}-{done}.{name}"
-            path.write_bytes(finding.data)
-            sys.exit(f"{path}: {finding.problem}")
+            keep(arguments.keep, f"seed{arguments.seed}-{done}.{name}", finding)
     print(f"{count} inputs in {time.monotonic() - start:.0f} s; only documented errors")
 
 
@@ -100,7 +87,7 @@ def fuzz(name: str, inputs: int, seconds: float, seed: int) -> tuple[int, Findin
                 path.write_bytes(data)
                 problem = _tried(READERS[name].read, path)
                 if problem:
-                    return count, Finding(name, data, problem)
+                    return count, Finding(data, problem)
         return inputs, None
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)

@@ -7,16 +7,15 @@ leak. Joint positions and motions must equal those of a strict parser that is in
 Anything else ends the run with exit status 1 and its input in the folder.
 """
 
-import argparse
 import logging
 import random
 import re
 import sys
-import tempfile
-import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+
+if __name__ == "__main__":
+    sys.path[0] = str(Path(__file__).parents[2])
 
 from google.protobuf.message import Message
 
@@ -32,11 +31,9 @@ from protocol_gateway.signals import Signals
 from protocol_gateway.telemetry import Telemetry
 from robots.description import load
 from robots.joints import joints_of
+from tests.fuzz.fuzzing import Finding, campaign, cut
 
 JOINTS = joints_of(load("pt600"))
-# State between inputs is bounded: numbers and words of a few units.
-GROWTH_MIB = 24
-WARM_UP = 20_000
 LONGEST = 64 * 1024
 
 CODES: tuple[Mapping[int, str], ...] = (
@@ -73,39 +70,18 @@ TOKENS = (
 _NUMBER_AT = re.compile(rb"-? ?[0-9.]+")
 
 
-class Finding(NamedTuple):
-    """Input that the gateway handles wrongly."""
-
-    data: bytes
-    problem: str
-
-
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--inputs", type=int, default=10_000_000)
-    parser.add_argument("--seconds", type=float, default=7200.0)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--keep", type=Path, default=Path(tempfile.gettempdir()) / "robomesh-fuzz")
-    arguments = parser.parse_args()
     logging.disable()
-    begun_s, begun_mib = time.monotonic(), 0.0
-    end_s = begun_s + arguments.seconds
-    done, finding = fuzz(WARM_UP, arguments.seed)
-    begun_mib = rss_mib()
-    while finding is None and done < arguments.inputs and time.monotonic() < end_s:
-        more, finding = fuzz(min(100_000, arguments.inputs - done), arguments.seed * 1_000_003 + done)
-        done += more
-    took_s, mib = time.monotonic() - begun_s, rss_mib()
-    print(f"{done:,} inputs in {took_s:.0f} s, {done / took_s:,.0f} a second")
-    print(f"memory {begun_mib:.1f} MiB after {WARM_UP:,} inputs, {mib:.1f} MiB at the end")
-    if finding is not None:
-        arguments.keep.mkdir(parents=True, exist_ok=True)
-        path = arguments.keep / f"seed{arguments.seed}-{done}.unit"
-        path.write_bytes(finding.data)
-        sys.exit(f"{path}: {finding.problem}")
-    if mib - begun_mib > GROWTH_MIB:
-        sys.exit(f"memory grew by {mib - begun_mib:.1f} MiB, {GROWTH_MIB} are allowed")
-    print("no exception, no motion but what a strict reading gives")
+    campaign(
+        __doc__,
+        fuzz,
+        inputs=10_000_000,
+        seconds=7200.0,
+        name="units",
+        # State between inputs is bounded: numbers and words of a few units.
+        growth_mib=24,
+        verdict="no exception, no motion but what a strict reading gives",
+    )
 
 
 def fuzz(inputs: int, seed: int) -> tuple[int, Finding | None]:
@@ -299,18 +275,6 @@ def _changed(unit: bytes, chance: random.Random) -> bytes:
                 if number := _NUMBER_AT.search(data, at):
                     data[number.start() : number.end()] = chance.choice(TOKENS)
     return bytes(data)
-
-
-def cut(data: bytes, chance: random.Random) -> list[bytes]:
-    """Split the same bytes as TCP may deliver them."""
-    places = sorted(int(chance.random() * len(data)) for _ in range(chance.choice((0, 0, 1, 3))))
-    return [data[begin:end] for begin, end in zip([0, *places], [*places, len(data)], strict=True)]
-
-
-def rss_mib() -> float:
-    """Return the memory of this process now."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * 4096 / 2**20
 
 
 if __name__ == "__main__":

@@ -1,69 +1,45 @@
 """Broken messages of Universal Robots' controllers: RTDE and the primary interface.
 
-    python tests/fuzz/fuzz_universal_robots.py [--messages N] [--seconds S] [--seed N] [--keep FOLDER]
+    python tests/fuzz/fuzz_universal_robots.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
 Real messages, changed at random, some in one input, cut into pieces anywhere. They may cause no exception and
 no leak. States and alarms must equal those of a strict parser that is independent of the gateway's. Anything
 else ends the run with exit status 1 and its input in the folder.
 """
 
-import argparse
 import math
 import random
 import struct
 import sys
-import tempfile
-import time
 from collections import Counter
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+
+if __name__ == "__main__":
+    sys.path[0] = str(Path(__file__).parents[2])
 
 from protocol_gateway.drivers.universal_robots.primary import Alarm, PrimaryStream, SafetyModeChanged
 from protocol_gateway.drivers.universal_robots.rtde_reader import RtdeReader
 from protocol_gateway.drivers.universal_robots.state import OUTPUTS, ControllerState
+from tests.fuzz.fuzzing import Finding, campaign, changed, cut
 
-GROWTH_MIB = 16
-WARM_UP = 20_000
 LONGEST = 4096
 FIELDS = {"timestamp": "DOUBLE", "actual_q": "VECTOR6D", "robot_mode": "INT32", "payload": "DOUBLE"}
 
 
-class Finding(NamedTuple):
-    """Input that the codec handles wrongly."""
-
-    data: bytes
-    problem: str
-
-
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--messages", type=int, default=1_000_000)
-    parser.add_argument("--seconds", type=float, default=3600.0)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--keep", type=Path, default=Path(tempfile.gettempdir()) / "robomesh-fuzz")
-    arguments = parser.parse_args()
-    begun_s = time.monotonic()
     counts: Counter[str] = Counter()
-    done, finding = fuzz(WARM_UP, arguments.seed, counts)
-    begun_mib = rss_mib()
-    while finding is None and done < arguments.messages and time.monotonic() < begun_s + arguments.seconds:
-        more, finding = fuzz(
-            min(50_000, arguments.messages - done), arguments.seed * 1_000_003 + done, counts
-        )
-        done += more
-    took_s, mib = time.monotonic() - begun_s, rss_mib()
-    print(f"{done:,} messages in {took_s:.0f} s, {time.process_time():.0f} s of CPU")
-    print(", ".join(f"{count:,} {name}" for name, count in counts.most_common()))
-    print(f"memory {begun_mib:.1f} MiB after {WARM_UP:,} messages, {mib:.1f} MiB at the end")
-    if finding is not None:
-        arguments.keep.mkdir(parents=True, exist_ok=True)
-        path = arguments.keep / f"ur-seed{arguments.seed}-{done}.bin"
-        path.write_bytes(finding.data)
-        sys.exit(f"{path}: {finding.problem}")
-    if mib - begun_mib > GROWTH_MIB:
-        sys.exit(f"memory grew by {mib - begun_mib:.1f} MiB, {GROWTH_MIB} are allowed")
-    print("no exception, no state and no alarm but what a strict reading gives")
+    campaign(
+        __doc__,
+        partial(fuzz, counts=counts),
+        inputs=1_000_000,
+        seconds=3600.0,
+        name="ur",
+        growth_mib=16,
+        verdict="no exception, no state and no alarm but what a strict reading gives",
+        told=lambda: ", ".join(f"{count:,} {name}" for name, count in counts.most_common()),
+    )
 
 
 def fuzz(messages: int, seed: int, counts: Counter[str]) -> tuple[int, Finding | None]:
@@ -74,7 +50,7 @@ def fuzz(messages: int, seed: int, counts: Counter[str]) -> tuple[int, Finding |
         number = chance.choice((1, 1, 2, 3, 5))
         primary = chance.random() < 0.5
         seeds = PRIMARY if primary else RTDE
-        data = b"".join(_changed(chance.choice(seeds), seeds, chance) for _ in range(number))
+        data = b"".join(changed(chance.choice(seeds), seeds, TOKENS, chance) for _ in range(number))
         try:
             problem = (_primary if primary else _rtde)(data, cut(data, chance), counts)
         except Exception as error:
@@ -211,46 +187,6 @@ TOKENS = (
     *(struct.pack(">d", each) for each in (math.nan, math.inf, -math.inf, 1e308, -0.0, 5e-324)),
     *(b"\0\0\0\5\x10", b"\0\0\0\4", b"\x80\0\0\0", b"\1", b"\2", b"U", b"DOUBLE,", b"\xc2\xb2", b"\x1b[2J"),
 )
-
-
-def _changed(message: bytes, seeds: Sequence[bytes], chance: random.Random) -> bytes:
-    data = bytearray(message)
-    for _ in range(chance.choice((0, 0, 1, 1, 1, 2, 4))):
-        at = int(chance.random() * (len(data) + 1))
-        length = chance.choice((1, 1, 2, 4, 8, 32))
-        match int(chance.random() * 8):
-            case 0 if at < len(data):
-                data[at] ^= 1 << int(chance.random() * 8)
-            case 1:
-                data[at : at + length] = chance.randbytes(length)
-            case 2:
-                del data[at : at + length]
-            case 3:
-                del data[at:]
-            case 4:
-                other = chance.choice(seeds)
-                begin = int(chance.random() * len(other))
-                data[at:at] = other[begin : begin + length]
-            case 5:
-                token = chance.choice(TOKENS)
-                data[at : at + len(token)] = token
-            case 6:
-                data[at:at] = chance.choice(TOKENS)
-            case 7 if len(data) > 5 and chance.random() < 0.01:
-                data += bytes(70_000)
-    return bytes(data)
-
-
-def cut(data: bytes, chance: random.Random) -> list[bytes]:
-    """Split the same bytes as TCP may deliver them."""
-    places = sorted(int(chance.random() * len(data)) for _ in range(chance.choice((0, 0, 1, 3))))
-    return [data[begin:end] for begin, end in zip([0, *places], [*places, len(data)], strict=True)]
-
-
-def rss_mib() -> float:
-    """Return the memory of this process now."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * 4096 / 2**20
 
 
 if __name__ == "__main__":

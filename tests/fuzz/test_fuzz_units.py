@@ -1,36 +1,20 @@
 """A short run of the fuzzer of units; run `python tests/fuzz/fuzz_units.py` for a long one."""
 
-import importlib.util
-import sys
-from pathlib import Path
-from types import ModuleType
-
 import pytest
 
 from protocol_gateway.core import stream
 from protocol_gateway.core.records import AbsolutePositions
-
-
-@pytest.fixture(scope="module")
-def fuzzer() -> ModuleType:
-    path = Path(__file__).with_name("fuzz_units.py")
-    spec = importlib.util.spec_from_file_location("fuzz_units", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+from tests.fuzz import fuzz_units as fuzzer
 
 
 @pytest.mark.slow
-def test_changed_units_move_nothing_but_what_a_strict_reading_gives(fuzzer: ModuleType) -> None:
+def test_changed_units_move_nothing_but_what_a_strict_reading_gives() -> None:
     done, finding = fuzzer.fuzz(30_000, seed=3)
     assert finding is None, finding
     assert done == 30_000
 
 
-def test_unit_that_is_read_carelessly_is_found(fuzzer: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unit_that_is_read_carelessly_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     def careless(data: bytes, readers: object) -> tuple[AbsolutePositions] | None:
         return (AbsolutePositions((1.0, 2.0, 3.0, 4.0, 5.0)),) if b"ABSOLUTE.DEG*1" in data else None
 
@@ -40,7 +24,7 @@ def test_unit_that_is_read_carelessly_is_found(fuzzer: ModuleType, monkeypatch: 
     assert "a strict reading gives" in finding.problem
 
 
-def test_exception_that_escapes_is_found(fuzzer: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_exception_that_escapes_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(data: bytes, readers: object) -> None:
         raise ZeroDivisionError
 

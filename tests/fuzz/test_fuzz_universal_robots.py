@@ -1,34 +1,17 @@
 """A short run of the fuzzer of Universal Robots' messages; run the program for a long one."""
 
-import importlib.util
 import struct
-import sys
 from collections import Counter
-from pathlib import Path
-from types import ModuleType
 
 import pytest
 
 from protocol_gateway.drivers.universal_robots import primary
 from protocol_gateway.drivers.universal_robots.rtde_messages import Recipe
-
-
-@pytest.fixture(scope="module")
-def fuzzer() -> ModuleType:
-    path = Path(__file__).with_name("fuzz_universal_robots.py")
-    spec = importlib.util.spec_from_file_location("fuzz_universal_robots", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+from tests.fuzz import fuzz_universal_robots as fuzzer
 
 
 @pytest.mark.slow
-def test_changed_messages_give_no_state_and_no_alarm_but_what_a_strict_reading_gives(
-    fuzzer: ModuleType,
-) -> None:
+def test_changed_messages_give_no_state_and_no_alarm_but_what_a_strict_reading_gives() -> None:
     counts: Counter[str] = Counter()
     done, finding = fuzzer.fuzz(20_000, 3, counts)
     assert finding is None, finding
@@ -36,7 +19,7 @@ def test_changed_messages_give_no_state_and_no_alarm_but_what_a_strict_reading_g
     assert min(counts[each] for each in ("ControllerState", "Alarm", "Malformed", "Popup")) > 100
 
 
-def test_state_that_is_read_carelessly_is_found(fuzzer: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_state_that_is_read_carelessly_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     def careless(recipe: Recipe, payload: bytes) -> dict[str, object]:
         flat = struct.unpack_from(">7did", payload.ljust(80, b"\0"), 1)
         return {"timestamp": flat[0], "actual_q": flat[1:7], "robot_mode": flat[7], "payload": flat[8]}
@@ -46,7 +29,7 @@ def test_state_that_is_read_carelessly_is_found(fuzzer: ModuleType, monkeypatch:
     assert "a strict reading gives" in finding.problem
 
 
-def test_exception_that_escapes_is_found(fuzzer: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_exception_that_escapes_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(data: bytes) -> None:
         raise ZeroDivisionError
 

@@ -1,0 +1,122 @@
+"""What the fuzz programs share: options, the run with its check of memory, changes of bytes, findings."""
+
+import argparse
+import random
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple, NoReturn
+
+WARM_UP = 20_000
+
+
+class Finding(NamedTuple):
+    """Input that is handled wrongly."""
+
+    data: bytes
+    problem: str
+
+
+def options(doc: str, *, inputs: int, seconds: float) -> argparse.ArgumentParser:
+    """Return the parser of the options that all programs have."""
+    parser = argparse.ArgumentParser(description=doc.splitlines()[0])
+    parser.add_argument("--inputs", type=int, default=inputs)
+    parser.add_argument("--seconds", type=float, default=seconds)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--keep", type=Path, default=Path(tempfile.gettempdir()) / "robomesh-fuzz")
+    return parser
+
+
+def keep(folder: Path, name: str, finding: Finding) -> NoReturn:
+    """Write a finding's input into the folder, and end the program with exit status 1."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / name
+    path.write_bytes(finding.data)
+    sys.exit(f"{path}: {finding.problem}")
+
+
+def campaign(
+    doc: str,
+    fuzz: Callable[[int, int], tuple[int, Finding | None]],
+    *,
+    inputs: int,
+    seconds: float,
+    name: str,
+    growth_mib: float,
+    verdict: str,
+    told: Callable[[], str] = str,
+) -> None:
+    """Fuzz in blocks until the options' end; exit with status 1 at a finding, or if the memory grows.
+
+    Args:
+        fuzz: Reads so many inputs with a seed; returns how many it read, and the first wrong one.
+        name: Of the files of findings: NAME-seed1-23.bin.
+        growth_mib: Growth of the process after a warm-up that is allowed.
+        verdict: Last line of a run without findings.
+        told: Returns a line with further counts; empty: none.
+    """
+    arguments = options(doc, inputs=inputs, seconds=seconds).parse_args()
+    begun_s = time.monotonic()
+    done, finding = fuzz(WARM_UP, arguments.seed)
+    begun_mib = rss_mib()
+    while finding is None and done < arguments.inputs and time.monotonic() < begun_s + arguments.seconds:
+        more, finding = fuzz(min(50_000, arguments.inputs - done), arguments.seed * 1_000_003 + done)
+        done += more
+    took_s, mib = time.monotonic() - begun_s, rss_mib()
+    print(f"{done:,} inputs in {took_s:.0f} s, {time.process_time():.0f} s of CPU")
+    if line := told():
+        print(line)
+    print(f"memory {begun_mib:.1f} MiB after {WARM_UP:,} inputs, {mib:.1f} MiB at the end")
+    if finding is not None:
+        keep(arguments.keep, f"{name}-seed{arguments.seed}-{done}.bin", finding)
+    if mib - begun_mib > growth_mib:
+        sys.exit(f"memory grew by {mib - begun_mib:.1f} MiB, {growth_mib:g} are allowed")
+    print(verdict)
+
+
+def changed(message: bytes, others: Sequence[bytes], tokens: Sequence[bytes], chance: random.Random) -> bytes:
+    """Return a binary message, changed in none to four places; a few become far too long.
+
+    Args:
+        others: Messages of which parts are inserted.
+        tokens: Bytes that replace others, or are inserted.
+    """
+    data = bytearray(message)
+    for _ in range(chance.choice((0, 0, 1, 1, 1, 2, 4))):
+        at = int(chance.random() * (len(data) + 1))
+        length = chance.choice((1, 1, 2, 4, 8, 32))
+        match int(chance.random() * 8):
+            case 0 if at < len(data):
+                data[at] ^= 1 << int(chance.random() * 8)
+            case 1:
+                data[at : at + length] = chance.randbytes(length)
+            case 2:
+                del data[at : at + length]
+            case 3:
+                del data[at:]
+            case 4:
+                other = chance.choice(others)
+                begin = int(chance.random() * len(other))
+                data[at:at] = other[begin : begin + length]
+            case 5:
+                token = chance.choice(tokens)
+                data[at : at + len(token)] = token
+            case 6:
+                data[at:at] = chance.choice(tokens)
+            case 7 if len(data) > 5 and chance.random() < 0.01:
+                data += bytes(70_000)
+    return bytes(data)
+
+
+def cut(data: bytes, chance: random.Random) -> list[bytes]:
+    """Split the same bytes as TCP may deliver them."""
+    places = sorted(int(chance.random() * len(data)) for _ in range(chance.choice((0, 0, 1, 3))))
+    return [data[begin:end] for begin, end in zip([0, *places], [*places, len(data)], strict=True)]
+
+
+def rss_mib() -> float:
+    """Return the memory of this process now."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * 4096 / 2**20
