@@ -82,7 +82,9 @@ class Robot:
         joints = joints_of(load(settings.description))
         relay = None if settings.legacy_clients is None else self._relay
         try:
-            driver = DRIVERS[settings.protocol](joints.types, settings.codes, relay=relay)
+            driver = DRIVERS[settings.protocol](
+                joints.types, settings.codes, relay=relay, options=settings.options
+            )
         except GatewaySettingsError as error:
             raise GatewaySettingsError(f"robot {settings.name}: {error}") from None
         if unknown := sorted(settings.ports.keys() - driver.ports):
@@ -94,6 +96,7 @@ class Robot:
         self._legacy: LegacyClients | None = None
         self._capabilities = driver.capabilities
         self._read_only = _why_read_only(settings, driver)
+        self._no_joints = driver.capabilities.no_joints
 
         def publisher(topic: str) -> Publisher:
             return session.declare_publisher(site, settings.name, topic)
@@ -410,7 +413,7 @@ class Robot:
             status=self._telemetry.status(now_s),
             fault=self._telemetry.fault(now_s),
             positions=self._telemetry.positions(now_s),
-            positions_stale=self._telemetry.positions_stale(now_s),
+            positions_stale=self._no_joints or self._telemetry.positions_stale(now_s),
             read_only=self._read_only,
             capabilities=self._capabilities,
             stop_arrives=self._link.carries(Carries.STOP),

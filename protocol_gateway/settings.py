@@ -33,6 +33,7 @@ class RobotSettings:
         ports: Ports of the controller's other interfaces, where they are not the usual ones:
             {"primary": 30011}.
         protocol: Protocol of the controller, by its name in `protocol_gateway.drivers.registry`.
+        options: Settings of the protocol's driver, such as `YaskawaSettings`; None: it has none.
         codes: Type codes, where the controller sends numbers: {2: "ABSOLUTE.DEG", 101: "COMMAND:home"}.
         accept_unknown: States that the controller never reports and that are not required: "mode", "homed".
         stop_proven: The stop unit was tried on this controller; otherwise the robot is read-only.
@@ -52,6 +53,7 @@ class RobotSettings:
     port: int
     ports: Mapping[str, int] = field(default_factory=dict)
     protocol: str = "unit"
+    options: object = None
     codes: Mapping[int, str] = field(default_factory=dict)
     accept_unknown: frozenset[str] = frozenset()
     stop_proven: bool = False

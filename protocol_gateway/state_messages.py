@@ -163,6 +163,7 @@ def _health(health: LinkHealth, *, flooding: bool) -> schema.LinkHealth:
         jitter_s=health.jitter_s,
         network_round_trip_s=health.network_round_trip_s,
         answer_s=health.answer_s,
+        stamp_uncertainty_s=health.stamp_uncertainty_s,
         flooding=flooding,
     )
 

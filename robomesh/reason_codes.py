@@ -424,6 +424,11 @@ CONTROLLER_FAULT = Code(
 CONTROLLER_HOLDING = Code("controller.holding", "a motion is on hold", "RESUME it, or cancel it with RESET")
 CONTROLLER_NOT_HOLDING = Code("controller.not_holding", "nothing is on hold", "there is no motion to resume")
 POSITIONS_STALE = Code("positions.stale", "no joint positions for {seconds:g} s")
+JOINTS_UNDECLARED = Code(
+    "joints.undeclared",
+    "its joints are not shown, because the controller sends pulses",
+    "declare pulses_per_degree of each joint in [robot.yaskawa] of the site file",
+)
 POSITIONS_UNKNOWN = Code("positions.unknown", "the robot's position is unknown ({cause})")
 POSITIONS_NONE = Code("positions.none", "the controller has not reported joint positions")
 

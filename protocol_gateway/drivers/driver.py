@@ -287,6 +287,7 @@ class Capabilities:
         absolute: The arm has absolute encoders: it is homed by nature.
         dies_with_link: Whether the controller itself ends a motion when the gateway or its link is gone;
             None: unknown.
+        no_joints: Reason for missing joint positions; None: the driver reports them.
     """
 
     commands: frozenset[type[ControllerCommand]]
@@ -294,6 +295,7 @@ class Capabilities:
     jogs: bool = False
     absolute: bool = False
     dies_with_link: bool | None = None
+    no_joints: Reason | None = None
 
 
 # ------------------------------------------------------------------------ effects
@@ -377,11 +379,16 @@ class Report:
         units: Number of well-formed units; one may give several events, or none.
         refusals: Number of these units that hold only refusals, so do not show that the arm's state is
             received.
+        asked_s: Time of the question that they answer, on the gateway's clock. The values are of some moment
+            since then, so they are stamped with the middle; None: they were not asked for.
+        lost: Number of questions that were not answered in time.
     """
 
     events: Sequence[ControllerEvent]
     units: int
     refusals: int = 0
+    asked_s: float | None = None
+    lost: int = 0
 
 
 Effect: TypeAlias = Open | Close | Send | SetTimer | Report

@@ -6,6 +6,7 @@ from typing import Protocol
 from protocol_gateway.drivers.driver import Driver
 from protocol_gateway.drivers.unit import UnitDriver
 from protocol_gateway.drivers.universal_robots.driver import RtdeDriver
+from protocol_gateway.drivers.yaskawa.driver import HsesDriver
 from robots.joints import JointType
 
 
@@ -18,6 +19,7 @@ class DriverMaker(Protocol):
         codes: Mapping[int, str],
         *,
         relay: Callable[[bytes, bool, Hashable], None] | None,
+        options: object,
     ) -> Driver:
         """Create a driver.
 
@@ -25,6 +27,7 @@ class DriverMaker(Protocol):
             joint_types: Types of the joints, in the order of the controller's values.
             codes: The site file's table of type codes; empty if there is none.
             relay: Callback with units for old client programs, see `UnitDriver`; None: there are none.
+            options: What the site file declares for this kind of controller; None: nothing.
 
         Raises:
             ProtocolGatewayError: If the arguments are invalid.
@@ -32,5 +35,5 @@ class DriverMaker(Protocol):
         ...
 
 
-DRIVERS: dict[str, DriverMaker] = {"unit": UnitDriver, "rtde": RtdeDriver}
+DRIVERS: dict[str, DriverMaker] = {"unit": UnitDriver, "rtde": RtdeDriver, "hses": HsesDriver}
 """Driver factories by the site file's `protocol`."""

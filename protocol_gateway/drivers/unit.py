@@ -95,6 +95,7 @@ class UnitDriver:
         codes: Mapping[int, str] = _NO_CODES,
         *,
         relay: Callable[[bytes, bool, Hashable], None] | None = None,
+        options: object = None,
     ) -> None:
         self._table = code_table(codes)
         self._stream = UnitStream(self._table)

@@ -10,6 +10,7 @@ from itertools import pairwise
 from statistics import median
 
 from protocol_gateway.drivers.driver import ControllerEvent, Refused, StatusReceived
+from protocol_gateway.link.timestamping import Received
 
 _WINDOW_S = 5.0
 _MOST_ARRIVALS = 512
@@ -25,6 +26,7 @@ class LinkHealth:
     jitter_s: float | None
     network_round_trip_s: float | None
     answer_s: float | None
+    stamp_uncertainty_s: float | None
 
 
 class Arrivals:
@@ -57,6 +59,26 @@ class Arrivals:
             return None
         spans_s = sorted(later - earlier for earlier, later in pairwise(times_s))
         return spans_s[(len(spans_s) - 1) * 99 // 100] - spans_s[len(spans_s) // 2]
+
+
+class Questions:
+    """Times between questions and their answers, of a controller that is asked for its state.
+
+    The state is of some moment between the two, so the middle is wrong by at most half of it.
+    """
+
+    def __init__(self) -> None:
+        self._halves_s: deque[tuple[float, float]] = deque(maxlen=_MOST_ARRIVALS)
+
+    def answered(self, asked_s: float, now: Received) -> Received:
+        """Return the time stamp of an answer that was received now."""
+        half_s = max(0.0, now.monotonic_s - asked_s) / 2
+        self._halves_s.append((now.monotonic_s, half_s))
+        return Received(now.monotonic_s - half_s, now.wall_ns - round(half_s * 1e9), now.clock)
+
+    def stamp_uncertainty_s(self, now_s: float) -> float | None:
+        """Return the greatest uncertainty of stamps within the last 5 s; None: nothing was asked."""
+        return max((half for at_s, half in self._halves_s if now_s - at_s < _WINDOW_S), default=None)
 
 
 class LossCounter:

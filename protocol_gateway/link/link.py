@@ -9,7 +9,8 @@ flood, and of a burst after a gap, the newest of each kind is dispatched and the
 The link is SILENT if the controller's units have another joint count, or if it sends over 2 MiB a second. It
 stays connected then, so that a stop can be sent.
 
-Data is stamped once: with the time of the read, or earlier by the controller's clock (`timestamping`).
+Data is stamped once: with the time of the read, or earlier by the controller's clock (`timestamping`); an
+answer without such a clock in the middle between its question and its receipt.
 """
 
 import asyncio
@@ -42,7 +43,7 @@ from protocol_gateway.errors import LinkDownError, LinkError
 from protocol_gateway.link.channel import KeptChannel
 from protocol_gateway.link.connection import READ_BYTES
 from protocol_gateway.link.flood import EventDispatcher, FloodDetector
-from protocol_gateway.link.health import Arrivals, LinkHealth, LossCounter, ResponseTimer
+from protocol_gateway.link.health import Arrivals, LinkHealth, LossCounter, Questions, ResponseTimer
 from protocol_gateway.link.status import LinkState, LinkStatus
 from protocol_gateway.link.timestamping import Received, Timestamper
 from robomesh import reason_codes as codes
@@ -143,6 +144,8 @@ class ControllerLink:
         self._arrivals = Arrivals()
         self._losses = LossCounter()
         self._response_timer = ResponseTimer()
+        self._questions = Questions()
+        self._unanswered = 0
         self._dispatcher = EventDispatcher(on_event, self._later)
         self._send_failed = asyncio.Event()
 
@@ -155,7 +158,7 @@ class ControllerLink:
     def counters(self) -> LinkCounters:
         """Counts so far."""
         return LinkCounters(
-            units_lost=self._losses.lost,
+            units_lost=self._losses.lost + self._unanswered,
             units_skipped=self._dispatcher.skipped,
             **self._counts,
         )
@@ -177,6 +180,7 @@ class ControllerLink:
             jitter_s=self._arrivals.jitter_s(self._monotonic_s()),
             network_round_trip_s=next((each.round_trip_s for each in self._readable()), None),
             answer_s=self._response_timer.answer_s,
+            stamp_uncertainty_s=self._questions.stamp_uncertainty_s(self._monotonic_s()),
         )
 
     async def run(self) -> None:
@@ -388,6 +392,7 @@ class ControllerLink:
 
     def _report(self, report: Report, now: Received) -> None:
         events, units = report.events, report.units
+        self._unanswered += report.lost
         if units:
             self._counts["units_received"] += units
             self._arrivals.count(units, now.monotonic_s)
@@ -401,6 +406,8 @@ class ControllerLink:
             self._fall_silent()
         for event in events:
             self._note_losses(event)
+        if report.asked_s is not None:
+            now = self._questions.answered(report.asked_s, now)
         dates = self._timestamper.timestamps(events, now)
         if units > report.refusals and not other_joints:
             self._refusal, self._unusable = "", None

@@ -165,16 +165,18 @@ class JogState(_message.Message):
     def __init__(self, operator: _Optional[str] = ..., jog: _Optional[_Union[Jog, _Mapping]] = ...) -> None: ...
 
 class LinkHealth(_message.Message):
-    __slots__ = ("jitter_s", "network_round_trip_s", "answer_s", "flooding")
+    __slots__ = ("jitter_s", "network_round_trip_s", "answer_s", "flooding", "stamp_uncertainty_s")
     JITTER_S_FIELD_NUMBER: _ClassVar[int]
     NETWORK_ROUND_TRIP_S_FIELD_NUMBER: _ClassVar[int]
     ANSWER_S_FIELD_NUMBER: _ClassVar[int]
     FLOODING_FIELD_NUMBER: _ClassVar[int]
+    STAMP_UNCERTAINTY_S_FIELD_NUMBER: _ClassVar[int]
     jitter_s: float
     network_round_trip_s: float
     answer_s: float
     flooding: bool
-    def __init__(self, jitter_s: _Optional[float] = ..., network_round_trip_s: _Optional[float] = ..., answer_s: _Optional[float] = ..., flooding: _Optional[bool] = ...) -> None: ...
+    stamp_uncertainty_s: float
+    def __init__(self, jitter_s: _Optional[float] = ..., network_round_trip_s: _Optional[float] = ..., answer_s: _Optional[float] = ..., flooding: _Optional[bool] = ..., stamp_uncertainty_s: _Optional[float] = ...) -> None: ...
 
 class AuditHead(_message.Message):
     __slots__ = ("number", "hash")

@@ -13,9 +13,11 @@ import numpy as np
 
 from robots.description import RobotDescription
 from robots.joints import FloatArray, Joints, joints_of, violations
+from robots.motion import ArmState, Motion
 
 _Reachable: TypeAlias = Callable[[FloatArray, FloatArray], bool]
 
+_REST_S = 0.4
 _POSES = 8
 _CANDIDATES = 240
 # Fraction of the way from home to each limit; a demonstration stays away from limits.
@@ -24,6 +26,67 @@ _REACH = 0.62
 _FLOOR = 0.22
 _STEPS = 12
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)
+
+
+class DemoProgram:
+    """Program that moves an arm along a tour, with a pause at each pose. No I/O; time is an argument.
+
+    Args:
+        tour: Targets (n,) [rad] or [m]; None: no program, at rest.
+        speed: Fraction of the joints' speeds.
+
+    Attributes:
+        speed: The next motions have it.
+        leg: Number of motions so far.
+        stopped: The program waits at the place where the arm was stopped.
+    """
+
+    def __init__(self, joints: Joints, tour: Iterator[FloatArray] | None, *, speed: float) -> None:
+        self._motion = Motion(joints, joints.home.copy())
+        self._tour = tour
+        self._target: FloatArray | None = None
+        self.speed = speed
+        self.leg = 0
+        self.stopped = False
+
+    @property
+    def runs(self) -> bool:
+        """True if there is a program that is not stopped."""
+        return self._tour is not None and not self.stopped
+
+    def tick(self, now_s: float) -> None:
+        """Begin the next motion if the current one has ended."""
+        if self._tour is None or self.stopped or self._motion.moving(now_s):
+            return
+        if self._target is None or now_s >= self._motion.end_s + _REST_S:
+            self._target = next(self._tour)
+            self.leg += 1
+            self._move(now_s)
+
+    def stop(self, now_s: float) -> None:
+        """Brake, and wait."""
+        self.stopped = True
+        self._motion.brake(now_s)
+
+    def go_on(self, now_s: float) -> None:
+        """End the wait."""
+        self.stopped = False
+        if self._target is not None:
+            self._move(now_s)
+
+    def set_speed(self, speed: float, now_s: float) -> None:
+        """Change the speed, also of the current motion."""
+        self.speed = speed
+        if self._motion.moving(now_s) and not self.stopped:
+            self._move(now_s)
+
+    def state(self, now_s: float) -> ArmState:
+        """Return positions, velocities and accelerations."""
+        return self._motion.state(now_s)
+
+    def _move(self, now_s: float) -> None:
+        assert self._target is not None
+        self._motion.move(self._target, now_s, speed=self.speed)
 
 
 def demo_tour(description: RobotDescription) -> Iterator[FloatArray]:

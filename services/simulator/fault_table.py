@@ -42,5 +42,10 @@ FAULTS: Mapping[str, Fault] = MappingProxyType(
         "refuse": Fault(effect="closes all connections and refuses new ones: too many clients"),
         "burst": Fault(effect="holds its units back for 2 s, then sends them together, again and again"),
         "bare": Fault(effect="sends positions only"),
+        "busy": Fault(effect="answers every second question with busy"),
+        "loss": Fault(effect="does not answer every third question"),
     }
 )
+
+UNIT_FAULTS = tuple(name for name in FAULTS if name not in ("busy", "loss"))
+"""Faults of a controller with the unit protocol: it is not asked for its state."""

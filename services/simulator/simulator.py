@@ -14,6 +14,7 @@ from services.simulator.controller import Controller
 from services.simulator.demo import demo_tour
 from services.simulator.errors import SimulatorError
 from services.simulator.fault_requests import Mesh, answer_requests
+from services.simulator.fault_table import UNIT_FAULTS
 from services.simulator.faults import Faults
 from services.simulator.server import Server
 from services.site_file.listen_address import check_reach, split_address
@@ -64,7 +65,7 @@ async def serve(settings: Settings, *, ready: Callable[[str], None] | None = Non
         "the simulator", host, secured=False, insecure=settings.insecure, remedy=remedy
     ):
         logger.warning("%s", warning)
-    faults = Faults(settings.faults)
+    faults = Faults(settings.faults, known=UNIT_FAULTS)
     server = _server(settings, faults)
     loop = asyncio.get_running_loop()
     try:

@@ -2,10 +2,11 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, StrictBool, field_validator
+from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
 
 from protocol_gateway.core.codes import code_table
 from protocol_gateway.drivers.registry import DRIVERS
+from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
 from protocol_gateway.errors import CodeTableError
 from robomesh import keys
 from robomesh.access_rights import PROBE_ROBOT
@@ -16,6 +17,7 @@ from services.site_file.fixtures import Clearance, Floor
 from services.site_file.legacy_clients import LegacyClients
 from services.site_file.listen_address import split_address
 from services.site_file.part import PART_CONFIG
+from services.site_file.yaskawa import Yaskawa
 
 
 class Robot(BaseModel):
@@ -27,11 +29,14 @@ class Robot(BaseModel):
             URDF.
         pose: Pose of its base in the site's frame.
         cell: Name of its cell; empty: alone in its cell. Robots of one cell are checked against each other.
-        controller: `simulated`: `robomesh up` starts a simulator; otherwise `tcp://HOST:PORT`.
+        controller: `simulated`: `robomesh up` starts a simulator; otherwise `tcp://HOST:PORT`, or
+            `udp://HOST:PORT` with the protocol `hses`.
         ports: Ports of the controller's other interfaces, where they are not the usual ones, as in
             `{ primary = 30011 }`.
-        protocol: The controller's protocol: `unit` (docs/controllers.md), or `rtde` to read a controller of
-            Universal Robots (docs/controllers/universal-robots.md).
+        protocol: The controller's protocol: `unit` (docs/controllers.md), `rtde` to read a controller of
+            Universal Robots (docs/controllers/universal-robots.md), or `hses` to read one of Yaskawa
+            (docs/controllers/yaskawa.md).
+        yaskawa: Properties of the robot that a Yaskawa controller does not report; with the protocol `hses`.
         codes: Type codes of a controller that sends numbers, as in
             `{ 2 = "ABSOLUTE.DEG", 101 = "COMMAND:home" }`; they replace the default codes. Empty: the gateway
             sends types as names.
@@ -60,6 +65,7 @@ class Robot(BaseModel):
     controller: str = "simulated"
     ports: dict[str, Annotated[int, Field(gt=0, lt=65536)]] = Field(default_factory=dict)
     protocol: str = "unit"
+    yaskawa: Yaskawa | None = None
     codes: dict[int, str] = Field(default_factory=dict)
     accept_unknown: tuple[Literal["mode", "homed"], ...] = ()
     check: Literal["require", "warn", "off"] = "warn"
@@ -133,9 +139,38 @@ class Robot(BaseModel):
             _, port = split_address(address)
         except ListenError:
             port = 0
-        if scheme != "tcp" or not port:
+        if scheme not in ("tcp", "udp") or not port:
             raise ValueError("should be 'simulated' or tcp://HOST:PORT, as in tcp://10.0.0.7:5400")
         return controller
+
+    @model_validator(mode="after")
+    def _of_protocol(self) -> "Robot":
+        hses = self.protocol == "hses"
+        if self.yaskawa is not None and not hses:
+            raise ValueError(f"yaskawa needs the protocol 'hses', this robot's is {self.protocol!r}")
+        if not self.simulated and self.controller.startswith("udp://") is not hses:
+            raise ValueError(
+                f"controller {self.controller}: protocol {self.protocol!r} needs "
+                f"{'udp' if hses else 'tcp'}://{self.address}"
+            )
+        return self
+
+    @property
+    def address(self) -> str:
+        """HOST:PORT of the controller."""
+        return self.controller.partition("://")[2]
+
+    @property
+    def group(self) -> str:
+        """Control group of its controller, where one controller has several robots; empty: it has one."""
+        return (self.yaskawa or Yaskawa()).group if self.protocol == "hses" else ""
+
+    @property
+    def options(self) -> YaskawaSettings | None:
+        """Settings of the protocol's driver, which the gateway passes on; None: it has none."""
+        if self.protocol != "hses":
+            return None
+        return (self.yaskawa or Yaskawa()).settings
 
     @property
     def simulated(self) -> bool:

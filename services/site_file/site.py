@@ -163,14 +163,18 @@ class Site(RoutedSite):
         here.append(("the console", self.console.listen))
         linked = (_tcp_address(each.rpartition("=")[2]) for each in self.router.connect)
         there = [("another router", address) for address in linked if address]
+        # A controller with several control groups is several robots.
+        groups: dict[str, list[tuple[str, str]]] = {}
         for robot in self.robot:
             if not robot.simulated:
-                there.append((f"robot {robot.name}'s controller", robot.controller.removeprefix("tcp://")))
+                controller = (f"robot {robot.name}'s controller", robot.address)
+                (groups.setdefault(robot.group, []) if robot.group else there).append(controller)
             if robot.legacy_clients is not None:
                 here.append((f"robot {robot.name}'s legacy_clients", robot.legacy_clients.listen))
         tests = [
             *((cannot_both_listen, *pair) for pair in combinations(here, 2)),
             *((same_address, *pair) for pair in (*combinations(there, 2), *product(here, there))),
+            *((same_address, *pair) for robots in groups.values() for pair in combinations(robots, 2)),
         ]
         for in_conflict, (what, address), (other, another) in tests:
             try:

@@ -49,7 +49,7 @@ class JsonLines:
     capabilities = Capabilities(commands=frozenset({Home, Stop, Reset, MoveAbsolute}))
     requests_a_second = 0.0
 
-    def __init__(self, joint_types, codes, *, relay):
+    def __init__(self, joint_types, codes, *, relay, options):
         self._joints = len(joint_types)
         self.ports = frozenset()
         self._rest, self._offset = b"", 0

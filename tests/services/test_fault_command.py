@@ -9,7 +9,7 @@ import pytest
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.live.monitor import link_words
 from services.simulator.fault_requests import Mesh
-from services.simulator.fault_table import FAULTS
+from services.simulator.fault_table import FAULTS, UNIT_FAULTS
 from services.simulator.simulator import Settings, serve
 from services.simulator.universal_robots.server import UR_FAULTS
 from services.simulator.universal_robots.service import UrSettings, serve_rtde
@@ -34,10 +34,10 @@ def test_fault_begins_ends_and_lists_faults(mesh, router):
             begun = await ask("fault", "arm", "garbage", *to)
             assert (begun.returncode, begun.stdout) == (0, "faults now: garbage\n"), begun.stderr
             listed = await ask("fault", "arm", *to)
-            assert [line[2:].split()[0] for line in listed.stdout.splitlines()] == list(FAULTS)
+            assert [line[2:].split()[0] for line in listed.stdout.splitlines()] == list(UNIT_FAULTS)
             assert "* garbage" in listed.stdout
             printed = json.loads((await ask("fault", "hall/arm", "garbage", "--off", "--json", *to)).stdout)
-            assert printed == {"active": [], "known": list(FAULTS)}
+            assert printed == {"active": [], "known": list(UNIT_FAULTS)}
             unknown = await ask("fault", "arm", "melt", *to)
             assert unknown.returncode == 2
             assert "'melt' is unknown; there are freeze, garbage" in unknown.stderr

@@ -106,6 +106,7 @@ class RtdeDriver:
         codes: Mapping[int, str],
         *,
         relay: Callable[[bytes, bool, Hashable], None] | None = None,
+        options: object = None,
     ) -> None:
         if [*joint_types] != [JointType.ROTARY] * JOINTS:
             raise GatewaySettingsError(

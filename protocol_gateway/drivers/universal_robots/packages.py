@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias
 
-_SHOWN_BYTES = 32
+from protocol_gateway.drivers.hexadecimal import hexadecimal
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,8 +127,3 @@ class PackageStream:
         self.lost = True
         self._buffer.clear()
         return event
-
-
-def hexadecimal(data: bytes | bytearray) -> str:
-    """Return the first 32 bytes from a peer in hexadecimal."""
-    return data[:_SHOWN_BYTES].hex(" ") + (" …" if len(data) > _SHOWN_BYTES else "")

@@ -21,11 +21,11 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TypeAlias
 
+from protocol_gateway.drivers.hexadecimal import hexadecimal
 from protocol_gateway.drivers.universal_robots.packages import (
     Malformed,
     Package,
     PackageStream,
-    hexadecimal,
 )
 from robomesh.texts import one_line
 

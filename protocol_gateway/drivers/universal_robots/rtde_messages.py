@@ -23,11 +23,11 @@ from itertools import accumulate
 from types import MappingProxyType
 from typing import TypeAlias
 
+from protocol_gateway.drivers.hexadecimal import hexadecimal
 from protocol_gateway.drivers.universal_robots.packages import (
     Malformed,
     Package,
     PackageStream,
-    hexadecimal,
 )
 from robomesh.texts import one_line
 

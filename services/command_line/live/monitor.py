@@ -284,7 +284,7 @@ def link_words(state: schema.ControllerState) -> str:
     """Return the health of the controller's link: known values, and counters that are not 0."""
     health, counters = state.health, state.counters
     words = [f"{state.rate_hz:.0f} units/s"] if state.HasField("rate_hz") else []
-    for name in ("jitter", "network_round_trip", "answer"):
+    for name in ("jitter", "network_round_trip", "answer", "stamp_uncertainty"):
         if health.HasField(f"{name}_s"):
             seconds: float = getattr(health, f"{name}_s")
             words.append(f"{name.replace('_', ' ')} {1000 * seconds:.1f} ms")

@@ -132,6 +132,7 @@ class SimulatedProtocol(StrEnum):
 
     UNIT = "unit"
     RTDE = "rtde"
+    HSES = "hses"
 
 
 @app.command()
@@ -139,11 +140,14 @@ def simulate(
     robot: Annotated[
         str,
         typer.Option(
-            metavar="R", help="A library robot or a description.", show_default="pt600; with rtde puma560"
+            metavar="R",
+            help="A library robot or a description.",
+            show_default="pt600; with rtde and hses puma560",
         ),
     ] = "",
     listen: Annotated[
-        str, typer.Option(metavar="HOST:PORT", show_default="127.0.0.1:5400; with rtde 127.0.0.1:30004")
+        str,
+        typer.Option(metavar="HOST:PORT", show_default="127.0.0.1:5400; with rtde :30004, with hses :10040"),
     ] = "",
     rate: Annotated[float, typer.Option(metavar="HZ", min=1, max=1000, help="With unit.")] = 100.0,
     max_clients: Annotated[int, typer.Option(metavar="N", min=1, help="With unit.")] = 8,
@@ -163,12 +167,16 @@ def simulate(
     protocol: Annotated[
         SimulatedProtocol,
         typer.Option(
-            help="unit: the old text protocol; rtde: RTDE and the primary interface of Universal Robots."
+            help="unit: the old text protocol; rtde: RTDE and the primary interface of Universal Robots; "
+            "hses: the High-Speed Ethernet Server of Yaskawa."
         ),
     ] = SimulatedProtocol.UNIT,
     primary: Annotated[
         str, typer.Option(metavar="HOST:PORT", help="The primary interface; with rtde.")
     ] = "127.0.0.1:30011",
+    yaskawa: Annotated[
+        str, typer.Option(metavar="JSON", help="The site file's table `yaskawa` as JSON; with hses.")
+    ] = "",
     for_: Annotated[
         str,
         typer.Option("--for", metavar="SITE/ROBOT", help="Accept `robomesh fault` for this robot."),
@@ -176,7 +184,7 @@ def simulate(
     site: SiteFile = None,
     connect: Connect = DEFAULT_ROUTER,
 ) -> None:
-    """Run a simulated controller with the old text protocol, or with RTDE."""
+    """Run a simulated controller with the old text protocol, RTDE or HSES."""
     from services.command_line.site import launch
 
     mesh = launch.faults_mesh(for_, site, connect)
@@ -185,6 +193,17 @@ def simulate(
             robot=robot or "puma560",
             listen=listen or "127.0.0.1:30004",
             primary=primary,
+            demo=demo,
+            faults=tuple(fault or ()),
+            insecure=insecure,
+            mesh=mesh,
+        )
+        return
+    if protocol is SimulatedProtocol.HSES:
+        launch.launch_hses_simulator(
+            robot=robot or "puma560",
+            listen=listen or "127.0.0.1:10040",
+            yaskawa=yaskawa,
             demo=demo,
             faults=tuple(fault or ()),
             insecure=insecure,

@@ -55,16 +55,17 @@ def controller_addresses(site: Site, options: Sequence[str]) -> dict[str, Contro
                 f"robot {robot.name}: its controller is simulated, at an unknown address: give "
                 f"--controller {robot.name}=tcp://HOST:PORT (robomesh up starts a simulator itself)"
             )
-        addresses[robot.name] = address.removeprefix("tcp://")
+        addresses[robot.name] = address.removeprefix("tcp://").removeprefix("udp://")
     # The site file's addresses were compared when it was read; those of options were not.
-    taken = [(f"robot {name}'s controller", address) for name, address in addresses.items()]
+    taken = [(f"robot {robot.name}'s controller", addresses[robot.name], robot.group) for robot in site.robot]
     taken += [
-        (f"robot {robot.name}'s legacy_clients", robot.legacy_clients.listen)
+        (f"robot {robot.name}'s legacy_clients", robot.legacy_clients.listen, "")
         for robot in site.robot
         if robot.legacy_clients is not None
     ]
-    for (what, address), (other, another) in combinations(taken, 2):
-        if same_address(address, another):
+    for (what, address, group), (other, another, group_2) in combinations(taken, 2):
+        # A controller with several control groups is several robots.
+        if same_address(address, another) and (group == group_2 or not (group and group_2)):
             raise ControllerError(f"{another} is given twice, to {what} and to {other}: each needs its own")
     return {
         name: ControllerAddress(*split_address(address), ports[name]) for name, address in addresses.items()

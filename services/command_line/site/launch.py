@@ -155,6 +155,47 @@ def launch_rtde_simulator(
     service.run_until_signalled(serve_rtde(settings, ready=ready))
 
 
+def launch_hses_simulator(
+    *,
+    robot: str,
+    listen: str,
+    yaskawa: str,
+    demo: bool,
+    faults: tuple[str, ...],
+    insecure: bool,
+    mesh: "Mesh | None",
+) -> None:
+    """Run a simulated controller with HSES."""
+    from pydantic import ValidationError
+
+    from services.simulator.yaskawa.service import HsesSettings, serve_hses
+    from services.site_file.listen_address import split_address
+    from services.site_file.validation_errors import problem_text
+    from services.site_file.yaskawa import Yaskawa
+
+    try:
+        declared = Yaskawa.model_validate_json(yaskawa).settings if yaskawa else None
+    except ValidationError as error:
+        problem = error.errors()[0]
+        where = ".".join(map(str, problem["loc"]))
+        raise ControllerError(f"--yaskawa {where}: {problem_text(problem)}") from None
+
+    def ready(port: int) -> None:
+        print(f"listening on udp {split_address(listen)[0]}:{port}", flush=True)
+
+    service.log_to_stderr()
+    settings = HsesSettings(
+        robot=robot,
+        listen=listen,
+        yaskawa=declared,
+        demo=demo,
+        faults=faults,
+        insecure=insecure,
+        mesh=mesh,
+    )
+    service.run_until_signalled(serve_hses(settings, ready=ready))
+
+
 def _code(text: str) -> tuple[int, str]:
     number, _, meaning = text.partition("=")
     try:

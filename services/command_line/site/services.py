@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from services.site_file.cell_file import CellFile
+    from services.site_file.robot import Robot
     from services.site_file.site import Site
 
 
@@ -68,6 +69,7 @@ def _gateway(site: "Site", options: Options) -> Any:
             description=robot.model,
             **addresses[robot.name]._asdict(),
             protocol=robot.protocol,
+            options=_driver_options(robot),
             codes=robot.codes,
             accept_unknown=frozenset(robot.accept_unknown),
             stop_proven=robot.can_be_stopped,
@@ -88,6 +90,17 @@ def _gateway(site: "Site", options: Options) -> Any:
         cell_file=_cell_file(site, options),
         quotas=site.quotas.settings,
     )
+
+
+def _driver_options(robot: "Robot") -> object:
+    """Return the settings of the driver; a simulated controller has factors of its own, unless declared."""
+    if robot.protocol == "hses" and robot.simulated:
+        from robots.description import load
+        from robots.joints import joints_of
+        from services.simulator.yaskawa.service import with_factors
+
+        return with_factors(robot.options, len(joints_of(load(robot.model))))
+    return robot.options
 
 
 def _cell_file(site: "Site", options: Options) -> "CellFile":

@@ -121,6 +121,10 @@ def _simulator(robot: Robot, site: str, attach: tuple[str, ...]) -> tuple[Progra
         primary = _free_port()
         protocol = ("--protocol", "rtde", "--primary", f"127.0.0.1:{primary}")
         controller += f",primary={primary}"
+    if robot.protocol == "hses":
+        controller = f"udp://127.0.0.1:{port}"
+        declared = robot.yaskawa.model_dump_json(exclude_defaults=True) if robot.yaskawa else ""
+        protocol = ("--protocol", "hses", *(("--yaskawa", declared) if declared else ()))
     for_ = ("--for", f"{site}/{robot.name}", *attach)
     address = ("--robot", robot.model, "--listen", f"127.0.0.1:{port}")
     arguments = ("simulate", *address, *demo, *codes, *protocol, *for_)

@@ -30,7 +30,7 @@ from protocol_gateway.drivers.universal_robots.rtde_messages import Value
 from robots.description import RobotDescription
 from robots.joints import FloatArray, joints_of
 from robots.model import build_model, link_placements, tool_jacobian, tool_placement
-from robots.motion import Motion
+from services.simulator.demo import DemoProgram
 from services.simulator.errors import SimulatorError
 from services.simulator.fault_table import LEAP
 from services.simulator.universal_robots.fields import OFFERED
@@ -39,7 +39,6 @@ JOINTS = 6
 PROGRAM = "demo"
 
 _SPEED = 0.6
-_REST_S = 0.4
 _LOWEST_SPEED = 0.01
 _WARM_UP_S = 1800.0
 _PAYLOAD_KG = 1.2
@@ -86,17 +85,15 @@ class UrController:
                 f"this protocol needs {JOINTS} rotary ones: simulate puma560 or another arm with six"
             )
         self._model = build_model(description)
-        self._motion = Motion(self._joints, self._joints.home.copy())
+        self._program = DemoProgram(self._joints, tour, speed=_SPEED)
+        self._has_program = tour is not None
         flange_to_base = link_placements(self._model, self._joints.home)[-1]
         tool_to_base = tool_placement(self._model, self._joints.home)
         self._tool_offset = _pose(np.linalg.inv(flange_to_base) @ tool_to_base)
-        self._tour = tour
         self._announce = announce
         self._boot_s = now_s
         self._powered = powered
         self._safety = SafetyMode.NORMAL
-        self._target: FloatArray | None = None
-        self._leg = 0
         self._slider = 1.0
         self._outputs = 0
         self._inputs: dict[str, Value] = {}
@@ -107,17 +104,12 @@ class UrController:
 
     def tick(self, now_s: float) -> None:
         """Begin the next motion of the program if the current one has ended."""
-        if self._tour is None or self._safety is not SafetyMode.NORMAL or self._motion.moving(now_s):
-            return
-        if self._target is None or now_s >= self._motion.end_s + _REST_S:
-            self._target = next(self._tour)
-            self._leg += 1
-            self._move(now_s)
+        self._program.tick(now_s)
 
     def protective_stop(self, now_s: float) -> None:
         """Stop the arm, pause the program and send an alarm."""
         self._safety = SafetyMode.PROTECTIVE_STOP
-        self._motion.brake(now_s)
+        self._program.stop(now_s)
         self._announce(
             Alarm(
                 self._origin(_BASE, now_s),
@@ -135,8 +127,7 @@ class UrController:
         """End the protective stop and continue the program."""
         self._safety = SafetyMode.NORMAL
         self._announce_safety_mode(now_s)
-        if self._target is not None:
-            self._move(now_s)
+        self._program.go_on(now_s)
 
     def write(self, values: Mapping[str, Value], now_s: float) -> None:
         """Take a client's inputs: speed slider, digital outputs and registers; others have no effect."""
@@ -144,16 +135,11 @@ class UrController:
         fraction = values.get("speed_slider_fraction")
         if values.get("speed_slider_mask") == 1 and isinstance(fraction, float) and 0.0 <= fraction <= 1.0:
             self._slider = fraction
-            if self._motion.moving(now_s) and self._safety is SafetyMode.NORMAL:
-                self._move(now_s)
+            self._program.set_speed(_SPEED * max(fraction, _LOWEST_SPEED), now_s)
         for name, first in (("standard", 0), ("configurable", 8), ("tool", 16)):
             mask, bits = values.get(f"{name}_digital_output_mask"), values.get(f"{name}_digital_output")
             if isinstance(mask, int) and isinstance(bits, int):
                 self._outputs = self._outputs & ~(mask << first) | (bits & mask) << first
-
-    def _move(self, now_s: float) -> None:
-        assert self._target is not None
-        self._motion.move(self._target, now_s, speed=_SPEED * max(self._slider, _LOWEST_SPEED))
 
     def _key(self, title: str, now_s: float) -> None:
         self._announce(KeyMessage(self._origin(_CONTROLLER, now_s), 0, 0, title, PROGRAM))
@@ -183,7 +169,7 @@ class UrController:
     @property
     def runtime_state(self) -> RuntimeState:
         """State of the program."""
-        if self._tour is None:
+        if not self._has_program:
             return RuntimeState.STOPPED
         return RuntimeState.PLAYING if self._safety is SafetyMode.NORMAL else RuntimeState.PAUSED
 
@@ -198,7 +184,7 @@ class UrController:
         Args:
             leap: The first joint is reported LEAP degrees too high.
         """
-        state = self._motion.state(now_s)
+        state = self._program.state(now_s)
         positions = state.positions.copy()
         positions[0] += math.radians(LEAP) if leap else 0.0
         found = self._modes() | self._measured(state.positions, state.velocities, state.accelerations, now_s)
@@ -209,7 +195,7 @@ class UrController:
             "target_q": _tuple(state.positions),
             "target_qd": _tuple(state.velocities),
             "target_qdd": _tuple(state.accelerations),
-            "script_control_line": 2 + self._leg % 16 if self._tour is not None else 0,
+            "script_control_line": 2 + self._program.leg % 16 if self._has_program else 0,
             **self._inputs,
         }
         if any("TCP_pose" in name for name in names):
@@ -240,7 +226,7 @@ class UrController:
             "safety_status_bits": int(safety),
             "speed_scaling": self._slider if normal else 0.0,
             "target_speed_fraction": self._slider,
-            "actual_digital_input_bits": self._leg % 2,
+            "actual_digital_input_bits": self._program.leg % 2,
             "actual_digital_output_bits": self._outputs,
         }
 

@@ -635,6 +635,13 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ],
   ["controller.not_holding", ["nothing is on hold: there is no motion to resume", "没有处于保持的运动可继续"]],
   ["positions.stale", ["no joint positions for {seconds} s", "{seconds} 秒未收到关节位置"]],
+  [
+    "joints.undeclared",
+    [
+      "its joints are not shown, because the controller sends pulses: declare pulses_per_degree of each joint in [robot.yaskawa] of the site file",
+      "控制器发送的是脉冲，因此不显示关节：请在站点文件的 [robot.yaskawa] 中声明每个关节的 pulses_per_degree",
+    ],
+  ],
   ["positions.unknown", ["the robot's position is unknown ({cause})", "机器人当前位置未知（{cause}）"]],
   ["positions.none", ["the controller has not reported joint positions", "控制器未告知关节位置"]],
   ["speed.missing", ["SPEED needs speed_percent, from 1 to 100", "SPEED 须带 speed_percent，1 至 100"]],

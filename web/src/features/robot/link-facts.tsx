@@ -25,6 +25,7 @@ export function LinkFacts({ controller }: { controller: Latest<ControllerState> 
   milliseconds("link_jitter", health?.jitterS);
   milliseconds("link_round_trip", health?.networkRoundTripS);
   milliseconds("link_answer", health?.answerS);
+  milliseconds("link_stamps", health?.stampUncertaintyS);
   if (counters) {
     facts.push(["link_units", count(counters.unitsReceived)], ["link_lost", count(counters.unitsLost)]);
     facts.push(["link_malformed", count(counters.unitsMalformed)], ["link_unknown", count(counters.recordsUnknown)]);

@@ -1,0 +1,117 @@
+"""Choice of the next question: one at a time, each kind at its own rate, fewer while the controller is busy.
+
+    idle --a question is due--> asked --its answer, or TIMEOUT_S--> idle
+
+An answer to an older question, or a second one to the same, is not used. No I/O and no clock.
+"""
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from protocol_gateway.drivers.yaskawa.hses import Answer, Read
+
+TIMEOUT_S = 0.3
+"""Time after which an answer is lost: a controller answers within some tens of milliseconds."""
+_SLOWEST = 16
+_CALM_S = 10.0
+
+
+@dataclass(slots=True)
+class Regular:
+    """A question that is asked again and again.
+
+    Attributes:
+        period_s: Time from one to the next, if the controller is not busy.
+        next_s: When it is due.
+    """
+
+    read: Read
+    period_s: float
+    next_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """The open question."""
+
+    read: Read
+    number: int
+    at_s: float
+
+
+class Polling:
+    """Questions of one connection.
+
+    Attributes:
+        slowness: The periods are longer by this factor, 1 to 16: it doubles with each busy answer, and halves
+            again after ten seconds without one.
+        asked: None: no answer is awaited.
+        lost: Questions without an answer, so far.
+    """
+
+    def __init__(self, regular: Iterable[Regular], once: Iterable[Read]) -> None:
+        self._regular = list(regular)
+        self._once = deque(once)
+        self.slowness = 1
+        self._calm_since_s = 0.0
+        self._number = 0
+        self.asked: Asked | None = None
+        self.lost = 0
+
+    def ask_once(self, read: Read) -> None:
+        """Ask a question before the regular ones."""
+        if read not in self._once and (self.asked is None or self.asked.read != read):
+            self._once.append(read)
+
+    def drop(self, read: Read) -> None:
+        """Do not ask a question any more."""
+        self._regular = [each for each in self._regular if each.read != read]
+
+    def next_question(self, now_s: float) -> Asked | None:
+        """Return the question to send now; None: none is due, or an answer is awaited."""
+        if self.asked is not None:
+            if now_s < self.asked.at_s + TIMEOUT_S:
+                return None
+            self.lost += 1
+            self.asked = None
+        if self.slowness > 1 and now_s - self._calm_since_s >= _CALM_S:
+            self.slowness //= 2
+            self._calm_since_s = now_s
+        read = self._due(now_s)
+        if read is not None:
+            self.asked = Asked(read, self._number, now_s)
+            self._number = (self._number + 1) % 256
+        return self.asked
+
+    def _due(self, now_s: float) -> Read | None:
+        if self._once:
+            return self._once.popleft()
+        due = [each for each in self._regular if each.next_s <= now_s]
+        if not due:
+            return None
+        # The one that is late by most of its periods: a slow controller answers all kinds, each more seldom.
+        chosen = max(due, key=lambda each: (now_s - each.next_s) / each.period_s)
+        period_s = chosen.period_s * self.slowness
+        # On a grid, so that the rate is kept; after a pause the grid begins anew.
+        chosen.next_s = max(chosen.next_s + period_s, now_s + period_s / 2)
+        return chosen.read
+
+    def wake_s(self) -> float | None:
+        """Return when to call `next_question` again; None: there are no questions."""
+        if self.asked is not None:
+            return self.asked.at_s + TIMEOUT_S
+        return min((each.next_s for each in self._regular), default=None)
+
+    def take(self, answer: Answer, now_s: float) -> Asked | None:
+        """Return the question that an answer belongs to; None: it is late, or a duplicate."""
+        asked = self.asked
+        if asked is None or (answer.number, answer.service) != (asked.number, asked.read.service):
+            return None
+        self.asked = None
+        if answer.busy:
+            self.slowness = min(self.slowness * 2, _SLOWEST)
+            self._calm_since_s = now_s
+            for each in self._regular:
+                each.next_s = max(each.next_s, now_s + each.period_s * self.slowness / 2)
+        return asked

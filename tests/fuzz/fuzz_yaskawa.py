@@ -1,0 +1,233 @@
+"""Broken answers of Yaskawa's controllers by HSES.
+
+    python tests/fuzz/fuzz_yaskawa.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
+
+Answers to the driver's own questions, changed at random, doubled, late and in the wrong order. They may cause
+no exception and no leak. Joints, alarms and activities must be those of a strict reading that is independent
+of the gateway's, and the driver may send nothing but reads, one at a time. Anything else ends the run with
+exit status 1 and its input in the folder.
+"""
+
+import random
+import struct
+import sys
+from collections import Counter, deque
+from functools import partial
+from pathlib import Path
+
+if __name__ == "__main__":
+    sys.path[0] = str(Path(__file__).parents[2])
+
+from protocol_gateway.drivers.driver import (
+    AlarmReceived,
+    ControllerEvent,
+    Effects,
+    JointsReceived,
+    Report,
+    Send,
+    SetTimer,
+    Severity,
+    StatusReceived,
+)
+from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
+from protocol_gateway.drivers.yaskawa.driver import HSES, HsesDriver
+from robots.joints import JointType
+from tests.fuzz.fuzzing import Finding, campaign, changed
+
+READS = {0x70: 1, 0x72: 1, 0x73: 1, 0x74: 1, 0x75: 1, 0x77: 1, 0x78: 0x0E, 0x89: 1}
+BUSY = (0xD8F1, 0xD8FA, 0xE444, 0xFFF6)
+TIMEOUT_S = 0.3
+NEW_SOCKET_EACH = 2000
+
+
+def main() -> None:
+    counts: Counter[str] = Counter()
+    campaign(
+        __doc__,
+        partial(fuzz, counts=counts),
+        inputs=1_000_000,
+        seconds=3600.0,
+        name="yaskawa",
+        growth_mib=16,
+        verdict="no exception, no joints and no alarm but what a strict reading gives; only reads were sent",
+        told=lambda: ", ".join(f"{count:,} {name}" for name, count in counts.most_common()),
+    )
+
+
+def fuzz(inputs: int, seed: int, counts: Counter[str]) -> tuple[int, Finding | None]:
+    """Return how many datagrams were read, and the first that was handled wrongly."""
+    chance = random.Random(seed)
+    bench = Bench(counts)
+    for done in range(inputs):
+        if done % NEW_SOCKET_EACH == 0:
+            bench.open()
+        data = bench.next_datagram(chance)
+        try:
+            problem = bench.receive(data)
+        except Exception as error:
+            problem = repr(error)
+        if problem or bench.problem:
+            return done, Finding(data, problem or bench.problem)
+    return inputs, None
+
+
+class Bench:
+    """A driver, its clock and its open question.
+
+    Attributes:
+        problem: What it sent wrongly; empty: nothing.
+    """
+
+    def __init__(self, counts: Counter[str]) -> None:
+        settings = YaskawaSettings(pulses_per_degree=(1000.0,) * 6)
+        self.driver = HsesDriver((JointType.ROTARY,) * 6, {}, options=settings)
+        self.now_s = 0.0
+        self.problem = ""
+        self._counts = counts
+        self._question = b""
+        self._asked_s = 0.0
+        self._timer_s = 0.0
+        self._old: deque[bytes] = deque(maxlen=5)
+        self._alarms_seen: set[bytes] = set()
+
+    def open(self) -> None:
+        """Begin with a new socket, which does not get the answers of the one before."""
+        self._question = b""
+        self._old.clear()
+        self.perform(self.driver.opened(HSES, self.now_s))
+
+    def perform(self, effects: Effects) -> list[ControllerEvent]:
+        """Note what the driver sends; return what it reports."""
+        events: list[ControllerEvent] = []
+        for effect in effects:
+            match effect:
+                case Send(_, data):
+                    command, _, _, service = struct.unpack_from("<HHBB", data, 24)
+                    if len(data) != 32 or READS.get(command) != service or data[6:8] != b"\0\0":
+                        self.problem = f"sends {data!r}"
+                    if self._question and self.now_s < self._asked_s + TIMEOUT_S:
+                        self.problem = "asks before the answer"
+                    self._question, self._asked_s = data, self.now_s
+                case SetTimer(at_s):
+                    self._timer_s = self.now_s if at_s is None else at_s
+                case Report(reported):
+                    events += reported
+                case _:
+                    pass
+        return events
+
+    def next_datagram(self, chance: random.Random) -> bytes:
+        """Return an answer to the open question, or another datagram; a question is open then."""
+        while not self._question:
+            self.now_s = max(self.now_s, self._timer_s)
+            self.perform(self.driver.timer_ended(self.now_s))
+        kind = chance.random()
+        if kind < 0.05 and self._old:
+            return chance.choice(self._old)
+        if kind < 0.06:
+            # The answer is lost.
+            self.now_s = self._asked_s + TIMEOUT_S + 0.001
+            self._question = b""
+            self.perform(self.driver.timer_ended(self.now_s))
+            return self.next_datagram(chance)
+        number, command = self._question[11], self._question[24]
+        right = [_answer(number, READS[command], data) for data in DATA[command]]
+        if command == 0x74:
+            return _answer(number, 1, b"", status=0x28)
+        if kind < 0.1:
+            return _answer(number, READS[command], b"", status=0x1F, added=chance.choice((*BUSY, 0xB008)))
+        return changed(chance.choice(right), right, TOKENS, chance)
+
+    def receive(self, data: bytes) -> str:
+        """Return the problem with a datagram; empty: none."""
+        self.now_s += 0.002
+        self._old.append(data)
+        question = self._question
+        answer = strict_answer(data, question)
+        if answer is not None:
+            self._question = b""
+        events = self.perform(self.driver.received(HSES, data, self.now_s))
+        self._counts.update(type(event).__name__ for event in events)
+        return self._compare(events, question[24], answer)
+
+    def _compare(self, events: list[ControllerEvent], command: int, answer: bytes | None) -> str:
+        joints = [each.positions for each in events if isinstance(each, JointsReceived)]
+        right = strict_joints(answer) if command == 0x75 and answer else None
+        if len(joints) != (right is not None):
+            return f"joints {joints}, a strict reading gives {right}"
+        if right is not None and any(abs(a - b) > 1e-9 for a, b in zip(joints[0], right, strict=True)):
+            return f"joints {joints}, a strict reading gives {right}"
+        states = [each for each in events if isinstance(each, StatusReceived)]
+        if len(states) != (command == 0x72 and answer is not None and len(answer) == 8):
+            return f"states {states} from {answer!r}"
+        codes = [
+            int(each.number)
+            for each in events
+            if isinstance(each, AlarmReceived) and each.severity is Severity.ERROR
+        ]
+        alarm = answer is not None and command == 0x70 and len(answer) in (60, 268)
+        code = int.from_bytes(answer[:4], "little") if answer is not None and alarm else 0
+        # An alarm that is known is not repeated.
+        return "" if codes in ([], [code]) and (not codes or code) else f"alarms {codes} from {answer!r}"
+
+
+# -------------------------------------------------------------- a strict reading, written apart
+
+
+def strict_answer(data: bytes, question: bytes) -> bytes | None:
+    """Return the data that answer a question; None: the datagram is not its answer.
+
+    An answer that reports an error has no data.
+    """
+    if len(data) < 32 or data[:6] != b"YERC\x20\x00" or data[9:11] != b"\x01\x01" or not data[15] & 0x80:
+        return None
+    size = data[6] + 256 * data[7]
+    if size > 479 or size != len(data) - 32 or data[11] != question[11]:
+        return None
+    if data[24] - 0x80 != question[29] or data[26] > 2:
+        return None
+    added = int.from_bytes(data[28 : 28 + 2 * data[26]], "little")
+    return b"" if data[25] or added in BUSY else data[32:]
+
+
+def strict_joints(data: bytes) -> list[float] | None:
+    """Return the joints of a position [rad]; None: it has none."""
+    if len(data) not in (44, 48, 52) or data[:4] != b"\0\0\0\0":
+        return None
+    pulses = [int.from_bytes(data[at : at + 4], "little", signed=True) for at in range(20, 44, 4)]
+    return [value / 1000 * 0.017453292519943295 for value in pulses]
+
+
+# -------------------------------------------------------------------------------- inputs
+
+
+def _answer(number: int, service: int, data: bytes, *, status: int = 0, added: int = 0) -> bytes:
+    head = struct.pack("<4sHHBBBBI8s", b"YERC", 32, len(data), 3, 1, 1, number, 1 << 31, b"99999999")
+    return head + struct.pack("<BBBxHH", service + 0x80, status, bool(added), added, 0) + data
+
+
+_ALARM = struct.pack("<3I", 4107, 1, 1) + b"2026/11/26 09:30" + b"OUT OF RANGE".ljust(32, b"\0")
+DATA = {
+    0x70: (_ALARM, _ALARM + bytes(208), bytes(60)),
+    0x72: (b"\xc4\0\0\0\x40\0\0\0", b"\xcc\0\0\0\x50\0\0\0", b"\x20\0\0\0\x02\0\0\0"),
+    0x73: (b"WELD".ljust(32, b"\0") + struct.pack("<3I", 12, 3, 5000),),
+    0x74: (b"S\0\0\0L\0\0\0U\0\0\0R\0\0\0B\0\0\0T\0\0\0\0\0\0\0\0\0\0\0",),
+    0x75: (
+        struct.pack("<5I8i", 0, 0, 1, 0, 0, 90_000, -45_000, 1, -1, 0, 2**31 - 1, 0, 0),
+        struct.pack("<5I7i", 0, 0, 1, 0, 0, 1, 2, 3, 4, 5, 6, 7),
+        struct.pack("<5I6i", 0, 0, 1, 0, 0, 1, 2, 3, 4, 5, 6),
+        struct.pack("<5I8i", 16, 0, 1, 0, 0, 500_000, 0, 700_000, 0, 0, 0, 0, 0),
+    ),
+    0x77: (struct.pack("<8i", 1, -2, 3, 0, 0, 0, 0, 0), bytes(28)),
+    0x78: (b"\x05",),
+    0x89: (b"DS2.07".ljust(24, b"\0") + b"ES0165D".ljust(16, b"\0") + b"12.34\0\0\0",),
+}
+TOKENS = (
+    *(b"\0", b"\0\0\0\0", b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", b"\0\0\0\x80", b"\x10\0\0\0"),
+    *(b"YERC", b"\x20\0", b"\x34\0", b"\x30\0", b"99999999", b"\x81\0", b"\x8e\0", b"\x1f\x01\0\xf1\xd8"),
+    *("異常".encode("shift_jis"), "größer".encode(), b"\x1b[2J", b"\x85\xe2\x80\xa8"),
+)
+
+
+if __name__ == "__main__":
+    main()
