@@ -33,9 +33,16 @@ SHARED: Mapping[str, str] = MappingProxyType(
         "io.tool_analog_in.*": "V or A",
         "io.register.*": "",
         "counter.*": "",
-        # The tool, its centre point in the flange's frame, and the force at it in the base frame.
+        # The tool, its centre point in the active frame and in the flange's frame, and the force at it in
+        # the base frame.
         "tool.number": "",
         "tool.name": TEXT,
+        "tool.pose.x": "m",
+        "tool.pose.y": "m",
+        "tool.pose.z": "m",
+        "tool.pose.rx": "rad",
+        "tool.pose.ry": "rad",
+        "tool.pose.rz": "rad",
         "tool.offset.x": "m",
         "tool.offset.y": "m",
         "tool.offset.z": "m",

@@ -246,7 +246,7 @@ def test_each_alarm_is_reported_once_when_it_appears_and_again_after_it_was_rese
     arm.now_s += 1.0
     assert [each.number for each in round_of(servo)] == ["4315"]
     arm.now_s += 1.0
-    # Four are all that a controller tells.
+    # A controller reports at most four.
     four = [alarm(4000 + number, "X") for number in range(4)]
     assert [each.number for each in round_of(*four)] == ["4000", "4001", "4002", "4003"]
 

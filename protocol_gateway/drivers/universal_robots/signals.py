@@ -45,6 +45,7 @@ _ANALOG = {
 }
 _FORCES = (*of_axes("tool.force", "N"), *of_axes("tool.torque", "N·m"))
 _OFFSETS = (*of_axes("tool.offset", "m"), *of_axes("tool.offset", "rad", "rx ry rz"))
+_POSES = (*of_axes("tool.pose", "m"), *of_axes("tool.pose", "rad", "rx ry rz"))
 _CENTRE = of_axes("payload", "m")
 _TOOL_VOLTAGE = Signal("tool.voltage", "V")
 _TOOL_CURRENT = Signal("tool.current", "A")
@@ -109,6 +110,7 @@ def signals_of(state: ControllerState) -> Values:
         (_TEMPERATURES, state.temperatures_c),
         (_FORCES, state.tool_force),
         (_OFFSETS, state.tool_offset),
+        (_POSES, state.tool_pose),
         (_CENTRE, state.payload_centre_m),
     ):
         if values is not None:

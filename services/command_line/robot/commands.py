@@ -1,4 +1,4 @@
-"""`robomesh robot`: robot descriptions, without a running mesh.
+"""`robomesh robot`: robot descriptions; all but `verify` without a running mesh.
 
 A command imports the robot model when it runs: numpy and Pinocchio take a second.
 """
@@ -10,10 +10,11 @@ from typing import Annotated, Any
 
 import typer
 
-from services.command_line.options import Json, command_group
+from robomesh.endpoints import DEFAULT_ROUTER
+from services.command_line.options import Connect, Json, Robot, command_group
 from services.errors import ServiceError
 
-app = command_group("robot", "Robot descriptions: check, show, import, export.")
+app = command_group("robot", "Robot descriptions: check, show, import, export, verify.")
 
 _Robot = Annotated[str, typer.Argument(metavar="ROBOT")]
 
@@ -204,4 +205,30 @@ def import_(
         print(f"missing: {name}: that shape is left out", file=sys.stderr)
     print(write_folder(robot.values, robot.files, folder.absolute()).path)
     if robot.missing:
+        raise typer.Exit(1)
+
+
+@app.command()
+def verify(
+    robot: Robot,
+    connect: Connect = DEFAULT_ROUTER,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help="Keep the result, with the model's SHA-256.")
+    ] = None,
+    base: Annotated[
+        str,
+        typer.Option(metavar="LINK", help="Link at the controller's base frame; else base, or first."),
+    ] = "",
+    flange: Annotated[
+        str, typer.Option(metavar="LINK", help="Link at its flange; else tool0, or that of the tool.")
+    ] = "",
+    as_json: Json = False,
+) -> None:
+    """Compare a running robot's model with the controller's Cartesian position; exit status 1: they differ.
+
+    Move the arm from its own panel; poses are taken while it rests. Ctrl-C ends it.
+    """
+    from services.command_line.robot.verify import verify as verified
+
+    if not verified(robot, connect, out, base=base, flange=flange, as_json=as_json):
         raise typer.Exit(1)

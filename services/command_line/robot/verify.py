@@ -1,0 +1,267 @@
+"""`robomesh robot verify`: a controller's joints, compared with the Cartesian position that it computes."""
+
+import asyncio
+import hashlib
+import sys
+import tempfile
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from math import degrees
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robomesh.atomic_write import write_atomically
+from robomesh.client.robot import AsyncRobot
+from robomesh.schemas import robomesh_pb2 as schema
+from services.command_line import discovery
+from services.errors import ServiceError
+
+if TYPE_CHECKING:
+    from robots.joints import FloatArray, Joints
+    from robots.verification import Placement, Sample, Verification
+
+_REST_S = 1.0
+_STILL = 2e-4  # of a joint at rest [rad] or [m]: more than the noise of encoders
+_SIGNALS_WITHIN_S = 10.0
+_TOO_MANY_POSES = 40
+_AXES = ("x", "y", "z", "rx", "ry", "rz")
+
+
+class VerificationError(ServiceError):
+    """The robot cannot be verified."""
+
+
+def verify(robot: str, connect: str, out: Path | None, *, base: str, flange: str, as_json: bool) -> bool:
+    """Take poses of an arm that a person moves; print, and keep, whether model and controller agree.
+
+    Args:
+        base, flange: Links at the controller's base frame and flange; empty: "base" and "tool0", as in the
+            URDFs of ROS-Industrial, else the model's base and the link of its tool.
+
+    Raises:
+        VerificationError: If the robot cannot be verified.
+    """
+    result = discovery.run(_verify(robot, connect, base, flange))
+    text = discovery.json_line(result)
+    if out is not None:
+        write_atomically(out, (text + "\n").encode())
+    print(text if as_json else "\n".join(_lines(result)), flush=True)
+    return bool(result["agrees"])
+
+
+async def _verify(name: str, connect: str, base: str, flange: str) -> dict[str, Any]:
+    from robots.verification import verify
+
+    async with discovery.attached(connect) as session:
+        place = await discovery.find(session, name)
+        robot = AsyncRobot(session, *place)
+        description = await robot.description()
+        joints, placement = _model(description, base, flange)
+        samples = await _samples(robot, joints, _tool(description))
+        return _result(str(place), description, joints, verify(placement, joints, samples))
+
+
+def _model(description: schema.Description, base: str, flange: str) -> tuple["Joints", "Placement"]:
+    """Return the joints of a site's description, and the placement of its flange in the base frame."""
+    from robots.description import load
+    from robots.model import build_model, link_placements
+    from robots.poses import inverse
+
+    with tempfile.TemporaryDirectory() as folder:
+        urdf = Path(folder) / "robot.urdf"
+        urdf.write_text(description.urdf, "utf-8")
+        model = build_model(load(urdf))
+    names = model.link_names
+    tool = next(frame.link for frame in description.frames if frame.name == "tool")
+    base = base or ("base" if "base" in names else names[0])
+    flange = flange or ("tool0" if "tool0" in names else tool)
+    for link in (base, flange):
+        if link not in names:
+            raise VerificationError(f"{link!r} is no link of the model: {', '.join(names)}")
+    here, there = names.index(base), names.index(flange)
+
+    def placement(positions: "FloatArray") -> "FloatArray":
+        links = link_placements(model, positions)
+        flange_to_base: FloatArray = inverse(links[here]) @ links[there]
+        return flange_to_base
+
+    return model.joints, placement
+
+
+def _tool(description: schema.Description) -> "FloatArray":
+    import numpy as np
+
+    tool = next(frame for frame in description.frames if frame.name == "tool")
+    return np.array(tool.frame_to_link).reshape(4, 4)
+
+
+async def _samples(robot: AsyncRobot, joints: "Joints", tool: "FloatArray") -> list["Sample"]:
+    """Return a sample of each pose in which the arm rested, until they are enough."""
+    from robots.verification import POSES, unlike, unmoved
+
+    samples: list[Sample] = []
+    signals = _Signals(robot, tool)
+    following = asyncio.create_task(signals.follow())
+    try:
+        await signals.first()
+        _say(
+            f"move {robot} from its own panel to {POSES} poses, each joint by 20 degrees or more in all, and "
+            "let it rest in each"
+        )
+        rest = _Rest()
+        async with robot.joints() as states:
+            async for state in states:
+                positions = _in_order(joints, state.names, state.positions)
+                if not rest.lasts(positions, state.time_ns) or not unlike(joints, positions, samples):
+                    continue
+                sample = signals.sample(positions, rest.since_ns)
+                if sample is None:
+                    continue
+                samples.append(sample)
+                lacking = unmoved(joints, samples)
+                if len(samples) >= POSES and (not lacking or len(samples) >= _TOO_MANY_POSES):
+                    return samples
+                more = f" ({'; '.join(lacking)})" if len(samples) >= POSES else ""
+                _say(f"pose {len(samples)} of {max(POSES, len(samples) + 1)} taken: move on{more}")
+        raise VerificationError(f"{robot} sends no joints any more")
+    finally:
+        following.cancel()
+        await asyncio.gather(following, return_exceptions=True)
+
+
+class _Rest:
+    """How long an arm has rested.
+
+    Attributes:
+        since_ns: Begin of the rest, ns since the Unix epoch.
+    """
+
+    def __init__(self) -> None:
+        self.since_ns = 0
+        self._at: FloatArray | None = None
+
+    def lasts(self, positions: "FloatArray", time_ns: int) -> bool:
+        """Take a state; return whether the arm has rested for a second."""
+        if self._at is None or abs(positions - self._at).max() > _STILL:
+            self._at, self.since_ns = positions, time_ns
+        return time_ns - self.since_ns >= _REST_S * 1e9
+
+
+class _Signals:
+    """The newest signals of a robot; `tool`: its tool on the flange, if the controller does not report it."""
+
+    def __init__(self, robot: AsyncRobot, tool: "FloatArray") -> None:
+        self._robot = robot
+        self._tool = tool
+        self._numbers: dict[str, tuple[float, int]] = {}  # with their times
+        self._arrived = asyncio.Event()
+
+    async def follow(self) -> None:
+        """Keep the newest signals until cancelled."""
+        async with self._robot.topic("signals", on_stale="yield") as messages:
+            async for message in messages:
+                self._numbers = {
+                    each.name: (each.number, message.time_ns - round(each.age_s * 1e9))
+                    for each in message.message.signals
+                    if each.HasField("number")
+                }
+                if self._vector("tool.pose") is not None:
+                    self._arrived.set()
+
+    async def first(self) -> None:
+        """Wait for the controller's Cartesian position.
+
+        Raises:
+            VerificationError: If there is none.
+        """
+        try:
+            async with asyncio.timeout(_SIGNALS_WITHIN_S):
+                await self._arrived.wait()
+        except TimeoutError:
+            text = f"{self._robot} reports no Cartesian position (signals tool.pose.x to tool.pose.rz)"
+            raise VerificationError(f"{text}: only a controller that does can be verified") from None
+
+    def sample(self, positions: "FloatArray", since_ns: int) -> "Sample | None":
+        """Return the sample of an arm at rest; None: the signals are from before the rest."""
+        from robots.verification import Sample
+
+        pose, offset = self._vector("tool.pose"), self._vector("tool.offset")
+        if pose is None or pose[1] < since_ns + _REST_S * 0.5e9:
+            return None
+        return Sample(
+            positions=positions,
+            tool_to_base=_placement(pose[0]),
+            tool_to_flange=self._tool if offset is None else _placement(offset[0]),
+        )
+
+    def _vector(self, name: str) -> tuple[tuple[float, ...], int] | None:
+        found = [self._numbers.get(f"{name}.{axis}") for axis in _AXES]
+        if not all(found):
+            return None
+        values = [each for each in found if each is not None]
+        return tuple(value for value, _ in values), min(time_ns for _, time_ns in values)
+
+
+def _placement(vector: tuple[float, ...]) -> "FloatArray":
+    """Convert a position [m] and a rotation vector [rad] to a (4, 4) placement."""
+    import numpy as np
+
+    from robots.poses import axis_rotation
+
+    placement = np.eye(4)
+    placement[:3, :3] = axis_rotation(np.array(vector[3:]), float(np.linalg.norm(vector[3:])))
+    placement[:3, 3] = vector[:3]
+    return placement
+
+
+def _in_order(joints: "Joints", names: tuple[str, ...], positions: tuple[float, ...]) -> "FloatArray":
+    import numpy as np
+
+    of: Mapping[str, float] = dict(zip(names, positions, strict=True))
+    return np.array([of[name] for name in joints.names])
+
+
+def _result(
+    place: str, description: schema.Description, joints: "Joints", found: "Verification"
+) -> dict[str, Any]:
+    model = hashlib.sha256(f"{description.robot_toml}\0{description.urdf}".encode()).hexdigest()
+    return {
+        "robot": place,
+        "time": datetime.now(UTC).isoformat(timespec="seconds"),
+        "agrees": found.agrees,
+        "model": description.name,
+        "model_sha256": model,
+        "joints": list(joints.names),
+        "poses": [
+            {
+                "positions": each.sample.positions.tolist(),
+                "distance_m": each.distance_m,
+                "angle_rad": each.angle_rad,
+            }
+            for each in found.deviations
+        ],
+        "unmoved": list(found.unmoved),
+        "suspects": list(found.suspects),
+    }
+
+
+def _lines(result: Mapping[str, Any]) -> list[str]:
+    poses = result["poses"]
+    distance, angle = (max(each[of] for each in poses) for of in ("distance_m", "angle_rad"))
+    most = f"at most {1000 * distance:.2f} mm and {degrees(angle):.3f}° in {len(poses)} poses"
+    if result["agrees"]:
+        return [f"{result['robot']}: model and controller agree ({most})"]
+    lines = [f"{result['robot']}: model and controller differ: {most}; 1 mm and 0.1° are allowed"]
+    lines += [
+        f"  pose {number}: {1000 * each['distance_m']:.2f} mm, {degrees(each['angle_rad']):.3f}°"
+        for number, each in enumerate(poses, start=1)
+    ]
+    lines += [f"  {each}" for each in result["unmoved"]]
+    lines += [f"  all poses agree if: {each}" for each in result["suspects"]]
+    if not result["suspects"] and not result["unmoved"]:
+        lines.append("  no single joint, frame or unit explains it: is it the right model?")
+    return lines
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
