@@ -61,7 +61,7 @@ def test_commands_are_encoded_in_the_papers_words_and_units(command, data):
     ],
 )
 def test_a_controller_of_codes_needs_a_code_for_stop(codes, can_stop):
-    assert driver(codes=codes).can_stop is can_stop
+    assert (Stop in driver(codes=codes).capabilities.commands) is can_stop
 
 
 def test_commands_are_encoded_in_the_site_files_codes():
