@@ -242,6 +242,11 @@ def test_each_alarm_is_reported_once_when_it_appears_and_again_after_it_was_rese
     assert [each.number for each in round_of(limit, servo)] == ["4414"]
     arm.now_s += 1.0
     assert round_of(limit, servo) == []
+    # The link was lost, and is back.
+    arm.perform(arm.driver.closed(HSES, arm.now_s))
+    arm.perform(arm.driver.opened(HSES, arm.now_s))
+    arm.answered = len(arm.sent) - 1
+    assert round_of(limit, servo) == []
     arm.give(0x72, status())
     arm.now_s += 1.0
     assert [each.number for each in round_of(servo)] == ["4315"]

@@ -95,6 +95,9 @@ class HsesDriver:
         # With a round of alarms each second, and the questions of a new connection.
         self.requests_a_second = regular_hz + ALARMS / _ALARMS_EACH_S + 2.0
         self._known_system: payloads.System | None = None
+        # Kept over a lost link, so that it is not reported again.
+        self._alarms: set[Alarm] = set()
+        self._extra_axes = ""
         self._begin()
 
     def _begin(self) -> None:
@@ -106,8 +109,6 @@ class HsesDriver:
         self._polling = Polling(regular, (STATUS, self._system, self._axis_names))
         self._refused: set[Read] = set()
         self._names: Sequence[str] = ()
-        self._extra_axes = ""
-        self._alarms: set[Alarm] = set()
         self._round: set[Alarm] = set()
         self._next_round_s = self._next_tool_s = 0.0
         self._tool: int | None = None

@@ -471,7 +471,7 @@ const TEXTS = {
   link_jitter: ["Jitter", "抖动"],
   link_round_trip: ["Round trip", "往返时间"],
   link_answer: ["Answer to a command", "命令应答"],
-  link_stamps: ["Time stamps, plus or minus", "时间戳误差（±）"],
+  link_stamps: ["Time stamps ±", "时间戳 ±"],
   link_units: ["Units received", "已接收"],
   link_lost: ["Lost", "丢失"],
   link_malformed: ["Malformed", "格式错误"],
