@@ -101,7 +101,7 @@ def demo_tour(description: RobotDescription) -> Iterator[FloatArray]:
         return float(min(links.min(initial=np.inf), tool_placement(model, positions)[2, 3]))
 
     candidates = _candidates(joints)
-    # An arm that lies flat at home is never above the floor there, so it may stay as low as at home.
+    # A flat arm at home is never above the floor there, so it may stay as low as at home.
     floor = min(_FLOOR * max([height(joints.home), *map(height, candidates)]), height(joints.home))
 
     def reachable(begin: FloatArray, end: FloatArray) -> bool:

@@ -93,7 +93,7 @@ class Polling:
         # The one that is late by most of its periods: a slow controller answers all kinds, each more seldom.
         chosen = max(due, key=lambda each: (now_s - each.next_s) / each.period_s)
         period_s = chosen.period_s * self.slowness
-        # On a grid, so that the rate is kept; after a pause the grid begins anew.
+        # A grid keeps the rate; after a pause it starts again.
         chosen.next_s = max(chosen.next_s + period_s, now_s + period_s / 2)
         return chosen.read
 
