@@ -77,7 +77,7 @@ class HsesDriver:
         self._group, instance = settings.group, instance_of(settings.group)
         self._position = Read(Command.POSITION, instance)
         self._axis_names = Read(Command.AXES, instance)
-        # Bases have no system information; the controller refuses this question for them.
+        # Robots are numbered from 11 here, like their bases, and stations as elsewhere.
         self._system = Read(Command.SYSTEM, instance + 10 if settings.group[0] == "R" else instance)
         self._axes = Axes(settings, joint_types) if settings.pulses_per_degree else None
         self._torques = Read(Command.TORQUE, instance)
