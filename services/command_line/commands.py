@@ -60,7 +60,7 @@ COMMANDS = {
         "robot.kinematics",
         'Inverse kinematics of a pose; JSON: {"pose", "task", "near", "all", "seed"} a line in.',
     ),
-    "robot": Row("robot.commands", "Robot descriptions: check, show, import, export."),
+    "robot": Row("robot.commands", "Robot descriptions: check, show, import, export, verify."),
     "mesh": Row("mesh", "Mesh files: inspect, convert."),
     "program": Row("program", "Teach programs: check, plan, from CAD."),
     "programs": Row(
