@@ -10,6 +10,7 @@ What a report changes too soon for this is published within 0.1 s. Without a rep
 """
 
 import math
+import re
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,6 +28,13 @@ MOST_SIGNALS = 256
 """Most signals of a robot; the rest is left out, and reported once a connection."""
 _NUMBERS_EACH_S, _CHANGES_EACH_S, _SAME_EACH_S = 0.1, 0.02, 1.0
 _S = schema.Event.Severity
+# What the arm carries, and in which frame it works: a change at the controller is an event.
+_SETUP: Mapping[str, tuple[str, re.Pattern[str]]] = {
+    "controller.tool_changed": ("tool", re.compile(r"tool\.(number|name|offset\..*)")),
+    "controller.payload_changed": ("payload", re.compile(r"payload\..*")),
+    "controller.frame_changed": ("user frame", re.compile(r"frame\..*")),
+}
+_LEAST_CHANGE = 1e-6
 
 
 @dataclass(slots=True, eq=False)
@@ -37,6 +45,7 @@ class _Entry:
     unit: str
     row: schema.Signal = field(default_factory=schema.Signal)
     changed: bool = True
+    event: str = ""  # code of the event that reports a change
     raw: SignalValue | None = None
     value: SignalValue | None = None
     received: Received = field(default_factory=lambda: Received(0.0, 0))
@@ -111,21 +120,29 @@ class Signals:
     def take(self, report: SignalsReceived, received: Received) -> None:
         """Take a report's values, and publish if it is time."""
         valid_until_s = received.monotonic_s + report.valid_for_s
+        changes: dict[str, list[str]] = {}
         for signal, raw in report.values:
             entry = self._by_signal.get(signal) or self._entry(signal, received.monotonic_s)
             if entry is None:
                 continue
             # 1 and True are equal, but one is a number.
             if raw != entry.raw or type(raw) is not type(entry.raw):
-                before = entry.value
+                before, moved = entry.value, False
                 entry.take(raw)
                 if isinstance(before, float) and isinstance(entry.value, float):
                     self._numbers_changed = True
+                    moved = abs(entry.value - before) > _LEAST_CHANGE
                 elif entry.value != before or type(entry.value) is not type(before):
-                    self._states_changed = True
+                    self._states_changed = moved = True
+                if moved and entry.event and before is not None and entry.value is not None:
+                    change = f"{entry.name} {_shown(before)} → {_shown(entry.value)} {entry.unit}"
+                    changes.setdefault(entry.event, []).append(change.rstrip())
             entry.received, entry.valid_until_s = received, valid_until_s
         self._newest, self._unpublished = received, True
         self.publish_due(received.monotonic_s)
+        for code, some in changes.items():
+            text = f"the {_SETUP[code][0]} was changed at the controller: {', '.join(some)}"
+            self._journal.report(_S.INFO, code, text, changes=", ".join(some))
 
     def publish_due(self, now_s: float) -> None:
         """Publish what was reported since the last message, if it is time; call it repeatedly."""
@@ -163,7 +180,8 @@ class Signals:
                 self._journal.report(_S.WARNING, "signals.too_many", text, signal=name, most=MOST_SIGNALS)
             return None
         if entry is None:
-            entry = _Entry(name, signal.unit)
+            event = next((code for code, (_, names) in _SETUP.items() if names.fullmatch(name)), "")
+            entry = _Entry(name, signal.unit, event=event)
             self._entries[name] = entry
             self._entries = dict(sorted(self._entries.items()))
         elif entry.unit != signal.unit:
@@ -216,3 +234,7 @@ class Signals:
             elif entry.row.HasField("age_s"):
                 entry.row.ClearField("age_s")
         self._publisher.put(message, source_time_ns=newest.wall_ns, dated_by=newest.clock)
+
+
+def _shown(value: SignalValue) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -13,7 +13,7 @@ TEXT, BOOLEAN = "text", "boolean"
 
 SHARED: Mapping[str, str] = MappingProxyType(
     {
-        # Of a joint: the joint's name stands in for *.
+        # Of a joint: the joint's name replaces the asterisk.
         "joint.*.current": "A",
         "joint.*.voltage": "V",
         "joint.*.torque": "N·m",

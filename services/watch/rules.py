@@ -79,6 +79,9 @@ RULES: Mapping[str, Rule] = MappingProxyType(
         "controller.alarm": Rule(MEDIUM, "See the controller's own display.", (), 5 * _MINUTE_S),
         "signals.too_many": Rule(LOW, "Let the controller's driver report fewer signals.", (), _MINUTE_S),
         "controller.refused": Rule(LOW, "See what was asked for, and its reason.", (), _MINUTE_S),
+        "controller.tool_changed": _NONE,
+        "controller.payload_changed": _NONE,
+        "controller.frame_changed": _NONE,
         "robot.read_only": _NONE,
         "stop.remembered": _NONE,  # the controller state reports it
         "stop.sent": _NONE,

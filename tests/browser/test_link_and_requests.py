@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import expect
 
 from robomesh.errors import RefusedError
-from robomesh.schemas.robomesh_pb2 import LeaseRequest
+from robomesh.schemas.robomesh_pb2 import LeaseRequest, Signals
 from tests.browser.robot_page import ARM, button, serious, state_word
 
 pytestmark = pytest.mark.browser
@@ -34,6 +34,31 @@ def test_old_clients_are_counted_where_they_may_attach(open_page, plant):
     with socket.create_connection(("127.0.0.1", plant.legacy_port)):
         expect(page.locator(".facts-list")).to_contain_text(re.compile(r"Old clients attached\s*1"))
         expect(page.locator(".facts")).to_contain_text("old clients: 1")
+
+
+def test_signals_are_shown_in_groups_and_never_look_live_when_they_are_stale(open_page, plant):
+    page = open_page(ARM, drawn=False)
+    expect(button(page, "Link")).to_be_visible()
+    expect(button(page, "Signals")).to_have_count(0)  # its controller reports none
+
+    async def publish():
+        message = Signals()
+        message.signals.add(name="io.digital_in.3", on=True)
+        message.signals.add(name="payload.mass", unit="kg", number=1.25)
+        message.signals.add(name="safety.mode", text="protective_stop")
+        plant.session.declare_publisher("hall", "arm", "signals").put(message)
+
+    plant.call(publish())
+    button(page, "Signals").click()
+    shown = page.get_by_role("group", name="Signals")
+    for text in ("protective stop", "1.250kg", "digital input 3"):
+        expect(shown).to_contain_text(text)
+    button(page, "Payload (1)").click()
+    expect(button(page, "Payload (1)")).to_have_attribute("aria-expanded", "false")
+    expect(shown).not_to_contain_text("1.250")
+    expect(shown.locator("dd.stale")).to_have_count(2)
+    expect(shown).to_contain_text("stale")
+    assert serious(page) == []
 
 
 def test_a_flooding_controller_is_told_in_words(open_page, plant):

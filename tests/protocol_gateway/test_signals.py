@@ -24,7 +24,7 @@ class Robot:
     """Signals of a robot, with a publisher that keeps messages and a journal that keeps codes."""
 
     def __init__(self):
-        self.published, self.times_ns, self.codes = [], [], []
+        self.published, self.times_ns, self.codes, self.events = [], [], [], []
         journal = Journal(self, "arm", monotonic_s=lambda: self.now_s)
         self.signals = Signals(self, journal, ["waist", "elbow"])
         self.now_s = START_S
@@ -32,6 +32,7 @@ class Robot:
     def put(self, message, *, source_time_ns=None, dated_by=None):
         if source_time_ns is None:
             self.codes.append(message.code)
+            self.events.append(message)
             return
         self.published.append({each.name: value(each) for each in message.signals})
         self.times_ns.append(source_time_ns)
@@ -154,6 +155,22 @@ def test_a_text_is_one_line_of_at_most_200_characters(robot):
     robot.reports((PROGRAM, "a\nb" + "c" * 1_000_000))
     assert robot.published[0]["program.name"].startswith("a bccc")
     assert len(robot.published[0]["program.name"]) == 200
+
+
+def test_a_change_of_tool_or_payload_at_the_controller_is_an_event(robot):
+    offset, number = Signal("tool.offset.z", "m"), Signal("tool.number")
+    force = Signal("tool.force.z", "N")
+    robot.reports((LOAD, 1.2), (offset, 0.1), (number, 1), (force, 0.0))
+    robot.reports((LOAD, 1.2 + 1e-9), (offset, 0.1), (number, 1), (force, 5.0), after_s=0.1)
+    assert robot.codes == []
+    robot.reports((LOAD, 2.5), (offset, 0.15), (number, 2), after_s=0.1)
+    assert robot.codes == ["controller.payload_changed", "controller.tool_changed"]
+    assert robot.events[0].values["changes"] == "payload.mass 1.2 → 2.5 kg"
+    assert robot.events[1].values["changes"] == "tool.offset.z 0.1 → 0.15 m, tool.number 1 → 2"
+    # Another controller may have answered.
+    robot.signals.forget()
+    robot.reports((LOAD, 3.0), after_s=1.0)
+    assert len(robot.codes) == 2
 
 
 def test_the_unit_may_change(robot):

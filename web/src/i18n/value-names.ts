@@ -12,6 +12,12 @@ const SHOWN: Record<string, Shown> = {
   "rad/s²": { unit: "°/s²", factor: 180 / Math.PI, decimals: 0 },
   m: { unit: "mm", factor: 1000, decimals: 1 },
   "m/s": { unit: "mm/s", factor: 1000, decimals: 1 },
+  A: { unit: "A", factor: 1, decimals: 3 },
+  V: { unit: "V", factor: 1, decimals: 2 },
+  N: { unit: "N", factor: 1, decimals: 1 },
+  N·m: { unit: "N·m", factor: 1, decimals: 2 },
+  "°C": { unit: "°C", factor: 1, decimals: 1 },
+  "%": { unit: "%", factor: 1, decimals: 1 },
   s: { unit: "s", factor: 1, decimals: 3 },
   "": { unit: "", factor: 1, decimals: 3 },
 };

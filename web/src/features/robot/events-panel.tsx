@@ -1,46 +1,56 @@
-// Events of the robot, audited requests, newest first, and the state of its link.
+// Events of the robot, audited requests, newest first, its signals, and the state of its link.
 
 import { useState } from "preact/hooks";
-import type { AuditEntry, ControllerState, Description_Joint, Event } from "../../gen/robomesh_pb";
+import type { AuditEntry, ControllerState, Description, Description_Joint, Event } from "../../gen/robomesh_pb";
+import { SignalsSchema } from "../../gen/robomesh_pb";
 import { entrySentence } from "../../i18n/audit-text";
 import { eventText } from "../../i18n/event-text";
 import { count, stampFull, stampTime } from "../../i18n/format";
+import { sg } from "../../i18n/signals";
 import { t } from "../../i18n/texts";
 import { useMotionTimes } from "../../mesh/motion-times";
 import { WRITTEN, withdrawnIds } from "../../mesh/notes";
 import type { Latest } from "../../mesh/topics";
-import { useAudit } from "../../mesh/topics";
+import { useAudit, useTopic } from "../../mesh/topics";
 import { Withdrawable } from "../../panels/note-form";
 import { Choice } from "../../ui/choice";
 import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
 import { Panel } from "../../ui/panel";
 import { SeenPicture } from "../../video/seen-picture";
 import { LinkFacts } from "./link-facts";
+import { SignalList } from "./signal-list";
 
-const SHOWN = ["events", "requests", "link"] as const;
+const SHOWN = ["events", "requests", "signals", "link"] as const;
+type Shown = (typeof SHOWN)[number];
 
 export function EventsPanel(props: {
   robotKey: string;
   events: readonly Event[];
   controller: Latest<ControllerState> | undefined;
-  joints: readonly Description_Joint[];
+  description: Description | undefined;
 }) {
   const { robotKey, events } = props;
-  const [shown, setShown] = useState<(typeof SHOWN)[number]>("events");
+  const [shown, setShown] = useState<Shown>("events");
   const audit = useAudit(robotKey);
   const withdrawn = withdrawnIds(events);
   const times = useMotionTimes(audit, props.controller?.message);
+  const signals = useTopic(SignalsSchema, `${robotKey}/signals`);
+  // Only some controllers have signals.
+  const values = SHOWN.filter((each) => each !== "signals" || signals !== undefined);
+  const textOf = (each: Shown) => (each === "signals" ? sg("signals") : t(each));
   const empty = (shown === "events" ? events : audit).length === 0;
   return (
     <Panel
       name="events"
-      title={t(shown)}
-      end={<Choice label={t("events")} values={SHOWN} chosen={shown} text={(each) => t(each)} choose={setShown} />}
+      title={textOf(shown)}
+      end={<Choice label={t("events")} values={values} chosen={shown} text={textOf} choose={setShown} />}
     >
       {shown === "link" ? (
         <LinkFacts controller={props.controller} />
+      ) : shown === "signals" && signals ? (
+        <SignalList signals={signals} description={props.description} />
       ) : (
-        <ol class="event-list" tabIndex={0} aria-label={t(shown)}>
+        <ol class="event-list" tabIndex={0} aria-label={textOf(shown)}>
           {empty && <li class="dim">{t("no_events")}</li>}
           {shown === "events"
             ? events.map((event, i) => (
@@ -51,7 +61,7 @@ export function EventsPanel(props: {
                   key={`${entry.number} ${entry.repeatedCount}`}
                   robotKey={robotKey}
                   entry={entry}
-                  joints={props.joints}
+                  joints={props.description?.joints ?? []}
                   took={times.get(entry.number)}
                 />
               ))}

@@ -4,6 +4,7 @@ import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/ho
 import type { Description } from "../../gen/robomesh_pb";
 import { ageText, DASH, fixed, jointTitle, timeOfDay } from "../../i18n/format";
 import { p, partText, rangeText } from "../../i18n/plots";
+import { fullSignalText } from "../../i18n/signals";
 import { commonOf, shownUnit } from "../../i18n/value-names";
 import { ageClock } from "../../mesh/age-clock";
 import { hello, watch } from "../../mesh/connection";
@@ -266,6 +267,7 @@ function withUnit(text: string, unit: string): string {
 
 /** Return a value's words: with the joint's title in the page's language. */
 function valueText(name: string, common: string, description: Description | undefined): string {
+  if (name.startsWith("signals/")) return fullSignalText(name.slice("signals/".length), description);
   const parts = name.split("/").slice(1, common ? -1 : undefined);
   const joint = (part: string) => description?.joints.find((each) => each.name === part);
   const text = parts.map((part, i) => {

@@ -133,12 +133,7 @@ export function RobotPage({ site, robot }: RobotName) {
             program={program?.message}
             motion={motion}
           />
-          <EventsPanel
-            robotKey={key}
-            events={events}
-            controller={controller}
-            joints={description?.message.joints ?? []}
-          />
+          <EventsPanel robotKey={key} events={events} controller={controller} description={description?.message} />
         </div>
         {!layout.hidden.includes("video") && (
           <CameraPanel
