@@ -17,6 +17,20 @@ PICTURE_SIZES = ((1440, 900), (360, 740))
 # A position with its unit; a dash if it is not known.
 POSITION = re.compile(r"^\s*(−?\d+\.\d+|–)\s*(°|mm)\s*$")
 TOOL_VALUE = re.compile(r"^\s*(−?\d+\.\d+|–)\s*(mm|°|mm/s)?\s*$")
+# What each page shows once it is there, by role and name, in English and Chinese.
+PAGES = {
+    "#/": ("link", "^arm"),
+    "#/hall/arm": ("group", "^(waist|腰部)$"),
+    "#/hall/pt600": ("group", "^(waist|腰部)$"),
+    "#/wall": ("article", ""),
+    "#/recordings": ("heading", "^(Recordings|录制)"),
+    "#/program": ("heading", "robot|机器人"),
+    "#/program/hall/arm": ("textbox", "^(Program text|程序文本)$"),
+    "#/define": ("heading", "^(New robot|新建机器人)$"),
+    "#/events": ("region", "^(Alarms|报警)$"),
+    "#/settings": ("region", "^(Sites and services|站点与服务)$"),
+    "#/hall/nowhere": ("heading", "nowhere"),
+}
 HOME = ["0.00°", "90.00°", "−90.00°", "0.00°", "0.00°"]
 
 
@@ -61,6 +75,97 @@ def joint_values(page):
 def tool_values(page):
     """Return the tool's pose, speed and manipulability, with their units."""
     return region(page, "Tool").get_by_role("definition").get_by_text(TOOL_VALUE)
+
+
+def control_requests(page):
+    """Return the requests and offers of control that are open."""
+    return page.get_by_role("group", name="Request for control", exact=True)
+
+
+def events(page):
+    return page.get_by_role("list", name="Events", exact=True).get_by_role("listitem")
+
+
+def requests(page):
+    return page.get_by_role("list", name="Requests", exact=True).get_by_role("listitem")
+
+
+def stop_notice(page):
+    """Return what became of the last stop request."""
+    return page.get_by_role("banner").get_by_label("Outcome", exact=True)
+
+
+def alarm_band(page):
+    """Return the alarm above the robot's page."""
+    return page.get_by_role("alert").filter(has_text=re.compile("told to stop|^At "))
+
+
+def scene_stale(page):
+    """Return why the 3-D picture is not live; it is there only while it is not."""
+    words = re.compile("stale|no data yet|No joints were recorded")
+    return region(page, "3-D view").get_by_role("status").filter(has_text=words)
+
+
+def video_panel(page):
+    return page.get_by_role("region", name=re.compile("^(Video|视频)$"))
+
+
+def video_picture(page):
+    return video_panel(page).get_by_role("img")
+
+
+def video_age(page):
+    """Return how old the video is; it is there only while it is stale."""
+    return video_panel(page).get_by_text(re.compile("^stale"))
+
+
+def joint_track(page, joint):
+    """Return the bar of a joint's range, which has no role of its own."""
+    return page.get_by_role("group", name=joint, exact=True).locator(".track")
+
+
+def drawings(tiles):
+    """Return the canvas of each tile, which is hidden from screen readers."""
+    return tiles.locator("canvas")
+
+
+def alarms(page):
+    """Return the alarms of the list, in English or Chinese."""
+    return page.get_by_role("list", name=re.compile("^(Alarms|报警)$")).get_by_role("listitem")
+
+
+def visit(page, path):
+    """Go to a page, and wait until it is shown."""
+    page.evaluate("path => (location.hash = path)", path)
+    role, name = PAGES[path]
+    expect(page.get_by_role("main").get_by_role(role, name=re.compile(name)).first).to_be_visible()
+
+
+def scene(page):
+    """Return the 3-D picture, which says in `data-loaded` whether its models are there."""
+    return page.get_by_role("img", name=re.compile(r"^3-D view\."))
+
+
+def journal_lines(page):
+    """Return the lines of the journal that are drawn."""
+    return page.get_by_role("group", name=re.compile("^(Journal|日志)$")).get_by_role("button")
+
+
+def journal_entry(page):
+    """Return all that is known of the line that was chosen."""
+    return page.get_by_role("region", name=re.compile("^(Entry|条目)$"))
+
+
+def tiles(page):
+    """Return the robots of the fleet."""
+    return page.get_by_role("region", name=re.compile("^Site ")).get_by_role("listitem").get_by_role("link")
+
+
+def tile(page, robot):
+    """Return a robot of the fleet: its name, or its site and name."""
+    site, _, name = robot.rpartition("/")
+    sites = page.get_by_role("region", name=re.compile(f"^Site {site}"))
+    return sites.get_by_role("link", name=re.compile(rf"^{re.escape(name)}\b"))
 
 
 def stop_button(page):

@@ -7,19 +7,20 @@ from playwright.sync_api import expect
 
 from tests.browser.robot_page import (
     ARM,
+    alarm_band,
     button,
     fault,
     joints_notice,
     ready,
     serious,
     set_speed,
+    state_word,
     stop_button,
     stop_panel,
+    tile,
 )
 
 pytestmark = pytest.mark.browser
-
-STATE = ".headline .state"
 
 
 def test_an_arm_that_does_not_heed_its_stop_is_an_alarm_that_nothing_hides(open_page, plant):
@@ -29,31 +30,30 @@ def test_an_arm_that_does_not_heed_its_stop_is_an_alarm_that_nothing_hides(open_
     set_speed(page, 1)
     for key in (*["PageUp"] * 5, "Enter"):
         page.get_by_role("slider", name="Target of waist").press(key)
-    expect(page.locator(STATE)).to_have_text("Moving")
+    expect(state_word(page)).to_have_text("Moving")
     with fault(plant, "deaf"):
         stop_button(page).click()
         for each in (page, phone):
-            expect(each.locator(".alarm-band")).to_have_text(
+            expect(alarm_band(each)).to_have_text(
                 "It moves although it was told to stop: use the emergency stop at the robot."
             )
-            expect(each.locator(".alarm-band")).to_be_in_viewport(ratio=1)
-            box = each.locator(".alarm-band").bounding_box()
+            expect(alarm_band(each)).to_be_in_viewport(ratio=1)
+            box = alarm_band(each).bounding_box()
             assert box["width"] == each.viewport_size["width"]
         phone.mouse.wheel(0, 2000)
-        expect(phone.locator(".alarm-band")).to_be_in_viewport(ratio=1)
-        expect(page.locator(STATE)).to_have_text("Does not stop")
+        expect(alarm_band(phone)).to_be_in_viewport(ratio=1)
+        expect(state_word(page)).to_have_text("Does not stop")
         expect(stop_panel(page)).to_contain_text(re.compile(r"Stop sent by li at \S+: the arm still moves"))
-        expect(page.locator("body")).not_to_contain_text("Stopped by")
+        expect(page.get_by_role("main")).not_to_contain_text("Stopped by")
         expect(page.get_by_role("button", name="Reset stop")).to_be_disabled()
         expect(stop_panel(page)).to_contain_text("It can be reset when the arm rests")
-        tile = fleet.locator(".tile").filter(has_text="arm")
-        expect(tile.locator(".tile-problem.alarm")).to_contain_text("use the emergency stop at the robot")
+        expect(tile(fleet, "arm")).to_contain_text("use the emergency stop at the robot")
         # Of the page that is not in control: the check may block a page for longer than control lasts.
         assert serious(phone) == []
     # The stop is sent again each 2 s; now it is heeded.
-    expect(page.locator(STATE)).to_have_text("Stopped")
+    expect(state_word(page)).to_have_text("Stopped")
     expect(stop_panel(page)).to_contain_text("Stopped by li")
-    past = page.locator(".alarm-band.past")
+    past = alarm_band(page).filter(has_text="moved on")
     expect(past).to_have_text(re.compile(r"At \S+ it moved on although it was told to stop"))
     button(past, "Dismiss").click()
     expect(past).to_have_count(0)
@@ -67,7 +67,7 @@ def test_a_controllers_own_fault_can_be_reset_and_nothing_else_is_offered(open_p
     page = open_page(ARM, drawn=False)
     ready(page)
     with fault(plant, "fault"):
-        expect(page.locator(STATE)).to_have_text("Fault")
+        expect(state_word(page)).to_have_text("Fault")
         expect(stop_panel(page)).to_contain_text("The controller has a fault")
         expect(button(page, "Home")).to_be_disabled()
         expect(button(page, "waist +1°")).to_be_disabled()
@@ -78,7 +78,7 @@ def test_a_controllers_own_fault_can_be_reset_and_nothing_else_is_offered(open_p
     expect(button(page, "Home")).to_be_enabled()
     # At the end, because the check may block the page for longer than control lasts.
     with fault(plant, "fault"):
-        expect(page.locator(STATE)).to_have_text("Fault")
+        expect(state_word(page)).to_have_text("Fault")
         assert serious(page) == []
 
 
@@ -94,9 +94,9 @@ def test_in_local_mode_the_page_says_so_and_offers_no_motion(open_page, plant):
 
 def test_a_robot_that_is_not_there_is_said_with_those_that_are(open_page):
     page = open_page("#/hall/nope", drawn=False)
-    expect(page.locator("h1")).to_have_text("There is no robot nope at hall.")
-    expect(page.locator(".missing li")).to_have_text(["hall / arm", "hall / pt600"])
+    expect(page.get_by_role("heading", level=1)).to_have_text("There is no robot nope at hall.")
+    expect(page.get_by_role("main").get_by_role("listitem")).to_have_text(["hall / arm", "hall / pt600"])
     expect(button(page, "Take control")).to_have_count(0)
     assert serious(page) == []
     page.get_by_role("link", name="hall / arm").click()
-    expect(page.locator(STATE)).to_be_visible()
+    expect(state_word(page)).to_be_visible()

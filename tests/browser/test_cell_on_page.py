@@ -11,7 +11,15 @@ from playwright.sync_api import expect
 
 from robomesh.session import open_session
 from tests.browser.conftest import CHROMIUM
-from tests.browser.robot_page import keep_picture, serious, stop_panel, who_controls
+from tests.browser.robot_page import (
+    events,
+    keep_picture,
+    region,
+    scene,
+    serious,
+    stop_panel,
+    who_controls,
+)
 from tests.conftest import last_value
 from tests.site import READY_S, running_site
 from web import build_page
@@ -74,10 +82,11 @@ def newest(plant, topic):
 
 def test_what_stands_around_an_arm_is_in_its_picture_with_the_line_to_what_is_nearest(open_page):
     page = open_page(PAGE)
-    page.wait_for_selector('canvas[data-loaded="true"][data-fixtures="1"][data-neighbours="1"]')
-    expect(page.locator(".scene-label")).to_be_visible(timeout=SLOWLY_MS)
-    expect(page.locator(".scene-label")).to_have_text(re.compile(r"^\d+\.\d\smm$"), timeout=SLOWLY_MS)
-    expect(page.locator(".facts")).to_contain_text("motions are checked: required")
+    for name, value in (("loaded", "true"), ("fixtures", "1"), ("neighbours", "1")):
+        expect(scene(page)).to_have_attribute(f"data-{name}", value)
+    length = region(page, "3-D view").get_by_text(re.compile(r"^\d+\.\d\smm$"))
+    expect(length).to_be_visible(timeout=SLOWLY_MS)
+    expect(page.get_by_text("motions are checked: required")).to_be_visible()
     assert serious(page) == []
 
 
@@ -110,28 +119,27 @@ def test_a_fixture_is_moved_with_numbers_after_a_confirmation_and_moved_back(ope
 
 def test_a_clearance_that_grows_short_turns_amber_with_its_number_and_an_event_says_so(open_page, plant):
     page = open_page(PAGE, drawn=False)
-    row = page.locator('[data-margin="clearance"]')
+    row = page.get_by_role("listitem").filter(has_text=re.compile("^Clearance"))
     expect(row).to_contain_text("forearm – post", timeout=SLOWLY_MS)
-    expect(row).to_have_class("margin normal")
+    expect(row.get_by_role("img")).to_have_count(0)
     sent = plant.site.command("send", "arm", "move", "25", "90", "-90", "0", "0")
     assert sent.returncode == 0, sent.stderr
-    expect(row).to_have_class("margin warning", timeout=SLOWLY_MS)
+    expect(row.get_by_role("img", name="warning")).to_be_visible(timeout=SLOWLY_MS)
     distance = newest(plant, "kinematics").clearance.distance
     assert 0.01 < distance < 0.05
-    expect(row.locator(".margin-value")).to_have_text(f"{1000 * distance:.1f}\u202fmm")
-    expect(page.locator(".event-list")).to_contain_text(
-        re.compile(r"is \d+ mm from post, within the warning")
-    )
+    expect(row.get_by_text(f"{1000 * distance:.1f}\u202fmm", exact=True)).to_be_visible()
+    said = events(page).filter(has_text=re.compile(r"is \d+ mm from post, within the warning"))
+    expect(said).not_to_have_count(0)
 
 
 def test_every_monitor_sees_the_line_of_the_program_that_runs_and_that_it_is_done(open_page, plant, tmp_path):
     page = open_page(PAGE, drawn=False, width=360, height=740)
-    expect(page.locator(".facts")).to_contain_text("motions are checked: required", timeout=SLOWLY_MS)
+    expect(page.get_by_text("motions are checked: required")).to_be_visible(timeout=SLOWLY_MS)
     (tmp_path / "to-and-fro.robo").write_text(PROGRAM, encoding="utf-8")
     with ThreadPoolExecutor() as threads:
         file = str(tmp_path / "to-and-fro.robo")
         sent = threads.submit(plant.site.command, "send", "arm", "run", file)
-        line = page.locator(".program-line")
+        line = page.get_by_role("paragraph").filter(has_text=re.compile("^to-and-fro: "))
         running = r"to-and-fro: step \d of 3, line 2: move_joints 0 80 -80 0 0; \w+; 00:\d\d, 00:\d\d left"
         expect(line).to_have_text(re.compile(running), timeout=SLOWLY_MS)
         assert page.evaluate("document.documentElement.scrollWidth") == 360

@@ -114,11 +114,11 @@ def test_a_listed_page_frames_one_view_without_controls_and_nothing_else(mesh, i
             frames = {name: await (await tab.query_selector(f"#{name}")).content_frame() for name in NAMES}
             await frames["view"].wait_for_function(VIEW_SHOWN, timeout=PATIENCE_MS)
             assert await frames["view"].locator("a, button, input, form, [onclick], [tabindex]").count() == 0
-            assert (await frames["view"].locator(".frame-name").inner_text()).endswith("r")
+            assert (await frames["view"].get_by_role("strong").inner_text()).endswith("r")
             for name in ("page", "trick"):
                 assert frames[name].url.startswith("chrome-error:")
             renderer.playing.cancel()
-            await frames["view"].locator(".frame-notice .age").wait_for(timeout=PATIENCE_MS)
+            await frames["view"].get_by_role("alert").filter(has_text="stale").wait_for(timeout=PATIENCE_MS)
             await tab.goto(f"{other}/frames", timeout=PATIENCE_MS)
             for name in NAMES:
                 frame = await (await tab.query_selector(f"#{name}")).content_frame()
@@ -156,13 +156,13 @@ def test_with_accounts_another_site_needs_a_token_although_the_browser_is_signed
                 await (await tab.query_selector(f"#{name}")).content_frame() for name in ("token", "bare")
             ]
             await frame.wait_for_function(VIEW_SHOWN, timeout=PATIENCE_MS)
-            notice = bare.locator(".frame-notice", has_text="no account is signed in")
+            notice = bare.get_by_role("alert").filter(has_text="no account is signed in")
             await notice.wait_for(timeout=PATIENCE_MS)
             widths = "() => ['still', 'refused'].map((id) => document.getElementById(id).naturalWidth > 0)"
             assert await tab.evaluate(widths) == [True, False]
             assert [cookie["sameSite"] for cookie in await context.cookies()] == ["Strict"]
             revoke_token(accounts, "wall")
-            await frame.locator(".frame-notice", has_text="is revoked").wait_for(timeout=PATIENCE_MS)
+            await frame.get_by_role("alert").filter(has_text="is revoked").wait_for(timeout=PATIENCE_MS)
             await browser.close()
 
     run(main(), timeout_s=180.0)

@@ -10,7 +10,7 @@ from robomesh.errors import RefusedError
 from robomesh.keys import WHOLE_SITE
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.texts import DIRECTION
-from tests.browser.robot_page import button
+from tests.browser.robot_page import alarms, button, journal_entry, journal_lines, region, tile
 
 pytestmark = pytest.mark.browser
 
@@ -20,8 +20,18 @@ EVENTS = "#/events"
 Event = schema.Event
 
 
+def badge(page, words):
+    """Return the link to the alarms in the bar, which says how many there are."""
+    return page.get_by_role("banner").get_by_role("link", name=words)
+
+
+def isolated(line):
+    """Return the text of others in a line, which the browser orders by itself."""
+    return line.locator("bdi")
+
+
 def line(page, text):
-    return page.locator(".alarm-line").filter(has_text=text)
+    return alarms(page).filter(has_text=text)
 
 
 def test_the_badge_of_a_silent_watch_does_not_say_that_there_are_no_alarms(open_page, plant):
@@ -31,9 +41,8 @@ def test_the_badge_of_a_silent_watch_does_not_say_that_there_are_no_alarms(open_
         return publisher
 
     publisher = plant.call(publish_once())
-    badge = open_page(drawn=False).locator(".alarm-badge")
-    expect(badge.locator(".unseen")).to_contain_text("The watch of yard is silent")
-    expect(badge.locator(".badge-counts")).to_have_text("alarms stale")
+    silent = badge(open_page(drawn=False), "The watch of yard is silent")
+    expect(silent.get_by_text("alarms stale", exact=True)).to_be_visible()
     plant.loop.call_soon_threadsafe(publisher.close)
 
 
@@ -41,24 +50,24 @@ def test_who_acknowledges_an_alarm_on_one_page_has_done_so_on_every_page(open_pa
     fleet, mine, other = (open_page(path, drawn=False) for path in ("", EVENTS, EVENTS))
     raised("joints.gone", "no positions come from it")
     for page in (mine, other):
-        expect(line(page, "no positions come").locator(".alarm-state")).to_have_text("not acknowledged")
-        expect(line(page, "no positions come").locator(".priority")).to_have_text("high")
+        expect(line(page, "no positions come").get_by_text("not acknowledged", exact=True)).to_be_visible()
+        expect(line(page, "no positions come").get_by_text("high", exact=True)).to_be_visible()
         # Two sites may each have one of that id.
-        expect(line(page, "no positions come").locator("code")).to_have_text("hall/arm:joints.gone")
-    expect(fleet.locator(".alarm-badge .unseen")).to_have_text("Unacknowledged alarms: 1 high")
-    expect(fleet.locator(".tile", has_text="arm").locator(".tile-alarms")).to_have_text("high")
+        expect(line(page, "no positions come").get_by_role("code")).to_have_text("hall/arm:joints.gone")
+    expect(badge(fleet, "Unacknowledged alarms: 1 high")).to_be_visible()
+    expect(tile(fleet, "arm").get_by_text("high", exact=True)).to_be_visible()
     acknowledge = button(mine, "Acknowledge: no positions come from it")
     expect(acknowledge).to_be_disabled()
     mine.get_by_label("Your name").fill("li")
     acknowledge.click()
-    expect(mine.locator(".alarms > .notice")).to_have_text("Acknowledged: 1")
-    expect(line(other, "no positions come").locator(".alarm-state")).to_have_text("acknowledged")
-    expect(line(other, "no positions come").locator(".alarm-more")).to_contain_text("acknowledged by li at")
-    expect(fleet.locator(".alarm-badge .unseen")).to_have_text("No unacknowledged alarm")
+    expect(region(mine, "Alarms").get_by_label("Outcome", exact=True)).to_have_text("Acknowledged: 1")
+    expect(line(other, "no positions come").get_by_text("acknowledged", exact=True)).to_be_visible()
+    expect(line(other, "no positions come")).to_contain_text("acknowledged by li at")
+    expect(badge(fleet, "No unacknowledged alarm")).to_be_visible()
     raised("joints.back", "positions come again", Event.INFO)
     for page in (mine, other):
         expect(line(page, "no positions come")).to_have_count(0)
-    expect(fleet.locator(".tile-alarms")).to_have_count(0)
+    expect(tile(fleet, "arm").get_by_text("high", exact=True)).to_have_count(0)
 
 
 def test_an_alarm_is_shelved_with_a_reason_and_comes_back_when_it_is_asked_for(open_page, raised):
@@ -74,7 +83,7 @@ def test_an_alarm_is_shelved_with_a_reason_and_comes_back_when_it_is_asked_for(o
     button(shelve, "Shelve").click()
     expect(line(page, "no status comes")).to_have_count(0)
     page.get_by_role("button", name=re.compile("^Shelved 1")).click()
-    expect(line(page, "no status comes").locator(".alarm-more")).to_contain_text("the cell is being cleaned")
+    expect(line(page, "no status comes")).to_contain_text("the cell is being cleaned")
     button(page, "Unshelve: no status comes from it").click()
     expect(line(page, "no status comes")).to_have_count(0)
     page.get_by_role("button", name=re.compile("^Active or unacknowledged 1")).click()
@@ -85,20 +94,20 @@ def test_an_alarm_is_shelved_with_a_reason_and_comes_back_when_it_is_asked_for(o
 def test_the_journal_lists_every_robots_events_and_is_narrowed_by_what_one_looks_for(open_page, raised):
     page = open_page(EVENTS, drawn=False)
     raised("recorder.note", "a note of the arm's recorder", Event.INFO)
-    journal = page.locator(".journal")
-    note = journal.locator(".journal-line").filter(has_text="a note of the arm's recorder")
+    journal = region(page, "Journal")
+    note = journal_lines(page).filter(has_text="a note of the arm's recorder")
     expect(note).to_have_count(1)
     journal.get_by_label("Severity").select_option(label="Warnings and up")
     expect(note).to_have_count(0)
     journal.get_by_label("Severity").select_option(label="All severities")
     journal.get_by_label("Search text, code, robot").fill("recorder.note")
-    expect(journal.locator(".journal-line")).to_have_count(1)
+    expect(journal_lines(page)).to_have_count(1)
     button(journal, "Pause").click()
     raised("recorder.note", "another note", Event.INFO)
     expect(journal.get_by_role("button", name=re.compile(r"^Go on \([1-9]"))).to_be_visible()
-    expect(journal.locator(".journal-line")).to_have_count(1)
+    expect(journal_lines(page)).to_have_count(1)
     note.click()
-    expect(journal.locator(".entry-details")).to_contain_text("recorder.note")
+    expect(journal_entry(page)).to_contain_text("recorder.note")
 
 
 def test_the_audit_of_every_robot_is_there_and_its_logs_are_searched_when_asked(open_page, plant, raised):
@@ -113,14 +122,14 @@ def test_the_audit_of_every_robot_is_there_and_its_logs_are_searched_when_asked(
 
     plant.call(acquire_and_release())
     page = open_page(EVENTS, drawn=False)
-    journal = page.locator(".journal")
+    journal = region(page, "Journal")
     button(journal, "Requests").click()
-    asked = journal.locator(".journal-line").filter(has_text="wang: take control")
+    asked = journal_lines(page).filter(has_text="wang: take control")
     expect(asked).not_to_have_count(0)
     journal.get_by_label("Robot", exact=True).select_option(label="arm")
     button(journal, "Search the audit logs").click()
-    expect(journal.locator(".notice")).to_have_text(re.compile("^Found in the logs: [1-9]"))
-    refused = journal.locator(".journal-line").filter(has_text="zhao").first
+    expect(journal.get_by_role("status")).to_have_text(re.compile("^Found in the logs: [1-9]"))
+    refused = journal_lines(page).filter(has_text="zhao").first
     expect(refused).to_contain_text(
         "refused wang: offer control to zhao – no operator is in control, or the lease has ended"
     )
@@ -129,31 +138,30 @@ def test_the_audit_of_every_robot_is_there_and_its_logs_are_searched_when_asked(
         "已拒绝 wang：提出将控制权移交给 zhao——无人控制，或控制权已结束：请先取得控制（ACQUIRE）"
     )
     refused.click()
-    expect(page.locator(".entry-details [lang=en]")).to_contain_text(
-        "no operator is in control, or the lease"
-    )
+    original = journal_entry(page).get_by_text(re.compile("^no operator is in control, or the lease"))
+    expect(original).to_have_attribute("lang", "en")
 
 
 def test_alarms_and_events_have_their_reason_in_chinese(open_page, raised):
     page = open_page(EVENTS, drawn=False)
     button(page, "中文").click()
     raised("audit.failed", "the audit log's disk", Event.ERROR, codes.AUDIT_SLOW(seconds=3))
-    alarm = page.locator(".alarm-line").filter(has_text="audit.failed")
-    expect(alarm.locator("strong")).to_have_text("审计日志无法写入：审计日志所在磁盘超过 3 秒无响应")
-    happened = page.locator(".journal-line").filter(has_text="审计日志")
+    alarm = alarms(page).filter(has_text="audit.failed")
+    expect(alarm.get_by_role("strong")).to_have_text("审计日志无法写入：审计日志所在磁盘超过 3 秒无响应")
+    happened = journal_lines(page).filter(has_text="审计日志")
     expect(happened.first).to_contain_text("审计日志无法写入：审计日志所在磁盘超过 3 秒无响应。")
     released = codes.ENDED_RELEASED(name="li")
     raised("lease.ended", "control ended: li", Event.INFO, released, holder="li")
-    ended = page.locator(".journal-line").filter(has_text="的控制权已结束")
+    ended = journal_lines(page).filter(has_text="的控制权已结束")
     expect(ended.first).to_contain_text("li 的控制权已结束：li 释放了控制权。")
     number = codes.PROGRAM_UNREADABLE(codes.ONE_NUMBER(word="speed", unit="percent", given="nothing"))
     raised("program.ended", "program weld ended", reason=number)
-    alarm = page.locator(".alarm-line").filter(has_text="program.ended")
-    expect(alarm.locator("strong")).to_have_text("程序提前结束：“speed”须有一个数（%），而不是 空")
-    alarm = page.locator(".alarm-line").filter(has_text="audit.failed")
+    alarm = alarms(page).filter(has_text="program.ended")
+    expect(alarm.get_by_role("strong")).to_have_text("程序提前结束：“speed”须有一个数（%），而不是 空")
+    alarm = alarms(page).filter(has_text="audit.failed")
     # An older publisher sends no reason.
     raised("audit.failed", "the audit log's disk")
-    expect(alarm.locator("strong")).to_have_text("审计日志无法写入")
+    expect(alarm.get_by_role("strong")).to_have_text("审计日志无法写入")
     raised("lease.ended", "control ended: zhao", Event.INFO, holder="zhao")
     expect(ended.first).to_contain_text("zhao 的控制权已结束。")
 
@@ -165,13 +173,13 @@ def test_texts_of_others_change_the_order_of_nothing_beside_them(open_page, rais
         "recorder.note", 'if access_level != "user\u202e \u2066// Check if admin\u2069 \u2066" {', Event.INFO
     )
     raised("recorder.note", "stopped by \u05d4\u05d6\u05e8\u05d5\u05e2 3 at 10:15", Event.INFO)
-    trojan = page.locator(".journal-line").filter(has_text="access_level").first
-    expect(trojan.locator("bdi")).to_have_text(
+    trojan = journal_lines(page).filter(has_text="access_level").first
+    expect(isolated(trojan)).to_have_text(
         'if access_level != "user<U+202E> <U+2066>// Check if admin<U+2069> <U+2066>" {'
     )
     assert not set(trojan.inner_text()) & set(DIRECTION)
-    hebrew = page.locator(".journal-line").filter(has_text="stopped by").first
-    expect(hebrew.locator("bdi")).to_have_text("stopped by \u05d4\u05d6\u05e8\u05d5\u05e2 3 at 10:15")
+    hebrew = journal_lines(page).filter(has_text="stopped by").first
+    expect(isolated(hebrew)).to_have_text("stopped by \u05d4\u05d6\u05e8\u05d5\u05e2 3 at 10:15")
 
 
 def test_settings_shows_a_service_that_is_gone(open_page, plant, raised):
@@ -190,9 +198,9 @@ def test_settings_shows_a_service_that_is_gone(open_page, plant, raised):
 
     there = plant.call(appear())
     page = open_page("#/settings", drawn=False)
-    row = page.locator('tr[data-service="renderer"]')
+    row = page.get_by_role("row", name=re.compile("^renderer"))
     expect(row).to_contain_text("cell-9")
     expect(row).to_contain_text("0.0.9")
-    expect(page.locator(".certificates li")).to_contain_text(re.compile(r"ends in 3\sd"))
+    expect(region(page, "Certificates").get_by_role("listitem")).to_contain_text(re.compile(r"ends in 3\sd"))
     plant.call(go(*there))
-    expect(row.locator("td").first).to_have_text(re.compile("^(gone since|silent) "))
+    expect(row.get_by_role("cell").first).to_have_text(re.compile("^(gone since|silent) "))

@@ -6,6 +6,13 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.crowd import crowd
+from tests.browser.robot_page import (
+    drawings,
+    joint_value,
+    region,
+    tile,
+    tiles,
+)
 
 pytestmark = pytest.mark.browser
 
@@ -20,10 +27,6 @@ def many(plant):
         yield held
 
 
-def tile(page, name):
-    return page.locator(f'.tile[data-robot="robomesh/{name}"]')
-
-
 def until(page, holds, *, seconds=30):
     """Wait for a condition that no locator can see."""
     for _ in range(10 * seconds):
@@ -35,13 +38,13 @@ def until(page, holds, *, seconds=30):
 
 def test_of_two_hundred_robots_only_the_tiles_in_sight_are_watched_and_drawn(open_page, many):
     page = open_page()
-    expect(page.locator(".tile")).to_have_count(COUNT + 2)
-    expect(tile(page, FIRST).locator("canvas[data-drawn]")).to_have_count(1)
-    assert page.locator(".tile canvas").count() < COUNT / 4
+    expect(tiles(page)).to_have_count(COUNT + 2)
+    expect(drawings(tile(page, FIRST))).to_have_attribute("data-drawn", re.compile("."))
+    assert drawings(tiles(page)).count() < COUNT / 4
     until(page, lambda: FIRST in many.watched and len(many.watched) < COUNT / 4)
     tile(page, LAST).scroll_into_view_if_needed()
-    expect(tile(page, LAST).locator("canvas[data-drawn]")).to_have_count(1)
-    expect(tile(page, FIRST).locator("canvas")).to_have_count(0)
+    expect(drawings(tile(page, LAST))).to_have_attribute("data-drawn", re.compile("."))
+    expect(drawings(tile(page, FIRST))).to_have_count(0)
     until(page, lambda: LAST in many.watched and FIRST not in many.watched)
     expect(tile(page, LAST)).to_contain_text("slow link")
 
@@ -49,24 +52,24 @@ def test_of_two_hundred_robots_only_the_tiles_in_sight_are_watched_and_drawn(ope
 def test_what_needs_a_look_is_found_among_many_and_stands_first_when_asked(open_page, many):
     many.mark("faulty", [LAST])
     page = open_page(drawn=False)
-    expect(page.locator(".summary")).to_contain_text("1 Fault")
+    expect(page.get_by_role("list", name="Robots by state")).to_contain_text("1 Fault")
     page.get_by_label("Order").select_option(label="Most urgent first")
     yard = page.get_by_role("region", name="Site yard")
-    expect(yard.locator(".tile").first).to_have_attribute("data-robot", f"robomesh/{LAST}")
+    expect(yard.get_by_role("link").first).to_have_attribute("data-robot", f"robomesh/{LAST}")
     expect(tile(page, LAST)).to_contain_text("axis 2: following error")
-    page.get_by_label("State").select_option(label="Faults and stops")
-    expect(page.locator(".tile")).to_have_count(1)
+    page.get_by_label("State", exact=True).select_option(label="Faults and stops")
+    expect(tiles(page)).to_have_count(1)
     page.get_by_label("Filter robots").fill("nowhere")
-    expect(page.locator(".empty")).to_have_text(re.compile(r"^No robot matches the filter\. \d+ are on"))
+    expect(page.get_by_text(re.compile(r"^No robot matches the filter\. \d+ are on"))).to_be_visible()
     page.get_by_role("button", name="Clear the filter").click()
-    expect(page.locator(".tile")).to_have_count(COUNT + 2)
+    expect(tiles(page)).to_have_count(COUNT + 2)
     many.mark("faulty", [])
 
 
 def test_a_robot_of_another_site_is_shown_from_its_slow_states_until_all_is_asked_for(open_page, many):
     page = open_page("#/yard/r007", drawn=False)
-    expect(page.locator('[data-joint="waist"]')).to_have_text(re.compile(r"^−?\d"))
-    expect(page.locator(".camera select").first).to_have_value("far")
+    expect(joint_value(page, "waist")).to_have_text(re.compile(r"^−?\d"))
+    expect(region(page, "Video").get_by_label("View", exact=True)).to_have_value("far")
     until(page, lambda: "yard/r007" in many.watched)
     page.get_by_role("button", name="All", exact=True).click()
     until(page, lambda: "yard/r007" not in many.watched)

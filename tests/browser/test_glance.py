@@ -8,23 +8,26 @@ from playwright.sync_api import expect
 from protocol_gateway.authority import lease_rules
 from robomesh.keys import WHOLE_SITE
 from tests.browser.rendering import rendering
-from tests.browser.robot_page import ARM, button, control_notice, take
+from tests.browser.robot_page import (
+    ARM,
+    PAGES,
+    button,
+    control_notice,
+    control_requests,
+    joint_value,
+    joint_values,
+    region,
+    scene,
+    scene_stale,
+    state_word,
+    stop_button,
+    take,
+    tiles,
+    visit,
+)
 
 pytestmark = pytest.mark.browser
 
-PAGES = {
-    "#/": ".tile .state",
-    "#/hall/arm": '[data-joint="waist"]',
-    "#/hall/pt600": '[data-joint="waist"]',
-    "#/wall": ".wall-tile",
-    "#/recordings": "h1",
-    "#/program": "main h1",
-    "#/program/hall/arm": ".program",
-    "#/define": "h1",
-    "#/events": ".alarms",
-    "#/settings": ".panel.mesh",
-    "#/hall/nowhere": "main h1",
-}
 # Buttons, links and fields that a finger would miss. A link in a sentence is as high as its line; a box
 # is as large as its label.
 SMALL = """() => [...document.querySelectorAll(
@@ -37,19 +40,17 @@ SMALL = """() => [...document.querySelectorAll(
 NAMES = ["Fleet", "Wall", "Recordings", "Events", "New robot", "Settings"]
 
 
-def visit(page, path):
-    page.evaluate("path => (location.hash = path)", path)
-    expect(page.locator(PAGES[path]).first).to_be_visible()
+def page_links(page):
+    return page.get_by_role("banner").get_by_role("navigation", name="Pages").get_by_role("link")
 
 
-def box_of(page, selector):
-    place = page.locator(selector)
+def box_of(place):
     expect(place).to_be_visible()
     return place.bounding_box()
 
 
-def bottom_of(page, selector):
-    box = box_of(page, selector)
+def bottom_of(place):
+    box = box_of(place)
     return box["y"] + box["height"]
 
 
@@ -70,28 +71,28 @@ def test_every_touch_target_of_every_page_is_large_enough_for_a_finger(open_page
 
 def test_the_first_screen_of_a_phone_has_picture_state_stop_and_joints(open_page):
     page = open_page(ARM, 360, 740, has_touch=True, drawn=False)
-    expect(page.locator("[data-joint]")).to_have_count(5)
-    stop = box_of(page, "button.stop")["y"]
-    for shown in (".panel.scene", ".headline .state", '[data-joint="roll"]'):
-        assert bottom_of(page, shown) <= stop
-    control = box_of(page, ".panel.control")
+    expect(joint_values(page)).to_have_count(5)
+    stop = box_of(stop_button(page))["y"]
+    for shown in (region(page, "3-D view"), state_word(page), joint_value(page, "roll")):
+        assert bottom_of(shown) <= stop
+    control = box_of(region(page, "Control"))
     assert control["height"] <= 64
     take(page)
-    assert box_of(page, ".panel.control")["height"] > control["height"]
+    assert box_of(region(page, "Control"))["height"] > control["height"]
     for name in ("Home", "Hold", "waist +1°"):
         expect(button(page, name)).to_be_visible()
     button(page, "Release").click()
     expect(button(page, "waist +1°")).to_be_hidden()
-    assert box_of(page, ".panel.control")["height"] >= control["height"]
+    assert box_of(region(page, "Control"))["height"] >= control["height"]
 
 
 def test_the_first_screen_at_200_percent_shows_the_robot(open_page):
     page = open_page(ARM, 720, 450, device_scale_factor=2, drawn=False)
-    expect(page.locator("[data-joint]")).to_have_count(5)
-    scene, stop = box_of(page, ".panel.scene"), box_of(page, "button.stop")
-    assert scene["height"] >= 200
-    assert scene["y"] + scene["height"] <= stop["y"]
-    assert bottom_of(page, '[data-joint="shoulder"]') <= stop["y"]
+    expect(joint_values(page)).to_have_count(5)
+    picture, stop = box_of(region(page, "3-D view")), box_of(stop_button(page))
+    assert picture["height"] >= 200
+    assert picture["y"] + picture["height"] <= stop["y"]
+    assert bottom_of(joint_value(page, "shoulder")) <= stop["y"]
 
 
 def test_every_page_has_the_same_bar(open_page):
@@ -99,23 +100,23 @@ def test_every_page_has_the_same_bar(open_page):
     bars = []
     for path in PAGES:
         visit(page, path)
-        links = page.locator("header nav a:visible")
+        links = page_links(page)
         expect(links).to_have_text(NAMES)
         bars.append([each.bounding_box() for each in links.all()])
     assert all(bar == bars[0] for bar in bars)
     page.set_viewport_size({"width": 360, "height": 740})
     for path in ("#/wall", ARM):
         visit(page, path)
-        page.locator("header .page-menu summary").click()
-        expect(page.locator("header nav a:visible")).to_have_text(NAMES)
+        page.get_by_label(re.compile("^Pages")).filter(visible=True).click()
+        expect(page_links(page)).to_have_text(NAMES)
         page.keyboard.press("Escape")
-        expect(page.locator("header nav a:visible")).to_have_count(0)
+        expect(page_links(page)).to_have_count(0)
 
 
 def test_the_bar_leads_to_another_robot_by_a_few_letters(open_page):
     page = open_page(ARM, drawn=False)
     page.get_by_role("button", name="arm Choose another robot").click()
-    options = page.locator(".switcher").get_by_role("option")
+    options = page.get_by_role("dialog", name="Go to a robot").get_by_role("option")
     expect(options).to_have_text([re.compile("^arm"), re.compile("^pt600")])
     expect(options.nth(1)).to_contain_text(re.compile("Moving|Idle"))
     page.keyboard.press("ArrowDown")
@@ -126,7 +127,7 @@ def test_the_bar_leads_to_another_robot_by_a_few_letters(open_page):
     page.keyboard.type("hall pt")
     expect(options).to_have_count(1)
     page.keyboard.press("Enter")
-    expect(page.locator("h1")).to_have_text("pt600")
+    expect(page.get_by_role("heading", level=1)).to_have_text("pt600")
     # A program's page leads to the other robot's program.
     visit(page, "#/program/hall/arm")
     page.get_by_role("button", name="arm Choose another robot").click()
@@ -142,15 +143,15 @@ def test_a_request_for_control_that_expires_says_so_to_its_operator(open_page, m
     other.get_by_label("Your name").fill("bob")
     button(other, "Ask for control").click()
     other.get_by_label("Reason").press("Enter")
-    expect(mine.locator(".wish")).to_contain_text("bob asks for control")
+    expect(control_requests(mine)).to_contain_text("bob asks for control")
     expect(control_notice(other)).to_contain_text("li did not answer your request")
-    expect(mine.locator(".wish")).to_have_count(0)
+    expect(control_requests(mine)).to_have_count(0)
     button(mine, "Release").click()
 
 
 def test_a_robot_that_does_not_exist_is_said_at_once_without_any_control_before(open_page):
     page = open_page(drawn=False)
-    expect(page.locator(".tile").first).to_be_visible()
+    expect(tiles(page).first).to_be_visible()
     # Everything that the page shows from now on.
     page.evaluate(
         """() => { window.seen = new Set();
@@ -160,12 +161,12 @@ def test_a_robot_that_does_not_exist_is_said_at_once_without_any_control_before(
         }).observe(document, {childList: true, subtree: true}); }"""
     )
     page.evaluate("location.hash = '#/hall/nowhere'")
-    expect(page.locator("main h1")).to_have_text("There is no robot nowhere at hall.")
+    expect(page.get_by_role("heading", level=1)).to_have_text("There is no robot nowhere at hall.")
     page.evaluate("location.hash = '#/program/hall/nowhere'")
-    expect(page.locator("main h1")).to_have_text("There is no robot nowhere at hall.")
+    expect(page.get_by_role("heading", level=1)).to_have_text("There is no robot nowhere at hall.")
     assert page.evaluate("[...window.seen]") == [".missing h1"]
     visit(page, ARM)
-    expect(page.locator(".panel.control")).to_be_visible()
+    expect(region(page, "Control")).to_be_visible()
 
 
 def test_the_last_still_is_shown_until_the_3_d_view_can_draw_and_looks_neither_live_nor_stale(
@@ -177,11 +178,12 @@ def test_the_last_still_is_shown_until_the_3_d_view_can_draw_and_looks_neither_l
         held, open_gate = [], []
         page.route("**/mesh/**", lambda route: route.continue_() if open_gate else held.append(route))
         visit(page, "#/hall/pt600")
-        scene, poster = page.locator(".panel.scene"), page.locator(".poster")
+        view = region(page, "3-D view")
+        poster = view.get_by_role("img", name=re.compile("^Last picture of pt600"))
         expect(poster).to_be_visible()
-        expect(scene).to_contain_text(re.compile(r"Picture of [\d:]+, not live\. Loading the model…"))
-        expect(scene).not_to_have_class(re.compile("is-stale"))
-        expect(page.locator(".scene-stale")).to_have_count(0)
+        expect(view).to_contain_text(re.compile(r"Picture of [\d:]+, not live\. Loading the model…"))
+        expect(view).not_to_have_class(re.compile("is-stale"))
+        expect(scene_stale(page)).to_have_count(0)
         for _ in range(600):
             if held:
                 break
@@ -189,6 +191,6 @@ def test_the_last_still_is_shown_until_the_3_d_view_can_draw_and_looks_neither_l
         open_gate.append(True)
         for route in held:
             route.continue_()
-        expect(page.locator('.canvas-place canvas[data-loaded="true"]')).to_be_visible()
+        expect(scene(page)).to_have_attribute("data-loaded", "true")
         expect(poster).to_have_count(0)
-        expect(scene).not_to_have_class(re.compile("is-stale"))
+        expect(view).not_to_have_class(re.compile("is-stale"))

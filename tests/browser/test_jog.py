@@ -5,7 +5,12 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.robot_page import ARM, button, ready
+from tests.browser.robot_page import (
+    ARM,
+    button,
+    ready,
+    region,
+)
 from tests.site import wait_until
 
 pytestmark = pytest.mark.browser
@@ -17,7 +22,7 @@ ENDED = re.compile("Ended: ")
 def hold_panel(open_page, **settings):
     page = open_page(ARM, drawn=False, **settings)
     ready(page)
-    panel = page.locator(".panel.tool")
+    panel = region(page, "Tool")
     button(panel, "Base").click()
     button(panel, "Jog").click()
     return page, panel
@@ -32,7 +37,7 @@ def entries(plant):
 
 def test_a_jog_lasts_as_long_as_the_button_is_held(open_page, plant):
     page, panel = hold_panel(open_page)
-    notice = panel.locator(".notice")
+    notice = panel.get_by_label("Outcome", exact=True)
     minus = button(panel, "Base Z −")
     place = minus.bounding_box()
     x, y = place["x"] + place["width"] / 2, place["y"] + place["height"] / 2

@@ -9,10 +9,15 @@ from playwright.sync_api import expect
 from robomesh.schemas.robomesh_pb2 import Event
 from tests.browser.robot_page import (
     ARM,
+    alarm_band,
     button,
     control_notice,
+    control_requests,
+    joint_value,
+    joint_values,
     joints_notice,
     ready,
+    region,
     stop_button,
     stop_panel,
     who_controls,
@@ -54,10 +59,10 @@ def test_controls_keep_their_places_while_messages_come_and_go(page, open_page):
     button(bob, "Ask for control").click()
     bob.get_by_label("Reason").fill("the gripper must be changed before the next shift begins, please")
     bob.get_by_label("Reason").press("Enter")
-    expect(page.locator(".wish")).to_contain_text("bob asks for control")
+    expect(control_requests(page)).to_contain_text("bob asks for control")
     assert page.evaluate(PLACES) == before
     page.get_by_role("button", name=re.compile("^Record")).first.click()
-    expect(page.locator(".record-panel")).to_be_visible()
+    expect(region(page, "Record…")).to_be_visible()
     assert page.evaluate(PLACES) == before
     page.get_by_role("button", name=re.compile("^Record")).first.click()
     # A refusal of several lines, beside its cause.
@@ -88,7 +93,7 @@ def test_a_press_on_a_control_that_has_just_moved_is_ignored(page):
     }"""
     step.evaluate("each => each.scrollIntoView({block: 'center'})")  # not under STOP
     page.wait_for_timeout(600)
-    waist = page.locator("[data-joint]").first
+    waist = joint_value(page, "waist")
     at_rest = waist.inner_text()
     x, y = page.evaluate(push, 30)
     page.mouse.click(x, y)
@@ -107,9 +112,9 @@ def test_a_press_on_a_control_that_has_just_moved_is_ignored(page):
 @pytest.mark.parametrize(("width", "height"), SIZES)
 def test_an_alarm_moves_no_control(open_page, raised, width, height):
     page = open_page(ARM, width, height, drawn=False)
-    expect(page.locator("[data-joint]")).to_have_count(5)
+    expect(joint_values(page)).to_have_count(5)
     raised("kinematics.stop", "the arm is at the fence", severity=Event.CRITICAL)
-    band = page.locator(".alarm-band.past")
+    band = alarm_band(page)
     expect(band).to_contain_text("the arm is at the fence")
     with_alarm = page.evaluate(PLACES)
     assert len(with_alarm) >= 12

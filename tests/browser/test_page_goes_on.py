@@ -5,11 +5,19 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.robot_page import ARM, button, clear_stop, stop_button, take
+from tests.browser.robot_page import (
+    ARM,
+    button,
+    clear_stop,
+    state_word,
+    stop_button,
+    stop_notice,
+    take,
+    tiles,
+)
 
 pytestmark = pytest.mark.browser
 
-STATE = ".headline .state"
 # A connection through which nothing passes any more, a machine that sleeps, and time that passes.
 DEAD, SLEPT, PASSED = "sockets.at(-1).dead = true", "wall += {}", "steady += {}"
 WORLD = """
@@ -48,18 +56,18 @@ def open_idle(open_page):
     page = open_page(ARM, drawn=False)
     page.add_init_script(WORLD)
     page.reload()
-    expect(page.locator(STATE)).to_have_text("Idle")
+    expect(state_word(page)).to_have_text("Idle")
     return page
 
 
 def test_a_line_that_died_in_silence_is_told_and_opened_anew_and_sleep_makes_nothing_young(open_page):
     page = open_idle(open_page)
-    expect(page.locator("main")).not_to_contain_text("stale")
+    expect(page.get_by_role("main")).not_to_contain_text("stale")
     page.evaluate(DEAD)
     page.evaluate(SLEPT.format(3600e3))
-    expect(page.locator("main")).to_contain_text(re.compile(r"stale 6\d\smin"))
-    expect(page.locator(STATE)).to_have_text("Stale")
-    lost = page.locator(".banner").filter(has_text="No connection to the console since")
+    expect(page.get_by_role("main")).to_contain_text(re.compile(r"stale 6\d\smin"))
+    expect(state_word(page)).to_have_text("Stale")
+    lost = page.get_by_role("alert").filter(has_text="No connection to the console since")
     expect(lost).to_have_count(0)
     page.evaluate(PASSED.format(6e3))
     until(page, "sockets[0].lost > 0")  # it asks whether anybody is there
@@ -67,8 +75,8 @@ def test_a_line_that_died_in_silence_is_told_and_opened_anew_and_sleep_makes_not
     until(page, "sockets.length > 1")
     page.evaluate("steady = 0")  # no source is behind by it
     expect(lost).to_have_count(0)
-    expect(page.locator(STATE)).to_have_text("Idle")
-    expect(page.locator("main")).not_to_contain_text("stale")
+    expect(state_word(page)).to_have_text("Idle")
+    expect(page.get_by_role("main")).not_to_contain_text("stale")
 
 
 def test_a_stop_request_that_a_dead_line_swallowed_is_sent_by_another(open_page):
@@ -77,14 +85,14 @@ def test_a_stop_request_that_a_dead_line_swallowed_is_sent_by_another(open_page)
     stop_button(page).click()
     page.evaluate("wall -= 60e3")  # it is recent, however slow this machine is
     until(page, "sockets[0].lost > 0 && sockets.length > 1")
-    expect(page.locator(".stop-notice.done")).to_contain_text("Stop sent to hall/arm")
+    expect(stop_notice(page)).to_contain_text("Stop sent to hall/arm")
     take(page)
     clear_stop(page)
 
 
 def test_a_stop_that_cannot_be_sent_is_shown_so_and_sent_when_the_connection_returns(open_page, plant):
     page = open_idle(open_page)
-    stop, notice = stop_button(page), page.locator(".stop-notice")
+    stop, notice = stop_button(page), stop_notice(page)
     place = stop.bounding_box()
     with plant.standing_still():
         expect(stop).to_have_text("Stop cannot be sent: use the emergency stop")
@@ -92,7 +100,7 @@ def test_a_stop_that_cannot_be_sent_is_shown_so_and_sent_when_the_connection_ret
         expect(button(page, "Take control")).to_be_disabled()
         expect(stop).to_be_enabled()
         stop.click()
-        expect(page.locator(".stop-notice.refused")).to_contain_text(
+        expect(page.get_by_role("banner").get_by_role("alert")).to_contain_text(
             re.compile(r"^\d\d:\d\d:\d\d Stop request to hall/arm failed")
         )
         expect(button(page, "Send again")).to_have_count(0)  # nothing can be sent
@@ -106,7 +114,7 @@ def test_a_stop_that_cannot_be_sent_is_shown_so_and_sent_when_the_connection_ret
 
 def test_an_old_press_of_stop_is_offered_when_the_connection_returns(open_page, plant):
     page = open_idle(open_page)
-    stop, failed = stop_button(page), page.locator(".stop-notice.refused")
+    stop, failed = stop_button(page), page.get_by_role("banner").get_by_role("alert")
     page.evaluate(DEAD)
     with plant.standing_still():
         stop.click()
@@ -114,9 +122,9 @@ def test_an_old_press_of_stop_is_offered_when_the_connection_returns(open_page, 
         page.evaluate("wall += 11e3")  # longer than a press is meant
     again = button(page, "Send again")
     expect(again).to_be_visible()
-    expect(page.locator(STATE)).to_have_text("Idle")
+    expect(state_word(page)).to_have_text("Idle")
     again.click()
-    expect(page.locator(".stop-notice")).to_contain_text(re.compile("Stop (sent to|latched for) hall/arm"))
+    expect(stop_notice(page)).to_contain_text(re.compile("Stop (sent to|latched for) hall/arm"))
     expect(again).to_have_count(0)
     take(page)
     clear_stop(page)
@@ -124,13 +132,13 @@ def test_an_old_press_of_stop_is_offered_when_the_connection_returns(open_page, 
 
 def test_a_page_whose_part_is_no_longer_there_says_so(open_page):
     page = open_page(drawn=False)
-    expect(page.locator(".tile")).not_to_have_count(0)
+    expect(tiles(page)).not_to_have_count(0)
     page.route("**/assets/wall-*.js", lambda route: route.fulfill(status=504))
     page.evaluate("location.hash = '#/wall'")
-    expect(page.locator("main [role=alert]")).to_contain_text("This page could not be loaded")
+    expect(page.get_by_role("main").get_by_role("alert")).to_contain_text("This page could not be loaded")
     page.unroute("**/assets/wall-*.js")
     button(page, "Load again").click()
-    expect(page.locator(".wall-tile").first).to_be_visible()
+    expect(page.get_by_role("article").first).to_be_visible()
 
 
 def test_a_link_to_what_no_robot_can_be_called_is_said_and_costs_no_connection(open_page):
@@ -143,7 +151,7 @@ def test_a_link_to_what_no_robot_can_be_called_is_said_and_costs_no_connection(o
     ):
         page.evaluate("path => (location.hash = path)", path)
         page.reload()
-        expect(page.locator("h1")).to_have_text(f"There is no robot {robot}.")
-        expect(page.locator(".missing li")).not_to_have_count(0)
+        expect(page.get_by_role("heading", level=1)).to_have_text(f"There is no robot {robot}.")
+        expect(page.get_by_role("main").get_by_role("listitem")).not_to_have_count(0)
         expect(button(page, "Stop request: all")).to_be_enabled()
         assert page.evaluate("sockets.length") == 1

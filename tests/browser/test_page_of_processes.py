@@ -13,6 +13,7 @@ from tests.browser.robot_page import (
     degrees,
     drag,
     ready,
+    region,
     sent,
     state_word,
     stop_button,
@@ -80,7 +81,7 @@ def test_a_gateway_that_answers_no_more_is_told_as_what_it_may_be(site):
         gateway = site.children()["gateway"]
         kill(gateway, signal.SIGSTOP)
         try:
-            notice = page.locator(".control .notice.lost")
+            notice = region(page, "Control").get_by_role("alert")
             expect(notice).to_contain_text(
                 re.compile(r"Control ended: the gateway has not answered for \d s\.")
             )

@@ -1,6 +1,7 @@
 """The pictures of the page in the README: the page itself, before a real site."""
 
 import os
+import re
 import time
 from pathlib import Path
 
@@ -15,7 +16,15 @@ from services.site_file.fixtures import Fixture as FixtureRow
 from services.site_file.fixtures import fixture_shape, fixture_to_site
 from tests.browser.crowd import crowd
 from tests.browser.rendering import rendering
-from tests.browser.robot_page import keep_picture, take
+from tests.browser.robot_page import (
+    drawings,
+    keep_picture,
+    scene,
+    take,
+    tile,
+    tiles,
+    video_picture,
+)
 from tests.site import wait_until
 
 pytestmark = pytest.mark.browser
@@ -65,9 +74,10 @@ def orange(png):
 
 def test_the_page_shows_the_arm_moving_in_3d_and_as_video(open_page, rendered):
     page = open_page("#/hall/pt600")
-    page.wait_for_selector('canvas[data-loaded="true"][data-fixtures="2"]')
+    expect(scene(page)).to_have_attribute("data-loaded", "true")
+    expect(scene(page)).to_have_attribute("data-fixtures", "2")
     page.get_by_role("button", name="Trail").click()
-    expect(page.locator(".camera .picture-word")).to_have_count(0)
+    expect(video_picture(page)).to_have_attribute("data-drawn", "true")
     if WANTED:
         time.sleep(CURVES_S)
     take(page)
@@ -83,9 +93,9 @@ def test_the_page_shows_the_arm_moving_in_3d_and_as_video(open_page, rendered):
     if WANTED:
         page.screenshot(path=PICTURE)
         assert PICTURE.stat().st_size < LARGEST_BYTES
-    for place, least in ((".canvas-place", 4000), (".camera .picture", 1000)):
+    for place, least in ((scene(page), 4000), (video_picture(page), 1000)):
         # A picture that is stale for a moment has no colour.
-        wait_until(lambda place=place, least=least: orange(page.locator(place).screenshot()) > least)
+        wait_until(lambda place=place, least=least: orange(place.screenshot()) > least)
 
 
 COLLIDING = """# Down to the bench, and too far
@@ -102,8 +112,10 @@ move_joints 60 70 -80 0 0
 @pytest.mark.skipif(not WANTED, reason="makes the picture of the Program page, with ROBOMESH_PICTURES=1")
 def test_the_program_page_shows_where_a_program_collides(open_page):
     page = open_page("#/program/hall/pt600")
-    expect(page.locator("textarea")).not_to_have_value("")  # the example is shown first
-    page.locator("textarea").fill(COLLIDING)
+    expect(page.get_by_role("textbox", name="Program text")).not_to_have_value(
+        ""
+    )  # the example is shown first
+    page.get_by_role("textbox", name="Program text").fill(COLLIDING)
     row = page.get_by_role("button", name="touches bench").first
     row.click()
     time.sleep(4.0)
@@ -116,13 +128,13 @@ def test_the_fleet_page_shows_two_sites_and_what_needs_a_look(open_page, plant, 
     raised("joints.gone", "no positions come from it")
     with crowd(plant.endpoint, ("yard",), 3) as yard:
         page = open_page(height=1024)
-        tiles = page.locator(".tile")
-        expect(page.locator(".tile canvas[data-drawn]")).to_have_count(5, timeout=120_000)
-        expect(page.locator(".tile-alarms").first).to_be_visible()
+        for each in tiles(page).all():
+            expect(drawings(each)).to_have_attribute("data-drawn", re.compile("."), timeout=120_000)
+        expect(tile(page, "hall/arm").get_by_text("high", exact=True)).to_be_visible()
         yard.mark("faulty", ["yard/r001"])
         yard.mark("silent", ["yard/r002"])
-        expect(tiles.filter(has_text="following error")).to_have_count(1)
-        expect(tiles.filter(has_text="stale")).to_have_count(1)
+        expect(tiles(page).filter(has_text="following error")).to_have_count(1)
+        expect(tiles(page).filter(has_text="stale")).to_have_count(1)
         page.wait_for_timeout(2000)
         page.screenshot(path=DOCS / "fleet-page.png")
     assert (DOCS / "fleet-page.png").stat().st_size < 300_000

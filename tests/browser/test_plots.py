@@ -5,13 +5,19 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.robot_page import ARM, button, serious, stop_button
+from tests.browser.robot_page import (
+    ARM,
+    button,
+    region,
+    serious,
+    stop_button,
+)
 
 pytestmark = pytest.mark.browser
 
 
 def values(page, plot):
-    return page.get_by_role("region", name=f"Plot {plot}").locator("[data-value]")
+    return page.get_by_role("region", name=f"Plot {plot}").get_by_role("listitem")
 
 
 def test_a_field_is_found_by_typing_and_a_layout_opens_the_same_on_another_screen(open_page):
@@ -47,7 +53,7 @@ def test_an_invalid_layout_is_named_and_the_page_stays_whole(open_page):
     expect(values(page, 1)).to_have_count(5)
     button(page, "Layout…").click()
     assert serious(page, ".layout-panel") == []
-    stop, control = (page.locator(each).bounding_box() for each in ("button.stop", ".control"))
+    stop, control = stop_button(page).bounding_box(), region(page, "Control").bounding_box()
     button(page, "Default layout").click()
     expect(refused).to_have_count(0)
     assert page.evaluate("location.hash") == ARM
@@ -56,4 +62,4 @@ def test_an_invalid_layout_is_named_and_the_page_stays_whole(open_page):
     expect(page.get_by_role("region", name="Plot 1")).to_have_count(0)
     assert page.evaluate("location.hash") == f"{ARM}?hide=video,plots"
     assert stop_button(page).bounding_box() == stop
-    assert page.locator(".control").bounding_box() == control
+    assert region(page, "Control").bounding_box() == control

@@ -13,7 +13,19 @@ from robomesh.errors import RefusedError
 from robomesh.keys import WHOLE_SITE
 from robomesh.schemas import robomesh_pb2 as schema
 from services import player, recorder, store
-from tests.browser.robot_page import button, keep_picture, serious
+from tests.browser.robot_page import (
+    button,
+    events,
+    journal_entry,
+    journal_lines,
+    keep_picture,
+    region,
+    scene,
+    scene_stale,
+    serious,
+    stop_button,
+    tiles,
+)
 
 pytestmark = pytest.mark.browser
 
@@ -131,21 +143,54 @@ def joints_in(recording):
 def play(page):
     """Open the recording from the list, and pause it."""
     page.get_by_role("link", name=f"Play {NAME}").click()
-    expect(page.locator(".scene canvas[data-loaded=true]")).to_be_visible()
-    expect(page.locator(".player")).to_have_attribute("data-replay", re.compile("^replay-"))
+    expect(scene(page)).to_have_attribute("data-loaded", "true")
+    expect(player_of(page)).to_have_attribute("data-replay", re.compile("^replay-"))
+
+
+def player_of(page):
+    """Return the player, which names its replay in `data-replay`."""
+    return page.get_by_role("group", name="Player", exact=True)
+
+
+def transport(page):
+    return region(page, "Transport")
+
+
+def play_button(page):
+    return transport(page).get_by_role("button", name=re.compile("^(Play|Pause)$"))
+
+
+def recordings(page):
+    return page.get_by_role("list", name="Recordings", exact=True).get_by_role("listitem")
+
+
+def curves(page):
+    """Return the first chart; the line at the moment and the place of the curves have no role."""
+    return page.get_by_role("figure").first
+
+
+def curves_area(page):
+    return curves(page).locator(".u-over")
+
+
+def note_range(page):
+    """Return the mark of a note's range on the time line, which only the eye needs."""
+    return transport(page).locator(".note-range")
 
 
 def position(page):
-    minutes, seconds = page.locator(".transport-time .figure").inner_text().split(" /")[0].split(":")
+    minutes, seconds = (
+        transport(page).get_by_text(re.compile(r"^[\d:.]+ / ")).inner_text().split(" /")[0].split(":")
+    )
     return 60 * int(minutes) + float(seconds)
 
 
 def arm(page):
-    return page.locator(".scene canvas").screenshot()
+    return scene(page).screenshot()
 
 
 def moment_line(page):
-    return page.locator(".moment-line").first.evaluate("line => line.getBoundingClientRect().left")
+    return curves(page).locator(".moment-line").evaluate("line => line.getBoundingClientRect().left")
 
 
 def until(page, condition):
@@ -159,59 +204,59 @@ def until(page, condition):
 
 def test_a_recording_is_listed_and_played_and_a_seek_moves_arm_curves_and_clock(open_page, recorded):
     page = open_page("#/recordings", width=1280, height=800)
-    card = page.locator(f"[data-file='{recorded}']")
+    card = recordings(page).filter(has=page.get_by_title(recorded, exact=True))
     expect(card).to_contain_text("pt600")
     expect(card).to_contain_text("messages")
-    empty = page.locator("[data-file='empty.mcap']")
-    expect(empty.locator(".state.warning")).to_be_visible()
+    empty = recordings(page).filter(has=page.get_by_title("empty.mcap", exact=True))
+    expect(empty.get_by_text("empty.mcap is empty: the disk was full")).to_be_visible()
     expect(empty.get_by_role("link", name="Play")).to_have_count(0)
     button(card, "Compare").click()
     expect(page.get_by_role("link", name=f"Compare with {NAME}").first).to_be_visible()
     button(page, "Cancel").click()
     play(page)
-    expect(page.locator(".tag.replay").first).to_contain_text("replay of pt600")
-    expect(page.locator(".recorded-events")).to_contain_text("li asked acquire")
-    expect(page.locator(".event-mark").first).to_be_visible()
+    expect(page.get_by_text("replay of pt600").first).to_be_visible()
+    expect(events(page).filter(has_text="li asked acquire").first).to_be_visible()
+    expect(page.get_by_role("group", name="Events").get_by_role("button").first).to_be_visible()
 
     # It plays to its end without input.
-    expect(page.locator(".player")).to_have_attribute("data-playing", "false")
+    expect(button(transport(page), "Play")).to_be_visible()
     page.keyboard.press("Home")
     until(page, lambda: position(page) < 0.5)
-    expect(page.locator(".chart")).to_be_visible()
+    expect(curves(page)).to_be_visible()
     left, at_start = moment_line(page), arm(page)
     page.get_by_label("Moment").fill("1.5")
     until(page, lambda: abs(position(page) - 1.5) < 0.02)
     until(page, lambda: moment_line(page) > left + 10 and arm(page) != at_start)
 
     # A click into the curves goes there.
-    box = page.locator(".chart .u-over").first.bounding_box()
+    box = curves_area(page).bounding_box()
     page.mouse.click(box["x"] + 0.2 * box["width"], box["y"] + box["height"] / 2)
     until(page, lambda: position(page) < 1.4)
 
     # The picture follows the joints, slowly enough for a busy machine.
-    page.locator(".transport select").select_option("0.1")
+    transport(page).get_by_label("Speed").select_option("0.1")
     begun, before = position(page), arm(page)
     page.keyboard.press("Space")
     until(page, lambda: position(page) > begun + 0.1 and arm(page) != before)
     button(page, "Pause").click()
-    expect(page.locator(".player")).to_have_attribute("data-playing", "false")
+    expect(button(transport(page), "Play")).to_be_visible()
 
 
 def test_a_moment_without_joints_is_told_and_no_other_is_shown_as_this_one(open_page, recorded):
     page = open_page(f"#/recordings/hall/{QUARTER}", drawn=False)
-    expect(page.locator(".transport .play")).to_be_visible()
+    expect(play_button(page)).to_be_visible()
     page.keyboard.press("End")
-    expect(page.locator(".scene-stale")).to_have_text("No joints were recorded of this moment.")
+    expect(scene_stale(page)).to_have_text("No joints were recorded of this moment.")
     page.keyboard.press("Home")
-    expect(page.locator(".scene")).to_have_attribute("data-moment", "here")
-    expect(page.locator(".scene-stale")).to_have_count(0)
+    expect(region(page, "3-D view")).to_have_attribute("data-moment", "here")
+    expect(scene_stale(page)).to_have_count(0)
 
 
 def test_a_replay_cannot_be_commanded_and_stop_stays_that_of_the_robots(open_page, plant, recorded):
     page = open_page("#/recordings", drawn=False)
     page.get_by_role("link", name=f"Play {NAME}").click()
-    expect(page.locator(".player")).to_have_attribute("data-replay", re.compile("^replay-"))
-    robot = page.locator(".player").get_attribute("data-replay")
+    expect(player_of(page)).to_have_attribute("data-replay", re.compile("^replay-"))
+    robot = player_of(page).get_attribute("data-replay")
 
     with pytest.raises(RefusedError, match="replay"):
         plant.call(
@@ -222,67 +267,69 @@ def test_a_replay_cannot_be_commanded_and_stop_stays_that_of_the_robots(open_pag
         )
 
     other = open_page(f"#/hall/{robot}", drawn=False)
-    expect(other.locator(".tag.replay").first).to_contain_text("replay of pt600")
-    expect(other.locator(".transport")).to_be_visible()
+    expect(other.get_by_text("replay of pt600").first).to_be_visible()
+    expect(transport(other)).to_be_visible()
     expect(button(other, "Take control")).to_have_count(0)
-    expect(other.locator(".stop")).to_contain_text("Stop request: all")
+    expect(stop_button(other)).to_contain_text("Stop request: all")
     other.goto(f"{plant.address}/#/")
-    expect(other.locator(".replays")).to_contain_text("replay of pt600")
-    expect(other.locator(".tile").filter(has_text=robot)).to_have_count(0)
+    expect(region(other, "Replays")).to_contain_text("replay of pt600")
+    expect(tiles(other).filter(has_text=robot)).to_have_count(0)
 
     # It ends with the page that opened it.
     page.goto(f"{plant.address}/#/recordings")
-    expect(other.locator(".replays")).to_have_count(0)
+    expect(region(other, "Replays")).to_have_count(0)
 
 
 def test_a_recording_is_begun_and_ended_on_the_robots_page(open_page, recorded):
     page = open_page("#/hall/pt600", drawn=False)
-    page.locator(".record-button").click()
+    page.get_by_role("button", name=re.compile("^(Record…|recording now)")).click()
     page.get_by_label("Name of the recording").fill("from/here")
     button(page, "Record").click()
-    expect(page.locator(".record-panel [role=alert]")).to_contain_text("from/here")
+    expect(region(page, "Record…").get_by_role("alert")).to_contain_text("from/here")
     page.get_by_label("Name of the recording").fill("from the page")
     button(page, "Record").click()
-    expect(page.locator(".record-panel")).to_contain_text("nothing lost")
-    expect(page.locator(".record-button")).to_contain_text("recording now")
+    expect(region(page, "Record…")).to_contain_text("nothing lost")
+    expect(page.get_by_role("button", name=re.compile("^(Record…|recording now)"))).to_contain_text(
+        "recording now"
+    )
     button(page, "Stop recording").click()
-    page.locator(".record-last a").click()
-    expect(page.locator(".player h1")).to_have_text("from-the-page")
+    region(page, "Record…").get_by_role("link").click()
+    expect(page.get_by_role("heading", level=1)).to_have_text("from-the-page")
 
 
 def test_what_cannot_be_played_is_said(open_page, recorded):
     page = open_page("#/recordings/hall/gone.mcap", drawn=False)
-    expect(page.locator(".player-trouble")).to_contain_text("no recording 'gone.mcap' here")
+    expect(page.get_by_role("main").get_by_role("alert")).to_contain_text("no recording 'gone.mcap' here")
     page.evaluate("localStorage.setItem('robomesh.language', 'zh')")
     page.reload()
-    expect(page.locator(".player-trouble")).to_contain_text("此处没有录制“gone.mcap”")
+    expect(page.get_by_role("main").get_by_role("alert")).to_contain_text("此处没有录制“gone.mcap”")
     page.evaluate("localStorage.setItem('robomesh.language', 'en')")
     page.reload()
-    expect(page.locator(".player-trouble")).to_contain_text("no recording 'gone.mcap' here")
+    expect(page.get_by_role("main").get_by_role("alert")).to_contain_text("no recording 'gone.mcap' here")
     page.goto(page.url.replace("hall/gone.mcap", "nowhere/x.mcap"))
-    expect(page.locator(".player-trouble")).to_contain_text("No player answers at nowhere")
+    expect(page.get_by_role("main").get_by_role("alert")).to_contain_text("No player answers at nowhere")
 
 
 def test_the_list_and_the_player_fit_a_phone_and_axe_finds_nothing_serious(open_page, recorded):
     page = open_page("#/recordings", width=360, height=740, drawn=False)
-    expect(page.locator(".recording").first).to_be_visible()
+    expect(recordings(page).first).to_be_visible()
     fits = "document.documentElement.scrollWidth <= innerWidth"
     assert page.evaluate(fits)
     assert serious(page) == []
     keep_picture(page, "recordings")
     page.get_by_role("link", name=f"Play {NAME}").click()
-    expect(page.locator(".transport .play")).to_be_in_viewport()
-    expect(page.locator(".stop")).to_be_in_viewport()
+    expect(play_button(page)).to_be_in_viewport()
+    expect(stop_button(page)).to_be_in_viewport()
     assert page.evaluate(fits)
-    assert page.locator(".transport .play").bounding_box()["height"] >= 44
-    expect(page.locator(".chart")).to_be_visible()
+    assert play_button(page).bounding_box()["height"] >= 44
+    expect(curves(page)).to_be_visible()
     assert serious(page) == []
     keep_picture(page, "player")
 
 
 def test_the_steps_of_a_run_are_folded_under_it(open_page, recorded):
     page = open_page(f"#/recordings/hall/{RUNS}", drawn=False)
-    rows = page.locator(".recorded-events li")
+    rows = events(page)
     expect(rows).to_have_count(4)  # two runs, and the refused step of each
     run = rows.first.get_by_role("button", name="12 steps")
     expect(run).to_have_attribute("aria-expanded", "false")
@@ -318,7 +365,9 @@ def noted(plant, tmp_path_factory):
 def test_a_note_of_one_page_is_seen_and_withdrawn_on_another(noted, plant, open_page):
     mine, other = open_page("#/hall/pt600", drawn=False), open_page("#/events", drawn=False)
     button(other, "Notes").click()
-    controls = mine.locator(".control button, .joints button, .stop")
+    controls = (
+        region(mine, "Control").or_(region(mine, "Joints")).get_by_role("button").or_(stop_button(mine))
+    )
     before = controls.evaluate_all("all => all.map((each) => each.getBoundingClientRect().toJSON())")
     button(mine, "Note…").click()
     form = mine.get_by_role("form", name="Note")
@@ -327,39 +376,39 @@ def test_a_note_of_one_page_is_seen_and_withdrawn_on_another(noted, plant, open_
     form.get_by_label("Text").fill("gripper slips")
     button(form, "Last minute").click()
     button(form, "Save note").click()
-    line = other.locator(".journal-line", has_text="gripper slips")
+    line = journal_lines(other).filter(has_text="gripper slips")
     expect(line).to_contain_text(re.compile(r"li noted on [\d:]+ – [\d:]+: gripper slips"))
     expect(form).to_have_count(0)
     line.click()
-    expect(other.locator(".entry-details")).to_contain_text("gripper slips")
+    expect(journal_entry(other)).to_contain_text("gripper slips")
     expect(button(other, "Withdraw this note")).to_have_count(0)  # another author's
     mine.goto(f"{plant.address}/#/events")
     button(mine, "Notes").click()
-    mine.locator(".journal-line", has_text="gripper slips").click()
+    journal_lines(mine).filter(has_text="gripper slips").click()
     button(mine, "Withdraw this note").click()
     for page in (mine, other):
-        expect(page.locator(".journal-line s")).to_contain_text("gripper slips")
+        expect(journal_lines(page).get_by_role("deletion")).to_contain_text("gripper slips")
     button(other, "Day").click()
     other.get_by_label("Robot", exact=True).select_option("pt600")
-    expect(other.locator(".day-hours s")).to_contain_text("gripper slips")
-    expect(other.locator(".day-gaps")).to_contain_text("This day is not complete")
+    expect(region(other, "Journal").get_by_role("deletion")).to_contain_text("gripper slips")
+    expect(other.get_by_text("This day is not complete")).to_be_visible()
     keep_picture(other, "day")
 
 
 def test_a_note_on_a_recording_is_beside_it_and_its_file_is_unchanged(noted, recorded, plant, open_page):
     before = plant.call(ask_info(plant, recorded))
     page = open_page(f"#/recordings/hall/{recorded}")
-    events = page.get_by_role("region", name="Events")
-    button(events, "Note").click()
+    panel = region(page, "Events")
+    button(panel, "Note").click()
     form = page.get_by_role("form", name="Note")
     form.get_by_label("Your name").fill("wang")
     form.get_by_label("Text").fill("starts late")
     button(form, "From here to the player's position").click()
     page.get_by_label("Moment", exact=True).fill("1.5")  # it plays, so the range grows
     button(form, "Save note").click()
-    expect(events).to_contain_text("starts late")
-    expect(events).to_contain_text("Not in the file")
-    expect(page.locator(".note-range")).to_have_count(1)
+    expect(panel).to_contain_text("starts late")
+    expect(panel).to_contain_text("Not in the file")
+    expect(note_range(page)).to_have_count(1)
     again = open_page(f"#/recordings/hall/{recorded}", drawn=False)
     expect(again.get_by_role("region", name="Events")).to_contain_text("starts late")
     assert plant.call(ask_info(plant, recorded)) == before

@@ -13,30 +13,38 @@ from tests.browser.robot_page import (
     control_notice,
     degrees,
     drag,
+    events,
+    joint_track,
+    joint_value,
+    joint_values,
     joints_notice,
     ready,
+    region,
+    scene,
+    scene_stale,
     state_word,
     stop_button,
+    stop_notice,
     stop_panel,
     take,
+    tiles,
+    tool_values,
     wait_to_move,
     who_controls,
 )
+from tests.site import wait_until
 
 pytestmark = pytest.mark.browser
 
 
 def test_a_moving_arm_is_drawn_as_it_moves(open_page):
     page = open_page("#/hall/pt600")
-    page.wait_for_selector('canvas[data-loaded="true"]')
-    before = degrees(page, "waist"), int(page.locator(".canvas-place canvas").get_attribute("data-drawn"))
-    page.wait_for_function(
-        "drawn => Number(document.querySelector('.canvas-place canvas').dataset.drawn) > drawn + 3",
-        arg=before[1],
-    )
-    expect(page.locator('[data-joint="waist"]')).not_to_have_text(f"{before[0]:.2f}°".replace("-", "−"))
-    expect(page.locator(".scene-stale")).to_have_count(0)
-    expect(page.locator(".tool .number").first).to_have_text(re.compile(r"\d+\.\d\s*mm"))
+    expect(scene(page)).to_have_attribute("data-loaded", "true")
+    before = degrees(page, "waist"), int(scene(page).get_attribute("data-drawn"))
+    wait_until(lambda: int(scene(page).get_attribute("data-drawn")) > before[1] + 3)
+    expect(joint_value(page, "waist")).not_to_have_text(f"{before[0]:.2f}°".replace("-", "−"))
+    expect(scene_stale(page)).to_have_count(0)
+    expect(tool_values(page).first).to_have_text(re.compile(r"\d+\.\d\s*mm"))
 
 
 def test_control_needs_a_name_and_says_what_a_name_is(open_page):
@@ -50,11 +58,11 @@ def test_control_needs_a_name_and_says_what_a_name_is(open_page):
 
 def test_without_control_nothing_on_the_page_can_move_the_arm(open_page, plant):
     page = open_page(ARM, drawn=False)
-    page.wait_for_selector(".track")
+    expect(joint_track(page, "waist")).to_be_visible()
     assert page.get_by_role("slider", name="Target of").count() == 0
     for name in ("Home", "Hold"):
         expect(button(page, name)).to_be_disabled()
-    box = page.locator(".track").first.bounding_box()
+    box = joint_track(page, "waist").bounding_box()
     page.mouse.click(box["x"] + 10, box["y"] + box["height"] / 2)
     assert audited(plant, "MOVE_ABSOLUTE") == 0
 
@@ -67,17 +75,17 @@ def test_a_slider_moves_the_joint_when_it_is_let_go_and_not_before(open_page, pl
     expect(joints_notice(page)).to_contain_text("Target waist:")
     assert audited(plant, "MOVE_ABSOLUTE") == moves
     # Every link beyond the waist is shown where it would be.
-    page.wait_for_selector('.canvas-place canvas[data-ghost="5"]')
+    expect(scene(page)).to_have_attribute("data-ghost", "5")
     wanted = float(re.search(r"waist: (\S+)°", joints_notice(page).inner_text())[1].replace("−", "-"))
     assert wanted > start + 5
     page.mouse.up()
-    expect(page.locator('[data-joint="waist"]')).to_have_text(f"{wanted:.2f}°".replace("-", "−"))
+    expect(joint_value(page, "waist")).to_have_text(f"{wanted:.2f}°".replace("-", "−"))
     assert audited(plant, "MOVE_ABSOLUTE") > moves
     # A tap next to the handle sets no target.
     moves = audited(plant, "MOVE_ABSOLUTE")
-    box = page.locator(".track").first.bounding_box()
+    box = joint_track(page, "waist").bounding_box()
     page.mouse.click(box["x"] + 4, box["y"] + box["height"] / 2)
-    expect(page.locator(".track-handle.unsent")).to_have_count(0)
+    expect(joints_notice(page)).not_to_contain_text("Target waist")
     assert audited(plant, "MOVE_ABSOLUTE") == moves
 
 
@@ -86,7 +94,7 @@ def test_a_target_that_homing_left_behind_moves_no_joint_that_nobody_touched(ope
     ready(page)
     wait_to_move(page, "waist", lambda: drag(page, "waist", 60))
     button(page, "Home").click()
-    expect(page.locator("[data-joint]")).to_have_text(HOME)
+    expect(joint_values(page)).to_have_text(HOME)
     expect(state_word(page)).to_have_text("Idle")
     home = degrees(page, "waist")
     wait_to_move(page, "wrist", lambda: drag(page, "wrist", 20))
@@ -108,7 +116,7 @@ def test_by_keys_a_target_is_set_and_enter_sends_it_and_escape_takes_it_back(ope
     handle.press("PageUp")
     handle.press("Enter")
     wanted = f"{start + 10:.2f}°".replace("-", "−")
-    expect(page.locator('[data-joint="elbow"]')).to_have_text(wanted)
+    expect(joint_value(page, "elbow")).to_have_text(wanted)
 
 
 def test_space_asks_for_a_stop_and_only_its_reset_lets_motion_go_on(open_page):
@@ -116,7 +124,7 @@ def test_space_asks_for_a_stop_and_only_its_reset_lets_motion_go_on(open_page):
     ready(page)
     drag(page, "waist", -60)
     page.keyboard.press("Space")
-    expect(page.locator(".stop-notice")).to_contain_text("Stop sent to hall/arm")
+    expect(stop_notice(page)).to_contain_text("Stop sent to hall/arm")
     expect(state_word(page)).to_have_text("Stopped")
     expect(button(page, "Home")).to_be_disabled()
     page.get_by_role("button", name="Reset stop").click()
@@ -129,14 +137,15 @@ def test_stop_works_without_control_and_names_who_asked(open_page):
     page.get_by_label("Your name").fill("wang")
     stop_button(page).click()
     expect(stop_panel(page)).to_contain_text("Stopped by wang")
-    expect(page.locator(".stopped p")).to_have_text("No motion until it is reset.")
+    expect(stop_panel(page).get_by_role("paragraph")).to_have_text("No motion until it is reset.")
     expect(page.get_by_role("button", name="Reset stop")).to_be_disabled()
 
 
 def test_the_choice_of_a_program_says_where_it_is_and_its_stop_names_the_whole_fleet(open_page):
     page = open_page("#/program", drawn=False)
-    expect(page.locator(".crumbs")).to_contain_text("Go to a robot")
-    expect(page.locator(".crumbs strong")).to_have_text("Program")
+    crumbs = page.get_by_role("navigation", name="Robot of this page")
+    expect(crumbs).to_contain_text("Go to a robot")
+    expect(crumbs.get_by_role("strong")).to_have_text("Program")
     expect(stop_button(page)).to_have_attribute("title", re.compile("^Asks all robots of the fleet"))
 
 
@@ -157,14 +166,14 @@ def test_a_hidden_page_gives_control_back(open_page):
     )
     expect(control_notice(page)).to_contain_text("this page was hidden")
     expect(who_controls(page)).to_have_text("Nobody is in control")
-    expect(page.locator(".event-list")).to_contain_text("li's page was hidden or closed")
+    expect(events(page).filter(has_text="li's page was hidden or closed")).not_to_have_count(0)
 
 
 def test_going_to_another_page_gives_control_back(open_page):
     page, other = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
     take(page)
     expect(who_controls(other)).to_have_text("li is in control")
-    given_back = other.locator(".event-list li", has_text="li released control")
+    given_back = events(other).filter(has_text="li released control")
     before = given_back.count()
     page.get_by_role("link", name="Fleet", exact=True).click()
     expect(who_controls(other)).to_have_text("Nobody is in control")
@@ -173,40 +182,39 @@ def test_going_to_another_page_gives_control_back(open_page):
 
 def test_when_the_controller_falls_silent_nothing_looks_live(open_page, plant):
     page = open_page("#/hall/pt600")
-    page.wait_for_selector('canvas[data-loaded="true"]')
-    expect(page.locator(".scene-stale")).to_have_count(0)
+    expect(scene(page)).to_have_attribute("data-loaded", "true")
+    expect(scene_stale(page)).to_have_count(0)
     port = plant.call(plant.stop_controller("pt600"))
     try:
-        expect(page.locator(".scene-stale")).to_contain_text(re.compile(r"stale \d"))
-        expect(page.locator('[data-joint="waist"]')).to_have_class(re.compile("stale"))
+        expect(scene_stale(page)).to_contain_text(re.compile(r"stale \d"))
+        expect(joint_value(page, "waist")).to_have_class(re.compile("stale"))
         expect(state_word(page)).to_have_text("No link")
         expect(stop_button(page)).to_have_text("Stop cannot arrive: use the emergency stop")
         late = open_page("#/hall/pt600", drawn=False)  # a page that is opened now shows old values as old too
-        expect(late.locator('[data-joint="waist"]')).to_have_class(re.compile("stale"))
-        expect(late.locator(".scene-stale")).to_be_visible()
+        expect(joint_value(late, "waist")).to_have_class(re.compile("stale"))
+        expect(scene_stale(late)).to_be_visible()
     finally:
         plant.call(plant.start_controller("pt600", port, demo=True))
-    expect(page.locator(".scene-stale")).to_have_count(0)
+    expect(scene_stale(page)).to_have_count(0)
 
 
 def test_the_fleet_shows_every_robot_with_its_state_and_leads_to_it(open_page):
     page = open_page(drawn=False)
-    tiles = page.locator(".tile")
-    expect(tiles).to_have_count(2)
-    expect(tiles.nth(1)).to_contain_text("pt600")
-    expect(tiles.nth(1)).to_contain_text("Nobody is in control")
-    expect(tiles.nth(1)).to_contain_text("gateway")
+    expect(tiles(page)).to_have_count(2)
+    expect(tiles(page).nth(1)).to_contain_text("pt600")
+    expect(tiles(page).nth(1)).to_contain_text("Nobody is in control")
+    expect(tiles(page).nth(1)).to_contain_text("gateway")
     page.get_by_placeholder("Filter robots").fill("pt6")
-    expect(tiles).to_have_count(1)
-    tiles.click()
-    expect(page.locator("h1")).to_have_text("pt600")
+    expect(tiles(page)).to_have_count(1)
+    tiles(page).click()
+    expect(page.get_by_role("heading", level=1)).to_have_text("pt600")
 
 
 def test_a_phone_shows_one_column_with_stop_under_the_thumb(open_page):
     page = open_page(width=360, height=740, has_touch=True, drawn=False)
-    for path, there in (("#/", ".tile"), ("#/hall/pt600", '[data-joint="waist"]')):
+    for path, there in (("#/", tiles(page).first), ("#/hall/pt600", joint_value(page, "waist"))):
         page.evaluate("path => (location.hash = path)", path)
-        page.wait_for_selector(there)
+        expect(there).to_be_visible()
         assert page.evaluate("document.documentElement.scrollWidth") == 360
         stop = stop_button(page).bounding_box()
         assert stop["height"] >= 44
@@ -221,13 +229,13 @@ def test_a_phone_shows_one_column_with_stop_under_the_thumb(open_page):
 
 def test_a_control_room_sees_everything_of_a_robot_without_scrolling(open_page):
     page = open_page("#/hall/pt600", drawn=False)
-    page.wait_for_selector('[data-joint="waist"]')
+    expect(joint_value(page, "waist")).to_be_visible()
     assert page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]") == [
         1440,
         900,
     ]
-    for name in ("scene", "control", "joints", "tool", "events", "camera", "history"):
-        box = page.locator(f".panel.{name}").bounding_box()
+    for name in ("3-D view", "Control", "Joints", "Tool", "Events", "Video", "Plots"):
+        box = region(page, name).bounding_box()
         assert box["y"] + box["height"] <= 900, name
         assert box["height"] >= 80, name
 
@@ -237,15 +245,15 @@ def test_the_video_can_have_the_large_place_and_stop_stays_where_it_is(open_page
     stop = stop_button(page).bounding_box()
     place = page.get_by_label("Where the video stands")
     place.select_option("large")
-    sizes = [page.locator(f".panel.{name}").bounding_box()["height"] for name in ("camera", "scene")]
+    sizes = [region(page, name).bounding_box()["height"] for name in ("Video", "3-D view")]
     assert sizes[0] > 1.5 * sizes[1]
     assert stop_button(page).bounding_box() == stop
     place.select_option("inset")
-    video, scene = (page.locator(f".panel.{name}").bounding_box() for name in ("camera", "scene"))
-    assert video["y"] > scene["y"]
-    assert video["x"] + video["width"] < scene["x"] + scene["width"]
+    inset, large = (region(page, name).bounding_box() for name in ("Video", "3-D view"))
+    assert inset["y"] > large["y"]
+    assert inset["x"] + inset["width"] < large["x"] + large["width"]
     place.select_option("beside")
-    assert page.locator(".panel.scene").bounding_box()["height"] == pytest.approx(sizes[0], abs=2)
+    assert region(page, "3-D view").bounding_box()["height"] == pytest.approx(sizes[0], abs=2)
 
 
 def test_the_language_and_the_colours_can_be_switched_and_are_kept(open_page):

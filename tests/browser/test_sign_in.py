@@ -10,7 +10,18 @@ from services.console.accounts import sessions
 from services.console.accounts.auth_service import change_account
 from services.console.accounts.file import AccountRole
 from tests.browser.conftest import NO_WEBGL, Plant, run_plant
-from tests.browser.robot_page import ARM, button, control_notice, keep_picture, serious, who_controls
+from tests.browser.robot_page import (
+    ARM,
+    button,
+    control_notice,
+    events,
+    joint_values,
+    keep_picture,
+    region,
+    serious,
+    stop_notice,
+    who_controls,
+)
 from tests.services.certificates import self_signed
 from tests.services.signing_in import PASSWORD, accounts_file
 from tests.site import wait_until
@@ -67,14 +78,19 @@ def asked_by(plant, request):
     return [entry.operator for entry in plant.call(asked).entries]
 
 
+def account(page):
+    """Return the account's menu, in English or Chinese."""
+    return page.get_by_role("group", name=re.compile("^(Account|账户)$"))
+
+
 def signed_in(page):
-    return page.locator(".account-menu summary")
+    return page.get_by_title(re.compile("^(Account: |账户：)"))
 
 
 def test_an_operator_signs_in_has_control_in_its_own_name_and_signs_out_in_all_tabs(open_tab, plant):
     page = open_tab()
     expect(page.get_by_role("heading", name="Console of hall")).to_be_visible()
-    expect(page.locator(".sign-in")).to_contain_text("Encrypted connection")
+    expect(region(page, "Sign in")).to_contain_text("Encrypted connection")
     expect(button(page, "Stop request")).to_be_disabled()
     assert serious(page) == []
     keep_picture(page, "sign-in")
@@ -94,8 +110,8 @@ def test_an_operator_signs_in_has_control_in_its_own_name_and_signs_out_in_all_t
     button(second, "Sign out everywhere").click()
     for tab in (second, page):
         expect(tab.get_by_role("heading", name="Console of hall")).to_be_visible()
-        expect(tab.locator(".sign-in")).to_contain_text("You have signed out.")
-        expect(tab.locator("[data-joint]")).to_have_count(0)
+        expect(region(tab, "Sign in")).to_contain_text("You have signed out.")
+        expect(joint_values(tab)).to_have_count(0)
     # Control ended with the session: the next session finds none in control.
     sign_in(page, "li")
     expect(who_controls(page)).to_have_text("Nobody is in control")
@@ -126,10 +142,10 @@ def answer(refusal, **more):
 def test_a_monitor_finds_why_it_has_no_control_and_its_stop_request_works(open_tab, plant):
     page = open_tab()
     sign_in(page, "zhao")
-    expect(page.locator(".no-control")).to_contain_text("zhao is a monitor’s account")
+    expect(region(page, "Control")).to_contain_text("zhao is a monitor’s account")
     expect(button(page, "Take control")).to_have_count(0)
     button(page, "Stop request").click()
-    expect(page.locator(".stop-notice")).to_contain_text(re.compile("Stop sent to hall/arm"))
+    expect(stop_notice(page)).to_contain_text(re.compile("Stop sent to hall/arm"))
     # The stop went first; it is written down after it.
     wait_until(lambda: "zhao.hall" in asked_by(plant, "STOP"), what="the audit log does not name zhao.hall")
 
@@ -137,11 +153,11 @@ def test_a_monitor_finds_why_it_has_no_control_and_its_stop_request_works(open_t
 def test_who_is_disabled_is_told_so_and_sees_nothing_more(open_tab, accounts):
     page = open_tab()
     sign_in(page, "zhao")
-    expect(page.locator("[data-joint]").first).to_be_visible()
+    expect(joint_values(page).first).to_be_visible()
     change_account(accounts, "disable", "zhao")
-    expect(page.locator(".sign-in")).to_contain_text("this account was disabled")
-    expect(page.locator(".sign-in")).to_contain_text("nothing of it would be live")
-    expect(page.locator("[data-joint]")).to_have_count(0)
+    expect(region(page, "Sign in")).to_contain_text("this account was disabled")
+    expect(region(page, "Sign in")).to_contain_text("nothing of it would be live")
+    expect(joint_values(page)).to_have_count(0)
     change_account(accounts, "enable", "zhao")
 
 
@@ -152,7 +168,8 @@ def test_who_becomes_a_monitor_is_told_so_and_so_is_everybody_else(open_tab, acc
     expect(who_controls(page)).to_have_text("You are in control")
     change_account(accounts, "role", "li", role=AccountRole.MONITOR)
     expect(control_notice(page)).to_have_text("Control ended: li.hall is a monitor now")
-    expect(page.locator(".event-list")).to_contain_text("control ended: li.hall is a monitor now")
+    ended = events(page).filter(has_text="control ended: li.hall is a monitor now")
+    expect(ended).not_to_have_count(0)
     change_account(accounts, "role", "li", role=AccountRole.OPERATOR)
 
 
@@ -161,7 +178,7 @@ def test_a_password_is_changed_with_progress_and_a_wrong_one_is_named(open_tab):
     sign_in(page, "li")
     signed_in(page).click()
     button(page, "Change password").click()
-    sheet, outcome = page.locator(".account-sheet"), page.locator(".account-sheet [role=status]")
+    sheet, outcome = account(page), account(page).get_by_role("status")
     present = page.get_by_label("Present password", exact=True)
     for name, value in (
         ("Present password", "not the password"),
@@ -189,13 +206,13 @@ def test_the_right_to_command_that_rests_is_given_back_for_the_password(open_tab
     expect(button(page, "Take control")).to_be_visible()
     with monkeypatch.context() as patched:
         patched.setattr(sessions, "COMMANDS_UNTOUCHED_S", 0.0)
-        expect(page.locator(".no-control")).to_contain_text("The right to command rests")
+        expect(region(page, "Control")).to_contain_text("The right to command rests")
     expect(button(page, "Take control")).to_have_count(0)
     signed_in(page).click()
-    expect(page.locator(".account-sheet")).to_contain_text("Watches until the password is given again")
+    expect(account(page)).to_contain_text("Watches until the password is given again")
     assert serious(page) == []
     page.keyboard.press("Escape")
-    page.locator(".no-control").get_by_label("Password", exact=True).fill(PASSWORD)
+    region(page, "Control").get_by_label("Password", exact=True).fill(PASSWORD)
     button(page, "Give the right back").click()
     button(page, "Take control").click()
     expect(who_controls(page)).to_have_text("You are in control")
@@ -209,25 +226,25 @@ def test_on_a_phone_in_chinese_signing_in_fits_and_has_no_serious_finding(contex
     page.goto(plant.address)
     expect(page.get_by_role("heading", name="hall 的控制台")).to_be_visible()
     assert serious(page) == []
-    assert page.locator("html").evaluate("html => html.scrollWidth") == 360
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
     alert = page.get_by_role("alert")
     page.get_by_label("账户", exact=True).fill("li")
     page.get_by_label("密码", exact=True).fill("not the password")
     button(page, "登录").click()
     expect(alert).to_have_text("未登录：账户或密码错误")
-    assert page.locator("html").evaluate("html => html.scrollWidth") == 360
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
     page.get_by_label("密码", exact=True).fill(PASSWORD)
     button(page, "登录").click()
     expect(signed_in(page)).to_be_visible()
     signed_in(page).click()
-    expect(page.locator(".account-sheet")).to_contain_text("操作员")
-    assert page.locator("html").evaluate("html => html.scrollWidth") == 360
+    expect(account(page)).to_contain_text("操作员")
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
     button(page, "更改密码").click()
     page.get_by_label("当前密码", exact=True).fill(PASSWORD)
     page.get_by_label("新密码", exact=True).fill("short")
     page.get_by_label("再次输入新密码", exact=True).fill("short")
     button(page, "更改").click()
-    expect(page.locator(".account-sheet [role=status]")).to_have_text(
+    expect(account(page).get_by_role("status")).to_have_text(
         "未更改：密码太短：请用至少 10 个字符，几个词语即可"
     )
     contexts.give_back(context, kind, plant.address)

@@ -11,6 +11,12 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from playwright.sync_api import expect
 
+from tests.browser.robot_page import (
+    video_age,
+    video_panel,
+    video_picture,
+)
+
 pytestmark = pytest.mark.browser
 
 ROBOTS = ("arm",)
@@ -70,19 +76,19 @@ def test_a_joiner_sees_the_frames_since_the_key_frame_then_live_ones(open_page, 
         message, key = encoder.frame(*colour)
         publisher.put(message, key_frame=key)
     page = open_page("#/hall/arm", drawn=False)
-    page.wait_for_selector('.camera canvas[data-drawn="true"]')
+    expect(video_picture(page)).to_have_attribute("data-drawn", "true")
     page.wait_for_function("() => document.querySelector('.camera canvas').width === 320")
     # The earlier picture is shown as stale, because its age is not known.
-    expect(page.locator(".camera .age")).to_have_text("stale, age unknown")
+    expect(video_age(page)).to_have_text("stale, age unknown")
     red, green, _ = pixel(page)
     assert green > 150 > red
     with repeated(lambda: publisher.put(encoder.frame(30, 30, 200)[0])):
-        expect(page.locator(".camera .age")).to_have_count(0)
+        expect(video_age(page)).to_have_count(0)
         page.wait_for_function(
             "() => { const c = document.querySelector('.camera canvas');"
             "return c.getContext('2d').getImageData(9, 9, 1, 1).data[2] > 150 }"
         )
-    expect(page.locator(".camera .age")).to_contain_text("stale 1")
+    expect(video_age(page)).to_contain_text("stale 1")
     publisher.close()
 
 
@@ -97,10 +103,10 @@ def test_a_browser_without_a_decoder_shows_still_pictures_and_says_so(open_page,
     codec.time_base = Fraction(1, 5)
     (packet,) = codec.encode(picture.reformat(format="yuvj420p"))
     with repeated(lambda: publisher.put(CompressedImage(data=bytes(packet), format="jpeg"))):
-        expect(page.locator(".camera img")).to_be_visible()
+        expect(video_picture(page)).to_be_visible()
         page.wait_for_function("() => document.querySelector('.camera img').naturalWidth === 160")
-        expect(page.locator(".camera .age")).to_have_count(0)
-    expect(page.locator(".camera .footnote")).to_contain_text("Still pictures")
+        expect(video_age(page)).to_have_count(0)
+    expect(video_panel(page)).to_contain_text("Still pictures")
     publisher.close()
 
 
@@ -120,8 +126,8 @@ def test_a_refused_video_is_explained_in_the_page_s_language(open_page, plant, l
     message, key = encoder.frame(200, 30, 30)
     publisher.put(message, key_frame=key)
     page = open_page("#/hall/arm", drawn=False, refused=True, locale=locale)
-    page.wait_for_selector('.camera canvas[data-drawn="true"]')
+    expect(video_picture(page)).to_have_attribute("data-drawn", "true")
     page.get_by_role("button", name=save).click()
     # This site has no renderer, so the console refuses the video.
-    expect(page.locator(".camera .footnote")).to_contain_text(words)
+    expect(video_panel(page)).to_contain_text(words)
     publisher.close()

@@ -7,7 +7,14 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.rendering import rendering
-from tests.browser.robot_page import ARM, fault, serious, state_word, take
+from tests.browser.robot_page import (
+    ARM,
+    fault,
+    serious,
+    state_word,
+    take,
+    video_picture,
+)
 
 pytestmark = pytest.mark.browser
 
@@ -35,7 +42,7 @@ def changes(page, place=".wall-tile"):
 
 def test_what_is_chosen_stands_in_the_address_and_keys_go_from_tile_to_tile(open_page):
     page = open_page("#/wall", drawn=False)
-    tiles = page.locator(".wall-tile")
+    tiles = page.get_by_role("article")
     expect(tiles).to_have_count(2)
     page.get_by_role("button", name="Choose pictures").click()
     page.get_by_role("group", name="hall/pt600").get_by_role("button", name="Top").click()
@@ -57,21 +64,20 @@ def test_what_is_chosen_stands_in_the_address_and_keys_go_from_tile_to_tile(open
 
 def test_a_robot_that_there_is_not_is_said_so_and_a_picture_that_does_not_come_too(open_page):
     page = open_page("#/wall/hall/nobody/close/hall/arm/front", drawn=False)
-    expect(page.locator(".wall-tile").nth(0)).to_contain_text("not on the mesh")
-    expect(page.locator(".wall-tile").nth(1)).to_contain_text("Waiting for a picture")
+    expect(page.get_by_role("article").nth(0)).to_contain_text("not on the mesh")
+    expect(page.get_by_role("article").nth(1)).to_contain_text("Waiting for a picture")
 
 
 def test_a_tile_gives_only_the_reason_of_its_state(open_page, plant):
     page = open_page("#/wall/hall/arm/close/hall/replay-gone/close", drawn=False)
-    tile = page.locator(".wall-tile").nth(0)
-    expect(page.locator(".wall-tile").nth(1)).to_contain_text("This replay has ended")
-    state, reason = tile.locator(".state.alarm"), tile.locator(".wall-problem.alarm")
+    tile = page.get_by_role("article").nth(0)
+    expect(page.get_by_role("article").nth(1)).to_contain_text("This replay has ended")
     with fault(plant, "fault"):
-        expect(state).to_have_text("Fault")
-        expect(reason).to_contain_text("overheated")
-    expect(state).to_have_text("Stopped")
+        expect(tile).to_have_accessible_name(re.compile("Fault$"))
+        expect(tile.get_by_text("overheated")).to_be_visible()
+    expect(tile).to_have_accessible_name(re.compile("Stopped$"))
     # The link's text, that it is connected, is no reason.
-    expect(reason).to_have_text("The controller has stopped by itself")
+    expect(tile.get_by_text("The controller has stopped by itself", exact=True)).to_be_visible()
     page.evaluate("path => (location.hash = path)", ARM)
     take(page)
     page.get_by_role("button", name="Reset", exact=True).click()
@@ -80,16 +86,15 @@ def test_a_tile_gives_only_the_reason_of_its_state(open_page, plant):
 
 def test_a_tile_asks_for_a_picture_of_its_size_which_moves_as_the_arm_does(open_page, rendered):
     page = open_page("#/wall/hall/pt600/close", width=400, height=700, drawn=False)
-    page.wait_for_selector('.wall-tile canvas[data-drawn="true"]')
+    expect(page.get_by_role("article").get_by_role("img")).to_have_attribute("data-drawn", "true")
     assert changes(page) in ("320", "480")
-    expect(page.locator(".wall-line")).to_contain_text("pt600")
-    page.locator(".wall-line a").click()
+    page.get_by_role("article").get_by_role("link", name="pt600").click()
     expect(page).to_have_url(re.compile("#/hall/pt600$"))
 
 
 def test_the_robot_page_shows_live_video_that_can_be_taken_home(open_page, rendered):
     page = open_page("#/hall/pt600", drawn=False)
-    page.wait_for_selector('.camera canvas[data-drawn="true"]')
+    expect(video_picture(page)).to_have_attribute("data-drawn", "true")
     changes(page, ".camera")
     with page.expect_download() as still:
         page.get_by_role("button", name="Save still").click()
@@ -106,7 +111,7 @@ def test_the_robot_page_shows_live_video_that_can_be_taken_home(open_page, rende
 
 def test_the_wall_never_scrolls_sideways_and_axe_finds_nothing_serious(open_page):
     page = open_page("#/wall", drawn=False)
-    expect(page.locator(".wall-tile")).to_have_count(2)
+    expect(page.get_by_role("article")).to_have_count(2)
     page.get_by_role("button", name="Choose pictures").click()
     for width in (1440, 768, 360):
         page.set_viewport_size({"width": width, "height": 900})

@@ -20,10 +20,14 @@ from tests.browser.robot_page import (
     fault,
     joints_notice,
     ready,
+    region,
+    requests,
+    scene,
     serious,
     set_speed,
     state_word,
     stop_button,
+    video_picture,
 )
 from tests.browser.test_video_panel import publisher_of, repeated
 from tests.site import wait_until
@@ -78,6 +82,10 @@ class NumberedVideo:
         self.sequences[self.count] = header.sequence
 
 
+def trace_button(page):
+    return page.get_by_role("button", name=re.compile("^Trace o"))
+
+
 @pytest.fixture
 def video(plant):
     publisher = publisher_of(plant, "video/front")
@@ -127,7 +135,7 @@ def traces(plant):
 def test_a_frozen_video_lets_no_motion_start_until_it_is_live_or_off(open_page, video):
     page = open_page(ARM, drawn=False)
     with repeated(video.publish):
-        page.wait_for_selector('.camera canvas[data-drawn="true"]')
+        expect(video_picture(page)).to_have_attribute("data-drawn", "true")
         ready(page)
         expect(button(page, "waist +1°")).to_be_enabled()
     for name in ("Home", "waist +1°"):
@@ -148,11 +156,11 @@ def test_a_frozen_video_lets_no_motion_start_until_it_is_live_or_off(open_page, 
 def test_a_video_that_freezes_ends_a_jog_but_no_motion(open_page, video):
     page = open_page(ARM, drawn=False)
     with repeated(video.publish):
-        page.wait_for_selector('.camera canvas[data-drawn="true"]')
+        expect(video_picture(page)).to_have_attribute("data-drawn", "true")
         ready(page)
         page.get_by_label("Speed").fill("1")
         page.get_by_label("Speed").press("Enter")
-        button(page.locator(".joints"), "5").click()
+        button(region(page, "Joints"), "5").click()
         before = degrees(page, "waist")
         for _ in range(3):
             button(page, "waist +5°").click()
@@ -167,9 +175,9 @@ def test_a_video_that_freezes_ends_a_jog_but_no_motion(open_page, video):
 
 def test_a_step_of_the_tool_is_followed_to_its_end_although_the_video_freezes(open_page, video):
     page = open_page(ARM, drawn=False)
-    tool = page.locator(".panel.tool")
+    tool = region(page, "Tool")
     with repeated(video.publish):
-        page.wait_for_selector('.camera canvas[data-drawn="true"]')
+        expect(video_picture(page)).to_have_attribute("data-drawn", "true")
         ready(page)
         set_speed(page, 1)
         button(tool, "Base").click()
@@ -177,7 +185,7 @@ def test_a_step_of_the_tool_is_followed_to_its_end_although_the_video_freezes(op
         button(tool, "Base X +20\u202fmm").click()
         expect(state_word(page)).to_have_text("Running · moving")
     expect(button(tool, "Base X +20\u202fmm")).to_be_disabled()
-    expect(tool.locator(".notice")).to_contain_text("Done: Base X +20")
+    expect(tool.get_by_label("Outcome", exact=True)).to_contain_text("Done: Base X +20")
     button(page, "Release").click()
 
 
@@ -194,10 +202,10 @@ def test_a_frozen_state_lets_no_motion_start(open_page, plant):
 
 def test_a_drawing_that_stands_still_while_the_arm_moves_lets_no_motion_start(open_page):
     page = open_page(ARM)
-    expect(page.locator(".canvas-place canvas")).to_have_attribute("data-loaded", "true")
+    expect(scene(page)).to_have_attribute("data-loaded", "true")
     ready(page)
     set_speed(page, 1)
-    button(page.locator(".joints"), "5").click()
+    button(region(page, "Joints"), "5").click()
     page.evaluate("() => { window.requestAnimationFrame = () => 1; }")
     # At rest the old picture is still right.
     page.wait_for_timeout(1500)
@@ -213,12 +221,12 @@ def test_a_drawing_that_stands_still_while_the_arm_moves_lets_no_motion_start(op
 def test_the_audit_log_names_the_picture_that_was_on_the_screen(open_page, plant, video):
     page = open_page(ARM, drawn=False)
     with repeated(video.publish, interval_s=0.04):
-        page.wait_for_selector('.camera canvas[data-drawn="true"]')
+        expect(video_picture(page)).to_have_attribute("data-drawn", "true")
         ready(page)
         page.evaluate(READ_AT_PRESS, [BLOCK, BITS])
         before = len(traces(plant))
         for count in range(PRESSES):
-            page.locator(".command-row button[aria-pressed]").click()
+            trace_button(page).click()
             page.wait_for_timeout(7 * (count % 9))  # any phase of the pictures
         wait_until(lambda: len(traces(plant)) == before + PRESSES)
         seen = page.evaluate("() => window.seen")
@@ -235,9 +243,9 @@ def test_the_audit_log_names_the_picture_that_was_on_the_screen(open_page, plant
 def test_the_picture_of_a_request_is_opened_from_a_recording(open_page, plant, video, recorded):
     page = open_page(ARM, drawn=False)
     with repeated(video.publish):
-        page.wait_for_selector('.camera canvas[data-drawn="true"]')
+        expect(video_picture(page)).to_have_attribute("data-drawn", "true")
         ready(page)
-        trace = page.locator(".command-row button[aria-pressed]")
+        trace = trace_button(page)
         if trace.get_attribute("aria-pressed") == "true":
             trace.click()
         expect(trace).to_have_attribute("aria-pressed", "false")
@@ -252,9 +260,9 @@ def test_the_picture_of_a_request_is_opened_from_a_recording(open_page, plant, v
         set_speed(page, 90)
         button(page, "Release").click()
     button(page, "Requests").click()
-    page.locator(".event-list li").filter(has_text="trace off").first.get_by_role("button").click()
+    requests(page).filter(has_text="trace off").first.get_by_role("button").click()
     dialog = page.get_by_role("dialog", name="What the page showed")
-    still = dialog.locator("canvas")
+    still = dialog.get_by_role("img")
     expect(still).to_be_visible()
     expect(dialog).to_contain_text("Reported by the page")
     (seen,) = page.evaluate("() => window.seen")
@@ -263,5 +271,5 @@ def test_the_picture_of_a_request_is_opened_from_a_recording(open_page, plant, v
     page.keyboard.press("Escape")
     expect(dialog).to_have_count(0)
     # A picture that no recording has is said to be missing.
-    page.locator(".event-list li .seen").first.click()
+    requests(page).get_by_role("button").first.click()
     expect(dialog).to_contain_text("No recording of this site has this picture.")

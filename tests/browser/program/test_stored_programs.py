@@ -5,8 +5,16 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.program.page import CHECKED_MS, PAGE, WAITS, write
-from tests.browser.robot_page import button, serious, stop_button, take
+from tests.browser.program.page import CHECKED_MS, PAGE, WAITS, progress, run_button, write
+from tests.browser.robot_page import (
+    button,
+    journal_entry,
+    journal_lines,
+    region,
+    serious,
+    stop_button,
+    take,
+)
 
 pytestmark = pytest.mark.browser
 
@@ -18,7 +26,7 @@ def text_of(page):
 
 
 def line(page, text):
-    expect(page.locator(".store-line")).to_contain_text(text, timeout=STORED_MS)
+    expect(page.get_by_label("Saved state", exact=True)).to_contain_text(text, timeout=STORED_MS)
 
 
 def named(page, name):
@@ -49,10 +57,10 @@ def test_a_program_that_one_page_saves_is_opened_changed_and_restored_by_another
     line(page, "saved version 2")
     button(page, "Compare").click()
     difference = page.get_by_role("region", name="Difference")
-    expect(difference.locator("tr.diff-old")).to_contain_text("wait 1")
-    expect(difference.locator("tr.diff-new")).to_contain_text("wait 2")
+    expect(difference.get_by_role("deletion")).to_contain_text("wait 1")
+    expect(difference.get_by_role("insertion")).to_contain_text("wait 2")
     button(page, "side by side").click()
-    expect(difference.locator("td.diff-text.diff-new")).to_contain_text("wait 2")
+    expect(difference.get_by_role("insertion")).to_contain_text("wait 2")
     page.get_by_role("list", name="Versions of pick").get_by_role("button").last.click()
     button(page, "Restore version 1").click()
     line(page, "Version 1 is restored as version 3")
@@ -60,7 +68,7 @@ def test_a_program_that_one_page_saves_is_opened_changed_and_restored_by_another
     button(page, "Rename").click()
     page.get_by_role("textbox", name="New name").fill("place")
     page.get_by_role("textbox", name="New name").press("Enter")
-    expect(page.locator(".stored-panel h3")).to_have_text("place", timeout=STORED_MS)
+    expect(region(page, "Programs").get_by_role("heading", level=3)).to_have_text("place", timeout=STORED_MS)
     button(page, "Delete").click()
     page.get_by_role("form", name="Delete place").get_by_role("textbox").fill("not used")
     page.get_by_role("form", name="Delete place").get_by_role("button", name="Delete").click()
@@ -85,8 +93,8 @@ def test_two_people_who_save_at_the_same_time_lose_nothing_and_the_second_decide
     button(other, "Save").click()
     expect(other.get_by_text("Two people changed “both”")).to_be_visible(timeout=STORED_MS)
     difference = other.get_by_role("region", name="Difference")
-    expect(difference.locator("tr.diff-old")).to_contain_text("wait 1")
-    expect(difference.locator("tr.diff-new")).to_contain_text("wait 2")
+    expect(difference.get_by_role("deletion")).to_contain_text("wait 1")
+    expect(difference.get_by_role("insertion")).to_contain_text("wait 2")
     button(other, "Make mine current").click()
     line(other, "Version 3 is restored as version 4")
     expect(text_of(other)).to_have_value("home\nwait 2\n")
@@ -129,7 +137,7 @@ def test_files_are_imported_as_programs_and_a_version_is_exported_byte_for_byte(
     (tmp_path / "Größe.prog").write_text("home # ü\n", "utf-8")
     (tmp_path / "big.prog").write_text("#" * 70_000)
     for name, said in (("Größe.prog", "Größe: version 1 imported"), ("big.prog", "more than 64 KiB")):
-        page.locator(".stored-panel input[type=file]").set_input_files(tmp_path / name)
+        page.get_by_label("Import files…").set_input_files(tmp_path / name)
         line(page, said)
     button(page, "Versions of Größe").click()
     with page.expect_download() as download:
@@ -144,20 +152,18 @@ def test_an_audit_entry_opens_the_text_that_ran_although_it_was_never_saved(open
     write(page, WAITS)
     named(page, "unsaved run")
     take(page)
-    page.locator("button.run").click()
-    expect(page.locator('.progress[data-outcome="RUNNING"]')).to_contain_text(
-        "unsaved run", timeout=CHECKED_MS
-    )
+    run_button(page).click()
+    expect(progress(page)).to_contain_text(re.compile("^Running.*unsaved run"), timeout=CHECKED_MS)
     stop_button(page).click()
-    expect(page.locator('.progress[data-outcome="ENDED"]')).to_be_visible(timeout=CHECKED_MS)
+    expect(progress(page)).to_contain_text("Ended early", timeout=CHECKED_MS)
     page.get_by_role("button", name=re.compile("Reset stop")).click(timeout=CHECKED_MS)
     page.evaluate("location.hash = '#/events'")
     button(page, "Requests").click()
-    page.locator(".journal-line").filter(has_text="unsaved run", has_not_text="ended").first.click()
-    page.locator(".entry-details a").click()
-    expect(page.locator(".diff-whole")).to_have_text(WAITS.strip(), timeout=STORED_MS)
-    expect(page.locator(".stored-panel h3")).to_contain_text("unsaved run")
-    page.locator(".stored-panel").get_by_role("button", name="Open in the editor").click()
+    journal_lines(page).filter(has_text="unsaved run", has_not_text="ended").first.click()
+    journal_entry(page).get_by_role("link").click()
+    expect(page.get_by_role("group", name="Difference")).to_have_text(WAITS.strip(), timeout=STORED_MS)
+    expect(region(page, "Programs").get_by_role("heading", level=3)).to_contain_text("unsaved run")
+    region(page, "Programs").get_by_role("button", name="Open in the editor").click()
     expect(text_of(page)).to_have_value(WAITS)
 
 
@@ -170,7 +176,7 @@ def test_a_phone_shows_stored_programs_and_axe_finds_nothing_serious(open_page):
     save(page, 2)
     for open_next in ("Programs", "Versions of phone"):
         button(page, open_next).click()
-        page.wait_for_selector(".stored-panel")
+        expect(region(page, "Programs")).to_be_visible()
         assert page.evaluate("document.documentElement.scrollWidth") == 360
         assert serious(page) == []
 

@@ -158,7 +158,7 @@ function StopPlace({ robots }: { robots: readonly string[] }) {
       {robot && robots[0] ? (
         <RobotStop robot={robot} robotKey={robots[0]} />
       ) : (
-        <StopButton robots={robots} text="stop_all" hint={t("stop_all_hint")} />
+        <StopButton robots={robots} text={robot ? "stop" : "stop_all"} hint={t("stop_all_hint")} />
       )}
     </div>
   );

@@ -94,7 +94,7 @@ function Crumbs() {
   const { page } = route.value;
   const robot = robotOf(route.value);
   return (
-    <div class={`crumbs ${robot ? "" : "no-robot"}`}>
+    <nav class={`crumbs ${robot ? "" : "no-robot"}`} aria-label={t("crumbs")}>
       {robot && (
         <>
           <span class="crumb-site">{robot.site}</span>
@@ -112,7 +112,7 @@ function Crumbs() {
           <strong class="crumb-page">{t("program")}</strong>
         </>
       )}
-    </div>
+    </nav>
   );
 }
 

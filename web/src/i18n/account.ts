@@ -44,6 +44,7 @@ const TEXTS = {
     "页面内容已清除，因为其中不再有实时数据。",
   ],
 
+  account: ["Account", "账户"],
   menu: ["Account: {account}, {role}", "账户：{account}，{role}"],
   role_monitor: ["monitor", "监视"],
   role_operator: ["operator", "操作员"],

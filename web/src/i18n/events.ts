@@ -61,6 +61,7 @@ export const EVENTS_TEXTS = {
   acknowledge_selected: ["Acknowledge selected ({count})", "确认所选（{count}）"],
   acknowledge_shown: ["Acknowledge all shown ({count})", "确认全部显示（{count}）"],
   shelve: ["Shelve…", "搁置…"],
+  shelve_of: ["Shelve…: {text}", "搁置…：{text}"],
   shelve_selected: ["Shelve selected…", "搁置所选…"],
   shelve_count: [
     "Shelve {count} alarms: they are put aside for a while, and come back by themselves.",
@@ -97,6 +98,8 @@ export const EVENTS_TEXTS = {
   sound: ["Tone for new alarms", "新报警提示音"],
 
   journal: ["Journal", "日志"],
+  journal_kind: ["What the journal shows", "日志内容"],
+  entry: ["Entry", "条目"],
   journal_events: ["Events", "事件"],
   journal_notes: ["Notes", "备注"],
   journal_day: ["Day", "单日"],

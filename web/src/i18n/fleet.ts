@@ -5,6 +5,7 @@ import { inLanguage } from "./texts";
 export const FLEET_TEXTS = {
   every_site: ["All sites", "所有站点"],
   site: ["Site", "站点"],
+  state_counts: ["Robots by state", "各状态机器人数"],
   state: ["State", "状态"],
   any_state: ["All states", "所有状态"],
   needs_look: ["Needs a look", "需要关注"],

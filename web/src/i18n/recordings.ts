@@ -139,6 +139,7 @@ const TEXTS = {
   control: ["Control", "控制权"],
   program: ["Program", "程序"],
 
+  player: ["Player", "播放器"],
   transport: ["Transport", "播放控制"],
   pause: ["Pause", "暂停"],
   step_back: ["One step back ({step} s)", "后退一步（{step} 秒）"],

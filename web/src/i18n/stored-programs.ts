@@ -7,6 +7,7 @@ const TEXTS = {
   save_as: ["Save as new", "另存为"],
   save_hint: ["Saves a version at the site, for everybody (Ctrl+S).", "在站点保存一个版本，供所有人使用（Ctrl+S）。"],
   monitor: ["Only operators change stored programs.", "仅操作员可更改已存程序。"],
+  saved_state: ["Saved state", "保存状态"],
   programs: ["Programs", "程序库"],
   programs_hint: ["The programs that the site stores for this robot.", "站点为此机器人存储的程序。"],
   back_to_text: ["Back to the text", "返回文本"],

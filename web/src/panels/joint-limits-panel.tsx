@@ -30,7 +30,7 @@ export function JointLimitsPanel(props: {
   const singularity = state?.singularityMargin;
   const missing = state?.notCounted ?? [];
   return (
-    <ul class={`margins ${stale && state ? "stale" : ""}`}>
+    <ul class={`margins ${stale && state ? "stale" : ""}`} aria-label={t("margins")}>
       <Margin
         name="clearance"
         label={t("clearance")}
@@ -95,8 +95,14 @@ function Margin(props: {
   return (
     <li class={`margin ${level}`} data-margin={name}>
       <span class="margin-label">
-        {level !== "normal" && <span class={`shape ${level}`} aria-hidden="true" />}
-        {label}
+        {level !== "normal" && (
+          <span
+            class={`shape ${level}`}
+            role="img"
+            aria-label={t(level === "alarm" ? "severity_error" : "severity_warning")}
+          />
+        )}
+        {label}{" "}
         {of && (
           <span class="margin-of" title={of}>
             {of}

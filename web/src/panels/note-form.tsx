@@ -90,7 +90,7 @@ export function Withdrawable({ withdrawn, children }: { withdrawn: boolean; chil
   if (!withdrawn) return <>{children}</>;
   return (
     <>
-      <s>{children}</s> <span class="dim">({n("withdrawn")})</span>
+      <del>{children}</del> <span class="dim">({n("withdrawn")})</span>
     </>
   );
 }

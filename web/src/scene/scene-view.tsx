@@ -254,7 +254,8 @@ export function SceneView(props: {
       {stale && (staleJoints || !absent) && (loaded || problem) && (
         <p class="scene-stale" role="status">
           <span class="shape warning" aria-hidden="true" />
-          {age === undefined ? t("no_data") : staleText(age)}
+          {/* Announce it once, not each second. */}
+          <span aria-live="off">{age === undefined ? t("no_data") : staleText(age)}</span>
           {props.lostAt !== null && <span class="dim">{t("no_link_since", { time: timeOfDay(props.lostAt) })}</span>}
         </p>
       )}

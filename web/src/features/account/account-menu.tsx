@@ -21,7 +21,7 @@ export function AccountMenu() {
   const { account, role } = who;
   const operator = hello.value?.operator || who.operator;
   return (
-    <details ref={menu} class="account-menu">
+    <details ref={menu} class="account-menu" aria-label={a("account")}>
       <summary title={a("menu", { account, role: roleText(role) })}>
         <span class="account-name">{account}</span> <span class="account-role dim">{roleText(role)}</span>
       </summary>

@@ -124,7 +124,7 @@ function Row({ row, place }: { row: PairRow; place: number }) {
     Object.entries(values).map(([name, value]) => [name, value.toLocaleString("en")]),
   );
   return (
-    <tr class={isTouching(row) ? "touching" : isIgnored ? "ignored" : ""} data-kind={kind}>
+    <tr class={isTouching(row) ? "touching" : isIgnored ? "ignored" : ""}>
       <td>
         <input
           type="checkbox"

@@ -32,7 +32,7 @@ export function AlarmLine(props: {
   const [title, advice] = [alarmText(alarm), alarmAdvice(alarm.code, alarm.advice)];
   const when = alarm.last ?? alarm.since;
   return (
-    <li class={`alarm-line ${open ? "open" : ""} ${state === State.RETURNED ? "over" : ""}`} data-alarm={nameOf(alarm)}>
+    <li class={`alarm-line ${open ? "open" : ""} ${state === State.RETURNED ? "over" : ""}`}>
       <label class="alarm-select">
         <input
           type="checkbox"
@@ -89,7 +89,12 @@ export function AlarmLine(props: {
             {e("unshelve")}
           </button>
         ) : (
-          <button class="action" disabled={!able} onClick={props.shelve}>
+          <button
+            class="action"
+            disabled={!able}
+            aria-label={e("shelve_of", { text: title ?? text })}
+            onClick={props.shelve}
+          >
             {e("shelve")}
           </button>
         )}

@@ -176,7 +176,7 @@ export function AlarmPanel() {
               : e("no_alarms_match", { count: all.length })}
         </p>
       ) : (
-        <ul class="alarm-list">
+        <ul class="alarm-list" aria-label={e("alarms")}>
           {drawn.map((alarm) => (
             <AlarmLine
               key={nameOf(alarm)}

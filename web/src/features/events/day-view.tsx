@@ -178,7 +178,7 @@ function Sentence({ line }: { line: DayLine }) {
       <span class="dim small">{d(`kind_${line.kind}`)}</span>
       <span class="day-text">
         {line.bad && <span class="shape warning" aria-hidden="true" />}
-        {line.withdrawn ? <s>{line.text}</s> : wordsOf(line)}
+        {line.withdrawn ? <del>{line.text}</del> : wordsOf(line)}
       </span>
     </li>
   );

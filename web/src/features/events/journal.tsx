@@ -130,7 +130,7 @@ export function Journal() {
       <div class="panel-head">
         <h2>{e("journal")}</h2>
         <Choice
-          label={e("journal")}
+          label={e("journal_kind")}
           values={KINDS}
           chosen={kind}
           text={(each) => e(KIND_TEXTS[each])}
@@ -290,7 +290,7 @@ function Details({ entry, withdrawn, close }: { entry: Entry; withdrawn: boolean
     ...Object.entries(event?.values ?? audit?.values ?? {}),
   ];
   return (
-    <div class="entry-details" role="region" aria-label={wordsOf(entry)}>
+    <div class="entry-details" role="region" aria-label={e("entry")}>
       <p>{"event" in entry ? <EventWords entry={entry} /> : <AuditWords entry={entry} />}</p>
       {!original.includes(event ? eventText(event) : audit ? entryText(audit) : "") && (
         <p class="dim">

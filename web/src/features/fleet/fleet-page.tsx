@@ -59,11 +59,13 @@ export function FleetPage() {
       {[...bySite].map(([name, keys]) => (
         <section key={name} class="site" aria-label={`${t("site")} ${name}`}>
           <SiteHead site={name} robots={keys.length} />
-          <div class={`tiles ${size}`}>
+          <ul class={`tiles ${size}`}>
             {keys.map((key) => (
-              <RobotTile key={key} robotKey={key} />
+              <li key={key}>
+                <RobotTile robotKey={key} />
+              </li>
             ))}
-          </div>
+          </ul>
         </section>
       ))}
       <RunningReplays />
@@ -191,7 +193,7 @@ function Summary({ states }: { states: readonly StateWord[] }) {
     ([a], [b]) => LEVELS.indexOf(a?.level ?? "normal") - LEVELS.indexOf(b?.level ?? "normal"),
   );
   return (
-    <ul class="summary">
+    <ul class="summary" aria-label={f("state_counts")}>
       {sorted.map(
         ([first, ...others]) =>
           first && (

@@ -36,7 +36,7 @@ export function RobotTile({ robotKey }: { robotKey: string }) {
 function InvisibleTile({ robot }: { robot: string }) {
   return (
     <>
-      <div class="tile-picture">
+      <div class="tile-picture" aria-hidden="true">
         <span class="dim">{f("loading")}</span>
       </div>
       <div class="tile-body">
@@ -155,7 +155,7 @@ function Picture(props: { robotKey: string; description: Description | undefined
   const stale = props.stale || age === null || age > (description?.staleAfterS ?? staleAfter("joints/slow"));
   useEffect(() => picture?.setStale(stale), [picture, stale]);
   return (
-    <div class={`tile-picture ${stale ? "stale" : ""}`}>
+    <div class={`tile-picture ${stale ? "stale" : ""}`} aria-hidden="true">
       {drawable ? <canvas ref={canvas} /> : <Silhouette label={t("no_picture")} />}
       {drawable && age === null && !props.stale && <span class="picture-word dim">{f("loading")}</span>}
     </div>

@@ -73,7 +73,7 @@ function Verdict({ moved }: { moved: boolean }) {
       ? p(count === 1 ? "verdict_one" : "verdict_many", { count, duration })
       : p(count ? "verdict_warns" : answer.alone ? "verdict_alone" : "verdict_ok", { count, duration });
   return (
-    <p class={`verdict ${level} ${busy ? "busy" : ""}`} role="status" data-ok={!refused} data-busy={busy}>
+    <p class={`verdict ${level} ${busy ? "busy" : ""}`} role="status" data-ok={!refused} aria-busy={busy}>
       <span class={`shape ${level}`} aria-hidden="true" />
       <strong>{words}</strong>
       <span class="dim small">
@@ -123,7 +123,7 @@ function Row({ group: { worst, first, last, fromS, untilS } }: { group: Violatio
     if (line > 0) goToLine(line);
   };
   return (
-    <button class="violation" aria-current={current} data-kind={kind} onClick={show}>
+    <button class="violation" aria-current={current} onClick={show}>
       <span class={`violation-kind ${level}`}>
         <span class={`shape ${level}`} aria-hidden="true" />
         {known ? p(known) : kind}

@@ -20,7 +20,7 @@ export function Difference(props: { oldText: string; newText: string; whole: str
     <div class="difference" role="region" aria-label={s("difference")}>
       <div class="stored-tools">
         <Choice label={s("view")} values={VIEWS} chosen={view} text={(each) => s(each)} choose={setView} />
-        <span class="dim small" data-removed={removed} data-added={added}>
+        <span class="dim small">
           {rows.length === 0
             ? s("equal")
             : `${s("removed_lines", { count: count(removed) })} · ${s("added_lines", { count: count(added) })}`}
@@ -79,7 +79,7 @@ function Line({ row, half }: { row: Row; half?: boolean }) {
   return (
     <td class={`diff-text ${half ? `diff-${row.kind}` : ""}`}>
       <span class="diff-sign">{SIGNS[row.kind]}</span>
-      {row.text}
+      {row.kind === "old" ? <del>{row.text}</del> : row.kind === "new" ? <ins>{row.text}</ins> : row.text}
     </td>
   );
 }

@@ -31,7 +31,7 @@ export function PointList({ tell }: { tell: (words: Words) => void }) {
   return (
     <ul class="points" aria-label={p("points")}>
       {points.map((point) => (
-        <li key={`${point.line} ${point.name}`} data-point={point.name}>
+        <li key={`${point.line} ${point.name}`}>
           {naming === point.name ? (
             <input
               type="text"

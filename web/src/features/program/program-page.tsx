@@ -152,7 +152,7 @@ function ProgramOfRobot({ site, robot, sha256 }: RobotName & { sha256: string })
       <div class="program">
         <div class="headline">
           <h1>{p("program_of", { robot })}</h1>
-          <State state={stateWord(controller, events)} />
+          <State state={stateWord(controller, events)} told />
           {description?.message.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
           <a class="page-link" href={robotLink(site, robot)}>
             {p("to_robot")}

@@ -73,8 +73,9 @@ function Progress({ state }: { state: ProgramState }) {
   const level = { [Outcome.ENDED]: "alarm", [Outcome.RUNNING]: "motion" }[outcome as number] ?? "normal";
   const word = p(outcome === Outcome.RUNNING ? "is_running" : outcome === Outcome.DONE ? "is_done" : "is_ended");
   return (
-    <div class="progress" role="status" data-outcome={Outcome[outcome]}>
-      <p class="progress-head">
+    <div class="progress" role="group" aria-label={p("progress")} data-outcome={Outcome[outcome]}>
+      {/* Only this is announced: the rest changes each second. */}
+      <p class="progress-head" role="status">
         <span class={`state ${level}`}>
           <span class={`shape ${level}`} aria-hidden="true" />
           {word}
@@ -85,7 +86,7 @@ function Progress({ state }: { state: ProgramState }) {
       <progress
         max={Math.max(1, steps)}
         value={outcome === Outcome.DONE ? steps : Math.max(0, step - 1)}
-        aria-label={p("progress")}
+        aria-label={name}
       />
       <p class="progress-line">
         {line > 0 && <span class="dim">{p("line", { line })}</span>} <code>{statement}</code>
@@ -96,7 +97,11 @@ function Progress({ state }: { state: ProgramState }) {
             ` · ${p("time_left", { left: clock(Math.ceil(leftS)), all: clock(Math.ceil(durationS)) })}`}
         </span>
       </p>
-      {text && <p class="progress-text">{reasonText(state.reason, text)}</p>}
+      {text && (
+        <p class="progress-text" role="status">
+          {reasonText(state.reason, text)}
+        </p>
+      )}
     </div>
   );
 }

@@ -82,7 +82,7 @@ function List({ robotKey }: { robotKey: string }) {
           const name = current?.name ?? "";
           const [version, author] = [current?.number ?? 0, current?.author ?? ""];
           return (
-            <li key={id} data-program={name} aria-current={draft.value?.base?.id === id}>
+            <li key={id} aria-current={draft.value?.base?.id === id}>
               <span class="stored-name">
                 <strong>{name}</strong>
                 <span class="dim small">

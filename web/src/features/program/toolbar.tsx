@@ -115,11 +115,12 @@ function StoreLine() {
   const isNewer = base && current && (current.number > base.version || isDeleted(program));
   const said = lastAction.value;
   const words = said.words() || (now ? stateOfDraft() : "");
+  const state = { role: said.refused ? "alert" : "status", "aria-label": s("saved_state") } as const;
   return (
-    <p class="store-line" data-unsaved={isUnsaved.value}>
+    <p class="store-line">
       <span
         class={`store-words ${said.words() && said.refused ? "refused" : isNewer ? "newer" : "dim"}`}
-        role={said.refused ? "alert" : "status"}
+        {...state}
         title={words}
       >
         {words || "\u00a0"}

@@ -136,9 +136,10 @@ function Named({ curve, label, moment }: { curve: Curve; label: string; moment: 
     <span>
       <span class={`curve curve-${(colour % CURVES) + 1} ${second ? "second" : ""}`} aria-hidden="true" />
       <span title={series.name}>{label}</span>
-      <output class="figure">
+      {/* No output element: a screen reader would say each value as it plays. */}
+      <span class="figure">
         {value === null ? DASH : fixed(value * factor, decimals) + (unit === "°" ? unit : unit && `\u202f${unit}`)}
-      </output>
+      </span>
     </span>
   );
 }

@@ -49,7 +49,7 @@ export function EventMarks(props: { events: readonly RecordedEvent[]; duration: 
     .slice(0, MOST_MARKS)
     .sort((first, second) => first.at - second.at);
   return (
-    <div class="event-marks">
+    <div class="event-marks" role="group" aria-label={r("events")}>
       {duration > 0 &&
         props.events.map(({ at, until, withdrawn }, i) =>
           until === undefined || withdrawn ? null : (

@@ -60,7 +60,7 @@ export function Player({ first, second }: { first: RecordingName; second: Record
   const events = recordedEvents.value?.list ?? NONE;
   const recorded = viewsIn(info.value);
   return (
-    <div class={`player ${second ? "two" : ""}`} data-replay={key.split("/")[2]} data-playing={state?.playing ?? false}>
+    <div class={`player ${second ? "two" : ""}`} role="group" aria-label={r("player")} data-replay={key.split("/")[2]}>
       <div class="player-head">
         <div class="headline">
           <a class="page-link" href={recordingsLink()}>

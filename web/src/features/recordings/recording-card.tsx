@@ -50,7 +50,7 @@ export function RecordingCard(props: {
   const isFirst = first?.site === site && first.file === file;
   const compare = () => (props.first.value = isFirst ? null : { ...mine, name });
   return (
-    <li class={`recording ${open ? "open" : ""}`} data-file={file}>
+    <li class={`recording ${open ? "open" : ""}`}>
       <Thumbnail site={site} recording={recording} />
       <div class="recording-body">
         <div class="recording-title">

@@ -234,10 +234,11 @@ export function JointsPanel(props: {
 }
 
 function Limit({ text, refused }: { text: string; refused: boolean }) {
+  if (!refused) return <span class="limit dim">{text}</span>;
   return (
-    <span class={`limit ${refused ? "refused" : "dim"}`}>
-      {refused && <span class="shape warning" aria-hidden="true" />}
+    <strong class="limit refused">
+      <span class="shape warning" aria-hidden="true" />
       {text}
-    </span>
+    </strong>
   );
 }

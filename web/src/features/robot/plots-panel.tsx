@@ -234,8 +234,8 @@ function Legend(props: {
   now.value; // the values four times a second
   const held = Math.max(1, seconds / 100);
   return (
-    <div class="legend">
-      {props.common && <span>{partText(props.common)}</span>}
+    <ul class="legend" {...(props.common && { "aria-label": partText(props.common) })}>
+      {props.common && <li aria-hidden="true">{partText(props.common)}</li>}
       {fields.map((name, i) => {
         const { factor, decimals, unit } = shownUnit(props.unit(name));
         const at = moment ?? frozen?.end ?? null;
@@ -243,16 +243,16 @@ function Legend(props: {
         const value = at === null ? feed.newest(name) : past ? (past.low + past.high) / 2 : null;
         const sent = feed.has(name);
         return (
-          <span key={name} title={sent ? name : `${name}: ${p("not_sent_hint")}`}>
+          <li key={name} title={sent ? name : `${name}: ${p("not_sent_hint")}`}>
             <CurveMark index={i} />
             {valueText(name, props.common, props.description)}
-            <span class={`figure ${sent && value === null ? "absent" : ""}`} data-value={name}>
+            <span class={`figure ${sent && value === null ? "absent" : ""}`}>
               {!sent ? p("not_sent") : value === null ? DASH : withUnit(fixed(value * factor, decimals), unit)}
             </span>
-          </span>
+          </li>
         );
       })}
-    </div>
+    </ul>
   );
 }
 

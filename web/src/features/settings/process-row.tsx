@@ -33,11 +33,10 @@ export function ProcessRow(props: { of: string; seen: Seen; latest: Latest<MeshS
   const differs = mine !== "" && seen.version !== "" && seen.version !== mine;
   const values = Object.entries(seen.values).sort(([a], [b]) => a.localeCompare(b));
   return (
-    <tr class={goneAt !== null || silent ? "gone" : ""} data-service={seen.service}>
+    <tr class={goneAt !== null || silent ? "gone" : ""}>
       <th scope="row">
         {seen.site !== props.of && <span class="dim">{seen.site}/</span>}
-        {seen.service}
-        {seen.robots.length > 0 && <span class="dim small seen-robots">{robotsText(seen.robots)}</span>}
+        {seen.service} {seen.robots.length > 0 && <span class="dim small seen-robots">{robotsText(seen.robots)}</span>}
         {values.length > 0 && (
           <details class="seen-values">
             <summary aria-label={s("values", { name: seen.service })}>

@@ -237,7 +237,7 @@ function Requests({ mine, robotKey, lease }: { mine: boolean; robotKey: string; 
 
 function ControlRequest(props: { strong?: boolean; text: string; reason?: string; children?: ComponentChildren }) {
   return (
-    <div class={`wish ${props.strong ? "strong" : ""}`}>
+    <div class={`wish ${props.strong ? "strong" : ""}`} role="group" aria-label={t("control_request")}>
       <p>{props.reason ? t("with_reason", { text: props.text, reason: props.reason }) : props.text}</p>
       {props.children}
     </div>
