@@ -118,7 +118,8 @@ def _value(signal: schema.Signal) -> str:
         case "on":
             return str(int(signal.on))
         case _:
-            return signal.text
+            # A spreadsheet would calculate a text that begins like a formula.
+            return f"'{signal.text}" if signal.text.startswith(("=", "+", "-", "@", "\t", "\r")) else signal.text
 
 
 def _text(time_ns: int) -> str:

@@ -32,7 +32,7 @@ def signals(at_s, **others):
     message = schema.Signals()
     message.signals.add(name="io.digital_in.3", on=int(at_s) % 2 == 1)
     message.signals.add(name="joint.waist.current", unit="A", number=at_s / 10)
-    message.signals.add(name="program.name", text=f"weld, {int(at_s)}")
+    message.signals.add(name="program.name", text=f"=weld, {int(at_s)}")
     for name, number in others.items():
         message.signals.add(name=name, unit="kg", number=number)
     return message
@@ -81,9 +81,9 @@ def test_a_table_has_a_column_each_and_nothing_where_they_are_stale(recorded, tm
     last = ["io.digital_in.3", "joint.waist.current [A]", "mass [kg]", "program.name"]
     assert header[-4:] == last
     by_time = {round(float(row[3]), 2): row[-4:] for row in rows}
-    assert by_time[1.0] == ["1", "0.1", "", "weld, 1"]
+    assert by_time[1.0] == ["1", "0.1", "", "'=weld, 1"]
     assert by_time[1.05] == by_time[1.0]
-    assert by_time[9.0] == ["1", "0.9", "2.0", "weld, 9"]
+    assert by_time[9.0] == ["1", "0.9", "2.0", "'=weld, 9"]
     assert by_time[6.5][1] == "0.39"
     assert by_time[7.5] == ["", "", "", ""]
 

@@ -134,7 +134,7 @@ export function JointsPanel(props: {
         ? t("joint_hint")
         : mine || !reachable.value
           ? why
-          : isMonitor.value
+          : isMonitor.value || props.controller?.readOnly
             ? ""
             : t("joint_hint_take");
   return (
