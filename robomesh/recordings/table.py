@@ -119,7 +119,9 @@ def _value(signal: schema.Signal) -> str:
             return str(int(signal.on))
         case _:
             # A spreadsheet would calculate a text that begins like a formula.
-            return f"'{signal.text}" if signal.text.startswith(("=", "+", "-", "@", "\t", "\r")) else signal.text
+            return (
+                f"'{signal.text}" if signal.text.startswith(("=", "+", "-", "@", "\t", "\r")) else signal.text
+            )
 
 
 def _text(time_ns: int) -> str:
