@@ -66,6 +66,7 @@ COMMANDS = {
     "programs": Row(
         "programs", "Programs stored at a site: list, show, save, restore, diff, export, import."
     ),
+    "probe": Row("probe", "Show which protocol a controller's port speaks."),
     "note": Row("note", "Write a note on a robot's time, list its notes, or withdraw one."),
     "cell": Row("cell", "Fixtures and the floor of a robot's cell: show, set, move, undo."),
     "recordings": Row(

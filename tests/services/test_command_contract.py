@@ -30,6 +30,7 @@ CONTRACT = {
     "monitor": ("--json",),
     "signals": ("--follow", "--json"),
     "send": ("--json",),
+    "probe": ("--json",),
     "robot check": ("--json",),
     "robot show": ("--json",),
     "robot import": (),

@@ -1,0 +1,144 @@
+"""`robomesh probe` before simulated controllers, and before servers of others that are none."""
+
+import asyncio
+import contextlib
+import http.server
+import socket
+import threading
+
+import pytest
+
+from services.command_line import probe
+from services.command_line.probe import ProbeError, examine
+from tests.conftest import free_port, run
+from tests.protocol_gateway.gateway_site import simulator
+from tests.protocol_gateway.test_hses_driver import controller as yaskawa
+from tests.protocol_gateway.test_rtde_driver import controller as universal_robots
+
+
+@contextlib.contextmanager
+def server(*, says=b""):
+    """Listen on a port; yield it, and all bytes that arrive there."""
+    heard = bytearray()
+
+    def serve():
+        with contextlib.suppress(OSError), listening.accept()[0] as connection:
+            connection.sendall(says)
+            while data := connection.recv(4096):
+                heard.extend(data)
+
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        serving = threading.Thread(target=serve)
+        serving.start()
+        yield listening.getsockname()[1], heard
+    serving.join(10)
+
+
+@pytest.fixture(autouse=True)
+def _quick(monkeypatch):
+    monkeypatch.setattr(probe, "_LISTEN_S", 0.5)
+
+
+def examined(address):
+    return asyncio.to_thread(examine, address)
+
+
+def test_the_unit_protocol_is_recognized_without_a_byte_sent():
+    async def main():
+        async with simulator(demo=True) as port:
+            found = await examined(f"tcp://127.0.0.1:{port}")
+        assert (found.protocol, found.sent) == ("unit", "nothing")
+        assert "with 5 joints" in found.text
+
+    run(main())
+
+
+def test_a_controller_of_universal_robots_is_recognized_by_its_answer(monkeypatch):
+    async def main():
+        async with universal_robots() as (rtde, primary):
+            monkeypatch.setattr(probe, "_RTDE_PORT", rtde)
+            monkeypatch.setattr(probe, "_PRIMARY_PORTS", (primary,))
+            found = await examined(f"tcp://127.0.0.1:{rtde}")
+            assert (found.protocol, found.sent) == ("rtde", "the request for RTDE version 2")
+            assert "Universal Robots: RTDE, version 2" in found.text
+            found = await examined(f"tcp://127.0.0.1:{primary}")
+            assert (found.protocol, found.sent) == ("", "nothing")
+            assert "Universal Robots' primary or secondary interface" in found.text
+
+    run(main())
+
+
+def test_a_controller_of_yaskawa_is_recognized_by_its_answer(monkeypatch):
+    async def main():
+        async with yaskawa() as port:
+            monkeypatch.setattr(probe, "_HSES_PORT", port)
+            found = await examined(f"udp://127.0.0.1:{port}")
+        assert found.protocol == "hses"
+        assert "a controller of Yaskawa with HSES: model" in found.text
+
+    run(main())
+
+
+@pytest.mark.parametrize("name", ["_PRIMARY_PORTS", "_RMI_PORT", None])
+def test_to_ports_that_move_an_arm_and_to_unknown_ones_nothing_is_sent(monkeypatch, name):
+    with server() as (port, heard):
+        if name is not None:
+            monkeypatch.setattr(probe, name, (port,) if name == "_PRIMARY_PORTS" else port)
+        found = examine(f"tcp://127.0.0.1:{port}")
+    assert (found.protocol, found.sent, heard) == ("", "nothing", b"")
+
+
+def test_ports_that_move_an_arm_are_those_of_the_manuals():
+    assert {30001, 30002, 30003} <= {*probe._PRIMARY_PORTS}
+    assert (probe._RMI_PORT, probe._RTDE_PORT, probe._HSES_PORT) == (16001, 30004, 10040)
+
+
+@pytest.mark.parametrize(
+    ("says", "words"),
+    [
+        (b"SSH-2.0-OpenSSH_9.2\r\n", "sends something unknown: SSH-2.0-OpenSSH_9.2"),
+        (b"\x00" * 70_000, "sends something unknown"),
+        (b"1#ABSOLUTE.DEG*1;2@1#ABSOLUTE.DEG*1;2@", "with 2 joints"),
+        (b"1#7001*1;2@1#7001*1;2@", "no joint positions yet"),
+        (b"1#ABSOLUTE.DEG*\x1b[2J@", "sends something unknown"),
+    ],
+)
+def test_what_a_port_sends_is_shown_plainly(says, words):
+    with server(says=says) as (port, _):
+        found = examine(f"tcp://127.0.0.1:{port}")
+    assert words in found.text
+    assert "\x1b" not in found.text
+    assert len(found.text) < 200
+
+
+def test_a_web_server_is_no_controller(monkeypatch):
+    class Quiet(http.server.SimpleHTTPRequestHandler):
+        def log_message(self, *_):
+            pass
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Quiet) as serving:
+        threading.Thread(target=serving.serve_forever).start()
+        port = serving.server_address[1]
+        try:
+            assert "sends nothing within 0.5 s" in examine(f"tcp://127.0.0.1:{port}").text
+            monkeypatch.setattr(probe, "_RTDE_PORT", port)
+            monkeypatch.setattr(probe, "_ANSWER_S", 0.5)
+            assert "to a request for RTDE" in examine(f"tcp://127.0.0.1:{port}").text
+        finally:
+            serving.shutdown()
+
+
+@pytest.mark.parametrize(
+    ("address", "words"),
+    [
+        ("10.0.0.7:30004", "tcp://HOST:PORT is right"),
+        ("tcp://10.0.0.7", "tcp://HOST:PORT is right"),
+        ("http://10.0.0.7:80", "tcp://HOST:PORT is right"),
+        ("tcp://10.0.0.7:0", "tcp://HOST:PORT is right"),
+        ("udp://127.0.0.1:53", "of UDP ports only 10040 is known"),
+        (f"tcp://127.0.0.1:{free_port()}", "Connection refused"),
+    ],
+)
+def test_what_cannot_be_probed_is_named(address, words):
+    with pytest.raises(ProbeError, match=words):
+        examine(address)
