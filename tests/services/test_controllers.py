@@ -1,12 +1,15 @@
 """Addresses of controllers, from the site file and from options."""
 
+from pathlib import Path
+
 import pytest
 
+from protocol_gateway.drivers.registry import DRIVERS
 from services.command_line.site.controllers import ControllerError, controller_addresses
 from services.command_line.site.services import SERVICES, Options
 from services.command_line.site.up import programs
 from services.simulator.yaskawa.service import with_factors
-from services.site_file.site import Site
+from services.site_file.site import Site, load
 from services.site_file.yaskawa import Yaskawa
 
 UR = {"name": "ur", "model": "puma560", "protocol": "rtde", "controller": "tcp://10.0.0.7:30004"}
@@ -96,3 +99,13 @@ def test_a_simulated_robot_with_hses_gets_a_simulator_with_the_same_pulses():
         if yaskawa:
             told = Yaskawa.model_validate_json(words[words.index("--yaskawa") + 1])
             assert with_factors(told.settings, 6) == settings.robots[0].options
+
+
+def test_the_example_has_a_simulated_controller_of_each_protocol():
+    example = load(Path(__file__).resolve().parents[2] / "examples" / "vendors.toml")
+    assert {robot.protocol for robot in example.robot} == {*DRIVERS}
+    ways = {"unit": "tcp", "rtde": "tcp", "hses": "udp"}
+    named = enumerate(example.robot, start=1)
+    addresses = [f"{robot.name}={ways[robot.protocol]}://127.0.0.1:{port}" for port, robot in named]
+    settings = SERVICES["gateway"].settings(example, Options(controllers=addresses))
+    assert [robot.protocol for robot in settings.robots] == ["unit", "rtde", "hses"]
