@@ -109,8 +109,7 @@ def strict_states(data: bytes) -> list[tuple[float, tuple[float, ...], int]]:
         if data[at + 2] == ord("U") and len(body) == 1 + 8 * 7 + 4 + 8 and body[0] == 1:
             numbers = [struct.unpack(">d", body[1 + 8 * i : 9 + 8 * i])[0] for i in range(7)]
             mode = int.from_bytes(body[57:61], "big", signed=True)
-            (payload,) = struct.unpack(">d", body[61:69])
-            if all(number - number == 0 for number in (*numbers, payload)):
+            if all(number - number == 0 for number in numbers):
                 states.append((numbers[0], tuple(numbers[1:]), mode))
         at += size
     return states
