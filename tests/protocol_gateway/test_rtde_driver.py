@@ -34,9 +34,12 @@ from protocol_gateway.drivers.universal_robots.modes import (
 from protocol_gateway.drivers.universal_robots.signals import signals_of
 from protocol_gateway.drivers.universal_robots.state import OUTPUTS, ControllerState
 from protocol_gateway.errors import CommandError, GatewaySettingsError
+from robomesh.session import open_session
+from robots.description import load
 from robots.joints import JointType
+from robots.model import build_model, tool_placement
 from services.simulator.universal_robots.service import UrSettings, serve_rtde
-from tests.conftest import free_port, run
+from tests.conftest import free_port, last_value, run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
 
 UR = {"description": "puma560", "protocol": "rtde"}
@@ -201,7 +204,7 @@ def test_every_signal_has_a_shared_name_and_its_unit():
         timestamp_s=1.0,
         positions=(0.0,) * 6,
         **dict.fromkeys(("currents_a", "target_torques", "temperatures_c", "tool_force"), (1.0,) * 6),
-        tool_offset=(0.1,) * 6,
+        **dict.fromkeys(("tool_offset", "tool_pose"), (0.1,) * 6),
         payload_centre_m=(0.1,) * 3,
         joint_modes=(253,) * 6,
         **dict.fromkeys(("robot_mode", "safety_mode", "runtime_state"), 1),
@@ -226,7 +229,7 @@ def test_every_signal_has_a_shared_name_and_its_unit():
             assert (kind, signal.unit) == (SHARED[shared], ""), name
     units = {signal.name: signal.unit for signal, _ in found}
     assert (units["io.analog_in.0"], units["io.analog_in.1"], units["io.analog_out.1"]) == ("V", "A", "V")
-    assert len(found) == len({(signal.name, signal.joint) for signal, _ in found}) == 98
+    assert len(found) == len({(signal.name, signal.joint) for signal, _ in found}) == 104
 
 
 def test_a_controller_without_positions_is_left_and_tried_again_later():
@@ -335,6 +338,22 @@ async def tap(port):
     async with server:
         yield server.sockets[0].getsockname()[1], sent
         server.close()
+
+
+def test_the_controllers_cartesian_position_is_that_of_its_joints(mesh, tmp_path):
+    async def main():
+        async with (
+            controller() as (port, primary),
+            gateway(mesh, tmp_path, port, **UR, ports={"primary": primary}) as site,
+            open_session(mesh) as session,
+        ):
+            await until(lambda: site.joints)
+            message = await last_value(session, site.key("signals"))
+            return site.joints, {each.name: each.number for each in message.signals}
+
+    joints, numbers = run(main())
+    tool = tool_placement(build_model(load("puma560")), joints)
+    assert [numbers[f"tool.pose.{axis}"] for axis in "xyz"] == pytest.approx(tool[:3, 3], abs=1e-6)
 
 
 def test_a_controller_with_rtde_is_shown_and_never_commanded(mesh, tmp_path):

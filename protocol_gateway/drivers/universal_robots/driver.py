@@ -59,8 +59,8 @@ FREQUENCY_HZ = 125.0
 """States a second that are requested; every controller can send so many."""
 JOINTS = 6
 
-# The arm follows its targets closely, and robomesh computes the tool's pose and speed itself.
-_NOT_READ = frozenset({"target_q", "actual_TCP_pose", "actual_TCP_speed", "tool_mode"})
+# The arm follows its targets closely, and robomesh computes the tool's speed itself.
+_NOT_READ = frozenset({"target_q", "actual_TCP_speed", "tool_mode"})
 _FIELDS = {name: kind for name, kind in OUTPUTS.items() if name not in _NOT_READ}
 _RETRY_S = 2.0
 # A fault needs a restart of the controller's safety; a stop needs a person at the robot.
