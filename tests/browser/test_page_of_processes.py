@@ -53,8 +53,7 @@ def test_home_trace_move_and_stop_from_the_page_reach_the_controller_and_the_rec
         expect(state_word(page)).to_have_text("Idle")
         assert degrees(page, "waist") > before + 5
 
-        drag(page, "waist", -120)
-        expect(state_word(page)).to_have_text("Moving")
+        wait_to_move(page, "waist", lambda: drag(page, "waist", -120))
         stop_button(page).click()
         expect(state_word(page)).to_have_text("Stopped")
         page.get_by_role("button", name="Reset stop").click()
