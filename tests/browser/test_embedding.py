@@ -97,10 +97,10 @@ def test_pages_of_listed_origins_show_pictures_and_video_and_others_do_not(mesh,
 
 async def until_shown(tab, address):
     """Open a page until its pictures are there: a browser does not ask again for one that came too late."""
-    for last in (False, False, False, True):
+    for last in (False, False, True):
         await tab.goto(address, wait_until="commit")
         try:
-            await tab.wait_for_function(SHOWN, timeout=PATIENCE_MS / 2)
+            await tab.wait_for_function(SHOWN, timeout=PATIENCE_MS)
         except Error:
             if last:
                 raise
