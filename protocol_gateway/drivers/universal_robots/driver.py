@@ -14,7 +14,6 @@ from protocol_gateway.drivers.driver import (
     Carries,
     Channel,
     Close,
-    ControllerCommand,
     ControllerEvent,
     Effect,
     Effects,
@@ -27,6 +26,7 @@ from protocol_gateway.drivers.driver import (
     Severity,
     StatusReceived,
 )
+from protocol_gateway.drivers.only_reads import OnlyReads
 from protocol_gateway.drivers.universal_robots.modes import (
     ReportLevel,
     RobotMode,
@@ -47,8 +47,7 @@ from protocol_gateway.drivers.universal_robots.rtde_messages import TextReceived
 from protocol_gateway.drivers.universal_robots.rtde_reader import Failed, RtdeReader
 from protocol_gateway.drivers.universal_robots.signals import SignalReports
 from protocol_gateway.drivers.universal_robots.state import OUTPUTS, ControllerState
-from protocol_gateway.errors import CommandError, GatewaySettingsError
-from robomesh import reason_codes
+from protocol_gateway.errors import GatewaySettingsError
 from robots.joints import JointType
 
 RTDE = Channel(name="rtde", carries=Carries.READING)
@@ -88,7 +87,7 @@ _SEVERITIES: Mapping[int, Severity] = MappingProxyType(
 )
 
 
-class RtdeDriver:
+class RtdeDriver(OnlyReads):
     """Driver of RTDE and the primary interface (`protocol_gateway.drivers.driver.Driver`).
 
     Raises:
@@ -196,18 +195,6 @@ class RtdeDriver:
         """Connect again after a failure."""
         left, self._left = self._left, {}
         return tuple(left.values())
-
-    def encode(self, *commands: ControllerCommand) -> bytes:
-        """Refuse: nothing is ever commanded.
-
-        Raises:
-            CommandError: Always.
-        """
-        raise CommandError(reason_codes.READS_ONLY())
-
-    def command(self, encoded: bytes, now_s: float) -> Effects:
-        """Send nothing."""
-        return ()
 
 
 def alarm_of(event: PrimaryEvent) -> AlarmReceived | None:

@@ -12,7 +12,6 @@ from protocol_gateway.drivers.driver import (
     Capabilities,
     Carries,
     Channel,
-    ControllerCommand,
     ControllerEvent,
     Effect,
     Effects,
@@ -27,6 +26,7 @@ from protocol_gateway.drivers.driver import (
     StatusReceived,
 )
 from protocol_gateway.drivers.hexadecimal import hexadecimal
+from protocol_gateway.drivers.only_reads import OnlyReads
 from protocol_gateway.drivers.signal_names import of_joints
 from protocol_gateway.drivers.yaskawa import data as payloads
 from protocol_gateway.drivers.yaskawa import signals
@@ -34,7 +34,7 @@ from protocol_gateway.drivers.yaskawa.axes import Axes, YaskawaSettings, instanc
 from protocol_gateway.drivers.yaskawa.data import HELD, Alarm, DataType, Position, Status, Status1, Status2
 from protocol_gateway.drivers.yaskawa.hses import Answer, Command, Read, Service, decode
 from protocol_gateway.drivers.yaskawa.polling import Asked, Polling, Regular
-from protocol_gateway.errors import CommandError, GatewaySettingsError
+from protocol_gateway.errors import GatewaySettingsError
 from robomesh import reason_codes
 from robots.joints import JointType
 
@@ -54,7 +54,7 @@ _ALARMS_EACH_S = 1.0
 _SOME_PULSES = 10
 
 
-class HsesDriver:
+class HsesDriver(OnlyReads):
     """Driver of HSES (`protocol_gateway.drivers.driver.Driver`).
 
     Raises:
@@ -149,18 +149,6 @@ class HsesDriver:
     def timer_ended(self, now_s: float) -> Effects:
         """Ask the next question, or give up an answer that did not come."""
         return self._go_on(now_s)
-
-    def encode(self, *commands: ControllerCommand) -> bytes:
-        """Refuse: nothing is ever commanded.
-
-        Raises:
-            CommandError: Always.
-        """
-        raise CommandError(reason_codes.READS_ONLY())
-
-    def command(self, encoded: bytes, now_s: float) -> Effects:
-        """Send nothing."""
-        return ()
 
     def _go_on(self, now_s: float) -> Sequence[Effect]:
         before, lost = self._polling.asked, self._polling.lost
