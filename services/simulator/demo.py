@@ -34,6 +34,7 @@ class DemoProgram:
     Args:
         tour: Targets (n,) [rad] or [m]; None: no program, at rest.
         speed: Fraction of the joints' speeds.
+        start: Positions (n,) [rad] or [m] at which it begins; None: home.
 
     Attributes:
         speed: The next motions have it.
@@ -41,8 +42,15 @@ class DemoProgram:
         stopped: The program waits at the place where the arm was stopped.
     """
 
-    def __init__(self, joints: Joints, tour: Iterator[FloatArray] | None, *, speed: float) -> None:
-        self._motion = Motion(joints, joints.home.copy())
+    def __init__(
+        self,
+        joints: Joints,
+        tour: Iterator[FloatArray] | None,
+        *,
+        speed: float,
+        start: FloatArray | None = None,
+    ) -> None:
+        self._motion = Motion(joints, joints.home.copy() if start is None else start)
         self._tour = tour
         self._target: FloatArray | None = None
         self.speed = speed
@@ -79,6 +87,10 @@ class DemoProgram:
         self.speed = speed
         if self._motion.moving(now_s) and not self.stopped:
             self._move(now_s)
+
+    def moving(self, now_s: float) -> bool:
+        """Return whether the arm moves."""
+        return self._motion.moving(now_s)
 
     def state(self, now_s: float) -> ArmState:
         """Return positions, velocities and accelerations."""

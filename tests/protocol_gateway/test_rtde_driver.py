@@ -306,12 +306,10 @@ def test_it_refuses_other_robots_codes_and_every_command():
 async def controller(**settings):
     """Run a simulated controller; yield its ports of RTDE and of the primary interface."""
     ready = asyncio.get_running_loop().create_future()
-    task = asyncio.create_task(
-        serve_rtde(UrSettings(**settings), ready=lambda *ports: ready.set_result(ports))
-    )
+    task = asyncio.create_task(serve_rtde(UrSettings(**settings), ready=ready.set_result))
     await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
     try:
-        yield await ready
+        yield (await ready)[:2]
     finally:
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
@@ -413,7 +411,7 @@ def test_without_its_alarms_a_controller_is_shown_and_a_port_of_no_interface_is_
                 lost = await site.event("link.channel_lost", -1)
                 assert "primary" in lost.text
                 assert site.controller.link == STATE.UP
-            with pytest.raises(GatewaySettingsError, match=r"'primery'.*has 'primary'"):
+            with pytest.raises(GatewaySettingsError, match=r"'primery'.*has .*'primary'"):
                 async with gateway(mesh, tmp_path / "b", port, **UR, ports={"primery": primary}):
                     pass
 

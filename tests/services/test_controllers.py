@@ -41,12 +41,13 @@ def test_a_simulated_robot_with_rtde_gets_a_simulator_that_the_gateway_can_reach
     found = {each.name: each.arguments for each in programs(simulated, None, "tcp/127.0.0.1:7447")}
     words = found["simulate ur"]
     assert words[words.index("--protocol") :][:2] == ("--protocol", "rtde")
-    listen, primary = (words[words.index(f"--{name}") + 1] for name in ("listen", "primary"))
+    names = ("primary", "scripts", "dashboard")
+    listen, *others = (words[words.index(f"--{name}") + 1] for name in ("listen", *names))
     option = found["gateway"][found["gateway"].index("--controller") + 1]
     address = controller_addresses(simulated, [option])["ur"]
     assert (f"{address.host}:{address.port}", address.ports) == (
         listen,
-        {"primary": int(primary.rpartition(":")[2])},
+        {name: int(other.rpartition(":")[2]) for name, other in zip(names, others, strict=True)},
     )
 
 

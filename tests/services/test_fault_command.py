@@ -55,7 +55,7 @@ def test_fault_that_a_controller_cannot_show_is_refused(mesh, router):
         own = Mesh(site="hall", robot="ur", session=mesh)
         ready = asyncio.get_running_loop().create_future()
         settings = UrSettings(mesh=own)
-        task = asyncio.create_task(serve_rtde(settings, ready=lambda *ports: ready.set_result(ports)))
+        task = asyncio.create_task(serve_rtde(settings, ready=ready.set_result))
         await ready
         try:
             to = ("--connect", router)

@@ -67,12 +67,12 @@ PUMA = load("puma560")
 async def simulator(**options):
     ready = asyncio.get_running_loop().create_future()
     settings = UrSettings(**options)
-    task = asyncio.create_task(serve_rtde(settings, ready=lambda *ports: ready.set_result(ports)))
+    task = asyncio.create_task(serve_rtde(settings, ready=ready.set_result))
     await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
     if task.done():
         await task
     try:
-        yield ready.result()
+        yield ready.result()[:2]
     finally:
         task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
@@ -458,7 +458,7 @@ def test_rotation_vector_is_the_axis_times_the_angle():
             assert found == pytest.approx(axis * angle, abs=1e-7)
 
 
-def test_command_serves_both_interfaces():
+def test_command_serves_all_interfaces():
     words = (
         "simulate",
         "--protocol",
@@ -466,8 +466,7 @@ def test_command_serves_both_interfaces():
         "--demo",
         "--listen",
         "127.0.0.1:0",
-        "--primary",
-        "127.0.0.1:0",
+        *(word for name in ("primary", "scripts", "dashboard") for word in (f"--{name}", "127.0.0.1:0")),
     )
 
     async def main():
@@ -477,7 +476,9 @@ def test_command_serves_both_interfaces():
         try:
             line = (await process.stdout.readline()).decode()
             ports = re.fullmatch(
-                r"listening on 127\.0\.0\.1:(\d+), primary interface on 127\.0\.0\.1:(\d+)\n", line
+                r"listening on \S+:(\d+), primary interface on \S+:(\d+), scripts on \S+:(\d+), "
+                r"dashboard on \S+:(\d+)\n",
+                line,
             )
             async with connection(int(ports[1])) as streams, connection(int(ports[2])) as (reader, _):
                 assert (await Monitor(*streams).ready()).controller.major == 5

@@ -49,6 +49,28 @@ except RuntimeError as error:
 """
 
 
+MOVE = """
+import json, sys, time
+from rtde_control import RTDEControlInterface
+from rtde_receive import RTDEReceiveInterface
+control = RTDEControlInterface(sys.argv[1])
+receive = RTDEReceiveInterface(sys.argv[1])
+start = receive.getActualQ()
+target = [start[0] + 0.3, *start[1:4], start[4] - 0.2, start[5]]
+control.moveJ(target, 0.8, 1.5)
+there = receive.getActualQ()
+control.moveJ([target[0] + 1.0, *target[1:]], 0.5, 1.5, True)
+while receive.getActualQ()[0] < target[0] + 0.2:
+    time.sleep(0.01)
+control.stopJ(3.0)
+stopped = receive.getActualQ()
+control.setWatchdog(10.0)
+while receive.getRuntimeState() != 1:
+    time.sleep(0.01)
+print(json.dumps([target, there, stopped]))
+"""
+
+
 async def client_of(address, program, *words):
     """Return the last line that a program prints, read as JSON."""
     process = await asyncio.create_subprocess_exec(
@@ -83,15 +105,21 @@ async def signals_of(address, port):
 
 
 @contextlib.asynccontextmanager
-async def simulator(address):
+async def simulator(address, *, demo=True):
     ready = asyncio.get_running_loop().create_future()
-    settings = UrSettings(listen=f"{address}:30004", primary=f"{address}:0", demo=True)
-    task = asyncio.create_task(serve_rtde(settings, ready=lambda *ports: ready.set_result(ports)))
+    settings = UrSettings(
+        listen=f"{address}:30004",
+        primary=f"{address}:0",
+        scripts=f"{address}:30003",  # where ur_rtde sends its program
+        dashboard=f"{address}:29999",
+        demo=demo,
+    )
+    task = asyncio.create_task(serve_rtde(settings, ready=ready.set_result))
     await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
     if task.done():
         await task
     try:
-        yield ready.result()
+        yield ready.result()[:2]
     finally:
         task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
@@ -156,5 +184,16 @@ def test_ur_rtde_writes_outputs_and_a_second_one_finds_them_in_use():
     async def main():
         async with simulator("127.0.31.2"):
             assert "already in use" in await client_of("127.0.31.2", WRITE)
+
+    run(main())
+
+
+def test_program_of_ur_rtde_moves_and_stops_the_arm_and_its_watchdog_ends_it():
+    async def main():
+        async with simulator("127.0.31.5", demo=False):
+            target, there, stopped = await client_of("127.0.31.5", MOVE)
+        assert there == pytest.approx(target, abs=1e-9)
+        assert 0.2 <= stopped[0] - target[0] < 0.9
+        assert stopped[1:] == pytest.approx(target[1:], abs=1e-9)
 
     run(main())

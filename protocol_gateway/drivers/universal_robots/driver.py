@@ -94,7 +94,7 @@ class RtdeDriver(OnlyReads):
         GatewaySettingsError: If the model has not six rotary joints, or there are type codes.
     """
 
-    ports = frozenset({PRIMARY.name})
+    ports = frozenset({PRIMARY.name, "scripts", "dashboard"})
     capabilities = Capabilities(commands=frozenset(), absolute=True)
     # A greeting takes at most seven requests.
     requests_a_second = 10.0

@@ -167,13 +167,20 @@ def simulate(
     protocol: Annotated[
         SimulatedProtocol,
         typer.Option(
-            help="unit: the old text protocol; rtde: RTDE and the primary interface of Universal Robots; "
+            help="unit: the old text protocol; rtde: RTDE, scripts and the dashboard of Universal Robots; "
             "hses: the High-Speed Ethernet Server of Yaskawa."
         ),
     ] = SimulatedProtocol.UNIT,
     primary: Annotated[
-        str, typer.Option(metavar="HOST:PORT", help="The primary interface; with rtde.")
+        str, typer.Option(metavar="HOST:PORT", help="The primary interface for reading; with rtde.")
     ] = "127.0.0.1:30011",
+    scripts: Annotated[
+        str,
+        typer.Option(metavar="HOST:PORT", help="The primary interface that takes scripts; with rtde."),
+    ] = "127.0.0.1:30001",
+    dashboard: Annotated[
+        str, typer.Option(metavar="HOST:PORT", help="The dashboard server; with rtde.")
+    ] = "127.0.0.1:29999",
     yaskawa: Annotated[
         str, typer.Option(metavar="JSON", help="The site file's table `yaskawa` as JSON; with hses.")
     ] = "",
@@ -193,6 +200,8 @@ def simulate(
             robot=robot or "puma560",
             listen=listen or "127.0.0.1:30004",
             primary=primary,
+            scripts=scripts,
+            dashboard=dashboard,
             demo=demo,
             faults=tuple(fault or ()),
             insecure=insecure,

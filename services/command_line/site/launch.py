@@ -132,25 +132,36 @@ def launch_rtde_simulator(
     robot: str,
     listen: str,
     primary: str,
+    scripts: str,
+    dashboard: str,
     demo: bool,
     faults: tuple[str, ...],
     insecure: bool,
     mesh: "Mesh | None",
 ) -> None:
-    """Run a simulated controller with RTDE and the primary interface."""
-    from services.simulator.universal_robots.service import UrSettings, serve_rtde
+    """Run a simulated controller with RTDE, the primary interface and the dashboard."""
+    from services.simulator.universal_robots.service import UrPorts, UrSettings, serve_rtde
     from services.site_file.listen_address import split_address
 
-    def ready(rtde_port: int, primary_port: int) -> None:
-        hosts = (split_address(each)[0] for each in (listen, primary))
-        rtde, monitors = (
-            f"{host}:{port}" for host, port in zip(hosts, (rtde_port, primary_port), strict=True)
+    def ready(ports: UrPorts) -> None:
+        hosts = (split_address(each)[0] for each in (listen, primary, scripts, dashboard))
+        addresses = [f"{host}:{port}" for host, port in zip(hosts, ports, strict=True)]
+        print(
+            "listening on {}, primary interface on {}, scripts on {}, dashboard on {}".format(*addresses),
+            flush=True,
         )
-        print(f"listening on {rtde}, primary interface on {monitors}", flush=True)
 
     service.log_to_stderr()
     settings = UrSettings(
-        robot=robot, listen=listen, primary=primary, demo=demo, faults=faults, insecure=insecure, mesh=mesh
+        robot=robot,
+        listen=listen,
+        primary=primary,
+        scripts=scripts,
+        dashboard=dashboard,
+        demo=demo,
+        faults=faults,
+        insecure=insecure,
+        mesh=mesh,
     )
     service.run_until_signalled(serve_rtde(settings, ready=ready))
 

@@ -118,9 +118,10 @@ def _simulator(robot: Robot, site: str, attach: tuple[str, ...]) -> tuple[Progra
     protocol: tuple[str, ...] = ()
     controller = f"tcp://127.0.0.1:{port}"
     if robot.protocol == "rtde":
-        primary = _free_port()
-        protocol = ("--protocol", "rtde", "--primary", f"127.0.0.1:{primary}")
-        controller += f",primary={primary}"
+        ports = {name: _free_port() for name in ("primary", "scripts", "dashboard")}
+        addresses = (word for name, at in ports.items() for word in (f"--{name}", f"127.0.0.1:{at}"))
+        protocol = ("--protocol", "rtde", *addresses)
+        controller += "".join(f",{name}={at}" for name, at in ports.items())
     if robot.protocol == "hses":
         controller = f"udp://127.0.0.1:{port}"
         declared = robot.yaskawa.model_dump_json(exclude_defaults=True) if robot.yaskawa else ""

@@ -1,10 +1,11 @@
 """Model of the simulated controller: arm, program, modes and measured values. No I/O; time is an argument.
 
-The program is the demo's tour. The motors hold a mass at the tool against gravity and accelerate the joints;
-currents follow from these torques. Temperatures rise with time. Mass, inertias, voltages and inputs are
-invented.
+The program is the demo's tour, or a client's script. The motors hold a mass at the tool against gravity and
+accelerate the joints; currents follow from these torques. Temperatures rise with time. Mass, inertias,
+voltages and inputs are invented.
 """
 
+import logging
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping
 
@@ -23,23 +24,29 @@ from protocol_gateway.drivers.universal_robots.primary import (
     Alarm,
     KeyMessage,
     Origin,
+    Popup,
     PrimaryMessage,
+    PrimaryText,
+    RuntimeFault,
     SafetyModeChanged,
 )
 from protocol_gateway.drivers.universal_robots.rtde_messages import Value
 from robots.description import RobotDescription
 from robots.joints import FloatArray, joints_of
 from robots.model import build_model, link_placements, tool_jacobian, tool_placement
-from services.simulator.demo import DemoProgram
 from services.simulator.errors import SimulatorError
 from services.simulator.fault_table import LEAP
 from services.simulator.universal_robots.fields import OFFERED
+from services.simulator.universal_robots.programs import Programs
+from services.simulator.universal_robots.registers import Registers
+from services.simulator.universal_robots.script.code import compile_script
+from services.simulator.universal_robots.script.errors import ScriptError
+from services.simulator.universal_robots.script_functions import functions_of
+
+logger = logging.getLogger(__name__)
 
 JOINTS = 6
-PROGRAM = "demo"
 
-_SPEED = 0.6
-_LOWEST_SPEED = 0.01
 _WARM_UP_S = 1800.0
 _PAYLOAD_KG = 1.2
 # Of the arm's own links, as if they were at the tool.
@@ -53,6 +60,8 @@ _TORQUES_A = np.array((12.0, 12.0, 11.0, 9.0, 9.0, 9.0))
 _ANALOG_TYPES, _SENSOR_A = 0b1101, 0.012
 _CONTROLLER, _BASE = -2, 0
 _ALARM_CODE, _ALARM_ARGUMENT = 153, 0
+# A script on a connection that only reads.
+_ONLY_READS_CODE = 210
 
 
 class UrController:
@@ -64,6 +73,14 @@ class UrController:
         powered: The motors are on; a restarted controller waits for an operator to power them.
         now_s: The clock's time at boot.
         announce: Called with each robot message for the primary interface.
+
+    Attributes:
+        joints: The arm's joints.
+        registers: General purpose registers.
+        programs: The program that runs, and the arm's motion.
+        remote: Remote control: scripts and commands of the network are executed.
+        payload_kg: Mass of the payload [kg].
+        tool_offset: Tool centre point in the flange's frame: position [m], rotation vector [rad].
 
     Raises:
         SimulatorError: If the robot does not have six rotary joints.
@@ -78,38 +95,60 @@ class UrController:
         now_s: float,
         announce: Callable[[PrimaryMessage], None],
     ) -> None:
-        self._joints = joints_of(description)
-        if len(self._joints) != JOINTS or set(self._joints.types) != {"rotary"}:
+        self.joints = joints_of(description)
+        if len(self.joints) != JOINTS or set(self.joints.types) != {"rotary"}:
             raise SimulatorError(
-                f"robot {description.name} has {len(self._joints)} joints, "
+                f"robot {description.name} has {len(self.joints)} joints, "
                 f"this protocol needs {JOINTS} rotary ones: simulate puma560 or another arm with six"
             )
         self._model = build_model(description)
-        self._program = DemoProgram(self._joints, tour, speed=_SPEED)
-        self._has_program = tour is not None
-        flange_to_base = link_placements(self._model, self._joints.home)[-1]
-        tool_to_base = tool_placement(self._model, self._joints.home)
-        self._tool_offset = _pose(np.linalg.inv(flange_to_base) @ tool_to_base)
+        flange_to_base = link_placements(self._model, self.joints.home)[-1]
+        tool_to_base = tool_placement(self._model, self.joints.home)
+        self.payload_kg = _PAYLOAD_KG
+        self.tool_offset = _pose(np.linalg.inv(flange_to_base) @ tool_to_base)
         self._announce = announce
         self._boot_s = now_s
         self._powered = powered
         self._safety = SafetyMode.NORMAL
         self._slider = 1.0
         self._outputs = 0
-        self._inputs: dict[str, Value] = {}
-        if tour is not None:
-            self._key("PROGRAM_XXX_STARTED", now_s)
+        self._now_s = now_s
+        self.remote = True
+        self.registers = Registers()
+        self.programs = Programs(
+            self.joints, tour, self.registers, report_key=self._key, report_fault=self._report_fault
+        )
+        self.programs.functions = functions_of(self)
 
     # ------------------------------------------------------------------------ behaviour
 
     def tick(self, now_s: float) -> None:
-        """Begin the next motion of the program if the current one has ended."""
-        self._program.tick(now_s)
+        """Execute the program."""
+        self._now_s = now_s
+        self.programs.tick(now_s)
+
+    def take_script(self, source: str, now_s: float) -> None:
+        """Start a program of a client instead of the one that runs; report an error in it."""
+        self._now_s = now_s
+        try:
+            program = compile_script(source)
+        except ScriptError as error:
+            logger.warning("a script cannot be compiled: line %d: %s", error.line, error.text)
+            self._report_fault(error.line, error.text)
+            return
+        logger.info("script %s", program.name)
+        if self._powered and self._safety is SafetyMode.NORMAL:
+            self.programs.start(program, now_s)
+
+    def refuse_script(self, now_s: float) -> None:
+        """Report a script on a connection that only reads."""
+        origin = self._origin(_CONTROLLER, now_s)
+        self._announce(Alarm(origin, _ONLY_READS_CODE, 0, ReportLevel.WARNING, 0, 0, ""))
 
     def protective_stop(self, now_s: float) -> None:
         """Stop the arm, pause the program and send an alarm."""
         self._safety = SafetyMode.PROTECTIVE_STOP
-        self._program.stop(now_s)
+        self.programs.pause(now_s)
         self._announce(
             Alarm(
                 self._origin(_BASE, now_s),
@@ -127,22 +166,34 @@ class UrController:
         """End the protective stop and continue the program."""
         self._safety = SafetyMode.NORMAL
         self._announce_safety_mode(now_s)
-        self._program.go_on(now_s)
+        if self.programs.state is RuntimeState.PAUSED:
+            self.programs.play(now_s)
 
     def write(self, values: Mapping[str, Value], now_s: float) -> None:
         """Take a client's inputs: speed slider, digital outputs and registers; others have no effect."""
-        self._inputs.update({name: value for name, value in values.items() if name.startswith("input_")})
+        self.registers.write_inputs(values, now_s)
         fraction = values.get("speed_slider_fraction")
         if values.get("speed_slider_mask") == 1 and isinstance(fraction, float) and 0.0 <= fraction <= 1.0:
             self._slider = fraction
-            self._program.set_speed(_SPEED * max(fraction, _LOWEST_SPEED), now_s)
+            self.programs.set_speed(fraction, now_s)
         for name, first in (("standard", 0), ("configurable", 8), ("tool", 16)):
             mask, bits = values.get(f"{name}_digital_output_mask"), values.get(f"{name}_digital_output")
             if isinstance(mask, int) and isinstance(bits, int):
                 self._outputs = self._outputs & ~(mask << first) | (bits & mask) << first
 
-    def _key(self, title: str, now_s: float) -> None:
-        self._announce(KeyMessage(self._origin(_CONTROLLER, now_s), 0, 0, title, PROGRAM))
+    def report_text(self, text: str, now_s: float) -> None:
+        """Send a text of a program."""
+        self._announce(PrimaryText(self._origin(_CONTROLLER, now_s), text))
+
+    def report_popup(self, title: str, text: str, warning: bool, error: bool, now_s: float) -> None:
+        """Send a popup of a program."""
+        self._announce(Popup(self._origin(_CONTROLLER, now_s), title[:80], text, warning, error, False))
+
+    def _key(self, title: str, program: str) -> None:
+        self._announce(KeyMessage(self._origin(_CONTROLLER, self._now_s), 0, 0, title, program))
+
+    def _report_fault(self, line: int, text: str) -> None:
+        self._announce(RuntimeFault(self._origin(_CONTROLLER, self._now_s), line, 0, text))
 
     def _announce_safety_mode(self, now_s: float) -> None:
         self._announce(SafetyModeChanged(self._origin(_CONTROLLER, now_s), 0, 0, self._safety))
@@ -169,9 +220,7 @@ class UrController:
     @property
     def runtime_state(self) -> RuntimeState:
         """State of the program."""
-        if not self._has_program:
-            return RuntimeState.STOPPED
-        return RuntimeState.PLAYING if self._safety is SafetyMode.NORMAL else RuntimeState.PAUSED
+        return self.programs.state
 
     @property
     def speed_slider(self) -> float:
@@ -184,7 +233,7 @@ class UrController:
         Args:
             leap: The first joint is reported LEAP degrees too high.
         """
-        state = self._program.state(now_s)
+        state = self.programs.arm(now_s)
         positions = state.positions.copy()
         positions[0] += math.radians(LEAP) if leap else 0.0
         found = self._modes() | self._measured(state.positions, state.velocities, state.accelerations, now_s)
@@ -195,8 +244,9 @@ class UrController:
             "target_q": _tuple(state.positions),
             "target_qd": _tuple(state.velocities),
             "target_qdd": _tuple(state.accelerations),
-            "script_control_line": 2 + self._program.leg % 16 if self._has_program else 0,
-            **self._inputs,
+            "script_control_line": self.programs.line,
+            **self.registers.inputs,
+            **self.registers.outputs,
         }
         if any("TCP_pose" in name for name in names):
             found["target_TCP_pose"] = _pose(tool_placement(self._model, state.positions))
@@ -205,6 +255,10 @@ class UrController:
             speed = _tuple(tool_jacobian(self._model, state.positions) @ state.velocities)
             found["actual_TCP_speed"] = found["target_TCP_speed"] = speed
         return {name: found.get(name, _ZEROS[OFFERED[name]]) for name in names}
+
+    def tool_pose(self, now_s: float) -> tuple[float, ...]:
+        """Return the tool centre point in the base frame: position [m], rotation vector [rad]."""
+        return _pose(tool_placement(self._model, self.programs.arm(now_s).positions))
 
     def _modes(self) -> dict[str, Value]:
         normal = self._safety is SafetyMode.NORMAL
@@ -226,7 +280,7 @@ class UrController:
             "safety_status_bits": int(safety),
             "speed_scaling": self._slider if normal else 0.0,
             "target_speed_fraction": self._slider,
-            "actual_digital_input_bits": self._program.leg % 2,
+            "actual_digital_input_bits": self.programs.leg % 2,
             "actual_digital_output_bits": self._outputs,
         }
 
@@ -239,7 +293,9 @@ class UrController:
         # Row 2: height of the tool per joint; on a vertical axis gravity has no torque.
         lift = tool_jacobian(self._model, positions)[2]
         torques = on * (
-            (_PAYLOAD_KG + _ARM_KG) * _GRAVITY * lift + _INERTIAS * accelerations + _FRICTIONS * velocities
+            (self.payload_kg + _ARM_KG) * _GRAVITY * lift
+            + _INERTIAS * accelerations
+            + _FRICTIONS * velocities
         )
         currents = torques / _TORQUES_A
         return {
@@ -258,12 +314,12 @@ class UrController:
             "standard_analog_input1": _SENSOR_A,
             "analog_io_types": _ANALOG_TYPES,
             "tool_analog_input_types": 0b11,
-            "tcp_offset": self._tool_offset,
+            "tcp_offset": self.tool_offset,
             "tool_mode": 253 if self._powered else 255,
             "tool_output_voltage": 24 if self._powered else 0,
             "tool_output_current": 0.02 * on,
             "tool_temperature": 24.0 + on * warm * 9.0,
-            "payload": _PAYLOAD_KG,
+            "payload": self.payload_kg,
             "payload_cog": (0.0, 0.0, 0.05),
         }
 

@@ -9,8 +9,11 @@ from protocol_gateway.drivers.universal_robots.primary import (
     Alarm,
     KeyMessage,
     Origin,
+    Popup,
     PrimaryMessage,
+    PrimaryText,
     PrimaryVersion,
+    RuntimeFault,
     SafetyModeChanged,
 )
 from protocol_gateway.drivers.universal_robots.rtde_messages import (
@@ -79,6 +82,14 @@ def robot_message(message: PrimaryMessage) -> bytes:
             kind = 7
             payload = struct.pack(">ii", message.code, message.argument) + _counted(message.title)
             payload += message.text.encode()
+        case PrimaryText():
+            kind, payload = 0, message.text.encode()
+        case Popup():
+            flags = message.warning, message.error, message.blocking
+            kind, payload = 2, struct.pack(">II???", 0, 0, *flags) + _counted(message.title)
+            payload += message.text.encode()
+        case RuntimeFault():
+            kind, payload = 10, struct.pack(">ii", message.line, message.column) + message.text.encode()
         case _:
             raise AssertionError(f"the simulated controller does not send {type(message).__name__}")
     origin = struct.pack(">QbB", message.origin.time, message.origin.source, kind)

@@ -1,4 +1,5 @@
-"""Server of one simulated controller: clients of RTDE with their own recipes, and of the primary interface.
+"""Server of one simulated controller: clients of RTDE with their own recipes, of the primary interface for
+reading and for scripts, and of the dashboard.
 
 What documents leave open is decided here: a frequency outside the permitted range is brought into it, a start
 without a valid recipe is refused, and a client that reads nothing for 10 s is closed.
@@ -27,15 +28,16 @@ from protocol_gateway.drivers.universal_robots.rtde_messages import (
 from services.simulator import faults as effects
 from services.simulator.fault_table import FAULTS
 from services.simulator.faults import Faults
-from services.simulator.universal_robots import messages
+from services.simulator.universal_robots import dashboard, messages
 from services.simulator.universal_robots.controller import UrController
 from services.simulator.universal_robots.fields import INPUTS, NOT_ON_CB3, OFFERED
+from services.simulator.universal_robots.script.code import LONGEST_SOURCE
 
 logger = logging.getLogger(__name__)
 
 UR_FAULTS = (
     *("freeze", "garbage", "split", "flood", "deluge", "drop"),
-    *("jump", "fault", "restart", "refuse", "burst"),
+    *("jump", "local", "fault", "restart", "refuse", "burst"),
 )
 """Faults that this controller can show; the others concern units or commands."""
 
@@ -79,6 +81,7 @@ class UrServer:
         self._taken = taken
         self.rtde_clients: set[RtdeClient] = set()
         self._monitors: set[PrimaryMonitor] = set()
+        self._dashboards: set[DashboardClient] = set()
         self.active: frozenset[str] = frozenset()
         self._dropped_s = 0.0
         self.controller = boot(time.monotonic(), False, self._announce)
@@ -93,6 +96,14 @@ class UrServer:
         """Return the protocol of a connection of the primary interface."""
         return PrimaryMonitor(self)
 
+    def new_script_client(self) -> "ScriptClient":
+        """Return the protocol of a connection of the primary interface that takes scripts."""
+        return ScriptClient(self)
+
+    def new_dashboard_client(self) -> "DashboardClient":
+        """Return the protocol of a connection of the dashboard."""
+        return DashboardClient(self)
+
     def admit(self, client: "Connection") -> bool:
         """Register a connection, unless a fault forbids it."""
         now_s = time.monotonic()
@@ -101,15 +112,20 @@ class UrServer:
         if self.active & {"refuse", "restart"}:
             client.abort()
             return False
-        group = self.rtde_clients if isinstance(client, RtdeClient) else self._monitors
-        group.add(client)  # type: ignore[arg-type]
+        match client:
+            case RtdeClient():
+                self.rtde_clients.add(client)
+            case PrimaryMonitor():
+                self._monitors.add(client)
+            case DashboardClient():
+                self._dashboards.add(client)
         logger.info("%s connected", client.name)
         return True
 
     def remove(self, client: "Connection") -> None:
         """Forget a connection that has ended."""
-        self.rtde_clients.discard(client)
-        self._monitors.discard(client)
+        for group in (self.rtde_clients, self._monitors, self._dashboards):
+            group.discard(client)
 
     def input_type(self, name: str, client: "RtdeClient") -> str:
         """Return the answer to a set-up of one input."""
@@ -141,7 +157,7 @@ class UrServer:
 
     def close(self) -> None:
         """Close every connection."""
-        for client in (*self.rtde_clients, *self._monitors):
+        for client in (*self.rtde_clients, *self._monitors, *self._dashboards):
             client.abort()
 
     def _announce(self, message: PrimaryMessage) -> None:
@@ -165,14 +181,23 @@ class UrServer:
             if name == "fault":
                 self.controller.unlock(now_s)
             if name == "freeze":
-                for client in self.rtde_clients:
+                for client in (*self.rtde_clients, *self._monitors, *self._dashboards):
                     client.pause_reading(False)
+            if name == "local":
+                self.controller.remote = True
         if "drop" in self.active and now_s - self._dropped_s >= _DROP_EACH_S:
             self._dropped_s = now_s
             self.close()
 
     def _begin(self, name: str, now_s: float) -> None:
         match name:
+            case "freeze":
+                for client in (*self.rtde_clients, *self._monitors, *self._dashboards):
+                    client.pause_reading(True)
+            case "local":
+                self.controller.remote = False
+                for monitor in tuple(self._monitors):
+                    monitor.lose_control()
             case "fault":
                 self.controller.protective_stop(now_s)
             case "restart":
@@ -241,6 +266,11 @@ class Connection(asyncio.Protocol):
             else:
                 self._transport.write(data)
 
+    def pause_reading(self, paused: bool) -> None:
+        """Stop or continue reading."""
+        if not self._transport.is_closing():
+            (self._transport.pause_reading if paused else self._transport.resume_reading)()
+
     def abort(self) -> None:
         """Close the connection immediately."""
         self._transport.abort()
@@ -261,6 +291,82 @@ class PrimaryMonitor(Connection):
         """Send data to a client that reads."""
         if not self.behind:
             self.write(data)
+
+    def lose_control(self) -> None:
+        """Handle the change to local control."""
+
+
+class ScriptClient(PrimaryMonitor):
+    """A client of the primary interface on port 30001; the controller executes its scripts.
+
+    A connection opened in local control only reads; remote control needs a new one.
+    """
+
+    def __init__(self, server: UrServer) -> None:
+        super().__init__(server)
+        self._text = ""
+        self._lines: list[str] = []
+        self._executes = server.controller.remote
+
+    def lose_control(self) -> None:
+        """Close the connection, as controllers do when they change to local control."""
+        if self._executes:
+            self.abort()
+
+    def data_received(self, data: bytes) -> None:
+        """Start the programs in the next bytes."""
+        *lines, self._text = (self._text + data.decode("latin-1")).split("\n")
+        for line in lines:
+            self._take(line.rstrip())
+        if len(self._text) + sum(map(len, self._lines)) > LONGEST_SOURCE:
+            logger.info("%s sends a script that is too long", self.name)
+            self.abort()
+
+    def _take(self, line: str) -> None:
+        if not self._lines and not line.strip():
+            return
+        self._lines.append(line)
+        # A program ends with an "end" at the begin of a line; other lines are programs by themselves.
+        if line == "end" or not self._lines[0].startswith(("def ", "sec ")):
+            source = "\n".join(self._lines)
+            self._lines = []
+            now_s = time.monotonic()
+            if self._executes:
+                self._server.controller.take_script(source, now_s)
+            else:
+                self._server.controller.refuse_script(now_s)
+
+
+class DashboardClient(Connection):
+    """A client of the dashboard server."""
+
+    def __init__(self, server: UrServer) -> None:
+        super().__init__(server)
+        self._text = ""
+        self._remote = server.controller.remote
+
+    def admitted(self) -> None:
+        """Greet."""
+        self._say(dashboard.GREETING)
+
+    def data_received(self, data: bytes) -> None:
+        """Execute the commands in the next bytes."""
+        *lines, self._text = (self._text + data.decode("latin-1")).split("\n")
+        for line in lines:
+            now_s = time.monotonic()
+            self._say(
+                dashboard.answer(
+                    line, self._server.controller, self._server.version, remote=self._remote, now_s=now_s
+                )
+            )
+            if line.strip() == "quit":
+                self._transport.close()
+                return
+        if len(self._text) > dashboard.LONGEST_COMMAND:
+            self.abort()
+
+    def _say(self, words: str) -> None:
+        self.write(f"{words}\n".encode("latin-1", "replace"))
 
 
 class RtdeClient(Connection):
@@ -288,11 +394,6 @@ class RtdeClient(Connection):
         """Forget the connection and its inputs."""
         self._pause()
         super().connection_lost(error)
-
-    def pause_reading(self, paused: bool) -> None:
-        """Stop or continue reading."""
-        if not self._transport.is_closing():
-            (self._transport.pause_reading if paused else self._transport.resume_reading)()
 
     def data_received(self, data: bytes) -> None:
         """Answer the requests in the next bytes."""

@@ -1,10 +1,12 @@
-"""Service of the simulated controller: listens for RTDE and for the primary interface."""
+"""Service of the simulated controller: listens for RTDE, the primary interface, scripts and the dashboard."""
 
 import asyncio
+import contextlib
 import logging
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from protocol_gateway.drivers.universal_robots.primary import PrimaryMessage
 from protocol_gateway.drivers.universal_robots.rtde_messages import ControllerVersion
@@ -30,6 +32,8 @@ class UrSettings:
         robot: A library robot, or a path to a robot.toml or URDF, with six rotary joints.
         listen: `HOST:PORT` of RTDE; a real controller has 30004; port 0 takes a free one.
         primary: `HOST:PORT` of the primary interface; a real controller has 30011 for reading.
+        scripts: `HOST:PORT` of the primary interface that takes scripts, on a real controller 30001.
+        dashboard: `HOST:PORT` of the dashboard, on a real controller 29999.
         version: Version of the software: 3 is CB3 with at most 125 Hz, 5 and above have at most 500 Hz.
         demo: A program runs and moves the arm.
         taken: Input fields that are in use by the controller itself, such as by a fieldbus.
@@ -41,6 +45,8 @@ class UrSettings:
     robot: str = "puma560"
     listen: str = "127.0.0.1:0"
     primary: str = "127.0.0.1:0"
+    scripts: str = "127.0.0.1:0"
+    dashboard: str = "127.0.0.1:0"
     version: tuple[int, int, int, int] = (5, 21, 0, 0)
     demo: bool = False
     taken: frozenset[str] = frozenset()
@@ -49,18 +55,28 @@ class UrSettings:
     mesh: Mesh | None = None
 
 
-async def serve_rtde(settings: UrSettings, *, ready: Callable[[int, int], None] | None = None) -> None:
+class UrPorts(NamedTuple):
+    """Ports of a simulated controller."""
+
+    rtde: int
+    primary: int
+    scripts: int
+    dashboard: int
+
+
+async def serve_rtde(settings: UrSettings, *, ready: Callable[[UrPorts], None] | None = None) -> None:
     """Simulate a controller until cancelled.
 
     Args:
-        ready: Called with the ports of RTDE and of the primary interface once clients can connect.
+        ready: Called with the ports once clients can connect.
 
     Raises:
         ListenError: If it cannot listen on an address.
         SimulatorError: If a setting is invalid.
         DescriptionError: If the robot is unknown.
     """
-    for address in (settings.listen, settings.primary):
+    addresses = settings.listen, settings.primary, settings.scripts, settings.dashboard
+    for address in addresses:
         host, _ = split_address(address)
         remedy = "listen on 127.0.0.1, or take the risk with --insecure: these protocols have no TLS"
         if warning := check_reach(
@@ -69,21 +85,25 @@ async def serve_rtde(settings: UrSettings, *, ready: Callable[[int, int], None] 
             logger.warning("%s", warning)
     faults = Faults(settings.faults, known=UR_FAULTS)
     server = _server(settings, faults)
-    rtde = await _listen(server.new_rtde_client, settings.listen)
-    try:
-        primary = await _listen(server.new_monitor, settings.primary)
-        try:
-            if ready is not None:
-                ready(*(each.sockets[0].getsockname()[1] for each in (rtde, primary)))
-            async with asyncio.TaskGroup() as tasks:
-                tasks.create_task(server.run())
-                if settings.mesh is not None:
-                    tasks.create_task(answer_requests(settings.mesh, faults))
-        finally:
-            primary.close()
-    finally:
-        rtde.close()
-        server.close()
+    protocols = (
+        server.new_rtde_client,
+        server.new_monitor,
+        server.new_script_client,
+        server.new_dashboard_client,
+    )
+    with contextlib.ExitStack() as opened:
+        opened.callback(server.close)
+        listening = []
+        for protocol, address in zip(protocols, addresses, strict=True):
+            listener = await _listen(protocol, address)
+            opened.callback(listener.close)
+            listening.append(listener)
+        if ready is not None:
+            ready(UrPorts(*(each.sockets[0].getsockname()[1] for each in listening)))
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(server.run())
+            if settings.mesh is not None:
+                tasks.create_task(answer_requests(settings.mesh, faults))
 
 
 async def _listen(protocol: Callable[[], asyncio.Protocol], address: str) -> asyncio.Server:
