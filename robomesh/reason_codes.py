@@ -429,6 +429,12 @@ JOINTS_UNDECLARED = Code(
     "its joints are not shown, because the controller sends pulses",
     "declare pulses_per_degree of each joint in [robot.yaskawa] of the site file",
 )
+AXES_UNDECLARED = Code(
+    "joints.axes_undeclared",
+    "its joints are not shown, because the site file does not say how axis 3 is measured, or how positions "
+    "may be assigned",
+    "declare j23 and assignments in [robot.fanuc] of the site file",
+)
 POSITIONS_UNKNOWN = Code("positions.unknown", "the robot's position is unknown ({cause})")
 POSITIONS_NONE = Code("positions.none", "the controller has not reported joint positions")
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Protocol
 
 from protocol_gateway.drivers.driver import Driver
+from protocol_gateway.drivers.fanuc.driver import SnpxDriver
 from protocol_gateway.drivers.unit import UnitDriver
 from protocol_gateway.drivers.universal_robots.driver import RtdeDriver
 from protocol_gateway.drivers.yaskawa.driver import HsesDriver
@@ -35,5 +36,10 @@ class DriverMaker(Protocol):
         ...
 
 
-DRIVERS: dict[str, DriverMaker] = {"unit": UnitDriver, "rtde": RtdeDriver, "hses": HsesDriver}
+DRIVERS: dict[str, DriverMaker] = {
+    "unit": UnitDriver,
+    "rtde": RtdeDriver,
+    "hses": HsesDriver,
+    "snpx": SnpxDriver,
+}
 """Driver factories by the site file's `protocol`."""

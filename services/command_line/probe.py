@@ -1,7 +1,8 @@
 """`robomesh probe`: the protocol that one port of a controller speaks. It contacts that port only.
 
 It listens before it sends, and sends at most one question: the RTDE version to port 30004, the read of the
-system's information to port 10040. To any other port it sends nothing.
+system's information to UDP port 10040, the first packet of a connection to ports 60008 and 18245. To any
+other port it sends nothing.
 """
 
 import socket
@@ -19,6 +20,8 @@ from services.errors import ServiceError
 app = command_group()
 
 _RTDE_PORT, _HSES_PORT = 30004, 10040
+# Of FANUC: the Robot Interface, and the option HMI Device (SNPX).
+_SNPX_PORTS = (60008, 18245)
 # Of Universal Robots; the last three send the same, and take nothing.
 _PRIMARY_PORTS = (30001, 30002, 30003, 30011, 30012, 30013)
 _RMI_PORT = 16001
@@ -60,8 +63,9 @@ def probe(
 ) -> None:
     """Show which protocol a controller's port speaks.
 
-    It contacts this port only, listens for 2 s, and sends nothing but the RTDE version to port 30004 and a
-    read of the system's information to UDP port 10040. Exit status 1: no protocol that robomesh reads.
+    It contacts this port only, listens for 2 s, and sends nothing but the RTDE version to port 30004, a read
+    of the system's information to UDP port 10040, and the first packet of SNPX, 56 zero bytes, to ports
+    60008 and 18245. Exit status 1: no protocol that robomesh reads.
     """
     from services.command_line.discovery import print_json
 
@@ -119,6 +123,8 @@ def _examine(connection: socket.socket, port: int) -> Found:
     heard = _listen(connection, _LISTEN_S, _is_known)
     if port == _RTDE_PORT and not heard:
         return _examine_rtde(connection)
+    if port in _SNPX_PORTS and not heard:
+        return _examine_snpx(connection)
     found = _recognized(heard, port)
     return Found(**asdict(found) | {"received_bytes": len(heard)})
 
@@ -230,6 +236,25 @@ def _examine_rtde(connection: socket.socket) -> Found:
         protocol="rtde",
         text=f"a controller of Universal Robots: RTDE, {version}",
         next='in the site file: protocol = "rtde", and a model of its six joints',
+        sent=sent,
+        received_bytes=len(heard),
+    )
+
+
+def _examine_snpx(connection: socket.socket) -> Found:
+    from protocol_gateway.drivers.fanuc.srtp import HEADER_BYTES, Answer, AnswerStream, Connect
+
+    sent = "the first packet of SNPX, 56 zero bytes, which asks for nothing"
+    connection.sendall(Connect().encode(0))
+    heard = _listen(connection, _ANSWER_S, lambda heard: len(heard) >= HEADER_BYTES)
+    answers = AnswerStream().receive(heard)
+    if not answers or not isinstance(answers[0], Answer) or not answers[0].connected:
+        unknown = "answers nothing" if not heard else "answers something unknown"
+        return Found(text=f"it {unknown} to the first packet of SNPX", sent=sent, received_bytes=len(heard))
+    return Found(
+        protocol="snpx",
+        text="it speaks SRTP, as a controller of FANUC does with SNPX, and a PLC of GE",
+        next='in the site file: protocol = "snpx", and [robot.fanuc] with j23 and assignments',
         sent=sent,
         received_bytes=len(heard),
     )

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
 
 from protocol_gateway.core.codes import code_table
+from protocol_gateway.drivers.fanuc.axes import FanucSettings
 from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
 from protocol_gateway.errors import CodeTableError
@@ -13,6 +14,7 @@ from robomesh.access_rights import PROBE_ROBOT
 from robomesh.errors import KeyNameError
 from robots.description import Pose
 from services.errors import ListenError
+from services.site_file.fanuc import Fanuc
 from services.site_file.fixtures import Clearance, Floor
 from services.site_file.legacy_clients import LegacyClients
 from services.site_file.listen_address import split_address
@@ -34,9 +36,10 @@ class Robot(BaseModel):
         ports: Ports of the controller's other interfaces, where they are not the usual ones, as in
             `{ primary = 30011 }`.
         protocol: The controller's protocol: `unit` (docs/controllers.md), `rtde` to read a controller of
-            Universal Robots (docs/controllers/universal-robots.md), or `hses` to read one of Yaskawa
-            (docs/controllers/yaskawa.md).
+            Universal Robots (docs/controllers/universal-robots.md), `hses` to read one of Yaskawa
+            (docs/controllers/yaskawa.md), or `snpx` to read one of FANUC (docs/controllers/fanuc.md).
         yaskawa: Properties of the robot that a Yaskawa controller does not report; with the protocol `hses`.
+        fanuc: Properties of the robot that a FANUC controller does not report; with the protocol `snpx`.
         codes: Type codes of a controller that sends numbers, as in
             `{ 2 = "ABSOLUTE.DEG", 101 = "COMMAND:home" }`; they replace the default codes. Empty: the gateway
             sends types as names.
@@ -66,6 +69,7 @@ class Robot(BaseModel):
     ports: dict[str, Annotated[int, Field(gt=0, lt=65536)]] = Field(default_factory=dict)
     protocol: str = "unit"
     yaskawa: Yaskawa | None = None
+    fanuc: Fanuc | None = None
     codes: dict[int, str] = Field(default_factory=dict)
     accept_unknown: tuple[Literal["mode", "homed"], ...] = ()
     check: Literal["require", "warn", "off"] = "warn"
@@ -148,6 +152,8 @@ class Robot(BaseModel):
         hses = self.protocol == "hses"
         if self.yaskawa is not None and not hses:
             raise ValueError(f"yaskawa needs the protocol 'hses', this robot's is {self.protocol!r}")
+        if self.fanuc is not None and self.protocol != "snpx":
+            raise ValueError(f"fanuc needs the protocol 'snpx', this robot's is {self.protocol!r}")
         if not self.simulated and self.controller.startswith("udp://") is not hses:
             raise ValueError(
                 f"controller {self.controller}: protocol {self.protocol!r} needs "
@@ -163,14 +169,19 @@ class Robot(BaseModel):
     @property
     def group(self) -> str:
         """Control group of its controller, where one controller has several robots; empty: it has one."""
+        if self.protocol == "snpx":
+            return f"G{(self.fanuc or Fanuc()).group}"
         return (self.yaskawa or Yaskawa()).group if self.protocol == "hses" else ""
 
     @property
-    def options(self) -> YaskawaSettings | None:
+    def options(self) -> YaskawaSettings | FanucSettings | None:
         """Settings of the protocol's driver, which the gateway passes on; None: it has none."""
-        if self.protocol != "hses":
-            return None
-        return (self.yaskawa or Yaskawa()).settings
+        match self.protocol:
+            case "hses":
+                return (self.yaskawa or Yaskawa()).settings
+            case "snpx":
+                return (self.fanuc or Fanuc()).settings
+        return None
 
     @property
     def simulated(self) -> bool:

@@ -6,10 +6,10 @@ import struct
 import numpy as np
 import pytest
 
+from protocol_gateway.drivers.polling import TIMEOUT_S, Polling, Regular
 from protocol_gateway.drivers.yaskawa import data as payloads
 from protocol_gateway.drivers.yaskawa.axes import Axes, Coupling, YaskawaSettings, instance_of
 from protocol_gateway.drivers.yaskawa.hses import Answer, Command, Read, Service, decode
-from protocol_gateway.drivers.yaskawa.polling import TIMEOUT_S, Polling, Regular
 from protocol_gateway.errors import GatewaySettingsError
 from robots.joints import JointType
 

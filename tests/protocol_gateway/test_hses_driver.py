@@ -22,10 +22,10 @@ from protocol_gateway.drivers.driver import (
     SignalsReceived,
     StatusReceived,
 )
+from protocol_gateway.drivers.polling import TIMEOUT_S
 from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
 from protocol_gateway.drivers.yaskawa.data import Status
 from protocol_gateway.drivers.yaskawa.driver import HSES, HsesDriver, activity_of, mode_of
-from protocol_gateway.drivers.yaskawa.polling import TIMEOUT_S
 from protocol_gateway.errors import CommandError, GatewaySettingsError
 from robots.joints import JointType
 from services.simulator.yaskawa.service import HsesSettings, serve_hses, with_factors

@@ -5,10 +5,13 @@ from pathlib import Path
 import pytest
 
 from protocol_gateway.drivers.registry import DRIVERS
+from robots.joints import JointType
 from services.command_line.site.controllers import ControllerError, controller_addresses
 from services.command_line.site.services import SERVICES, Options
 from services.command_line.site.up import programs
+from services.simulator.fanuc.service import with_defaults
 from services.simulator.yaskawa.service import with_factors
+from services.site_file.fanuc import Fanuc
 from services.site_file.site import Site, load
 from services.site_file.yaskawa import Yaskawa
 
@@ -102,11 +105,65 @@ def test_a_simulated_robot_with_hses_gets_a_simulator_with_the_same_pulses():
             assert with_factors(told.settings, 6) == settings.robots[0].options
 
 
+FANUC = {"name": "loader", "model": "puma560", "protocol": "snpx", "controller": "tcp://10.0.0.7:60008"}
+
+
+def fanuc_site(*robots):
+    return Site.model_validate({"site": "hall", "robot": [FANUC | robot for robot in robots]})
+
+
+def test_a_controller_of_fanuc_with_two_groups_is_two_robots():
+    two = fanuc_site({}, {"name": "track", "fanuc": {"group": 2}})
+    assert [robot.group for robot in two.robot] == ["G1", "G2"]
+    with pytest.raises(ValueError, match="given twice"):
+        fanuc_site({}, {"name": "track"})
+
+
+@pytest.mark.parametrize(
+    ("robot", "problem"),
+    [
+        ({"controller": "udp://10.0.0.7:60008"}, "protocol 'snpx' needs tcp://10.0.0.7:60008"),
+        ({"protocol": "rtde", "fanuc": {}}, "fanuc needs the protocol 'snpx'"),
+        ({"fanuc": {"j23": 2}}, "Input should be -1, 0 or 1"),
+        ({"fanuc": {"assignments": "yes"}}, "'own' or 'pendant'"),
+        ({"fanuc": {"io": ["GI[1]"]}}, r"as in DI\[1-16\]"),
+        ({"fanuc": {"registers": [1, 1]}}, "each once"),
+        ({"fanuc": {"registers": [0]}}, "greater than or equal to 1"),
+        ({"fanuc": {"tools": [11]}}, "less than or equal to 10"),
+        ({"fanuc": {"group": 9}}, "less than or equal to 8"),
+        ({"fanuc": {"coupling": 1}}, "Extra inputs"),
+    ],
+)
+def test_what_a_site_file_declares_wrongly_of_a_fanuc_robot_is_refused(robot, problem):
+    with pytest.raises(ValueError, match=problem):
+        fanuc_site(robot)
+
+
+def test_a_simulated_robot_with_snpx_gets_a_simulator_with_the_same_axes():
+    declared = {"assignments": "pendant", "j23": -1, "group": 2}
+    for fanuc, expected in (
+        (None, ("own", 1, 1)),
+        ({"group": 2}, ("own", 1, 2)),
+        (declared, ("pendant", -1, 2)),
+    ):
+        simulated = fanuc_site({"controller": "simulated", "fanuc": fanuc})
+        found = {each.name: each.arguments for each in programs(simulated, None, "tcp/127.0.0.1:7447")}
+        words = found["simulate loader"]
+        assert words[words.index("--protocol") + 1] == "snpx"
+        option = found["gateway"][found["gateway"].index("--controller") + 1]
+        assert option == f"loader=tcp://{words[words.index('--listen') + 1]}"
+        settings = SERVICES["gateway"].settings(simulated, Options(controllers=[option])).robots[0].options
+        assert (settings.assignments, settings.j23, settings.group) == expected
+        if fanuc:
+            told = Fanuc.model_validate_json(words[words.index("--fanuc") + 1])
+            assert with_defaults(told.settings, (JointType.ROTARY,) * 6) == settings
+
+
 def test_the_example_has_a_simulated_controller_of_each_protocol():
     example = load(Path(__file__).resolve().parents[2] / "examples" / "vendors.toml")
     assert {robot.protocol for robot in example.robot} == {*DRIVERS}
-    ways = {"unit": "tcp", "rtde": "tcp", "hses": "udp"}
+    ways = {"unit": "tcp", "rtde": "tcp", "hses": "udp", "snpx": "tcp"}
     named = enumerate(example.robot, start=1)
     addresses = [f"{robot.name}={ways[robot.protocol]}://127.0.0.1:{port}" for port, robot in named]
     settings = SERVICES["gateway"].settings(example, Options(controllers=addresses))
-    assert [robot.protocol for robot in settings.robots] == ["unit", "rtde", "hses"]
+    assert [robot.protocol for robot in settings.robots] == ["unit", "rtde", "hses", "snpx"]

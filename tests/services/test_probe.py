@@ -14,6 +14,7 @@ from tests.conftest import free_port, run
 from tests.protocol_gateway.gateway_site import simulator
 from tests.protocol_gateway.test_hses_driver import controller as yaskawa
 from tests.protocol_gateway.test_rtde_driver import controller as universal_robots
+from tests.protocol_gateway.test_snpx_driver import controller as fanuc
 
 
 @contextlib.contextmanager
@@ -79,6 +80,30 @@ def test_a_controller_of_yaskawa_is_recognized_by_its_answer(monkeypatch):
     run(main())
 
 
+def test_a_controller_of_fanuc_is_recognized_by_its_first_answer(monkeypatch):
+    async def main():
+        async with fanuc() as port:
+            monkeypatch.setattr(probe, "_SNPX_PORTS", (port,))
+            found = await examined(f"tcp://127.0.0.1:{port}")
+        assert (found.protocol, found.received_bytes) == ("snpx", 56)
+        assert "56 zero bytes" in found.sent
+
+    run(main())
+
+
+@pytest.mark.parametrize(
+    ("says", "words"), [(b"", "answers nothing"), (b"\x05" * 60, "sends something unknown")]
+)
+def test_to_the_ports_of_snpx_nothing_is_sent_but_56_zero_bytes(monkeypatch, says, words):
+    monkeypatch.setattr(probe, "_ANSWER_S", 0.5)
+    with server(says=says) as (port, heard):
+        monkeypatch.setattr(probe, "_SNPX_PORTS", (port,))
+        found = examine(f"tcp://127.0.0.1:{port}")
+    assert found.protocol == ""
+    assert words in found.text
+    assert heard == (b"" if says else bytes(56))
+
+
 @pytest.mark.parametrize("name", ["_PRIMARY_PORTS", "_RMI_PORT", None])
 def test_to_ports_that_move_an_arm_and_to_unknown_ones_nothing_is_sent(monkeypatch, name):
     with server() as (port, heard):
@@ -91,6 +116,7 @@ def test_to_ports_that_move_an_arm_and_to_unknown_ones_nothing_is_sent(monkeypat
 def test_ports_that_move_an_arm_are_those_of_the_manuals():
     assert {30001, 30002, 30003} <= {*probe._PRIMARY_PORTS}
     assert (probe._RMI_PORT, probe._RTDE_PORT, probe._HSES_PORT) == (16001, 30004, 10040)
+    assert probe._SNPX_PORTS == (60008, 18245)
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,9 @@ from robomesh.session import open_session
 from robots.description import load
 from robots.kinematic_tree import tool_frame
 from robots.model import build_model, tool_placement
+from robots.poses import rotation_vector
 from robots.urdf.write import to_urdf
 from services.command_line.robot import verify
-from services.simulator.universal_robots.controller import rotation_vector
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import until
 

@@ -49,12 +49,13 @@ from protocol_gateway.drivers.universal_robots.state import OUTPUTS, ControllerS
 from robots.description import load
 from robots.joints import joints_of
 from robots.model import build_model, tool_placement
+from robots.poses import rotation_vector
 from services.errors import ListenError
 from services.simulator.errors import FaultError, SimulatorError
 from services.simulator.fault_table import LEAP
 from services.simulator.faults import Faults
 from services.simulator.universal_robots import service
-from services.simulator.universal_robots.controller import UrController, rotation_vector
+from services.simulator.universal_robots.controller import UrController
 from services.simulator.universal_robots.service import UrSettings, serve_rtde
 from tests.conftest import run
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from struct import Struct
 
+from protocol_gateway.drivers.pendant_text import text
+
 _FEWEST_AXES, _MOST_AXES = 6, 8
 _WORDS = {count: Struct(f"<{count}i") for count in range(_FEWEST_AXES, _MOST_AXES + 1)}
 _POSITION = Struct("<5I")
@@ -202,18 +204,6 @@ def io_byte(data: bytes) -> int:
         ValueError: If its length is wrong.
     """
     return _exactly(data, 1, "a group of signals")[0]
-
-
-def text(data: bytes) -> str:
-    """Return a text up to its first zero byte, on one line; its encoding is the pendant's."""
-    data = data.partition(b"\0")[0]
-    for encoding in ("utf-8", "shift_jis"):
-        try:
-            found = data.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-        return "".join(each if each.isprintable() else " " for each in found).strip()
-    return "".join(chr(byte) if 32 <= byte < 127 else "?" for byte in data).strip()
 
 
 def _words(data: bytes) -> tuple[int, ...]:

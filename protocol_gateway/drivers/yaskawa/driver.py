@@ -27,13 +27,13 @@ from protocol_gateway.drivers.driver import (
 )
 from protocol_gateway.drivers.hexadecimal import hexadecimal
 from protocol_gateway.drivers.only_reads import OnlyReads
+from protocol_gateway.drivers.polling import Asked, Polling, Regular
 from protocol_gateway.drivers.signal_names import of_joints
 from protocol_gateway.drivers.yaskawa import data as payloads
 from protocol_gateway.drivers.yaskawa import signals
 from protocol_gateway.drivers.yaskawa.axes import Axes, YaskawaSettings, instance_of
 from protocol_gateway.drivers.yaskawa.data import HELD, Alarm, DataType, Position, Status, Status1, Status2
 from protocol_gateway.drivers.yaskawa.hses import Answer, Command, Read, Service, decode
-from protocol_gateway.drivers.yaskawa.polling import Asked, Polling, Regular
 from protocol_gateway.errors import GatewaySettingsError
 from robomesh import reason_codes
 from robots.joints import JointType
@@ -162,7 +162,7 @@ class HsesDriver(OnlyReads):
 
     # ----------------------------------------------------------------------- answers
 
-    def _report(self, asked: Asked, answer: Answer, datagram: bytes, now_s: float) -> Report:
+    def _report(self, asked: Asked[Read], answer: Answer, datagram: bytes, now_s: float) -> Report:
         if answer.busy:
             # Not a sign that the state is received: a controller that is always busy is silent.
             return Report([], 1, refusals=1, asked_s=asked.at_s)

@@ -99,6 +99,10 @@ class Answer:
     added_status: int
     data: bytes
 
+    def answers(self, read: Read) -> bool:
+        """Return whether it can be the answer to a question with its number."""
+        return self.service == read.service
+
     @property
     def busy(self) -> bool:
         """True if the controller has no time now for the question."""

@@ -133,6 +133,7 @@ class SimulatedProtocol(StrEnum):
     UNIT = "unit"
     RTDE = "rtde"
     HSES = "hses"
+    SNPX = "snpx"
 
 
 @app.command()
@@ -142,12 +143,15 @@ def simulate(
         typer.Option(
             metavar="R",
             help="A library robot or a description.",
-            show_default="pt600; with rtde and hses puma560",
+            show_default="pt600; with the other protocols puma560",
         ),
     ] = "",
     listen: Annotated[
         str,
-        typer.Option(metavar="HOST:PORT", show_default="127.0.0.1:5400; with rtde :30004, with hses :10040"),
+        typer.Option(
+            metavar="HOST:PORT",
+            show_default="127.0.0.1:5400; with rtde :30004, with hses :10040, with snpx :60008",
+        ),
     ] = "",
     rate: Annotated[float, typer.Option(metavar="HZ", min=1, max=1000, help="With unit.")] = 100.0,
     max_clients: Annotated[int, typer.Option(metavar="N", min=1, help="With unit.")] = 8,
@@ -168,7 +172,7 @@ def simulate(
         SimulatedProtocol,
         typer.Option(
             help="unit: the old text protocol; rtde: RTDE, scripts and the dashboard of Universal Robots; "
-            "hses: the High-Speed Ethernet Server of Yaskawa."
+            "hses: the High-Speed Ethernet Server of Yaskawa; snpx: SNPX of FANUC."
         ),
     ] = SimulatedProtocol.UNIT,
     primary: Annotated[
@@ -184,6 +188,9 @@ def simulate(
     yaskawa: Annotated[
         str, typer.Option(metavar="JSON", help="The site file's table `yaskawa` as JSON; with hses.")
     ] = "",
+    fanuc: Annotated[
+        str, typer.Option(metavar="JSON", help="The site file's table `fanuc` as JSON; with snpx.")
+    ] = "",
     for_: Annotated[
         str,
         typer.Option("--for", metavar="SITE/ROBOT", help="Accept `robomesh fault` for this robot."),
@@ -191,7 +198,7 @@ def simulate(
     site: SiteFile = None,
     connect: Connect = DEFAULT_ROUTER,
 ) -> None:
-    """Run a simulated controller with the old text protocol, RTDE or HSES."""
+    """Run a simulated controller with the old text protocol, RTDE, HSES or SNPX."""
     from services.command_line.site import launch
 
     mesh = launch.faults_mesh(for_, site, connect)
@@ -213,6 +220,17 @@ def simulate(
             robot=robot or "puma560",
             listen=listen or "127.0.0.1:10040",
             yaskawa=yaskawa,
+            demo=demo,
+            faults=tuple(fault or ()),
+            insecure=insecure,
+            mesh=mesh,
+        )
+        return
+    if protocol is SimulatedProtocol.SNPX:
+        launch.launch_snpx_simulator(
+            robot=robot or "puma560",
+            listen=listen or "127.0.0.1:60008",
+            fanuc=fanuc,
             demo=demo,
             faults=tuple(fault or ()),
             insecure=insecure,

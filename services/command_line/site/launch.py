@@ -2,7 +2,7 @@
 
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from robomesh import service
 from robomesh.client.connection import addresses
@@ -19,7 +19,11 @@ from services.site_file.site import Site
 from services.site_file.started_robots import read_started
 
 if TYPE_CHECKING:
+    from pydantic import BaseModel
+
     from services.simulator.fault_requests import Mesh
+
+    _Part = TypeVar("_Part", bound=BaseModel)
 
 
 def launch(name: str, options: Options, connect: str, metrics: str = "") -> None:
@@ -177,19 +181,11 @@ def launch_hses_simulator(
     mesh: "Mesh | None",
 ) -> None:
     """Run a simulated controller with HSES."""
-    from pydantic import ValidationError
-
     from services.simulator.yaskawa.service import HsesSettings, serve_hses
     from services.site_file.listen_address import split_address
-    from services.site_file.validation_errors import problem_text
     from services.site_file.yaskawa import Yaskawa
 
-    try:
-        declared = Yaskawa.model_validate_json(yaskawa).settings if yaskawa else None
-    except ValidationError as error:
-        problem = error.errors()[0]
-        where = ".".join(map(str, problem["loc"]))
-        raise ControllerError(f"--yaskawa {where}: {problem_text(problem)}") from None
+    declared = _declared(Yaskawa, "yaskawa", yaskawa)
 
     def ready(port: int) -> None:
         print(f"listening on udp {split_address(listen)[0]}:{port}", flush=True)
@@ -198,13 +194,64 @@ def launch_hses_simulator(
     settings = HsesSettings(
         robot=robot,
         listen=listen,
-        yaskawa=declared,
+        yaskawa=None if declared is None else declared.settings,
         demo=demo,
         faults=faults,
         insecure=insecure,
         mesh=mesh,
     )
     service.run_until_signalled(serve_hses(settings, ready=ready))
+
+
+def launch_snpx_simulator(
+    *,
+    robot: str,
+    listen: str,
+    fanuc: str,
+    demo: bool,
+    faults: tuple[str, ...],
+    insecure: bool,
+    mesh: "Mesh | None",
+) -> None:
+    """Run a simulated controller with SNPX."""
+    from services.simulator.fanuc.service import SnpxSettings, serve_snpx
+    from services.site_file.fanuc import Fanuc
+    from services.site_file.listen_address import split_address
+
+    declared = _declared(Fanuc, "fanuc", fanuc)
+
+    def ready(port: int) -> None:
+        print(f"listening on {split_address(listen)[0]}:{port}", flush=True)
+
+    service.log_to_stderr()
+    settings = SnpxSettings(
+        robot=robot,
+        listen=listen,
+        fanuc=None if declared is None else declared.settings,
+        demo=demo,
+        faults=faults,
+        insecure=insecure,
+        mesh=mesh,
+    )
+    service.run_until_signalled(serve_snpx(settings, ready=ready))
+
+
+def _declared(part: "type[_Part]", option: str, text: str) -> "_Part | None":
+    """Return a table of the site file that an option gives as JSON; None: it is empty.
+
+    Raises:
+        ControllerError: If it is invalid.
+    """
+    from pydantic import ValidationError
+
+    from services.site_file.validation_errors import problem_text
+
+    try:
+        return part.model_validate_json(text) if text else None
+    except ValidationError as error:
+        problem = error.errors()[0]
+        where = ".".join(map(str, problem["loc"]))
+        raise ControllerError(f"--{option} {where}: {problem_text(problem)}") from None
 
 
 def _code(text: str) -> tuple[int, str]:

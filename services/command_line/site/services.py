@@ -93,14 +93,19 @@ def _gateway(site: "Site", options: Options) -> Any:
 
 
 def _driver_options(robot: "Robot") -> object:
-    """Return the settings of the driver; a simulated controller has factors of its own, unless declared."""
-    if robot.protocol == "hses" and robot.simulated:
-        from robots.description import load
-        from robots.joints import joints_of
-        from services.simulator.yaskawa.service import with_factors
+    """Return the settings of the driver; a simulated controller has values of its own, unless declared."""
+    if not robot.simulated or robot.protocol not in ("hses", "snpx"):
+        return robot.options
+    from protocol_gateway.drivers.fanuc.axes import FanucSettings
+    from robots.description import load
+    from robots.joints import joints_of
+    from services.simulator.fanuc.service import with_defaults
+    from services.simulator.yaskawa.service import with_factors
 
-        return with_factors(robot.options, len(joints_of(load(robot.model))))
-    return robot.options
+    joints, declared = joints_of(load(robot.model)), robot.options
+    if isinstance(declared, FanucSettings):
+        return with_defaults(declared, joints.types)
+    return with_factors(declared, len(joints))
 
 
 def _cell_file(site: "Site", options: Options) -> "CellFile":

@@ -126,6 +126,9 @@ def _simulator(robot: Robot, site: str, attach: tuple[str, ...]) -> tuple[Progra
         controller = f"udp://127.0.0.1:{port}"
         declared = robot.yaskawa.model_dump_json(exclude_defaults=True) if robot.yaskawa else ""
         protocol = ("--protocol", "hses", *(("--yaskawa", declared) if declared else ()))
+    if robot.protocol == "snpx":
+        declared = robot.fanuc.model_dump_json(exclude_defaults=True) if robot.fanuc else ""
+        protocol = ("--protocol", "snpx", *(("--fanuc", declared) if declared else ()))
     for_ = ("--for", f"{site}/{robot.name}", *attach)
     address = ("--robot", robot.model, "--listen", f"127.0.0.1:{port}")
     arguments = ("simulate", *address, *demo, *codes, *protocol, *for_)

@@ -34,6 +34,7 @@ from protocol_gateway.drivers.universal_robots.rtde_messages import Value
 from robots.description import RobotDescription
 from robots.joints import FloatArray, joints_of
 from robots.model import build_model, link_placements, tool_jacobian, tool_placement
+from robots.poses import rotation_vector
 from services.simulator.errors import SimulatorError
 from services.simulator.fault_table import LEAP
 from services.simulator.universal_robots.fields import OFFERED
@@ -345,23 +346,3 @@ def _tuple(values: FloatArray) -> tuple[float, ...]:
 def _pose(placement: FloatArray) -> tuple[float, ...]:
     """Return a (4, 4) placement as position [m] and rotation vector [rad]."""
     return (*placement[:3, 3].tolist(), *rotation_vector(placement[:3, :3]).tolist())
-
-
-def rotation_vector(rotation: FloatArray) -> FloatArray:
-    """Return a (3, 3) rotation as its axis times its angle [rad], 0 to pi."""
-    # By the quaternion: its largest component is never small, unlike the sine near 0 and pi.
-    xx, yy, zz = np.diag(rotation)
-    squares = np.array((1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz))
-    largest = int(squares.argmax())
-    r = rotation
-    w, x, y, z = (
-        (squares[0], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]),
-        (r[2, 1] - r[1, 2], squares[1], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]),
-        (r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], squares[2], r[1, 2] + r[2, 1]),
-        (r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], squares[3]),
-    )[largest]
-    vector = np.array((x, y, z)) * (1.0 if w >= 0 else -1.0)
-    length = float(np.linalg.norm(vector))
-    if length < 1e-12:
-        return np.zeros(3)
-    return vector / length * 2.0 * math.atan2(length, abs(w))

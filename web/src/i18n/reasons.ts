@@ -642,6 +642,13 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "控制器发送的是脉冲，因此不显示关节：请在站点文件的 [robot.yaskawa] 中声明每个关节的 pulses_per_degree",
     ],
   ],
+  [
+    "joints.axes_undeclared",
+    [
+      "its joints are not shown, because the site file does not say how axis 3 is measured, or how positions may be assigned: declare j23 and assignments in [robot.fanuc] of the site file",
+      "站点文件没有说明第 3 轴如何计量，或允许怎样分配位置数据，因此不显示关节：请在站点文件的 [robot.fanuc] 中声明 j23 和 assignments",
+    ],
+  ],
   ["positions.unknown", ["the robot's position is unknown ({cause})", "机器人当前位置未知（{cause}）"]],
   ["positions.none", ["the controller has not reported joint positions", "控制器未告知关节位置"]],
   ["speed.missing", ["SPEED needs speed_percent, from 1 to 100", "SPEED 须带 speed_percent，1 至 100"]],

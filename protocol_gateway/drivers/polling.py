@@ -1,6 +1,6 @@
 """Choice of the next question: one at a time, each kind at its own rate, fewer while the controller is busy.
 
-    idle --a question is due--> asked --its answer, or TIMEOUT_S--> idle
+    idle --a question is due--> asked --its answer, or a timeout--> idle
 
 An answer to an older question, or a second one to the same, is not used. No I/O and no clock.
 """
@@ -8,8 +8,7 @@ An answer to an older question, or a second one to the same, is not used. No I/O
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
-
-from protocol_gateway.drivers.yaskawa.hses import Answer, Read
+from typing import Generic, Protocol, TypeVar
 
 TIMEOUT_S = 0.3
 """Time after which an answer is lost: a controller answers within some tens of milliseconds."""
@@ -17,8 +16,30 @@ _SLOWEST = 16
 _CALM_S = 10.0
 
 
+R = TypeVar("R")
+R_contra = TypeVar("R_contra", contravariant=True)
+
+
+class Answered(Protocol[R_contra]):
+    """An answer of the controller."""
+
+    @property
+    def number(self) -> int:
+        """The question's."""
+        ...
+
+    @property
+    def busy(self) -> bool:
+        """True if the controller has no time now for the question."""
+        ...
+
+    def answers(self, read: R_contra) -> bool:
+        """Return whether it can be the answer to a question with its number."""
+        ...
+
+
 @dataclass(slots=True)
-class Regular:
+class Regular(Generic[R]):
     """A question that is asked again and again.
 
     Attributes:
@@ -26,22 +47,27 @@ class Regular:
         next_s: When it is due.
     """
 
-    read: Read
+    read: R
     period_s: float
     next_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class Asked(Generic[R]):
     """The open question."""
 
-    read: Read
+    read: R
     number: int
     at_s: float
 
 
-class Polling:
+class Polling(Generic[R]):
     """Questions of one connection.
+
+    Args:
+        once: Asked first, in this order.
+        timeout_s: Time after which an answer is lost.
+        numbers: Questions are numbered from 0 to one less than this, again and again.
 
     Attributes:
         slowness: The periods are longer by this factor, 1 to 16: it doubles with each busy answer, and halves
@@ -50,28 +76,37 @@ class Polling:
         lost: Questions without an answer, so far.
     """
 
-    def __init__(self, regular: Iterable[Regular], once: Iterable[Read]) -> None:
+    def __init__(
+        self,
+        regular: Iterable[Regular[R]],
+        once: Iterable[R],
+        *,
+        timeout_s: float = TIMEOUT_S,
+        numbers: int = 256,
+    ) -> None:
         self._regular = list(regular)
         self._once = deque(once)
         self.slowness = 1
         self._calm_since_s = 0.0
+        self._timeout_s = timeout_s
+        self._numbers = numbers
         self._number = 0
-        self.asked: Asked | None = None
+        self.asked: Asked[R] | None = None
         self.lost = 0
 
-    def ask_once(self, read: Read) -> None:
+    def ask_once(self, read: R) -> None:
         """Ask a question before the regular ones."""
         if read not in self._once and (self.asked is None or self.asked.read != read):
             self._once.append(read)
 
-    def drop(self, read: Read) -> None:
+    def drop(self, read: R) -> None:
         """Do not ask a question any more."""
         self._regular = [each for each in self._regular if each.read != read]
 
-    def next_question(self, now_s: float) -> Asked | None:
+    def next_question(self, now_s: float) -> Asked[R] | None:
         """Return the question to send now; None: none is due, or an answer is awaited."""
         if self.asked is not None:
-            if now_s < self.asked.at_s + TIMEOUT_S:
+            if now_s < self.asked.at_s + self._timeout_s:
                 return None
             self.lost += 1
             self.asked = None
@@ -81,10 +116,10 @@ class Polling:
         read = self._due(now_s)
         if read is not None:
             self.asked = Asked(read, self._number, now_s)
-            self._number = (self._number + 1) % 256
+            self._number = (self._number + 1) % self._numbers
         return self.asked
 
-    def _due(self, now_s: float) -> Read | None:
+    def _due(self, now_s: float) -> R | None:
         if self._once:
             return self._once.popleft()
         due = [each for each in self._regular if each.next_s <= now_s]
@@ -100,13 +135,13 @@ class Polling:
     def wake_s(self) -> float | None:
         """Return when to call `next_question` again; None: there are no questions."""
         if self.asked is not None:
-            return self.asked.at_s + TIMEOUT_S
+            return self.asked.at_s + self._timeout_s
         return min((each.next_s for each in self._regular), default=None)
 
-    def take(self, answer: Answer, now_s: float) -> Asked | None:
+    def take(self, answer: Answered[R], now_s: float) -> Asked[R] | None:
         """Return the question that an answer belongs to; None: it is late, or a duplicate."""
         asked = self.asked
-        if asked is None or (answer.number, answer.service) != (asked.number, asked.read.service):
+        if asked is None or answer.number != asked.number or not answer.answers(asked.read):
             return None
         self.asked = None
         if answer.busy:

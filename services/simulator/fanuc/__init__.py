@@ -1,0 +1,1 @@
+"""Simulated controller of FANUC's kind with SNPX, for reading."""

@@ -1,0 +1,160 @@
+"""Model of the simulated controller: arm, program, alarms and outputs. No I/O; time is an argument.
+
+The program is the demo's tour. Inputs and outputs are invented: they count its motions.
+"""
+
+import math
+from collections.abc import Collection, Iterator, Mapping
+from datetime import datetime
+
+import numpy as np
+
+from protocol_gateway.drivers.fanuc.axes import Axes
+from protocol_gateway.drivers.fanuc.data import ALARM, AXES, POSITION, TASK
+from protocol_gateway.drivers.fanuc.signals import Operator
+from robots.description import RobotDescription
+from robots.joints import FloatArray, joints_of
+from robots.model import build_model, link_placements, tool_placement
+from robots.poses import rotation_rpy
+from services.simulator.demo import DemoProgram
+from services.simulator.fault_table import LEAP
+
+PROGRAM = "DEMO"
+NO_SEVERITY = 128
+SERVO_SEVERITY = 54
+
+_SPEED = 0.6
+_MOVED_DEGREES = 12.345
+_VALID = 1
+
+
+class SnpxController:
+    """State of one simulated controller with one motion group.
+
+    Args:
+        axes: Relation between its axes and the joints.
+        group: Number of its motion group.
+        tour: Targets [rad] or [m] of the running program; None: none runs.
+        servo_on: A restarted controller waits for an operator to switch the servos on.
+    """
+
+    def __init__(
+        self,
+        description: RobotDescription,
+        axes: Axes,
+        *,
+        group: int,
+        tour: Iterator[FloatArray] | None,
+        servo_on: bool = True,
+    ) -> None:
+        self._axes = axes
+        self._joints = joints_of(description)
+        self._model = build_model(description)
+        self._program = DemoProgram(self._joints, tour, speed=_SPEED)
+        self._servo_on = servo_on
+        self._alarms: list[bytes] = []
+        self.group = group
+        self.registers: dict[int, float] = {1: 12.5}
+
+    # ------------------------------------------------------------------------ behaviour
+
+    def tick(self, now_s: float) -> None:
+        """Begin the next motion of the program if the current one has ended."""
+        self._program.tick(now_s)
+
+    def raise_alarm(self, facility: int, code: int, message: str, now_s: float) -> None:
+        """Stop the arm and report a servo alarm until `reset`."""
+        self._program.stop(now_s)
+        time = datetime.now().astimezone().timetuple()[:6]
+        self._alarms.insert(0, _alarm(facility, code, SERVO_SEVERITY, time, message, "SERVO"))
+
+    def reset(self, now_s: float) -> None:
+        """End all alarms and continue the program."""
+        self._alarms = []
+        self._program.go_on(now_s)
+
+    # ---------------------------------------------------------------------------- state
+
+    def positions(self, now_s: float) -> FloatArray:
+        """Return the joint positions [rad] or [m]."""
+        return self._program.state(now_s).positions
+
+    def position(self, now_s: float, active: Collection[str] = ()) -> bytes:
+        """Return the current position in the world frame, with the tool.
+
+        Args:
+            active: Of the faults: `jump`, `joints`.
+        """
+        positions = self.positions(now_s).copy()
+        if "jump" in active and int(now_s) % 2:
+            positions[0] += np.radians(LEAP)
+        axes = [*self._axes.values(positions)]
+        if "joints" in active:
+            axes[next(each for each in range(AXES) if each not in self._axes.used)] = _MOVED_DEGREES
+        pose = self._frame(tool_placement(self._model, positions))
+        # The configuration of an upright arm in front of its base: N R U T, without turns.
+        return POSITION.pack(*pose, 0, 0, 0, 0, 0, 1, 1, 0, 0, 0, _VALID, *axes, _VALID, 15, 15, 0, 0, 0)
+
+    def tool(self) -> bytes:
+        """Return the tool's frame in that of the flange, which is the model's last link."""
+        positions = self._joints.home
+        flange = link_placements(self._model, positions)[-1]
+        frame = self._frame(np.linalg.inv(flange) @ tool_placement(self._model, positions))
+        return POSITION.pack(*frame, *(0.0,) * 3, *(0,) * 7, _VALID, *(0.0,) * AXES, *(0,) * 6)
+
+    @staticmethod
+    def _frame(placement: FloatArray) -> tuple[float, ...]:
+        """Return x, y, z [mm] and w, p, r [degree] of a placement (4, 4)."""
+        angles = (math.degrees(each) for each in rotation_rpy(placement[:3, :3]))
+        return (*(placement[:3, 3] * 1e3).tolist(), *angles)
+
+    def alarm(self, line: int) -> bytes:
+        """Return an active alarm, 1 is the newest; a line without one is empty."""
+        if line <= len(self._alarms):
+            return self._alarms[line - 1]
+        return _alarm(0, 0, NO_SEVERITY, (0,) * 6, "", "")
+
+    def task(self, number: int) -> bytes:
+        """Return the state of a task; only the first has a program."""
+        if number != 1:
+            return bytes(TASK.size)
+        state = 2 if self._program.runs else 1 if self._alarms else 0
+        return TASK.pack(PROGRAM.encode(), 1 + self._program.leg % 16, state, b"")
+
+    def numbers(self) -> Mapping[str, int]:
+        """Return integer system variables."""
+        return {
+            "$MCR.$GENOVERRIDE": 100,
+            f"$MNUFRAMENUM[{self.group}]": 0,
+            f"$MNUTOOLNUM[{self.group}]": 1,
+            "$SNPX_PARAM.$VERSION": 2,
+            "$SNPX_PARAM.$NUM_ASG": 80,
+        }
+
+    def inputs(self) -> int:
+        """Return DI and DO, the first in the lowest bit."""
+        return self._program.leg % 256
+
+    def operator_outputs(self, active: Collection[str] = ()) -> int:
+        """Return UO.
+
+        Args:
+            active: Of the faults: `local`.
+        """
+        found = 1 << Operator.PENDANT_ENABLED if "local" in active else 0
+        if self._servo_on and not self._alarms:
+            found |= 1 << Operator.SYSTEM_READY
+            found |= 0 if "local" in active else 1 << Operator.COMMANDS_ENABLED
+        if self._program.runs:
+            found |= 1 << Operator.PROGRAM_RUNNING
+        if self._alarms:
+            found |= 1 << Operator.FAULT
+        return found
+
+
+def _alarm(
+    facility: int, code: int, severity: int, time: tuple[int, ...], message: str, severity_name: str
+) -> bytes:
+    return ALARM.pack(
+        facility, code, 0, 0, severity, *time, message.encode()[:80], b"", severity_name.encode()[:18]
+    )

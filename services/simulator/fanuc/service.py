@@ -1,0 +1,132 @@
+"""Service of the simulated controller: listens for SNPX."""
+
+import asyncio
+import logging
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from protocol_gateway.drivers.fanuc.axes import Axes, FanucSettings
+from protocol_gateway.drivers.fanuc.data import AXES
+from protocol_gateway.errors import GatewaySettingsError
+from robots.description import load
+from robots.joints import JointType, joints_of
+from services.errors import ListenError
+from services.simulator.demo import demo_tour
+from services.simulator.errors import SimulatorError
+from services.simulator.fanuc.controller import SnpxController
+from services.simulator.fanuc.memory import Entry
+from services.simulator.fanuc.server import SNPX_FAULTS, SnpxServer
+from services.simulator.fault_requests import Mesh, answer_requests
+from services.simulator.faults import Faults
+from services.site_file.listen_address import check_reach, split_address
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SnpxSettings:
+    """Settings of a simulated controller of FANUC's kind.
+
+    Attributes:
+        robot: A library robot, or a path to a robot.toml or URDF, of at most eight joints.
+        listen: `HOST:PORT`; a real controller has 60008; port 0 takes a free one.
+        fanuc: As in the site file; undeclared: as `with_defaults` says.
+        shared: All connections have one table of assignments.
+        demo: A program runs and moves the arm.
+        faults: Faults in the syntax of `services.simulator.faults`, of `SNPX_FAULTS`.
+        insecure: May listen beyond loopback; this protocol has no TLS.
+        mesh: Where to answer fault requests; None to stay off the mesh.
+    """
+
+    robot: str = "puma560"
+    listen: str = "127.0.0.1:0"
+    fanuc: FanucSettings | None = None
+    shared: bool = False
+    demo: bool = False
+    faults: tuple[str, ...] = ()
+    insecure: bool = False
+    mesh: Mesh | None = None
+
+
+def with_defaults(declared: FanucSettings | None, joint_types: tuple[JointType, ...]) -> FanucSettings:
+    """Return the settings of a simulated controller: as declared, and what the site file leaves open.
+
+    It keeps a table of assignments for each connection, and axis 3 contains axis 2 if both turn.
+    """
+    settings = declared or FanucSettings()
+    if settings.assignments is None:
+        settings = replace(settings, assignments="own")
+    if settings.j23 is None:
+        turn = all(each is JointType.ROTARY for each in joint_types)
+        settings = replace(settings, j23=1 if turn else 0)
+    return settings
+
+
+async def serve_snpx(settings: SnpxSettings, *, ready: Callable[[int], None] | None = None) -> None:
+    """Simulate a controller until cancelled.
+
+    Args:
+        ready: Called with the port once clients can connect.
+
+    Raises:
+        ListenError: If it cannot listen on the address.
+        SimulatorError: If a setting is invalid.
+        DescriptionError: If the robot is unknown.
+    """
+    host, port = split_address(settings.listen)
+    remedy = "listen on 127.0.0.1, or take the risk with --insecure: this protocol has no TLS"
+    if warning := check_reach(
+        "the simulator", host, secured=False, insecure=settings.insecure, remedy=remedy
+    ):
+        logger.warning("%s", warning)
+    faults = Faults(settings.faults, known=SNPX_FAULTS)
+    server = _server(settings, faults)
+    try:
+        listening = await asyncio.get_running_loop().create_server(server.new_client, host, port)
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
+        raise ListenError(f"the simulator cannot listen on {host}:{port}: {reason.lower()}") from None
+    try:
+        if ready is not None:
+            ready(listening.sockets[0].getsockname()[1])
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(server.run())
+            if settings.mesh is not None:
+                tasks.create_task(answer_requests(settings.mesh, faults))
+    finally:
+        listening.close()
+        server.close()
+
+
+def _server(settings: SnpxSettings, faults: Faults) -> SnpxServer:
+    description = load(settings.robot)
+    joints = joints_of(description)
+    if len(joints) >= AXES:
+        raise SimulatorError(
+            f"robot {description.name} has {len(joints)} joints, this controller has at most {AXES - 1} axes"
+        )
+    declared = with_defaults(settings.fanuc, joints.types)
+    try:
+        axes = Axes(declared, joints.types)
+    except GatewaySettingsError as error:
+        raise SimulatorError(str(error)) from None
+
+    def boot(restarted: bool) -> SnpxController:
+        return SnpxController(
+            description,
+            axes,
+            group=declared.group,
+            tour=demo_tour(description) if settings.demo and not restarted else None,
+            servo_on=not restarted,
+        )
+
+    entered = declared.table.assignments if declared.assignments == "pendant" else ()
+    return SnpxServer(
+        boot,
+        faults,
+        shared=settings.shared,
+        entered=[
+            Entry(each.first_word, each.variable.words, str(each.variable), each.multiply) for each in entered
+        ],
+    )
