@@ -31,7 +31,7 @@ DONE = re.compile("Sent:|Done")
 
 
 class User:
-    """A user of the page, whose clicks and typed fields are counted."""
+    """User of the page, with counters of clicks and typed fields."""
 
     def __init__(self, page: Page) -> None:
         self.page = page

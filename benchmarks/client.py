@@ -99,7 +99,7 @@ def measure(
 
 @contextmanager
 def process(target: Callable[[str, Connection], None], endpoint: str) -> Iterator[Connection]:
-    """Run a function in a process of its own, with a pipe."""
+    """Run a function in another process, with a pipe."""
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     running = context.Process(target=target, args=(endpoint, theirs), daemon=True)

@@ -26,7 +26,7 @@ from protocol_gateway.control.jog import Jogs
 from protocol_gateway.control.program import Programs
 from protocol_gateway.control.robot_authority import RobotAuthority
 from protocol_gateway.core.codes import code_table
-from protocol_gateway.drivers.driver import Activity, Carries, Channel, Driver, Stop
+from protocol_gateway.drivers.driver import Activity, Carries, Channel
 from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.journal import Journal
@@ -34,6 +34,7 @@ from protocol_gateway.legacy.clients import LegacyClients
 from protocol_gateway.link.link import JOINT_COUNT, ControllerLink, LinkSettings, LinkState, LinkStatus
 from protocol_gateway.link.status import transition_events
 from protocol_gateway.mesh_requests import MeshRequests
+from protocol_gateway.proofs import Proofs
 from protocol_gateway.settings import RobotSettings
 from protocol_gateway.signals import Signals
 from protocol_gateway.state_messages import controller_state, lease_state, timestamp
@@ -79,7 +80,8 @@ class Robot:
         planner: Checker,
         cell_occupancy: CellOccupancy,
     ) -> None:
-        joints = joints_of(load(settings.description))
+        description = load(settings.description)
+        joints = joints_of(description)
         relay = None if settings.legacy_clients is None else self._relay
         try:
             driver = DRIVERS[settings.protocol](
@@ -95,7 +97,18 @@ class Robot:
         self._settings = settings
         self._legacy: LegacyClients | None = None
         self._capabilities = driver.capabilities
-        self._read_only = _why_read_only(settings, driver)
+        self._proofs = Proofs(
+            f"{site}/{settings.name}",
+            description,
+            driver.capabilities,
+            protocol=settings.protocol,
+            simulated=settings.simulated,
+            verified=settings.verified,
+            stop=settings.stop_proven,
+            experimental=settings.experimental,
+        )
+        self._read_only = self._proofs.read_only("")
+        self._reported_unproven: Reason | None = None
         self._no_joints = driver.capabilities.no_joints
 
         def publisher(topic: str) -> Publisher:
@@ -213,9 +226,7 @@ class Robot:
             self._journal.report(
                 _S.ERROR, "audit.damaged", f"audit log {self._audit.path.name}: {self._audit.damage}"
             )
-        if self._read_only:
-            text = f"the robot is read-only: {self._read_only}"
-            self._journal.report(_S.WARNING, "robot.read_only", text, why=self._read_only)
+        self._report_read_only()
         stop = self._control.authority.stop
         if stop is not None:
             text = f"stop request {stop.id} ({stop.by}: {stop.reason}) is still latched after the restart"
@@ -224,6 +235,11 @@ class Robot:
             with contextlib.suppress(ValueError, TypeError):  # a changed line: `verify` reports it
                 self._audit_topic.remember(audit_entry(entry), source_time_ns=entry.time_ns)
         self._publish_state()
+
+    def _report_read_only(self) -> None:
+        if self._read_only:
+            text = f"the robot is read-only: {self._read_only}"
+            self._journal.report(_S.WARNING, "robot.read_only", text, why=self._read_only)
 
     @property
     def link(self) -> ControllerLink:
@@ -251,7 +267,7 @@ class Robot:
         name, authority, controller = self._settings.name, self._control.authority, self._controller()
         if authority.lease is not None:
             return codes.CELL_CONTROLLED(robot=name, holder=authority.lease.holder)
-        if controller.positions is None or controller.positions_stale or authority.moving is None:
+        if not self.has_current_joints or authority.moving is None:
             return codes.CELL_UNKNOWN(robot=name)
         moves = authority.moving or authority.motion is not None or self._control.program is not None
         if moves or controller.status.activity in (Activity.MOVING, Activity.HOMING, Activity.HOLDING):
@@ -383,6 +399,13 @@ class Robot:
         self._publish_state()
 
     def _on_controller_status(self) -> None:
+        before, self._read_only = self._read_only, self._proofs.read_only(self._telemetry.software)
+        if self._read_only != before:
+            self._report_read_only()
+        unproven = self._proofs.joints_unproven(self._telemetry.software)
+        if unproven is not None and unproven != self._reported_unproven and self._telemetry.software:
+            self._reported_unproven = unproven
+            self._journal.report(_S.WARNING, "joints.unproven", str(unproven), why=unproven)
         self._control.handle(events.StatusChanged())
         self._observe()
         self._publish_state()
@@ -407,13 +430,16 @@ class Robot:
             self._control.handle(events.MotionObserved(moving))
 
     def _controller(self) -> Controller:
-        now_s = time.monotonic()
+        now_s, software = time.monotonic(), self._telemetry.software
+        unproven = self._proofs.joints_unproven(software)
         return Controller(
             link=self._link.status,
             status=self._telemetry.status(now_s),
             fault=self._telemetry.fault(now_s),
-            positions=self._telemetry.positions(now_s),
+            positions=self._telemetry.positions(now_s) if unproven is None else None,
             positions_stale=self._no_joints or self._telemetry.positions_stale(now_s),
+            unproven=unproven,
+            software=software,
             read_only=self._read_only,
             capabilities=self._capabilities,
             stop_arrives=self._link.carries(Carries.STOP),
@@ -441,18 +467,10 @@ class Robot:
                 check_starting=self._checks.starting,
                 program=self._programs.running,
                 jog=self._jogs.running,
+                joints_sha256=self._proofs.joints_sha256,
                 now=now,
             )
         )
         self._lease_topic.put(lease_state(authority, now))
         self._programs.state.timestamp.CopyFrom(timestamp(now.wall_ns))
         self._program_topic.put(self._programs.state)
-
-
-def _why_read_only(settings: RobotSettings, driver: Driver) -> Reason | None:
-    """Return why no command may be sent to the controller; None: commands may be sent."""
-    if not driver.capabilities.commands:
-        return codes.READS_ONLY()
-    if Stop not in driver.capabilities.commands:
-        return codes.NO_STOP_CODE()
-    return None if settings.stop_proven else codes.STOP_NOT_PROVEN()

@@ -12,12 +12,14 @@ from protocol_gateway.checking.policy import Policy
 from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.legacy.settings import LegacySettings
+from protocol_gateway.proofs import StopProof
 from robomesh.keys import check_name
 from robomesh.quotas import DEFAULT_QUOTAS, Quotas
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.cells import CellDescription, CellRobot
 from robots.programs.jog_steps import MOST_M_S
+from robots.verification_record import VerificationRecord
 
 _KNOWN_UNKNOWNS = frozenset({"mode", "homed"})
 
@@ -36,8 +38,11 @@ class RobotSettings:
         options: Settings of the protocol's driver, such as `YaskawaSettings`; None: it has none.
         codes: Type codes, where the controller sends numbers: {2: "ABSOLUTE.DEG", 101: "COMMAND:home"}.
         accept_unknown: States that the controller never reports and that are not required: "mode", "homed".
-        stop_proven: The stop unit was tried on this controller; otherwise the robot is read-only.
-            How to try it: docs/safety.md.
+        simulated: The controller is a simulator of robomesh.
+        stop_proven: The trial of the stop on this controller, or True; False: the robot is read-only. How to
+            try it: docs/safety.md.
+        verified: Comparison of its joints with the pose that its controller computes; None: there is none.
+        experimental: Commands may be sent that were never tried on a real controller.
         stale_after_s: Without a unit for this long, the robot's state is unknown. Without positions for this
             long, motion is refused.
         reconnect_after_s: Without a unit for this long, the gateway reconnects.
@@ -56,7 +61,10 @@ class RobotSettings:
     options: object = None
     codes: Mapping[int, str] = field(default_factory=dict)
     accept_unknown: frozenset[str] = frozenset()
-    stop_proven: bool = False
+    simulated: bool = False
+    stop_proven: StopProof | bool = False
+    verified: VerificationRecord | None = None
+    experimental: bool = False
     stale_after_s: float = 1.0
     reconnect_after_s: float = 4.0
     legacy_clients: LegacySettings | None = None

@@ -86,6 +86,7 @@ def controller_state(
     check_starting: bool,
     program: schema.ControllerState.Program | None,
     jog: schema.JogState | None,
+    joints_sha256: str,
     now: Now,
 ) -> schema.ControllerState:
     """Return the controller's state; a value that the controller does not report is "unknown"."""
@@ -101,6 +102,9 @@ def controller_state(
         trace=_KNOWN[status.trace],
         fault=controller.fault,
         read_only=controller.read_only is not None,
+        software=controller.software,
+        joints_unproven=controller.unproven is not None,
+        joints_sha256=joints_sha256,
         last_unit_age_s=age_s,
         controller_time_s=controller_time_s,
         rate_hz=rate_hz,
@@ -173,6 +177,8 @@ def _link_reasons(controller: Controller) -> list[Reason]:
     # While the link is not up, its own reason already covers missing positions.
     if controller.positions_stale is not None and controller.link.state is LinkState.UP:
         reasons.append(controller.positions_stale)
+    if controller.unproven is not None and controller.link.state is LinkState.UP:
+        reasons.append(controller.unproven)
     if controller.read_only is not None:
         reasons.append(codes.READ_ONLY(controller.read_only))
     return reasons

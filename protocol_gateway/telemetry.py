@@ -15,6 +15,7 @@ from protocol_gateway.drivers.driver import (
     Refused,
     Severity,
     SignalsReceived,
+    SoftwareReceived,
     StatusReceived,
     UnknownReceived,
 )
@@ -23,11 +24,13 @@ from protocol_gateway.link.link import Received
 from protocol_gateway.motion import MotionDetector, is_moving
 from protocol_gateway.signals import Signals
 from protocol_gateway.state_messages import JointStatesMessage, raw_record
+from protocol_gateway.text_limits import LONGEST_TEXT
 from protocol_gateway.watchdog import STALE_S, Watchdog
 from robomesh import reason_codes as codes
 from robomesh.publisher import Publisher
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import Event
+from robomesh.texts import one_line
 from robots.joints import Joints
 
 _SLOW_S = 0.1
@@ -66,6 +69,7 @@ class Telemetry:
     Attributes:
         motion_detector: Detects motion in the positions.
         controller_time_s: Time on the controller's own clock; None: it reports none.
+        software: Version of the controller's software; empty: not reported since the link came up.
     """
 
     def __init__(
@@ -94,6 +98,7 @@ class Telemetry:
         self._stale_after_s = stale_after_s
         self._next_slow_s = 0.0
         self.motion_detector = MotionDetector(joints.types)
+        self._reported_software = ""
         self.forget()
 
     def forget(self) -> None:
@@ -106,6 +111,7 @@ class Telemetry:
         self._lost = (False, False)
         self._joints_notice, self._status_notice = _LossNotice(), _LossNotice()
         self.controller_time_s: float | None = None
+        self.software = ""
         self.motion_detector.forget()
         self._signals.forget()
 
@@ -192,6 +198,8 @@ class Telemetry:
                     bytes=text,
                     reason=reason,
                 )
+            case SoftwareReceived(version):
+                self._on_software(one_line(version, LONGEST_TEXT))
             case Refused(number, text):
                 self._on_refused(number, text)
             case AlarmReceived(severity, text, number):
@@ -202,6 +210,15 @@ class Telemetry:
                     apart=number or text,
                     number=number,
                 )
+
+    def _on_software(self, version: str) -> None:
+        if version != self.software:
+            self.software = version
+            self._on_status()
+        if version != self._reported_software:
+            self._reported_software = version
+            text = f"the controller's software: {version}"
+            self._journal.report(_S.INFO, "controller.software", text, software=version)
 
     def _on_controller_status(self, status: StatusReceived, now_s: float) -> None:
         changed = status.values != self._status.values

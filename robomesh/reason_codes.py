@@ -338,6 +338,26 @@ NO_STOP_CODE = Code(
     "the codes in the site file have no stop for its controller",
     'add the code of "COMMAND:stop", or of "COMMAND"',
 )
+EXPERIMENTAL = Code(
+    "robot.experimental",
+    "motion by the protocol {protocol} was never tried on a real controller",
+    "set experimental = true for this robot in the site file to try it",
+)
+STOP_PROOF_SHORT = Code(
+    "robot.stop_proof_short",
+    "stop_proven does not say what was tried",
+    'name driver = "{driver}", means = "{means}", software and date (see docs/safety.md)',
+)
+STOP_OTHER_MEANS = Code(
+    "robot.stop_other_means",
+    "its stop was proven by {before}, and is sent by {now}",
+    "test it again (see docs/safety.md)",
+)
+STOP_OTHER_SOFTWARE = Code(
+    "robot.stop_other_software",
+    "its stop was proven with the software {before} of its controller, which is {now} now",
+    "test it again (see docs/safety.md)",
+)
 STOP_NOT_PROVEN = Code(
     "robot.stop_not_proven",
     "its stop is not proven",
@@ -434,6 +454,32 @@ AXES_UNDECLARED = Code(
     "its joints are not shown, because the site file does not say how axis 3 is measured, or how positions "
     "may be assigned",
     "declare j23 and assignments in [robot.fanuc] of the site file",
+)
+JOINTS_NOT_VERIFIED = Code(
+    "joints.not_verified",
+    "its joints are unproven: they were never compared with the pose that its controller computes",
+    "run robomesh robot verify {robot} --out FILE, then set verified = FILE for this robot in the site file",
+)
+JOINTS_OF_OTHER_ROBOT = Code(
+    "joints.of_other_robot",
+    "its joints are unproven: the comparison was made with {other}",
+    "run robomesh robot verify {robot} --out FILE",
+)
+JOINTS_DISAGREE = Code(
+    "joints.disagree",
+    "its joints are unproven: model and controller differ by the comparison of {time}",
+    "change the model or the site file as the comparison says, then make it again",
+)
+JOINTS_OTHER_MODEL = Code(
+    "joints.other_model",
+    "its joints are unproven: the comparison of {time} was made with another model, or with other keys of "
+    "the site file",
+    "run robomesh robot verify again",
+)
+JOINTS_OTHER_SOFTWARE = Code(
+    "joints.other_software",
+    "its joints are unproven: its controller's software is {now}, the comparison was made with {before}",
+    "run robomesh robot verify again",
 )
 POSITIONS_UNKNOWN = Code("positions.unknown", "the robot's position is unknown ({cause})")
 POSITIONS_NONE = Code("positions.none", "the controller has not reported joint positions")

@@ -5,6 +5,7 @@ RobotError
 ├── MeshError           a mesh file cannot be read: file, place and what is wrong there
 ├── SaveError           a robot cannot be written to its folder
 │   └── RobotExistsError    a robot of that name exists
+├── VerificationRecordError a file is no record of a verification
 ├── ProgramError        a teach program cannot be read: each line, word, value and what would be right
 └── CodedRobotError     an error with a reason of the table
     ├── JointCountError joint positions do not have one value per joint
@@ -90,6 +91,10 @@ class RobotExistsError(SaveError):
         super().__init__(
             target, "the robot was changed since it was read" if changed else "a robot of that name exists"
         )
+
+
+class VerificationRecordError(RobotError):
+    """A file that is no record of a verification."""
 
 
 class ProgramError(RobotError):

@@ -4,6 +4,7 @@ A controller computes its tool's Cartesian position with its own model of the ar
 poses, in which every joint moved, joint names, order, signs, zeros, scales and link lengths are right.
 """
 
+import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.joints import FloatArray, Joints, JointType
+from robots.kinematic_tree import Tree
 from robots.poses import inverse, rotation_rpy
 
 POSES = 10
@@ -89,6 +91,30 @@ def verify(placement: Placement, joints: Joints, samples: Sequence[Sample]) -> V
         unmoved=unmoved(joints, samples),
         suspects=() if agree else tuple(_suspects(placement, joints, samples)),
     )
+
+
+def joints_sha256(tree: Tree, joint_mapping: str) -> str:
+    """Return the SHA-256 of everything that a verification depends on, as hexadecimal digits.
+
+    Neither shapes nor limits change it.
+
+    Args:
+        tree: Joints and links of the model.
+        joint_mapping: How the driver converts the controller's values to joints, as text.
+    """
+    parts = [joint_mapping]
+    parts += [
+        f"{each.name} {each.type} {each.parent} {each.mimic} {_digits(each.joint_to_parent)} "
+        f"{_digits(each.axis)}"
+        for each in tree.joints
+    ]
+    parts += [f"{each.name} {each.joint} {_digits(each.link_to_joint)}" for each in tree.links]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def _digits(values: FloatArray) -> str:
+    # Nine decimals, so that another order of operations gives the same; without a negative zero.
+    return " ".join(f"{each:.9f}" for each in np.round(values.ravel(), 9) + 0.0)
 
 
 def unlike(joints: Joints, positions: FloatArray, samples: Sequence[Sample]) -> bool:

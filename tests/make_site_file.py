@@ -4,9 +4,10 @@ import inspect
 import re
 import sys
 from collections.abc import Iterator
+from datetime import date
 from pathlib import Path
 from types import NoneType
-from typing import Annotated, Any, Literal, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[1])
@@ -36,7 +37,14 @@ _DESCRIBED_BY: dict[type[BaseModel], type] = {Quotas: quotas.Quotas}
 # A robot's description may choose other units for its poses; a site file does not.
 _UNITS: dict[tuple[type[BaseModel], str], str] = {(Pose, "xyz"): "mm", (Pose, "rpy"): "deg"}
 _UNIT = re.compile(r" \[([A-Za-z/]+)\]")
-_TYPES = {str: "text", Path: "path", bool: "true or false", int: "whole number", float: "number"}
+_TYPES = {
+    str: "text",
+    Path: "path",
+    bool: "true or false",
+    int: "whole number",
+    float: "number",
+    date: "date",
+}
 _BOUNDS = (
     (annotated_types.Ge, "ge", "at least"),
     (annotated_types.Gt, "gt", "above"),
@@ -73,6 +81,8 @@ def table_of(annotation: Any) -> type[BaseModel] | None:
     inner, _ = plain(annotation)
     if get_origin(inner) is tuple:
         inner, _ = plain(get_args(inner)[0])
+    for each in get_args(inner) if get_origin(inner) is Union else ():
+        inner = each if isinstance(each, type) and issubclass(each, BaseModel) else inner
     return inner if isinstance(inner, type) and issubclass(inner, BaseModel) else None
 
 
@@ -129,7 +139,8 @@ def rows(model: type[BaseModel], path: str, anchors: dict[type[BaseModel], str])
             continue
         kind = type_text(field.annotation, tuple(field.metadata)) if table is None else ""
         if table is not None:
-            several = "list of tables" if get_origin(plain(field.annotation)[0]) is tuple else "table"
+            of = get_origin(plain(field.annotation)[0])
+            several = "list of tables" if of is tuple else "true, false or table" if of is Union else "table"
             kind = f"[{several}](#{anchors[table].replace('.', '')})"
         unit = _UNIT.search(text)
         shown = unit.group(1) if unit else _UNITS.get((model, name), "")

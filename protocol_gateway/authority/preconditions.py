@@ -68,6 +68,9 @@ class Controller:
     Attributes:
         positions: Joint positions [rad] or [m]; None: none received, or stale.
         positions_stale: Reason if positions are stale; None: they are current, or none were received.
+        unproven: Reason why the joints that it sends may not be those of the model, so that `positions` has
+            none; None: they are.
+        software: Version of its software, in its words; empty: not reported.
         read_only: Reason why nothing is sent to it; None: commands may be sent.
         capabilities: What its driver can do.
         stop_arrives: What carries its stop is connected.
@@ -79,6 +82,8 @@ class Controller:
     fault: str = ""
     positions: tuple[float, ...] | None = None
     positions_stale: Reason | None = None
+    unproven: Reason | None = None
+    software: str = ""
     read_only: Reason | None = None
     capabilities: Capabilities = _EVERYTHING
     stop_arrives: bool = True
@@ -145,8 +150,8 @@ def _state_obstacle(request: CommandRequest, controller: Controller) -> Reason |
         return codes.CONTROLLER_FAULT(fault=controller.fault or "it does not say which")
     if status.activity is Activity.HOLDING and request.command != _C.RESUME:
         return codes.CONTROLLER_HOLDING()
-    if controller.positions_stale is not None:
-        return codes.POSITIONS_UNKNOWN(controller.positions_stale)
+    if (unknown := controller.unproven or controller.positions_stale) is not None:
+        return codes.POSITIONS_UNKNOWN(unknown)
     # Many arms have no positions before they are homed. An arm with stale positions is not moved.
     if controller.positions is None and request.command != _C.HOME:
         return codes.POSITIONS_NONE()

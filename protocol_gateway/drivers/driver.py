@@ -1,4 +1,4 @@
-"""Interface between a controller's own protocol and the gateway: another kind of controller is one more file.
+"""Interface between a controller's own protocol and the gateway. A driver for each protocol implements it.
 
 A driver does no I/O and reads no clock. It is told what happens on its channels, and returns effects, which
 the link performs in order:
@@ -194,6 +194,13 @@ class SignalsReceived:
     valid_for_s: float = 3.0
 
 
+@dataclass(frozen=True, slots=True)
+class SoftwareReceived:
+    """Version of the controller's software, in its own words: what was proven on another one is unproven."""
+
+    version: str
+
+
 ControllerEvent: TypeAlias = (
     JointsReceived
     | StatusReceived
@@ -202,6 +209,7 @@ ControllerEvent: TypeAlias = (
     | UnknownReceived
     | AlarmReceived
     | SignalsReceived
+    | SoftwareReceived
 )
 
 # -------------------------------------------------------------- commands to a controller
@@ -277,7 +285,7 @@ class StopEnds(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Capabilities:
-    """What a driver can do with its controller. The rest is refused with a code, and not offered.
+    """Capabilities of a driver with its controller. Other commands are refused with a code, and not offered.
 
     Attributes:
         commands: Commands that `encode` takes; empty: the driver only reads.
@@ -288,6 +296,12 @@ class Capabilities:
         dies_with_link: Whether the controller itself ends a motion when the gateway or its link is gone;
             None: unknown.
         no_joints: Reason for missing joint positions; None: the driver reports them.
+        reports_pose: It reports the tool's pose that the controller computes (signals "tool.pose.*"), so that
+            the joints of a real arm are unproven until `robomesh robot verify` has compared them.
+        joint_mapping: The site file's declarations by which it converts joints, in any form: with others,
+            the joints are unproven again.
+        experimental: Its commands were never tried on a real controller.
+        stop_means: How its `Stop` is sent, which a proof of the stop names; empty: in one way only.
     """
 
     commands: frozenset[type[ControllerCommand]]
@@ -296,13 +310,17 @@ class Capabilities:
     absolute: bool = False
     dies_with_link: bool | None = None
     no_joints: Reason | None = None
+    reports_pose: bool = False
+    joint_mapping: str = ""
+    experimental: bool = False
+    stop_means: str = ""
 
 
 # ------------------------------------------------------------------------ effects
 
 
 class Carries(Flag):
-    """What is lost while a channel is not open."""
+    """Functions that depend on a channel."""
 
     READING = auto()
     MOTION = auto()
@@ -413,7 +431,7 @@ class Driver(Protocol):
 
     @property
     def capabilities(self) -> Capabilities:
-        """What the driver can do with the controller; it stays the same."""
+        """Capabilities of the driver, which never change."""
         ...
 
     def started(self, now_s: float) -> Effects:

@@ -94,6 +94,11 @@ SHARED: Mapping[str, str] = MappingProxyType(
 """Pattern of each name, with its unit or kind."""
 
 
+def of_placement(name: str) -> tuple[Signal, ...]:
+    """Return the signals of a position and a rotation vector: "tool.pose" becomes "tool.pose.x", ..."""
+    return (*of_axes(name, "m"), *of_axes(name, "rad", "rx ry rz"))
+
+
 def of_joints(quantity: str, unit: str, joints: int) -> tuple[Signal, ...]:
     """Return the signals of a quantity of each joint: "current" becomes "joint.waist.current", ..."""
     return tuple(Signal(f"joint.{quantity}", unit, joint) for joint in range(joints))

@@ -31,12 +31,14 @@ class _Arm:
 
     Attributes:
         received_at: Receive time of its positions [s].
+        unproven: Its joints may not be those of the model: its positions are not used.
         cached: Its last clearances, and the positions that they were computed for.
     """
 
     fresh_for_s: float
     positions: FloatArray | None = None
     received_at: float = 0.0
+    unproven: bool = False
     cached: tuple[tuple[object, ...], Proximity] | None = None
 
 
@@ -57,9 +59,19 @@ class CellState:
         arm = self._arms[robot]
         arm.positions, arm.received_at = positions, self._now_s()
 
+    def update_proof(self, robot: str, *, unproven: bool) -> None:
+        """Store whether an arm's joints are unproven."""
+        self._arms[robot].unproven = unproven
+
+    def is_unproven(self, robot: str) -> bool:
+        """Return whether an arm's joints are unproven."""
+        return self._arms[robot].unproven
+
     def positions(self, robot: str) -> FloatArray | None:
-        """Return an arm's positions (n,) [rad] or [m]; None if they are unknown or stale."""
+        """Return an arm's positions (n,) [rad] or [m]; None if they are unknown, unproven or stale."""
         arm = self._arms[robot]
+        if arm.unproven:
+            return None
         return arm.positions if self._now_s() - arm.received_at <= arm.fresh_for_s else None
 
     def others(self, robot: str) -> tuple[dict[str, FloatArray], tuple[str, ...]]:

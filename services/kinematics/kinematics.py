@@ -18,7 +18,7 @@ from robots.urdf.write import to_urdf
 from services.kinematics.answers import Workers, answer_robot_requests
 from services.kinematics.cell_state import CellState
 from services.kinematics.descriptions import add_surroundings, describe
-from services.kinematics.publisher import FollowedArm, follow
+from services.kinematics.publisher import FollowedArm, follow, follow_proof
 from services.kinematics.settings import RobotSettings, Settings
 from services.kinematics.shown_cell import ShownCell, first_content, follow_gateway
 
@@ -124,4 +124,6 @@ async def _serve_robot(
         reach=reach_of(description),
         base_to_site=robot.base_to_site,
     )
-    await follow(session, arm, cell_state, shown)
+    async with asyncio.TaskGroup() as group:
+        group.create_task(follow_proof(session, arm, cell_state))
+        group.create_task(follow(session, arm, cell_state, shown))

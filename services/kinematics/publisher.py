@@ -126,7 +126,10 @@ async def follow(session: Session, arm: FollowedArm, cell_state: CellState, show
         before = time_ns, positions
         state, proximity = _state(arm, cell_state, now.built, positions, velocities, message.timestamp)
         kinematics.put(state, source_time_ns=time_ns, dated_by=dated_by)
-        found = alarms.judge(_conditions(arm, now.built, positions, state, proximity), sample.received)
+        # Unproven joints may be elsewhere: alarms about them would be invented.
+        unproven = cell_state.is_unproven(arm.name)
+        conditions = () if unproven else _conditions(arm, now.built, positions, state, proximity)
+        found = alarms.judge(conditions, sample.received)
         if now.built is not None and floor_reported is not now.built:
             floor_reported = now.built
             poses = {"at home": arm.model.joints.home, "where it is now": positions}
@@ -138,6 +141,17 @@ async def follow(session: Session, arm: FollowedArm, cell_state: CellState, show
             log.log(_LEVELS[event.severity], "%s: %s", arm.path, event.text)
 
 
+async def follow_proof(session: Session, arm: FollowedArm, cell_state: CellState) -> None:
+    """Keep in a cell's state whether an arm's joints are unproven, until cancelled."""
+    async for sample in session.subscribe(robot_key(arm.site, arm.name, "controller")):
+        try:
+            message = sample.message()
+        except MessageError:
+            continue
+        assert isinstance(message, schema.ControllerState)
+        cell_state.update_proof(arm.name, unproven=message.joints_unproven)
+
+
 def _state(
     arm: FollowedArm,
     cell_state: CellState,
@@ -146,9 +160,12 @@ def _state(
     velocities: FloatArray | None,
     timestamp: Timestamp,
 ) -> tuple[schema.KinematicState, Proximity | None]:
-    """Return the `kinematics` message and the clearances; the latter are None until the hulls are built."""
+    """Return the `kinematics` message and the clearances.
+
+    The latter are None until the hulls are built, and for an arm whose joints are unproven.
+    """
     state = kinematic_state(arm.model, positions, velocities, reach=arm.reach, timestamp=timestamp)
-    if built is None:
+    if built is None or cell_state.is_unproven(arm.name):
         return state, None
     proximity = cell_state.proximity(built, arm.name, positions)
     add_proximity(state, proximity, site=arm.site)

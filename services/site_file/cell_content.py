@@ -164,7 +164,7 @@ def member_of(robot: Robot) -> schema.CellMember:
         check=robot.check,
         warning_distance=_metres(robot.clearance.warning),
         stop_distance=_metres(robot.clearance.stop),
-        stop_proven=robot.can_be_stopped,
+        stop_proven=bool(robot.proof_of_stop),
     )
 
 

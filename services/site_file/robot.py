@@ -1,5 +1,7 @@
 """The site file's `[[robot]]`."""
 
+from datetime import date
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
@@ -9,10 +11,12 @@ from protocol_gateway.drivers.fanuc.axes import FanucSettings
 from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
 from protocol_gateway.errors import CodeTableError
+from protocol_gateway.proofs import StopProof
 from robomesh import keys
 from robomesh.access_rights import PROBE_ROBOT
 from robomesh.errors import KeyNameError
 from robots.description import Pose
+from robots.verification_record import VerificationRecord, read_record
 from services.errors import ListenError
 from services.site_file.fanuc import Fanuc
 from services.site_file.fixtures import Clearance, Floor
@@ -20,6 +24,23 @@ from services.site_file.legacy_clients import LegacyClients
 from services.site_file.listen_address import split_address
 from services.site_file.part import PART_CONFIG
 from services.site_file.yaskawa import Yaskawa
+
+
+class StopTrial(BaseModel):
+    """A trial of the stop on the real controller.
+
+    Attributes:
+        driver: The robot's protocol.
+        means: How the stop was sent; the page of the protocol has the words.
+        software: Version of the controller's software, as `robomesh list --json` shows it.
+        date: Day of the trial.
+    """
+
+    model_config = PART_CONFIG
+    driver: str
+    means: str
+    software: str
+    date: date
 
 
 class Robot(BaseModel):
@@ -51,8 +72,14 @@ class Robot(BaseModel):
         clearance: Distances to fixtures and other robots.
         floor: The floor of its cell: its height [mm], a table, or `false` for none. In a cell of several
             robots one robot's key applies to all.
-        stop_proven: The stop unit was tried on this controller (docs/safety.md); otherwise the robot is
-            read-only. Absent: `true` for a simulated controller, else `false`.
+        stop_proven: The stop was tried on this controller (docs/safety.md); otherwise the robot is read-only.
+            `true` with the protocol `unit`; with others what was tried, as in `{ driver = "rtde",
+            means = "...", software = "5.12.4", date = 2026-11-26 }`. Absent: `true` for a simulated
+            controller, else `false`.
+        verified: File of `robomesh robot verify --out`: the model's joints were compared with this
+            controller's. Without it, the joints of a controller that reports its tool's pose are shown as
+            unproven, and count for no check.
+        experimental: Send commands although this protocol's were never tried on a real controller.
         stale_after_s: The stale time [s]: without a unit of the controller for this long, the robot's state
             is stale; without joint positions for this long, the gateway refuses motion. It reconnects after
             twice this time, at least 4 s.
@@ -76,7 +103,9 @@ class Robot(BaseModel):
     jog_speed: Annotated[float, Field(ge=0, le=250)] = 250.0
     clearance: Clearance = Clearance()
     floor: Floor | None = Floor()
-    stop_proven: StrictBool | None = None
+    stop_proven: StrictBool | StopTrial | None = None
+    verified: Path | None = None
+    experimental: StrictBool = False
     stale_after_s: Annotated[float, Field(gt=0.05, le=60)] = 1.0
     demo: StrictBool = False
     legacy_clients: LegacyClients | None = None
@@ -92,6 +121,16 @@ class Robot(BaseModel):
             return keys.check_name(name, "robot")
         except KeyNameError as error:
             raise ValueError(str(error)) from None
+
+    @field_validator("stop_proven", mode="before")
+    @classmethod
+    def _stop_proven(cls, proven: Any) -> Any:
+        if not isinstance(proven, bool | dict | StopTrial | None):
+            raise ValueError(
+                "should be true, false, or what was tried, as in "
+                '{ driver = "rtde", means = "...", software = "5.12.4", date = 2026-11-26 }'
+            )
+        return proven
 
     @field_validator("protocol")
     @classmethod
@@ -189,6 +228,17 @@ class Robot(BaseModel):
         return self.controller == "simulated"
 
     @property
-    def can_be_stopped(self) -> bool:
-        """True if the stop unit is proven: `stop_proven` says so, or the controller is simulated."""
+    def proof_of_stop(self) -> StopProof | bool:
+        """The trial of the stop; a simulated controller needs none."""
+        if isinstance(self.stop_proven, StopTrial):
+            return StopProof(**self.stop_proven.model_dump())
         return self.simulated if self.stop_proven is None else self.stop_proven
+
+    @property
+    def comparison(self) -> VerificationRecord | None:
+        """The comparison of its joints; None: the file names none.
+
+        Raises:
+            VerificationRecordError: If the file cannot be used.
+        """
+        return None if self.verified is None else read_record(self.verified)

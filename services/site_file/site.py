@@ -20,7 +20,7 @@ from pydantic import (
 
 from robots import description
 from robots.bounded_toml import read_toml
-from robots.errors import DescriptionError
+from robots.errors import DescriptionError, VerificationRecordError
 from robots.kinematic_tree import BASE, bare_links, tree_of
 from robots.schema import Pose, UrdfDescription
 from services.errors import ListenError, SiteFileError
@@ -231,6 +231,10 @@ def load(path: Path | None) -> Site:
             tree = tree_of(described)
         except DescriptionError as error:
             raise SiteFileError(f"{path}: robot {robot.name}: model = {robot.model!r}: {error}") from None
+        try:
+            _ = robot.comparison
+        except VerificationRecordError as error:
+            raise SiteFileError(f"{path}: robot {robot.name}: verified: {error}") from None
         links[robot.name] = {link.name: bool(link.checked) for link in tree.links}
         missing = described.robot.unchecked if isinstance(described, UrdfDescription) else ()
         shaped = [number for number, link in enumerate(tree.links) if link.checked]
@@ -288,12 +292,7 @@ def _unseen_problem(robots: tuple[Robot, ...], unseen: Mapping[str, str]) -> str
 
 def resolve_site(site: Site, folder: Path) -> Site:
     """Return the site with paths relative to a folder."""
-    robots = tuple(
-        robot.model_copy(update={"model": str(folder / robot.model)})
-        if robot.model.endswith((".toml", ".urdf")) and not Path(robot.model).is_absolute()
-        else robot
-        for robot in site.robot
-    )
+    robots = tuple(_resolve_robot(robot, folder) for robot in site.robot)
     fixtures = tuple(
         fixture.model_copy(update={"mesh": folder / fixture.mesh}) if fixture.mesh is not None else fixture
         for fixture in site.fixture
@@ -311,6 +310,15 @@ def resolve_site(site: Site, folder: Path) -> Site:
             **resolve_paths(site.router, site.keys, folder),
         }
     )
+
+
+def _resolve_robot(robot: Robot, folder: Path) -> Robot:
+    paths: dict[str, object] = {}
+    if robot.model.endswith((".toml", ".urdf")):
+        paths["model"] = str(folder / robot.model)
+    if robot.verified is not None:
+        paths["verified"] = folder / robot.verified
+    return robot.model_copy(update=paths)
 
 
 def _tcp_address(endpoint: str) -> str:

@@ -83,6 +83,8 @@ RULES: Mapping[str, Rule] = MappingProxyType(
         "controller.payload_changed": _NONE,
         "controller.frame_changed": _NONE,
         "robot.read_only": _NONE,
+        "joints.unproven": _NONE,
+        "controller.software": _NONE,
         "stop.remembered": _NONE,  # the controller state reports it
         "stop.sent": _NONE,
         "stop.not_sent": Rule(CRITICAL, "The stop did not reach the controller: use its emergency stop."),

@@ -31,7 +31,7 @@ STATE = Report((JointsReceived((0.1, 0.2)),), units=1)
 
 
 class Driver:
-    """Driver whose effects the test chooses; it notes what it is told."""
+    """Driver whose effects the test chooses; it records each event."""
 
     requests_a_second = 100.0
     capabilities = Capabilities(commands=frozenset())

@@ -20,6 +20,7 @@ from protocol_gateway.drivers.driver import (
     SetTimer,
     Severity,
     SignalsReceived,
+    SoftwareReceived,
     StatusReceived,
 )
 from protocol_gateway.drivers.polling import TIMEOUT_S
@@ -83,10 +84,13 @@ class Stepped:
         self.now_s += 0.004
         self.perform(self.driver.received(HSES, head + sub + data, self.now_s))
 
-    def until(self, command):
-        """Answer what is asked, until a question with a command is open."""
+    def until(self, command, *, pose=False):
+        """Answer what is asked, until a question with a command is open; of positions, pulses or the pose."""
         for _ in range(200):
-            if self.question[1] == command and len(self.sent) > self.answered:
+            _, asked, instance, _, _ = self.question
+            if (asked, asked == 0x75 and instance > 100) == (command, pose) and len(
+                self.sent
+            ) > self.answered:
                 return
             self.step()
         raise AssertionError(f"0x{command:X} is not asked")
@@ -100,11 +104,13 @@ class Stepped:
             self.perform(self.driver.timer_ended(self.now_s))
             return
         self.answered = len(self.sent)
-        self.answer(HEALTHY[self.question[1]] if data is None else data)
+        _, command, instance, _, _ = self.question
+        healthy = POSE if command == 0x75 and instance > 100 else HEALTHY[command]
+        self.answer(healthy if data is None else data)
 
-    def give(self, command, *arguments, **options):
+    def give(self, command, *arguments, pose=False, **options):
         """Answer the next question with a command; return the events of this answer."""
-        self.until(command)
+        self.until(command, pose=pose)
         self.answered = len(self.sent)
         before = len(self.events)
         self.answer(*arguments, **options)
@@ -137,6 +143,8 @@ HEALTHY = {
     0x78: b"\x05",
     0x89: b"DS2.07".ljust(24, b"\0") + b"ES0165D".ljust(16, b"\0") + b"12.34\0\0\0",
 }
+# x 500, y -20, z 30 mm, turned by 90° about z, with tool 3.
+POSE = position(500_000, -20_000, 30_000, 0, 0, 900_000, 0, 0, data_type=17, tool=3)
 READS = {(0x70, 1), (0x72, 1), (0x73, 1), (0x74, 1), (0x75, 1), (0x77, 1), (0x78, 0x0E), (0x89, 1)}
 
 
@@ -156,7 +164,8 @@ def test_it_asks_for_status_system_and_axes_first_and_then_again_and_again():
     asked = [struct.unpack_from("<H", each, 24)[0] for each in arm.sent]
     assert asked[:3] == [0x72, 0x89, 0x74]
     seconds = arm.now_s - NOW_S
-    assert asked.count(0x75) / seconds == pytest.approx(20, rel=0.05)
+    # Pulses, and twice a second the tool's pose.
+    assert asked.count(0x75) / seconds == pytest.approx(22, rel=0.05)
     assert asked.count(0x72) / seconds == pytest.approx(5, rel=0.1)
     assert asked.count(0x89) == asked.count(0x74) == 1
     assert len(asked) / seconds < arm.driver.requests_a_second
@@ -197,7 +206,8 @@ def test_without_factors_no_positions_are_asked_for_and_a_reason_is_given():
     for _ in range(500):
         arm.step()
     assert not any(isinstance(each, JointsReceived) for each in arm.events)
-    assert 0x75 not in {struct.unpack_from("<H", each, 24)[0] for each in arm.sent}
+    asked = {struct.unpack_from("<HH", each, 24) for each in arm.sent}
+    assert {instance for command, instance in asked if command == 0x75} == {101}
     assert arm.driver.capabilities.no_joints.code == "joints.undeclared"
     assert Stepped().driver.capabilities.no_joints is None
     assert any(isinstance(each, StatusReceived) for each in arm.events)
@@ -274,8 +284,21 @@ def test_job_load_inputs_and_system_are_reported():
     assert (found["io.digital_in.9", None], found["io.digital_in.10", None]) == (True, False)
     assert (found["io.digital_out.3", None], found["hses.io.40012", None]) == (True, True)
     assert (found["robot.mode", None], found["robot.servo", None]) == ("play", True)
-    texts = [each.text for each in arm.events if isinstance(each, AlarmReceived)]
-    assert texts == ["software DS2.07, model ES0165D, parameters 12.34"]
+    texts = [each.version for each in arm.events if isinstance(each, SoftwareReceived)]
+    assert texts == ["DS2.07, model ES0165D"]
+
+
+def test_the_pose_of_the_tool_is_a_position_and_a_rotation_vector():
+    arm = Stepped()
+    (event,) = arm.give(0x75, POSE, pose=True)
+    found = {signal.name: value for signal, value in event.values}
+    assert found.pop("tool.number") == 3
+    assert [*found] == [f"tool.pose.{axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")]
+    assert [*found.values()] == pytest.approx([0.5, -0.02, 0.03, 0, 0, math.pi / 2])
+    # Of the user's frame or the tool: not comparable.
+    (event,) = arm.give(0x75, position(0, 0, 0, 0, 0, 0, 0, 0, data_type=19), pose=True)
+    assert "a tool's pose of type 19" in event.reason
+    assert Stepped(group="S1").driver.capabilities.reports_pose is False
 
 
 def test_a_read_that_the_controller_does_not_have_is_not_repeated():

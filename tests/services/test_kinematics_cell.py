@@ -144,6 +144,33 @@ def test_clearance_counts_the_other_robot_only_while_it_reports_its_position(mes
     run(main())
 
 
+def test_an_arm_with_unproven_joints_has_no_clearance_and_counts_for_no_other(mesh):
+    left, right = np.radians([[-57.0, 90.0, -67.0, 0.0, 0.0], [69.0, 79.0, -73.0, 0.0, 0.0]])
+
+    async def main():
+        async with (
+            cell_service(mesh) as (gateway, monitor),
+            publishing(gateway, {"left": left, "right": right}),
+        ):
+            await until(monitor, "kinematics", lambda m: m.HasField("clearance") and not m.not_counted)
+            controllers = {
+                name: gateway.declare_publisher("hall", name, "controller") for name in ("left", "right")
+            }
+            controllers["right"].put(schema.ControllerState(joints_unproven=True))
+            state = await until(monitor, "kinematics", lambda m: m.not_counted)
+            assert list(state.not_counted) == ["right"]
+            controllers["left"].put(schema.ControllerState(joints_unproven=True))
+            state = await until(monitor, "kinematics", lambda m: not m.HasField("clearance"))
+            # The pose of its tool is shown.
+            assert len(state.tool_to_base) == 16
+            assert not state.HasField("own_clearance")
+            for each in controllers.values():
+                each.put(schema.ControllerState())
+            await until(monitor, "kinematics", lambda m: m.HasField("clearance") and not m.not_counted)
+
+    run(main())
+
+
 def test_late_joiners_receive_the_events_of_an_arm_near_a_post(mesh):
     async def main():
         near = np.radians([-36.87, 15.0, -30.0, 0.0, 0.0])

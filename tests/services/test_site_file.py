@@ -24,7 +24,7 @@ def test_without_a_file_the_demo_runs():
     demo = site.load(None)
     assert (demo.site, [robot.name for robot in demo.robot]) == ("demo", ["pt600"])
     assert demo.robot[0].simulated
-    assert demo.robot[0].can_be_stopped
+    assert demo.robot[0].proof_of_stop
 
 
 def test_paths_are_taken_from_the_files_own_folder(tmp_path):
@@ -41,8 +41,8 @@ def test_the_view_recorded_by_default_is_rendered(tmp_path):
 
 def test_a_controller_of_the_plant_is_read_only_until_its_stop_is_proven(tmp_path):
     text = f'site = "hall"\n{ROBOT}controller = "tcp://10.0.0.7:5400"\n'
-    assert not load(tmp_path, text).robot[0].can_be_stopped
-    assert load(tmp_path, text + "stop_proven = true\n").robot[0].can_be_stopped
+    assert not load(tmp_path, text).robot[0].proof_of_stop
+    assert load(tmp_path, text + "stop_proven = true\n").robot[0].proof_of_stop
 
 
 def test_codes_are_numbers(tmp_path):

@@ -24,6 +24,7 @@ from protocol_gateway.drivers.driver import (
     Send,
     SetTimer,
     Severity,
+    SoftwareReceived,
     StatusReceived,
 )
 from protocol_gateway.drivers.only_reads import OnlyReads
@@ -44,7 +45,7 @@ from protocol_gateway.drivers.universal_robots.primary import (
     RuntimeFault,
 )
 from protocol_gateway.drivers.universal_robots.rtde_messages import TextReceived
-from protocol_gateway.drivers.universal_robots.rtde_reader import Failed, RtdeReader
+from protocol_gateway.drivers.universal_robots.rtde_reader import Failed, Ready, RtdeReader
 from protocol_gateway.drivers.universal_robots.signals import SignalReports
 from protocol_gateway.drivers.universal_robots.state import OUTPUTS, ControllerState
 from protocol_gateway.errors import GatewaySettingsError
@@ -95,7 +96,7 @@ class RtdeDriver(OnlyReads):
     """
 
     ports = frozenset({PRIMARY.name, "scripts", "dashboard"})
-    capabilities = Capabilities(commands=frozenset(), absolute=True)
+    capabilities = Capabilities(commands=frozenset(), absolute=True, reports_pose=True)
     # A greeting takes at most seven requests.
     requests_a_second = 10.0
 
@@ -155,8 +156,8 @@ class RtdeDriver(OnlyReads):
                     failure = reason if fatal else failure
                 case Failed(reason):
                     failure = reason
-                case _:
-                    pass
+                case Ready(version):
+                    events.append(SoftwareReceived(str(version)))
         effects: list[Effect] = [Report(events, units)]
         if asked := self._reader.to_send():
             effects.append(Send(RTDE, asked))

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from enum import IntEnum
 
 from protocol_gateway.drivers.driver import Signal, SignalsReceived, SignalValue
-from protocol_gateway.drivers.signal_names import numbered, of_axes, of_joints
+from protocol_gateway.drivers.signal_names import numbered, of_axes, of_joints, of_placement
 from protocol_gateway.drivers.universal_robots.modes import (
     JointMode,
     RobotMode,
@@ -44,8 +44,8 @@ _ANALOG = {
     for unit in _ANALOG_UNITS
 }
 _FORCES = (*of_axes("tool.force", "N"), *of_axes("tool.torque", "N·m"))
-_OFFSETS = (*of_axes("tool.offset", "m"), *of_axes("tool.offset", "rad", "rx ry rz"))
-_POSES = (*of_axes("tool.pose", "m"), *of_axes("tool.pose", "rad", "rx ry rz"))
+_OFFSETS = of_placement("tool.offset")
+_POSES = of_placement("tool.pose")
 _CENTRE = of_axes("payload", "m")
 _TOOL_VOLTAGE = Signal("tool.voltage", "V")
 _TOOL_CURRENT = Signal("tool.current", "A")

@@ -78,6 +78,10 @@ def instance_of(group: str) -> int:
 class Axes:
     """Linear relation between pulses and joint positions.
 
+    Attributes:
+        used: Axis of each joint, from 0.
+        mapping: The relation as text.
+
     Args:
         joint_types: Types of the model's joints.
 
@@ -115,6 +119,7 @@ class Axes:
                 "yaskawa pulses_per_degree and coupling: pulses do not determine the joints; none may be 0"
             )
         self._matrix, self._inverse = matrix, np.linalg.inv(matrix)
+        self.mapping = repr((settings.group, numbers, self._zero.tolist(), matrix.tolist()))
 
     def positions(self, pulses: Sequence[int]) -> tuple[float, ...]:
         """Return joint positions [rad] or [m].

@@ -23,6 +23,7 @@ from protocol_gateway.drivers.driver import (
     Send,
     SetTimer,
     Severity,
+    SoftwareReceived,
     StatusReceived,
 )
 from protocol_gateway.drivers.hexadecimal import hexadecimal
@@ -46,7 +47,7 @@ ALARMS = 4
 """Active alarms that can be asked for, the newest first."""
 
 _STATUS_HZ = 5.0
-# Of job, torques, and each group of inputs or outputs.
+# Of the tool's pose, job, torques, and each group of inputs or outputs.
 _SIGNALS_HZ = 2.0
 _TOOL_EACH_S = 1.0
 _ALARMS_EACH_S = 1.0
@@ -76,6 +77,8 @@ class HsesDriver(OnlyReads):
         settings = options if isinstance(options, YaskawaSettings) else YaskawaSettings()
         self._group, instance = settings.group, instance_of(settings.group)
         self._position = Read(Command.POSITION, instance)
+        # Robots only: a base or a station has no tool.
+        self._pose = Read(Command.POSITION, 100 + instance) if settings.group[0] == "R" else None
         self._axis_names = Read(Command.AXES, instance)
         # Robots are numbered from 11 here, like their bases, and stations as elsewhere.
         self._system = Read(Command.SYSTEM, instance + 10 if settings.group[0] == "R" else instance)
@@ -90,11 +93,12 @@ class HsesDriver(OnlyReads):
             commands=frozenset(),
             absolute=True,
             no_joints=reason_codes.JOINTS_UNDECLARED() if self._axes is None else None,
+            reports_pose=self._pose is not None,
+            joint_mapping="" if self._axes is None else self._axes.mapping,
         )
-        regular_hz = settings.rate_hz + _STATUS_HZ + _SIGNALS_HZ * (2 + len(self._io))
+        regular_hz = settings.rate_hz + _STATUS_HZ + _SIGNALS_HZ * (3 + len(self._io))
         # With a round of alarms each second, and the questions of a new connection.
         self.requests_a_second = regular_hz + ALARMS / _ALARMS_EACH_S + 2.0
-        self._known_system: payloads.System | None = None
         # Kept over a lost link, so that it is not reported again.
         self._alarms: set[Alarm] = set()
         self._extra_axes = ""
@@ -105,7 +109,8 @@ class HsesDriver(OnlyReads):
         if self._axes is not None:
             regular.insert(0, Regular(self._position, 1.0 / self._rate_hz))
             regular.append(Regular(self._torques, 1.0 / _SIGNALS_HZ))
-        regular += [Regular(each, 1.0 / _SIGNALS_HZ) for each in (JOB, *self._io)]
+        others = (JOB, *self._io) if self._pose is None else (self._pose, JOB, *self._io)
+        regular += [Regular(each, 1.0 / _SIGNALS_HZ) for each in others]
         self._polling = Polling(regular, (STATUS, self._system, self._axis_names))
         self._refused: set[Read] = set()
         self._names: Sequence[str] = ()
@@ -187,6 +192,8 @@ class HsesDriver(OnlyReads):
 
     def _events(self, read: Read, data: bytes, now_s: float) -> list[ControllerEvent]:
         match read.command:
+            case Command.POSITION if read == self._pose:
+                return self._tool_pose(payloads.position(data))
             case Command.POSITION:
                 return self._joints(payloads.position(data), now_s)
             case Command.STATUS:
@@ -225,6 +232,13 @@ class HsesDriver(OnlyReads):
         moved = {each: str(each + 1) for each, at in enumerate(position.axes) if abs(at) > _SOME_PULSES}
         return [*events, *self._report_extra_axes(moved)]
 
+    def _tool_pose(self, position: Position) -> list[ControllerEvent]:
+        if position.data_type not in (DataType.BASE, DataType.ROBOT):
+            raise ValueError(
+                f"a tool's pose of type {position.data_type}; 16 (base) and 17 (robot) can be used"
+            )
+        return [signals.of_pose(position)]
+
     def _on_axis_names(self, names: Sequence[str]) -> list[ControllerEvent]:
         self._names = names
         return self._report_extra_axes({each: name for each, name in enumerate(names) if name})
@@ -260,16 +274,8 @@ class HsesDriver(OnlyReads):
         return [alarm_of(alarm)] if alarm.code and alarm not in known else []
 
     def _on_system(self, system: payloads.System) -> list[ControllerEvent]:
-        if system == self._known_system:
-            return []
-        self._known_system = system
-        return [
-            AlarmReceived(
-                Severity.INFO,
-                f"software {system.software or '-'}, model {system.model or '-'}, "
-                f"parameters {system.parameters or '-'}",
-            )
-        ]
+        model = f", model {system.model}" if system.model else ""
+        return [SoftwareReceived(f"{system.software or 'unknown'}{model}")]
 
 
 def status_of(status: Status) -> StatusReceived:

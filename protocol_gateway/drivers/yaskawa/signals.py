@@ -1,10 +1,12 @@
 """Signals that the answers give, by the names that all drivers share (docs/signals.md)."""
 
 from collections.abc import Sequence
+from math import radians
 
 from protocol_gateway.drivers.driver import Signal, SignalsReceived, SignalValue
-from protocol_gateway.drivers.signal_names import numbered
+from protocol_gateway.drivers.signal_names import numbered, of_placement
 from protocol_gateway.drivers.yaskawa.data import HELD, Job, Position, Status, Status1, Status2
+from robots.poses import rotation_vector, rpy_rotation
 
 _SERVO = Signal("robot.servo")
 _MODE = Signal("robot.mode")
@@ -12,6 +14,7 @@ _STATE = Signal("program.state")
 _CYCLE = Signal("program.cycle")
 _ERROR = Signal("hses.error")
 _TOOL = Signal("tool.number")
+_POSE = of_placement("tool.pose")
 _NAME, _LINE, _STEP = Signal("program.name"), Signal("program.line"), Signal("program.step")
 _OVERRIDE = Signal("speed.override", "%")
 
@@ -43,6 +46,14 @@ def of_status(status: Status) -> SignalsReceived:
 def of_position(position: Position) -> SignalsReceived:
     """Return the signals of a position."""
     return SignalsReceived(((_TOOL, position.tool),))
+
+
+def of_pose(position: Position) -> SignalsReceived:
+    """Return the signals of a tool's pose in the robot's frame."""
+    x, y, z, *angles = position.axes[:6]
+    turned = rpy_rotation(*(radians(each * 1e-4) for each in angles))
+    values = (x * 1e-6, y * 1e-6, z * 1e-6, *rotation_vector(turned).tolist())
+    return SignalsReceived([(_TOOL, position.tool), *zip(_POSE, values, strict=True)])
 
 
 def of_job(job: Job) -> SignalsReceived:

@@ -158,6 +158,8 @@ def _state(row: dict[str, Any]) -> str:
     words = [row["state"]]
     if row["stop_id"] is not None:
         words.append(f"stop {row['stop_id']} latched")
+    if row["joints_unproven"]:
+        words.append("joints unproven")
     if row["read_only"]:
         words.append("read-only")
     elif row["stops"] == "not_now" and row["link"] == "up":

@@ -1,14 +1,13 @@
 """`robomesh robot verify`: a controller's joints, compared with the Cartesian position that it computes."""
 
 import asyncio
-import hashlib
 import sys
 import tempfile
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from math import degrees
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from robomesh.atomic_write import write_atomically
 from robomesh.client.robot import AsyncRobot
@@ -19,6 +18,7 @@ from services.errors import ServiceError
 if TYPE_CHECKING:
     from robots.joints import FloatArray, Joints
     from robots.verification import Placement, Sample, Verification
+    from robots.verification_record import VerificationRecord
 
 _REST_S = 1.0
 _STILL = 2e-4  # of a joint at rest [rad] or [m]: more than the noise of encoders
@@ -41,24 +41,36 @@ def verify(robot: str, connect: str, out: Path | None, *, base: str, flange: str
     Raises:
         VerificationError: If the robot cannot be verified.
     """
-    result = discovery.run(_verify(robot, connect, base, flange))
-    text = discovery.json_line(result)
+    record = discovery.run(_verify(robot, connect, base, flange))
+    text = record.model_dump_json()
     if out is not None:
         write_atomically(out, (text + "\n").encode())
-    print(text if as_json else "\n".join(_lines(result)), flush=True)
-    return bool(result["agrees"])
+    print(text if as_json else "\n".join(_lines(record, out)), flush=True)
+    return record.agrees
 
 
-async def _verify(name: str, connect: str, base: str, flange: str) -> dict[str, Any]:
+async def _verify(name: str, connect: str, base: str, flange: str) -> "VerificationRecord":
     from robots.verification import verify
 
     async with discovery.attached(connect) as session:
         place = await discovery.find(session, name)
         robot = AsyncRobot(session, *place)
+        state = await _state(robot)
         description = await robot.description()
         joints, placement = _model(description, base, flange)
         samples = await _samples(robot, joints, _tool(description))
-        return _result(str(place), description, joints, verify(placement, joints, samples))
+        after = await _state(robot)
+        if (after.joints_sha256, after.software) != (state.joints_sha256, state.software):
+            raise VerificationError(f"{place}: its model or its controller's software has changed meanwhile")
+        return _record(str(place), description, state, joints, verify(placement, joints, samples))
+
+
+async def _state(robot: AsyncRobot) -> schema.ControllerState:
+    """Return what the comparison will be valid for; without a gateway, nothing."""
+    sample = await robot.last("controller")
+    state = schema.ControllerState() if sample is None else sample.message
+    assert isinstance(state, schema.ControllerState)
+    return state
 
 
 def _model(description: schema.Description, base: str, flange: str) -> tuple["Joints", "Placement"]:
@@ -221,44 +233,51 @@ def _in_order(joints: "Joints", names: tuple[str, ...], positions: tuple[float, 
     return np.array([of[name] for name in joints.names])
 
 
-def _result(
-    place: str, description: schema.Description, joints: "Joints", found: "Verification"
-) -> dict[str, Any]:
-    model = hashlib.sha256(f"{description.robot_toml}\0{description.urdf}".encode()).hexdigest()
-    return {
-        "robot": place,
-        "time": datetime.now(UTC).isoformat(timespec="seconds"),
-        "agrees": found.agrees,
-        "model": description.name,
-        "model_sha256": model,
-        "joints": list(joints.names),
-        "poses": [
-            {
-                "positions": each.sample.positions.tolist(),
-                "distance_m": each.distance_m,
-                "angle_rad": each.angle_rad,
-            }
+def _record(
+    place: str,
+    description: schema.Description,
+    state: schema.ControllerState,
+    joints: "Joints",
+    found: "Verification",
+) -> "VerificationRecord":
+    from robots.verification_record import VerificationRecord, VerifiedPose
+
+    return VerificationRecord(
+        robot=place,
+        time=datetime.now(UTC).isoformat(timespec="seconds"),
+        agrees=found.agrees,
+        model=description.name,
+        joints_sha256=state.joints_sha256,
+        software=state.software,
+        joints=joints.names,
+        poses=tuple(
+            VerifiedPose(
+                positions=tuple(each.sample.positions.tolist()),
+                distance_m=each.distance_m,
+                angle_rad=each.angle_rad,
+            )
             for each in found.deviations
-        ],
-        "unmoved": list(found.unmoved),
-        "suspects": list(found.suspects),
-    }
+        ),
+        unmoved=found.unmoved,
+        suspects=found.suspects,
+    )
 
 
-def _lines(result: Mapping[str, Any]) -> list[str]:
-    poses = result["poses"]
-    distance, angle = (max(each[of] for each in poses) for of in ("distance_m", "angle_rad"))
-    most = f"at most {1000 * distance:.2f} mm and {degrees(angle):.3f}° in {len(poses)} poses"
-    if result["agrees"]:
-        return [f"{result['robot']}: model and controller agree ({most})"]
-    lines = [f"{result['robot']}: model and controller differ: {most}; 1 mm and 0.1° are allowed"]
+def _lines(record: "VerificationRecord", out: Path | None = None) -> list[str]:
+    distance = max(each.distance_m for each in record.poses)
+    angle = max(each.angle_rad for each in record.poses)
+    most = f"at most {1000 * distance:.2f} mm and {degrees(angle):.3f}° in {len(record.poses)} poses"
+    if record.agrees:
+        lines = [f"{record.robot}: model and controller agree ({most})"]
+        return [*lines, f'  in the site file: verified = "{out}"'] if out is not None else lines
+    lines = [f"{record.robot}: model and controller differ: {most}; 1 mm and 0.1° are allowed"]
     lines += [
-        f"  pose {number}: {1000 * each['distance_m']:.2f} mm, {degrees(each['angle_rad']):.3f}°"
-        for number, each in enumerate(poses, start=1)
+        f"  pose {number}: {1000 * each.distance_m:.2f} mm, {degrees(each.angle_rad):.3f}°"
+        for number, each in enumerate(record.poses, start=1)
     ]
-    lines += [f"  {each}" for each in result["unmoved"]]
-    lines += [f"  all poses agree if: {each}" for each in result["suspects"]]
-    if not result["suspects"] and not result["unmoved"]:
+    lines += [f"  {each}" for each in record.unmoved]
+    lines += [f"  all poses agree if: {each}" for each in record.suspects]
+    if not record.suspects and not record.unmoved:
         lines.append("  no single joint, frame or unit explains it: is it the right model?")
     return lines
 

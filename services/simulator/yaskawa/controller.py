@@ -3,7 +3,6 @@
 The job is the demo's tour. Torques and inputs are invented: they follow the motion without any dynamics.
 """
 
-import math
 from collections.abc import Collection, Iterator
 from datetime import datetime
 
@@ -23,6 +22,7 @@ from protocol_gateway.drivers.yaskawa.data import (
 from robots.description import RobotDescription
 from robots.joints import FloatArray, joints_of
 from robots.model import build_model, tool_placement
+from robots.poses import rotation_rpy
 from services.simulator.demo import DemoProgram
 from services.simulator.fault_table import LEAP
 
@@ -105,12 +105,8 @@ class HsesController:
     def pose(self, now_s: float) -> Position:
         """Return the tool's pose in the base frame: position, and angles about the fixed axes x, y, z."""
         placement = tool_placement(self._model, self.positions(now_s))
-        angles = (
-            math.atan2(placement[2, 1], placement[2, 2]),
-            math.atan2(-placement[2, 0], math.hypot(placement[2, 1], placement[2, 2])),
-            math.atan2(placement[1, 0], placement[0, 0]),
-        )
-        numbers = [*(placement[:3, 3] * 1e6), *(math.degrees(each) * 1e4 for each in angles)]
+        angles = np.degrees(rotation_rpy(placement[:3, :3]))
+        numbers = [*(placement[:3, 3] * 1e6), *(angles * 1e4)]
         rest = (0,) * (self._axis_count - len(numbers))
         return Position(DataType.BASE, 0, 0, 0, 0, (*(round(float(each)) for each in numbers), *rest))
 

@@ -521,6 +521,34 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "其停止命令未经验证：请在控制器上试验停止（见 docs/safety.md），再在站点文件中写入 stop_proven = true",
     ],
   ],
+  [
+    "robot.experimental",
+    [
+      "motion by the protocol {protocol} was never tried on a real controller: set experimental = true for this robot in the site file to try it",
+      "协议 {protocol} 的运动从未在真实控制器上试验：如要试用，请在站点文件中为此机器人写入 experimental = true",
+    ],
+  ],
+  [
+    "robot.stop_proof_short",
+    [
+      'stop_proven does not say what was tried: name driver = "{driver}", means = "{means}", software and date (see docs/safety.md)',
+      'stop_proven 未说明试验内容：请写明 driver = "{driver}"、means = "{means}"、software 和 date（见 docs/safety.md）',
+    ],
+  ],
+  [
+    "robot.stop_other_means",
+    [
+      "its stop was proven by {before}, and is sent by {now}: test it again (see docs/safety.md)",
+      "其停止以 {before} 验证，而现以 {now} 发送：请重新试验（见 docs/safety.md）",
+    ],
+  ],
+  [
+    "robot.stop_other_software",
+    [
+      "its stop was proven with the software {before} of its controller, which is {now} now: test it again (see docs/safety.md)",
+      "其停止以控制器软件 {before} 验证，现为 {now}：请重新试验（见 docs/safety.md）",
+    ],
+  ],
   ["robot.not_homed", ["the robot is not homed: home it first (HOME)", "机器人未回零：请先回零（HOME）"]],
   [
     "robot.homed_unknown",
@@ -647,6 +675,41 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     [
       "its joints are not shown, because the site file does not say how axis 3 is measured, or how positions may be assigned: declare j23 and assignments in [robot.fanuc] of the site file",
       "站点文件没有说明第 3 轴如何计量，或允许怎样分配位置数据，因此不显示关节：请在站点文件的 [robot.fanuc] 中声明 j23 和 assignments",
+    ],
+  ],
+  [
+    "joints.not_verified",
+    [
+      "its joints are unproven: they were never compared with the pose that its controller computes: run robomesh robot verify {robot} --out FILE, then set verified = FILE for this robot in the site file",
+      "其关节未经核对：从未与控制器计算的位姿比较：请运行 robomesh robot verify {robot} --out FILE，再在站点文件中为此机器人写入 verified = FILE",
+    ],
+  ],
+  [
+    "joints.of_other_robot",
+    [
+      "its joints are unproven: the comparison was made with {other}: run robomesh robot verify {robot} --out FILE",
+      "其关节未经核对：该次比较属于 {other}：请运行 robomesh robot verify {robot} --out FILE",
+    ],
+  ],
+  [
+    "joints.disagree",
+    [
+      "its joints are unproven: model and controller differ by the comparison of {time}: change the model or the site file as the comparison says, then make it again",
+      "其关节未经核对：据 {time} 的比较，模型与控制器不一致：请按比较结果修改模型或站点文件，再重新比较",
+    ],
+  ],
+  [
+    "joints.other_model",
+    [
+      "its joints are unproven: the comparison of {time} was made with another model, or with other keys of the site file: run robomesh robot verify again",
+      "其关节未经核对：{time} 的比较使用了另一模型或站点文件的其他设置：请重新运行 robomesh robot verify",
+    ],
+  ],
+  [
+    "joints.other_software",
+    [
+      "its joints are unproven: its controller's software is {now}, the comparison was made with {before}: run robomesh robot verify again",
+      "其关节未经核对：控制器软件现为 {now}，而比较时为 {before}：请重新运行 robomesh robot verify",
     ],
   ],
   ["positions.unknown", ["the robot's position is unknown ({cause})", "机器人当前位置未知（{cause}）"]],

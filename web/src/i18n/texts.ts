@@ -358,6 +358,9 @@ const TEXTS = {
   no_such_command: ["This controller has no such command.", "此控制器没有该命令。"],
   dies_with_link: ["stops without the gateway", "失去网关即停止"],
   lives_without_link: ["moves on without the gateway", "失去网关仍继续运动"],
+  joints_unproven: ["Joints unproven", "关节未经核对"],
+  joints_unproven_short: ["unproven", "未经核对"],
+  software: ["Controller's software", "控制器软件"],
   reads_only_text: [
     "Read-only: robomesh reads this kind of controller and never sends it a command.",
     "只读：robomesh 只读取这类控制器，不会发送任何命令。",

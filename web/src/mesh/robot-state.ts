@@ -51,6 +51,13 @@ const REPEAT_MS = 3000;
 export const DISOBEYED = "stop.disobeyed";
 const END_S = 0.01; // a recording's end, by its player's rounding
 const POSITIONS_STALE = "positions.stale";
+const UNPROVEN = new Set([
+  "joints.not_verified",
+  "joints.of_other_robot",
+  "joints.disagree",
+  "joints.other_model",
+  "joints.other_software",
+]);
 const READS_ONLY = "robot.reads_only";
 
 /** Return how long before a controller's report an event was [ms], by the gateway's clock. */
@@ -128,6 +135,13 @@ export function stoppedByItself(state: ControllerState | undefined): boolean {
   return state !== undefined && !state.stop && [Activity.STOPPED, Activity.FAULT].includes(state.activity);
 }
 
+/** Explain why the joints that the controller sends may not be the model's; empty: they are. */
+export function whyUnproven(state: ControllerState | undefined): string {
+  if (!state?.jointsUnproven) return "";
+  const why = state.linkReasons.find(({ code }) => UNPROVEN.has(code));
+  return t("sentence", { text: why ? reasonText(why, why.text) : t("joints_unproven") });
+}
+
 /** Explain why nothing moves the robot now, not even RESUME, and what to do; empty: it can move, as far as is known. */
 export function whyNoMotion(state: ControllerState | undefined): string {
   if (!state) return "";
@@ -139,6 +153,7 @@ export function whyNoMotion(state: ControllerState | undefined): string {
   if (state.link !== Link.UP) return t("no_motion_link");
   if (state.mode === Mode.LOCAL) return t("no_motion_local");
   if (stoppedByItself(state)) return t("own_reset_needs");
+  if (state.jointsUnproven) return whyUnproven(state);
   const stale = state.linkReasons.find(({ code }) => code === POSITIONS_STALE);
   return stale ? t("no_motion_reason", { text: reasonText(stale, stale.text) }) : "";
 }
@@ -204,6 +219,6 @@ export function problemOf({ word }: StateWord, state: ControllerState | undefine
     case "state_silent":
       return reasonsText(state?.linkReasons, state?.linkText);
     default:
-      return "";
+      return state?.jointsUnproven ? t("joints_unproven") : "";
   }
 }

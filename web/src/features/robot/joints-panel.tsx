@@ -14,7 +14,7 @@ import { controlNotice, holds } from "../../mesh/control";
 import { useJointSteps } from "../../mesh/joint-steps";
 import type { Motion } from "../../mesh/notice-expiry";
 import { useNoticeExpiry } from "../../mesh/notice-expiry";
-import { whyNoNewMotion, whyNoTarget } from "../../mesh/robot-state";
+import { whyNoNewMotion, whyNoTarget, whyUnproven } from "../../mesh/robot-state";
 import { whyFrozen } from "../../mesh/sight";
 import { checkTarget, targetParts, targetProblem } from "../../mesh/target-check";
 import { now } from "../../mesh/topics";
@@ -135,7 +135,7 @@ export function JointsPanel(props: {
         : mine || !reachable.value
           ? why
           : isMonitor.value || props.controller?.readOnly
-            ? ""
+            ? whyUnproven(props.controller)
             : t("joint_hint_take");
   return (
     <Panel
@@ -143,6 +143,12 @@ export function JointsPanel(props: {
       title={t("joints")}
       end={
         <>
+          {props.controller?.jointsUnproven && (
+            <strong class="joints-unproven">
+              <span class="shape warning" aria-hidden="true" />
+              {t("joints_unproven_short")}
+            </strong>
+          )}
           {props.age === undefined ? <span class="dim">{t("no_data")}</span> : <Age stale={stale} age={props.age} />}
           {isMonitor.value || (
             <>

@@ -21,6 +21,7 @@ export function LinkFacts({ controller }: { controller: Latest<ControllerState> 
   const milliseconds = (name: TextName, seconds: number | undefined) => {
     if (seconds !== undefined) facts.push([name, fixed(seconds * 1000, 1), "ms"]);
   };
+  if (state.software) facts.push(["software", state.software]);
   if (state.rateHz !== undefined) facts.push(["link_rate", fixed(state.rateHz, 1), "/s"]);
   milliseconds("link_jitter", health?.jitterS);
   milliseconds("link_round_trip", health?.networkRoundTripS);
