@@ -283,7 +283,7 @@ class Signal(_message.Message):
     def __init__(self, name: _Optional[str] = ..., unit: _Optional[str] = ..., number: _Optional[float] = ..., on: _Optional[bool] = ..., text: _Optional[str] = ..., age_s: _Optional[float] = ...) -> None: ...
 
 class KinematicState(_message.Message):
-    __slots__ = ("timestamp", "tool_to_base", "linear_velocity", "angular_velocity", "manipulability", "limit_margins", "clearance", "own_clearance", "singularity_margin", "not_counted")
+    __slots__ = ("timestamp", "tool_to_base", "linear_velocity", "angular_velocity", "manipulability", "limit_margins", "clearance", "own_clearance", "singularity_margin", "not_counted", "joints_unproven")
     TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
     TOOL_TO_BASE_FIELD_NUMBER: _ClassVar[int]
     LINEAR_VELOCITY_FIELD_NUMBER: _ClassVar[int]
@@ -294,6 +294,7 @@ class KinematicState(_message.Message):
     OWN_CLEARANCE_FIELD_NUMBER: _ClassVar[int]
     SINGULARITY_MARGIN_FIELD_NUMBER: _ClassVar[int]
     NOT_COUNTED_FIELD_NUMBER: _ClassVar[int]
+    JOINTS_UNPROVEN_FIELD_NUMBER: _ClassVar[int]
     timestamp: _timestamp_pb2.Timestamp
     tool_to_base: _containers.RepeatedScalarFieldContainer[float]
     linear_velocity: Vector3
@@ -304,7 +305,8 @@ class KinematicState(_message.Message):
     own_clearance: Clearance
     singularity_margin: float
     not_counted: _containers.RepeatedScalarFieldContainer[str]
-    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., tool_to_base: _Optional[_Iterable[float]] = ..., linear_velocity: _Optional[_Union[Vector3, _Mapping]] = ..., angular_velocity: _Optional[_Union[Vector3, _Mapping]] = ..., manipulability: _Optional[float] = ..., limit_margins: _Optional[_Iterable[_Union[LimitMargin, _Mapping]]] = ..., clearance: _Optional[_Union[Clearance, _Mapping]] = ..., own_clearance: _Optional[_Union[Clearance, _Mapping]] = ..., singularity_margin: _Optional[float] = ..., not_counted: _Optional[_Iterable[str]] = ...) -> None: ...
+    joints_unproven: bool
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., tool_to_base: _Optional[_Iterable[float]] = ..., linear_velocity: _Optional[_Union[Vector3, _Mapping]] = ..., angular_velocity: _Optional[_Union[Vector3, _Mapping]] = ..., manipulability: _Optional[float] = ..., limit_margins: _Optional[_Iterable[_Union[LimitMargin, _Mapping]]] = ..., clearance: _Optional[_Union[Clearance, _Mapping]] = ..., own_clearance: _Optional[_Union[Clearance, _Mapping]] = ..., singularity_margin: _Optional[float] = ..., not_counted: _Optional[_Iterable[str]] = ..., joints_unproven: _Optional[bool] = ...) -> None: ...
 
 class Vector3(_message.Message):
     __slots__ = ("x", "y", "z")

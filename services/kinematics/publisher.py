@@ -127,8 +127,7 @@ async def follow(session: Session, arm: FollowedArm, cell_state: CellState, show
         state, proximity = _state(arm, cell_state, now.built, positions, velocities, message.timestamp)
         kinematics.put(state, source_time_ns=time_ns, dated_by=dated_by)
         # Unproven joints may be elsewhere: alarms about them would be invented.
-        unproven = cell_state.is_unproven(arm.name)
-        conditions = () if unproven else _conditions(arm, now.built, positions, state, proximity)
+        conditions = () if state.joints_unproven else _conditions(arm, now.built, positions, state, proximity)
         found = alarms.judge(conditions, sample.received)
         if now.built is not None and floor_reported is not now.built:
             floor_reported = now.built
@@ -165,7 +164,8 @@ def _state(
     The latter are None until the hulls are built, and for an arm whose joints are unproven.
     """
     state = kinematic_state(arm.model, positions, velocities, reach=arm.reach, timestamp=timestamp)
-    if built is None or cell_state.is_unproven(arm.name):
+    state.joints_unproven = cell_state.is_unproven(arm.name)
+    if built is None or state.joints_unproven:
         return state, None
     proximity = cell_state.proximity(built, arm.name, positions)
     add_proximity(state, proximity, site=arm.site)

@@ -160,7 +160,8 @@ def test_an_arm_with_unproven_joints_has_no_clearance_and_counts_for_no_other(me
             state = await until(monitor, "kinematics", lambda m: m.not_counted)
             assert list(state.not_counted) == ["right"]
             controllers["left"].put(schema.ControllerState(joints_unproven=True))
-            state = await until(monitor, "kinematics", lambda m: not m.HasField("clearance"))
+            state = await until(monitor, "kinematics", lambda m: m.joints_unproven)
+            assert not state.HasField("clearance")
             # The pose of its tool is shown.
             assert len(state.tool_to_base) == 16
             assert not state.HasField("own_clearance")

@@ -139,7 +139,8 @@ export function stoppedByItself(state: ControllerState | undefined): boolean {
 export function whyUnproven(state: ControllerState | undefined): string {
   if (!state?.jointsUnproven) return "";
   const why = state.linkReasons.find(({ code }) => UNPROVEN.has(code));
-  return t("sentence", { text: why ? reasonText(why, why.text) : t("joints_unproven") });
+  const text = why ? reasonText(why, why.text) : t("joints_unproven");
+  return t("sentence", { text: text.charAt(0).toUpperCase() + text.slice(1) });
 }
 
 /** Explain why nothing moves the robot now, not even RESUME, and what to do; empty: it can move, as far as is known. */

@@ -29,6 +29,7 @@ export function JointLimitsPanel(props: {
   const limit = nearestLimit(state, description);
   const singularity = state?.singularityMargin;
   const missing = state?.notCounted ?? [];
+  const unproven = state?.jointsUnproven;
   return (
     <ul class={`margins ${stale && state ? "stale" : ""}`} aria-label={t("margins")}>
       <Margin
@@ -38,7 +39,7 @@ export function JointLimitsPanel(props: {
         level={level}
         share={around && around.distance / Math.max(FULL_CLEARANCE_M, description?.warningDistance ?? 0)}
       >
-        {around ? distanceText(around) : state && t("nothing_around")}
+        {around ? distanceText(around) : state && t(unproven ? "joints_unproven_short" : "nothing_around")}
       </Margin>
       <Margin
         name="own-clearance"
@@ -47,7 +48,7 @@ export function JointLimitsPanel(props: {
         level={own ? ownLevel(own) : "normal"}
         share={own && own.distance / FULL_CLEARANCE_M}
       >
-        {own && distanceText(own)}
+        {own ? distanceText(own) : unproven && t("joints_unproven_short")}
       </Margin>
       <Margin
         name="limit"
