@@ -83,26 +83,6 @@ def rotation_rpy(rotation: FloatArray) -> tuple[float, float, float]:
     return roll, pitch, float(np.arctan2(rotation[1, 0], rotation[0, 0]))
 
 
-def rotation_vector(rotation: FloatArray) -> FloatArray:
-    """Return a (3, 3) rotation as its axis times its angle [rad], 0 to pi."""
-    # By the quaternion: its largest component is never small, unlike the sine near 0 and pi.
-    xx, yy, zz = np.diag(rotation)
-    squares = np.array((1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz))
-    largest = int(squares.argmax())
-    r = rotation
-    w, x, y, z = (
-        (squares[0], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]),
-        (r[2, 1] - r[1, 2], squares[1], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]),
-        (r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], squares[2], r[1, 2] + r[2, 1]),
-        (r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], squares[3]),
-    )[largest]
-    vector = np.array((x, y, z)) * (1.0 if w >= 0 else -1.0)
-    length = float(np.linalg.norm(vector))
-    if length < 1e-12:
-        return np.zeros(3)
-    return vector / length * 2.0 * float(np.arctan2(length, abs(w)))
-
-
 def inverse(placement: FloatArray) -> FloatArray:
     """Return the inverse of a (4, 4) placement."""
     back = np.eye(4)

@@ -109,6 +109,10 @@ class FanucSettings:
 class Axes:
     """Relation between the controller's axes and joint positions.
 
+    Attributes:
+        used: Axis of each joint, from 0.
+        mapping: The relation as text.
+
     Args:
         settings: With j23.
         joint_types: Types of the model's joints.
@@ -145,6 +149,7 @@ class Axes:
         signs = np.array([-1.0 if each + 1 in settings.reversed else 1.0 for each in range(joints)])
         self._scale = signs * units
         self._zero = np.array(settings.zero or [0.0] * joints) * units
+        self.mapping = repr((settings.group, numbers, self._j23, self._scale.tolist(), self._zero.tolist()))
 
     def positions(self, axes: Sequence[float]) -> tuple[float, ...]:
         """Return joint positions [rad] or [m].

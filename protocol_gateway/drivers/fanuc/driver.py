@@ -101,6 +101,8 @@ class SnpxDriver(OnlyReads):
             commands=frozenset(),
             absolute=True,
             no_joints=None if known else reason_codes.AXES_UNDECLARED(),
+            reports_pose=known,
+            joint_mapping=self._axes.mapping,
         )
         regular_hz = settings.rate_hz + _STATUS_HZ + _SIGNALS_HZ * (1 + len(self._io)) + _ALARMS_HZ
         # With the questions of a new connection.
