@@ -109,6 +109,7 @@ def _server(settings: SnpxSettings, faults: Faults) -> SnpxServer:
     declared = with_defaults(settings.fanuc, joints.types)
     try:
         axes = Axes(declared, joints.types)
+        entered = declared.table.assignments if declared.assignments == "pendant" else ()
     except GatewaySettingsError as error:
         raise SimulatorError(str(error)) from None
 
@@ -121,7 +122,6 @@ def _server(settings: SnpxSettings, faults: Faults) -> SnpxServer:
             servo_on=not restarted,
         )
 
-    entered = declared.table.assignments if declared.assignments == "pendant" else ()
     return SnpxServer(
         boot,
         faults,
