@@ -6,6 +6,7 @@ from pathlib import Path
 # Module -> extra that brings it.
 EXTRAS = {
     "argon2": "keys",
+    "asyncua": "opcua",
     "av": "renderer",
     "cascadio": "step",
     "coal": "robots",

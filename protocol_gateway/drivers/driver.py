@@ -342,11 +342,14 @@ class Channel:
         carries: What needs it. The robot is shown as disconnected while no channel that carries READING is
             open, so an addition to another channel carries nothing.
         datagrams: UDP instead of TCP; `received` gets each datagram by itself.
+        program: Module that reads the controller in a process of its own, because a library owns its sockets;
+            empty: there is none. `received` gets what it prints. It has no input, so `Send` fails.
     """
 
     name: str
     carries: Carries
     datagrams: bool = False
+    program: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -356,10 +359,12 @@ class Open:
     Attributes:
         port: Port of the controller's host, unless the site file's `ports` has another one; None: that of
             the site file's `controller`.
+        settings: What a channel's program is started with, besides host and port.
     """
 
     channel: Channel
     port: int | None = None
+    settings: str = ""
 
 
 @dataclass(frozen=True, slots=True)

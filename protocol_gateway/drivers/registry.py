@@ -5,6 +5,7 @@ from typing import Protocol
 
 from protocol_gateway.drivers.driver import Driver
 from protocol_gateway.drivers.fanuc.driver import SnpxDriver
+from protocol_gateway.drivers.opcua.driver import OpcUaDriver
 from protocol_gateway.drivers.unit import UnitDriver
 from protocol_gateway.drivers.universal_robots.driver import RtdeDriver
 from protocol_gateway.drivers.yaskawa.driver import HsesDriver
@@ -41,5 +42,6 @@ DRIVERS: dict[str, DriverMaker] = {
     "rtde": RtdeDriver,
     "hses": HsesDriver,
     "snpx": SnpxDriver,
+    "opcua": OpcUaDriver,
 }
 """Driver factories by the site file's `protocol`."""

@@ -13,11 +13,14 @@ from typing import Protocol
 from protocol_gateway.drivers.driver import Channel
 from protocol_gateway.errors import LinkDownError
 from protocol_gateway.link.connection import Connection, Datagrams, reason_of
+from protocol_gateway.link.program import ProgramError, ProgramOutput
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 
 _FIRST_PAUSE_S = 0.2
 _LONGEST_PAUSE_S = 5.0
+# A program's imports cost most of a second of CPU at each attempt.
+_LONGEST_PROGRAM_PAUSE_S = 30.0
 
 
 class Listener(Protocol):
@@ -43,6 +46,9 @@ class Listener(Protocol):
 class KeptChannel:
     """A channel that is kept connected.
 
+    Args:
+        settings: What a channel's program is started with.
+
     Attributes:
         channel: The driver's channel.
         where: Its address, for texts.
@@ -50,23 +56,35 @@ class KeptChannel:
         connection: None: not connected.
     """
 
-    def __init__(self, channel: Channel, host: str, port: int, timeout_s: float, listener: Listener) -> None:
+    def __init__(
+        self,
+        channel: Channel,
+        host: str,
+        port: int,
+        timeout_s: float,
+        listener: Listener,
+        settings: str = "",
+    ) -> None:
         self.channel = channel
         self.where = f"{host}:{port}"
         self.reason: Reason = codes.LINK_CONNECTING(where=self.where)
-        self.connection: Connection | Datagrams | None = None
+        self.connection: Connection | Datagrams | ProgramOutput | None = None
+        self._settings = settings
         self._host, self._port, self._timeout_s = host, port, timeout_s
         self._listener = listener
         self._send_failed = asyncio.Event()
+        # The last attempt came so far that the channel's program was started.
+        self._began = False
 
     async def run(self) -> None:
         """Keep the channel connected until cancelled; then close the connection."""
         pause_s = _FIRST_PAUSE_S
         while True:
+            self._began = False
             if await self._attempt():
                 pause_s = _FIRST_PAUSE_S
             await self._rest(pause_s)
-            pause_s = min(pause_s * 2.0, _LONGEST_PAUSE_S)
+            pause_s = min(pause_s * 2.0, _LONGEST_PROGRAM_PAUSE_S if self._began else _LONGEST_PAUSE_S)
 
     def hurry(self) -> None:
         """Connect without long pauses, until bytes were sent."""
@@ -108,10 +126,15 @@ class KeptChannel:
         try:
             async with asyncio.timeout(self._timeout_s):
                 connection = await self._connect()
+            if isinstance(connection, ProgramOutput):
+                self._began = True
+                await connection.connected()
         except TimeoutError:
             return self._attempt_failed(codes.LINK_NO_ANSWER(where=self.where))
         except OSError as error:
             return self._attempt_failed(codes.LINK_FAILED(where=self.where, detail=reason_of(error)))
+        except ProgramError as error:
+            return self._attempt_failed(codes.LINK_FAILED(where=self.where, detail=error))
         of_use = False
         try:
             self.reason = await self._serve(connection)
@@ -130,8 +153,18 @@ class KeptChannel:
         self._listener.on_ended(self)
         return False
 
-    async def _connect(self) -> Connection | Datagrams:
+    async def _connect(self) -> Connection | Datagrams | ProgramOutput:
         loop = asyncio.get_running_loop()
+        if self.channel.program:
+            # A controller that is off costs no process.
+            probe, _ = await loop.create_connection(asyncio.Protocol, self._host, self._port)
+            probe.close()
+            return await ProgramOutput.started(
+                self.channel.program,
+                (self._host, str(self._port), self._settings),
+                self._on_connected,
+                self._on_received,
+            )
         if self.channel.datagrams:
             _, datagrams = await loop.create_datagram_endpoint(
                 lambda: Datagrams(self._on_connected, self._on_received),
@@ -143,7 +176,7 @@ class KeptChannel:
         )
         return connection
 
-    async def _serve(self, connection: Connection | Datagrams) -> Reason:
+    async def _serve(self, connection: Connection | Datagrams | ProgramOutput) -> Reason:
         """Wait for the connection's end; return its reason."""
         while not connection.lost.done():
             wait_s = self._listener.patience(self)
@@ -152,7 +185,7 @@ class KeptChannel:
             await asyncio.wait([connection.lost], timeout=None if wait_s == math.inf else wait_s)
         return codes.LINK_LOST(connection.lost.result(), where=self.where)
 
-    def _on_connected(self, connection: Connection | Datagrams) -> None:
+    def _on_connected(self, connection: Connection | Datagrams | ProgramOutput) -> None:
         self.connection = connection
         self.reason = codes.LINK_CLOSED()
         self._listener.on_opened(self)

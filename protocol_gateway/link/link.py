@@ -284,7 +284,12 @@ class ControllerLink:
         port = self._settings.port if effect.port is None else effect.port
         port = self._settings.ports.get(effect.channel.name, port)
         kept = KeptChannel(
-            effect.channel, self._settings.host, port, self._settings.connect_timeout_s, listener=self
+            effect.channel,
+            self._settings.host,
+            port,
+            self._settings.connect_timeout_s,
+            listener=self,
+            settings=effect.settings,
         )
         self._channels[effect.channel.name] = kept
         if effect.channel.name in self._in_a_hurry:
@@ -460,6 +465,9 @@ class ControllerLink:
                 self._losses.forget()
             elif event.controller_time_s is not None:
                 self._losses.add(event.controller_time_s)
+            elif isinstance(event, JointsReceived):
+                # Such as a repetition while nothing changes: the gap before the next TIME is no loss.
+                self._losses.forget()
 
     def _unit_received(self, newest: Received, now: Received) -> None:
         self._last_received = newest

@@ -36,7 +36,9 @@ COMMANDS = {
     "watch": Row("site.app", "Hold the site's alarms, and check presence, clocks, versions and names."),
     "store": Row("site.app", "Store the site's programs with all their versions."),
     "metrics": Row("site.app", "Print a Prometheus configuration that scrapes every service of a site."),
-    "simulate": Row("site.app", "Run a simulated controller with the old text protocol, RTDE, HSES or SNPX."),
+    "simulate": Row(
+        "site.app", "Run a simulated controller with the old text protocol, RTDE, HSES, SNPX or OPC UA."
+    ),
     "foxglove": Row("bridges", "Serve Foxglove and Lichtblick on a Foxglove WebSocket, ws://127.0.0.1:8765."),
     "ros2": Row("bridges", "Publish the robots to ROS 2 nodes with rmw_zenoh."),
     "list": Row("live.app", "List sites, robots and services, with monitors, control, ages and round trips."),

@@ -152,6 +152,24 @@ def accept(
 
 
 @app.command()
+def opcua(
+    file: Annotated[Path, typer.Argument(metavar="FILE.pem", help="A new file.")],
+    days: Annotated[float, typer.Option(metavar="N", min=1, max=7300, help="Validity.")] = 1825.0,
+) -> None:
+    """Make the gateway's own certificate for OPC UA servers.
+
+    FILE.pem holds the private key; FILE.der is for the server's list of trusted clients.
+    """
+    from services.pki.authority import now
+    from services.pki.opcua import make
+
+    made = make(file, now(), timedelta(days=days))
+    print(f'{file}: write certificate = "{file}" below [robot.opcua]')
+    print(f"{made.public}: let the server trust it; {made.uri}, until {made.expires:%Y-%m-%d}")
+    print(f"  fingerprint sha256:{made.fingerprint}")
+
+
+@app.command()
 def renew(
     names: Annotated[list[str] | None, typer.Argument(metavar="[NAME]...")] = None,
     all_: Annotated[bool, typer.Option("--all", help="Every certificate, people's and guests' too.")] = False,

@@ -2,7 +2,8 @@
 
 It listens before it sends, and sends at most one question: the RTDE version to port 30004, the read of the
 system's information to UDP port 10040, the first packet of a connection to ports 60008 and 18245. To any
-other port it sends nothing.
+other port it sends nothing. An address that begins with opc.tcp is asked for its endpoints, which needs no
+user and no session.
 """
 
 import socket
@@ -29,6 +30,7 @@ _LISTEN_S = 2.0
 _ANSWER_S = 2.0
 _MOST_BYTES = 1 << 16
 _LONGEST_SHOWN = 60
+_OPC, _OPC_PORT = "opc.tcp", 4840
 
 
 class ProbeError(ServiceError):
@@ -44,20 +46,24 @@ class Found:
         text: In a sentence.
         next: What to do with it.
         sent: What was sent, in words.
-        received_bytes: Number of received bytes.
+        received_bytes: Number of received bytes; None: a library received them.
     """
 
     protocol: str = ""
     text: str
     next: str = ""
     sent: str = "nothing"
-    received_bytes: int = 0
+    received_bytes: int | None = 0
 
 
 @app.command()
 def probe(
     address: Annotated[
-        str, typer.Argument(metavar="tcp://HOST:PORT", help="The port, or udp://HOST:10040 of Yaskawa.")
+        str,
+        typer.Argument(
+            metavar="tcp://HOST:PORT",
+            help="The port; or udp://HOST:10040 of Yaskawa, opc.tcp://HOST:PORT of OPC UA.",
+        ),
     ],
     as_json: Json = False,
 ) -> None:
@@ -65,7 +71,8 @@ def probe(
 
     It contacts this port only, listens for 2 s, and sends nothing but the RTDE version to port 30004, a read
     of the system's information to UDP port 10040, and the first packet of SNPX, 56 zero bytes, to ports
-    60008 and 18245. Exit status 1: no protocol that robomesh reads.
+    60008 and 18245. Of an OPC UA server it asks the endpoints, and shows the certificate's fingerprint. Exit
+    status 1: no protocol that robomesh reads.
     """
     from services.command_line.discovery import print_json
 
@@ -74,7 +81,8 @@ def probe(
         print_json({"address": address, **asdict(found)})
     else:
         print(for_terminal(f"{address}: {found.text}"))
-        print(f"  sent: {found.sent}; received: {found.received_bytes} bytes")
+        received = "" if found.received_bytes is None else f"; received: {found.received_bytes} bytes"
+        print(f"  sent: {found.sent}{received}")
         if found.next:
             print(f"  {found.next}")
     if not found.protocol:
@@ -88,6 +96,8 @@ def examine(address: str) -> Found:
         ProbeError: If the address is none, or nothing can be reached there.
     """
     scheme, host, port = _split(address)
+    if scheme == _OPC:
+        return _examine_opcua(address)
     if scheme == "udp":
         if port != _HSES_PORT:
             raise ProbeError(f"{address}: of UDP ports only {_HSES_PORT} is known (Yaskawa's HSES)")
@@ -107,10 +117,11 @@ def _split(address: str) -> tuple[str, str, int]:
 
     scheme, _, rest = address.partition("://")
     try:
-        host, port = split_address(rest)
+        # The path of an OPC UA server is not part of HOST:PORT.
+        host, port = split_address(rest.partition("/")[0] if scheme == _OPC else rest)
     except ListenError:
         port = 0
-    if scheme not in ("tcp", "udp") or port == 0:
+    if scheme not in ("tcp", "udp", _OPC) or port == 0:
         raise ProbeError(f"{address!r}: tcp://HOST:PORT is right, as in tcp://10.0.0.7:30004")
     return scheme, host, port
 
@@ -174,6 +185,11 @@ def _recognized(heard: bytes, port: int) -> Found:
         return Found(
             text="it accepts a connection on the port of FANUC's RMI, to which nothing is ever sent here",
             next="RMI takes one client, and is for motion; robomesh does not speak it yet",
+        )
+    if port == _OPC_PORT and not heard:
+        return Found(
+            text=f"it accepts a connection, and sends nothing within {_LISTEN_S:g} s",
+            next=f"the port is that of OPC UA: probe {_OPC}://HOST:{port}",
         )
     if heard:
         shown = one_line(heard.decode("ascii", "backslashreplace"), _LONGEST_SHOWN)
@@ -291,4 +307,40 @@ def _examine_hses(host: str, port: int) -> Found:
         next='in the site file: protocol = "hses", and [robot.yaskawa] with the pulses of each joint',
         sent=sent,
         received_bytes=len(datagram),
+    )
+
+
+def _examine_opcua(url: str) -> Found:
+    import asyncio
+    import logging
+
+    from robomesh.extras import is_missing, missing
+
+    if is_missing("asyncua"):
+        raise ProbeError(missing("asyncua"))
+    from protocol_gateway.drivers.opcua.reader.problems import ReadingError
+    from protocol_gateway.drivers.opcua.reader.security import endpoints_of, offers_of
+
+    logging.getLogger("asyncua").setLevel(logging.CRITICAL)
+    try:
+        offers = offers_of(asyncio.run(endpoints_of(url)))
+    except ReadingError as error:
+        raise ProbeError(f"{url}: {error}") from None
+    known = "; ".join(
+        "no security" if name == "None" else f"{name}: {', '.join(policies)}"
+        for name, policies in offers.security.items()
+    )
+    pinned = sorted(offers.fingerprints)
+    lines = [f'server_certificate = "{each}"' for each in pinned]
+    return Found(
+        protocol="opcua",
+        text=f"an OPC UA server, {offers.name}; {known or 'no endpoint that robomesh knows'}",
+        next='in the site file: protocol = "opcua", and in [robot.opcua] '
+        + (
+            f"{' or '.join(lines)}, once the controller itself shows the same fingerprint"
+            if lines
+            else 'security = "none", because it offers no encryption with SHA-256'
+        ),
+        sent="the request for its endpoints",
+        received_bytes=None,
     )

@@ -8,6 +8,7 @@ from pydantic import BaseModel, Field, StrictBool, field_validator, model_valida
 
 from protocol_gateway.core.codes import code_table
 from protocol_gateway.drivers.fanuc.axes import FanucSettings
+from protocol_gateway.drivers.opcua.settings import OpcUaSettings
 from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
 from protocol_gateway.errors import CodeTableError
@@ -21,7 +22,8 @@ from services.errors import ListenError
 from services.site_file.fanuc import Fanuc
 from services.site_file.fixtures import Clearance, Floor
 from services.site_file.legacy_clients import LegacyClients
-from services.site_file.listen_address import split_address
+from services.site_file.listen_address import is_loopback, split_address
+from services.site_file.opcua import OpcUa
 from services.site_file.part import PART_CONFIG
 from services.site_file.yaskawa import Yaskawa
 
@@ -58,9 +60,11 @@ class Robot(BaseModel):
             `{ primary = 30011 }`.
         protocol: The controller's protocol: `unit` (docs/controllers.md), `rtde` to read a controller of
             Universal Robots (docs/controllers/universal-robots.md), `hses` to read one of Yaskawa
-            (docs/controllers/yaskawa.md), or `snpx` to read one of FANUC (docs/controllers/fanuc.md).
+            (docs/controllers/yaskawa.md), `snpx` to read one of FANUC (docs/controllers/fanuc.md), or `opcua`
+            to read an OPC UA server (docs/controllers/opcua.md).
         yaskawa: Properties of the robot that a Yaskawa controller does not report; with the protocol `hses`.
         fanuc: Properties of the robot that a FANUC controller does not report; with the protocol `snpx`.
+        opcua: The OPC UA server, and what is read from it; with the protocol `opcua`.
         codes: Type codes of a controller that sends numbers, as in
             `{ 2 = "ABSOLUTE.DEG", 101 = "COMMAND:home" }`; they replace the default codes. Empty: the gateway
             sends types as names.
@@ -97,6 +101,7 @@ class Robot(BaseModel):
     protocol: str = "unit"
     yaskawa: Yaskawa | None = None
     fanuc: Fanuc | None = None
+    opcua: OpcUa | None = None
     codes: dict[int, str] = Field(default_factory=dict)
     accept_unknown: tuple[Literal["mode", "homed"], ...] = ()
     check: Literal["require", "warn", "off"] = "warn"
@@ -189,10 +194,12 @@ class Robot(BaseModel):
     @model_validator(mode="after")
     def _of_protocol(self) -> "Robot":
         hses = self.protocol == "hses"
-        if self.yaskawa is not None and not hses:
-            raise ValueError(f"yaskawa needs the protocol 'hses', this robot's is {self.protocol!r}")
-        if self.fanuc is not None and self.protocol != "snpx":
-            raise ValueError(f"fanuc needs the protocol 'snpx', this robot's is {self.protocol!r}")
+        for part, protocol in (("yaskawa", "hses"), ("fanuc", "snpx"), ("opcua", "opcua")):
+            if getattr(self, part) is not None and self.protocol != protocol:
+                raise ValueError(f"{part} needs the protocol {protocol!r}, this robot's is {self.protocol!r}")
+        if self.protocol == "opcua" and not self.simulated:
+            host, _ = split_address(self.address)
+            (self.opcua or OpcUa()).check(loopback=is_loopback(host))
         if not self.simulated and self.controller.startswith("udp://") is not hses:
             raise ValueError(
                 f"controller {self.controller}: protocol {self.protocol!r} needs "
@@ -207,20 +214,25 @@ class Robot(BaseModel):
 
     @property
     def group(self) -> str:
-        """Control group of its controller, where one controller has several robots; empty: it has one."""
+        """Control group or device of its controller, where one has several robots; empty: it has one."""
         if self.protocol == "snpx":
             return f"G{(self.fanuc or Fanuc()).group}"
+        if self.protocol == "opcua":
+            return (self.opcua or OpcUa()).device
         return (self.yaskawa or Yaskawa()).group if self.protocol == "hses" else ""
 
     @property
-    def options(self) -> YaskawaSettings | FanucSettings | None:
+    def options(self) -> YaskawaSettings | FanucSettings | OpcUaSettings | None:
         """Settings of the protocol's driver, which the gateway passes on; None: it has none."""
         match self.protocol:
             case "hses":
                 return (self.yaskawa or Yaskawa()).settings
             case "snpx":
                 return (self.fanuc or Fanuc()).settings
-        return None
+            case "opcua":
+                return (self.opcua or OpcUa()).settings(simulated=self.simulated)
+            case _:
+                return None
 
     @property
     def simulated(self) -> bool:

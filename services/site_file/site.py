@@ -318,6 +318,8 @@ def _resolve_robot(robot: Robot, folder: Path) -> Robot:
         paths["model"] = str(folder / robot.model)
     if robot.verified is not None:
         paths["verified"] = folder / robot.verified
+    if robot.opcua is not None:
+        paths["opcua"] = robot.opcua.in_folder(folder)
     return robot.model_copy(update=paths)
 
 

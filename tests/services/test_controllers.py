@@ -12,7 +12,7 @@ from services.command_line.site.up import programs
 from services.simulator.fanuc.service import with_defaults
 from services.simulator.yaskawa.service import with_factors
 from services.site_file.fanuc import Fanuc
-from services.site_file.site import Site, load
+from services.site_file.site import Site, load, resolve_site
 from services.site_file.yaskawa import Yaskawa
 
 UR = {"name": "ur", "model": "puma560", "protocol": "rtde", "controller": "tcp://10.0.0.7:30004"}
@@ -159,11 +159,65 @@ def test_a_simulated_robot_with_snpx_gets_a_simulator_with_the_same_axes():
             assert with_defaults(told.settings, (JointType.ROTARY,) * 6) == settings
 
 
+OPC_UA = {"name": "handler", "model": "puma560", "protocol": "opcua", "controller": "tcp://10.0.0.7:4840"}
+PINNED = {"server_certificate": "AB:" * 31 + "ab", "certificate": "keys/opcua.pem"}
+
+
+def opcua_site(part, **robot):
+    return Site.model_validate({"site": "hall", "robot": [OPC_UA | {"opcua": part} | robot]})
+
+
+@pytest.mark.parametrize(
+    ("part", "problem"),
+    [
+        (None, "opcua.server_certificate is missing"),
+        ({"server_certificate": "ab" * 32}, "opcua.certificate is missing"),
+        ({"server_certificate": "ab"}, "64 hexadecimal digits"),
+        ({"security": "none"}, "beyond this machine needs insecure = true"),
+        ({"security": "none", "user": "a", "password_file": "b"}, "a password is not sent"),
+        (PINNED | {"user": "a"}, "user and password_file need each other"),
+        (PINNED | {"joints": [{}]}, "either axis or node"),
+        (PINNED | {"joints": [{"node": "J1"}]}, "should be a NodeId"),
+        (PINNED | {"joints": [{"axis": "A"}, {"axis": "A"}]}, "A is given for two joints"),
+        (PINNED | {"signals": [{"name": "Bad Name", "node": "i=1"}]}, "lower-case words"),
+        (PINNED | {"signals": [{"name": "a", "node": "i=1"}] * 2}, "two signals are named a"),
+        (PINNED | {"rate": 1000}, "less than or equal to 100"),
+    ],
+)
+def test_what_a_site_file_declares_wrongly_of_an_opc_ua_server_is_refused(part, problem):
+    with pytest.raises(ValueError, match=problem):
+        opcua_site(part)
+
+
+def test_opc_ua_is_encrypted_unless_the_site_file_says_otherwise():
+    site = opcua_site(PINNED | {"user": "a", "password_file": "password"})
+    robot = resolve_site(site, Path("/site")).robot[0]
+    assert robot.options.security == "sign_and_encrypt"
+    assert robot.options.server_certificate == "ab" * 32
+    assert (robot.options.certificate, robot.options.password_file) == (
+        "/site/keys/opcua.pem",
+        "/site/password",
+    )
+    assert opcua_site(None, controller="simulated").robot[0].options.security == "none"
+    unencrypted = {"security": "none", "insecure": True}
+    assert opcua_site(unencrypted).robot[0].options.security == "none"
+    here = opcua_site({"security": "none"}, controller="tcp://127.0.0.1:4840")
+    assert here.robot[0].options.security == "none"
+    with pytest.raises(ValueError, match="opcua needs the protocol 'opcua'"):
+        opcua_site({}, protocol="rtde")
+
+
+def test_two_devices_of_one_opc_ua_server_are_two_robots():
+    two = [OPC_UA | {"name": name.lower(), "opcua": PINNED | {"device": name}} for name in ("Left", "Right")]
+    site = Site.model_validate({"site": "hall", "robot": two})
+    assert controller_addresses(site, [])["right"] == ("10.0.0.7", 4840, {})
+
+
 def test_the_example_has_a_simulated_controller_of_each_protocol():
     example = load(Path(__file__).resolve().parents[2] / "examples" / "vendors.toml")
     assert {robot.protocol for robot in example.robot} == {*DRIVERS}
-    ways = {"unit": "tcp", "rtde": "tcp", "hses": "udp", "snpx": "tcp"}
+    ways = {"unit": "tcp", "rtde": "tcp", "hses": "udp", "snpx": "tcp", "opcua": "tcp"}
     named = enumerate(example.robot, start=1)
     addresses = [f"{robot.name}={ways[robot.protocol]}://127.0.0.1:{port}" for port, robot in named]
     settings = SERVICES["gateway"].settings(example, Options(controllers=addresses))
-    assert [robot.protocol for robot in settings.robots] == ["unit", "rtde", "hses", "snpx"]
+    assert [robot.protocol for robot in settings.robots] == ["unit", "rtde", "hses", "snpx", "opcua"]

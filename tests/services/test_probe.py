@@ -13,6 +13,7 @@ from services.command_line.probe import ProbeError, examine
 from tests.conftest import free_port, run
 from tests.protocol_gateway.gateway_site import simulator
 from tests.protocol_gateway.test_hses_driver import controller as yaskawa
+from tests.protocol_gateway.test_opcua_driver import controller as opcua
 from tests.protocol_gateway.test_rtde_driver import controller as universal_robots
 from tests.protocol_gateway.test_snpx_driver import controller as fanuc
 
@@ -87,6 +88,19 @@ def test_a_controller_of_fanuc_is_recognized_by_its_first_answer(monkeypatch):
             found = await examined(f"tcp://127.0.0.1:{port}")
         assert (found.protocol, found.received_bytes) == ("snpx", 56)
         assert "56 zero bytes" in found.sent
+
+    run(main())
+
+
+@pytest.mark.slow
+def test_an_opc_ua_server_is_asked_for_its_endpoints_only():
+    async def main():
+        async with opcua() as port:
+            found = await examined(f"opc.tcp://127.0.0.1:{port}")
+        assert (found.protocol, found.sent) == ("opcua", "the request for its endpoints")
+        assert "robomesh (simulated controller); no security" in found.text
+        with pytest.raises(ProbeError, match="does not list its endpoints: connection refused"):
+            await examined(f"opc.tcp://127.0.0.1:{port}")
 
     run(main())
 

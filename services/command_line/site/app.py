@@ -134,6 +134,7 @@ class SimulatedProtocol(StrEnum):
     RTDE = "rtde"
     HSES = "hses"
     SNPX = "snpx"
+    OPCUA = "opcua"
 
 
 @app.command()
@@ -150,7 +151,8 @@ def simulate(
         str,
         typer.Option(
             metavar="HOST:PORT",
-            show_default="127.0.0.1:5400; with rtde :30004, with hses :10040, with snpx :60008",
+            show_default="127.0.0.1:5400; with rtde :30004, with hses :10040, with snpx :60008, "
+            "with opcua :4840",
         ),
     ] = "",
     rate: Annotated[float, typer.Option(metavar="HZ", min=1, max=1000, help="With unit.")] = 100.0,
@@ -172,7 +174,8 @@ def simulate(
         SimulatedProtocol,
         typer.Option(
             help="unit: the old text protocol; rtde: RTDE, scripts and the dashboard of Universal Robots; "
-            "hses: the High-Speed Ethernet Server of Yaskawa; snpx: SNPX of FANUC."
+            "hses: the High-Speed Ethernet Server of Yaskawa; snpx: SNPX of FANUC; "
+            "opcua: an OPC UA server, OPC 40010-1."
         ),
     ] = SimulatedProtocol.UNIT,
     primary: Annotated[
@@ -191,6 +194,9 @@ def simulate(
     fanuc: Annotated[
         str, typer.Option(metavar="JSON", help="The site file's table `fanuc` as JSON; with snpx.")
     ] = "",
+    path: Annotated[
+        str, typer.Option(metavar="PATH", help="Path of the server's address, as /server; with opcua.")
+    ] = "",
     for_: Annotated[
         str,
         typer.Option("--for", metavar="SITE/ROBOT", help="Accept `robomesh fault` for this robot."),
@@ -198,7 +204,7 @@ def simulate(
     site: SiteFile = None,
     connect: Connect = DEFAULT_ROUTER,
 ) -> None:
-    """Run a simulated controller with the old text protocol, RTDE, HSES or SNPX."""
+    """Run a simulated controller with the old text protocol, RTDE, HSES, SNPX or OPC UA."""
     from services.command_line.site import launch
 
     mesh = launch.faults_mesh(for_, site, connect)
@@ -231,6 +237,17 @@ def simulate(
             robot=robot or "puma560",
             listen=listen or "127.0.0.1:60008",
             fanuc=fanuc,
+            demo=demo,
+            faults=tuple(fault or ()),
+            insecure=insecure,
+            mesh=mesh,
+        )
+        return
+    if protocol is SimulatedProtocol.OPCUA:
+        launch.launch_opcua_simulator(
+            robot=robot or "puma560",
+            listen=listen or "127.0.0.1:4840",
+            path=path,
             demo=demo,
             faults=tuple(fault or ()),
             insecure=insecure,

@@ -203,6 +203,35 @@ def launch_hses_simulator(
     service.run_until_signalled(serve_hses(settings, ready=ready))
 
 
+def launch_opcua_simulator(
+    *,
+    robot: str,
+    listen: str,
+    path: str,
+    demo: bool,
+    faults: tuple[str, ...],
+    insecure: bool,
+    mesh: "Mesh | None",
+) -> None:
+    """Run a simulated controller with an OPC UA server."""
+    from robomesh.extras import is_missing, missing
+
+    if is_missing("asyncua"):
+        raise ControllerError(missing("asyncua"))
+    from services.simulator.opcua.service import OpcUaSimulatorSettings, serve_opcua
+    from services.site_file.listen_address import split_address
+
+    def ready(port: int) -> None:
+        host, _ = split_address(listen)
+        print(f"listening on opc.tcp://{host}:{port}/{path.lstrip('/')}".rstrip("/"), flush=True)
+
+    service.log_to_stderr()
+    settings = OpcUaSimulatorSettings(
+        robot=robot, listen=listen, path=path, demo=demo, faults=faults, insecure=insecure, mesh=mesh
+    )
+    service.run_until_signalled(serve_opcua(settings, ready=ready))
+
+
 def launch_snpx_simulator(
     *,
     robot: str,

@@ -97,18 +97,21 @@ def _gateway(site: "Site", options: Options) -> Any:
 
 def _driver_options(robot: "Robot") -> object:
     """Return the settings of the driver; a simulated controller has values of its own, unless declared."""
-    if not robot.simulated or robot.protocol not in ("hses", "snpx"):
+    if not robot.simulated:
         return robot.options
     from protocol_gateway.drivers.fanuc.axes import FanucSettings
+    from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
     from robots.description import load
     from robots.joints import joints_of
     from services.simulator.fanuc.service import with_defaults
     from services.simulator.yaskawa.service import with_factors
 
-    joints, declared = joints_of(load(robot.model)), robot.options
+    declared = robot.options
     if isinstance(declared, FanucSettings):
-        return with_defaults(declared, joints.types)
-    return with_factors(declared, len(joints))
+        return with_defaults(declared, joints_of(load(robot.model)).types)
+    if isinstance(declared, YaskawaSettings):
+        return with_factors(declared, len(joints_of(load(robot.model))))
+    return declared
 
 
 def _cell_file(site: "Site", options: Options) -> "CellFile":

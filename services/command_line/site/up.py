@@ -129,6 +129,9 @@ def _simulator(robot: Robot, site: str, attach: tuple[str, ...]) -> tuple[Progra
     if robot.protocol == "snpx":
         declared = robot.fanuc.model_dump_json(exclude_defaults=True) if robot.fanuc else ""
         protocol = ("--protocol", "snpx", *(("--fanuc", declared) if declared else ()))
+    if robot.protocol == "opcua":
+        path = robot.opcua.path if robot.opcua else ""
+        protocol = ("--protocol", "opcua", *(("--path", path) if path else ()))
     for_ = ("--for", f"{site}/{robot.name}", *attach)
     address = ("--robot", robot.model, "--listen", f"127.0.0.1:{port}")
     arguments = ("simulate", *address, *demo, *codes, *protocol, *for_)

@@ -1,0 +1,1 @@
+"""Simulated controller with an OPC UA server in the form of OPC 40010-1, for reading."""
