@@ -30,7 +30,7 @@ from protocol_gateway.drivers.yaskawa.driver import HSES, HsesDriver, activity_o
 from protocol_gateway.errors import CommandError, GatewaySettingsError
 from robots.joints import JointType
 from services.simulator.yaskawa.service import HsesSettings, serve_hses, with_factors
-from tests.conftest import free_port, run
+from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
 from tests.protocol_gateway.hses_tap import tap
 
@@ -466,23 +466,6 @@ def test_lost_late_doubled_and_reordered_answers_give_no_joints_of_another_momen
     run(main())
 
 
-def test_a_controller_that_falls_silent_is_disconnected_and_recovers(mesh, tmp_path):
-    async def main():
-        quick = {"stale_after_s": 0.5, "reconnect_after_s": 1.0}
-        async with contextlib.AsyncExitStack() as before, contextlib.AsyncExitStack() as after:
-            port = await before.enter_async_context(controller(faults=("freeze@0.5+3",)))
-            site = await after.enter_async_context(gateway(mesh, tmp_path, port, **YASKAWA | quick))
-            await until(lambda: site.controller.link == STATE.SILENT)
-            await until(lambda: site.controller.link == STATE.DOWN)
-            await until(lambda: site.controller.link == STATE.UP)
-            await before.aclose()
-            await until(lambda: site.controller.link == STATE.DOWN)
-            await after.enter_async_context(controller(listen=f"127.0.0.1:{port}"))
-            await until(lambda: site.controller.link == STATE.UP)
-
-    run(main())
-
-
 def test_without_factors_the_robot_is_shown_without_joints_and_says_why(mesh, tmp_path):
     async def main():
         async with (
@@ -492,13 +475,5 @@ def test_without_factors_the_robot_is_shown_without_joints_and_says_why(mesh, tm
             await until(lambda: site.controller.activity == STATE.IDLE)
             assert "declare pulses_per_degree" in site.controller.link_text
             assert not site.seen["joints"]
-
-    run(main())
-
-
-def test_a_port_without_a_controller_is_down(mesh, tmp_path):
-    async def main():
-        async with gateway(mesh, tmp_path, free_port(), up=False, **YASKAWA) as site:
-            await until(lambda: site.controller.link == STATE.DOWN and "refused" in site.controller.link_text)
 
     run(main())

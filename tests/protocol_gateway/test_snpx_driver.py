@@ -34,7 +34,7 @@ from robots.joints import JointType, joints_of
 from robots.model import build_model, tool_placement
 from robots.poses import axis_rotation
 from services.simulator.fanuc.service import SnpxSettings, serve_snpx, with_defaults
-from tests.conftest import free_port, last_value, run
+from tests.conftest import last_value, run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
 from tests.protocol_gateway.test_rtde_driver import tap
 from tests.protocol_gateway.test_snpx import EMPTY_ALARM, alarm, position
@@ -589,36 +589,6 @@ def test_the_controllers_cartesian_position_is_that_of_its_joints(mesh, tmp_path
     assert rotation == pytest.approx(placement[:3, :3], abs=1e-4)
 
 
-@pytest.mark.parametrize("fault", ["garbage", "split", "flood", "busy", "loss"])
-def test_faults_of_the_connection_leave_the_joints_right(mesh, tmp_path, fault):
-    async def main():
-        async with (
-            controller(faults=(fault,)) as port,
-            gateway(mesh, tmp_path, port, **FANUC, stale_after_s=5.0, reconnect_after_s=10.0) as site,
-        ):
-            await site.units(6)
-            home = joints_of(load("puma560")).home
-            for state in site.seen["joints"]:
-                assert [each.position for each in state.joints] == pytest.approx(home, abs=1e-6)
-
-    run(main())
-
-
-def test_a_controller_that_falls_silent_is_disconnected_and_recovers(mesh, tmp_path):
-    async def main():
-        quick = {"stale_after_s": 0.5, "reconnect_after_s": 1.5}
-        async with (
-            controller(faults=("freeze@0.5+4",)) as port,
-            gateway(mesh, tmp_path, port, **FANUC | quick) as site,
-        ):
-            await until(lambda: site.controller.link == STATE.SILENT)
-            await until(lambda: site.controller.link == STATE.DOWN)
-            await until(lambda: site.controller.link == STATE.UP)
-            await site.units(3)
-
-    run(main())
-
-
 def test_two_clients_of_one_table_do_not_fight_and_show_no_wrong_joints(mesh, tmp_path):
     async def main():
         other = FANUC | {"options": with_defaults(FanucSettings(registers=(1,)), SIX)}
@@ -647,13 +617,5 @@ def test_without_a_declaration_the_robot_is_shown_without_joints_and_says_why(me
             await until(lambda: site.controller.activity == STATE.IDLE)
             assert "declare j23 and assignments" in site.controller.link_text
             assert not site.seen["joints"]
-
-    run(main())
-
-
-def test_a_port_without_a_controller_is_down(mesh, tmp_path):
-    async def main():
-        async with gateway(mesh, tmp_path, free_port(), up=False, **FANUC) as site:
-            await until(lambda: site.controller.link == STATE.DOWN and "refused" in site.controller.link_text)
 
     run(main())

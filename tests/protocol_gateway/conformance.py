@@ -1,0 +1,120 @@
+"""The drivers that the conformance suite tries, each with its simulated controller."""
+
+import contextlib
+import re
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from tests.protocol_gateway import test_hses_driver, test_rtde_driver, test_snpx_driver
+from tests.protocol_gateway.gateway_site import simulator
+
+
+@dataclass(frozen=True, kw_only=True)
+class Subject:
+    """A driver under test.
+
+    Attributes:
+        settings: Of the robot.
+        start: Runs a simulated controller with a demo or at rest, and with faults; yields its ports, that of
+            the site file's `controller` first.
+        ports: Names of the other ports, in the order of `start`.
+        declared: Asserts that all packets that were sent to a port are among those that the driver declares,
+            and returns their number.
+        reads: It never commands.
+        faults: Those of the simulated controller that the suite tries.
+        reports_time: It reports the controller's own clock.
+    """
+
+    name: str
+    settings: dict
+    start: Callable
+    ports: tuple[str, ...] = ()
+    declared: dict = field(default_factory=dict)
+    datagrams: bool = False
+    reads: bool = True
+    faults: tuple[str, ...] = ()
+    reports_time: bool = False
+
+    def __str__(self):
+        return self.name
+
+
+@contextlib.asynccontextmanager
+async def one_port(starting):
+    async with starting as port:
+        yield (port,)
+
+
+def nothing(parts):
+    assert not b"".join(parts)
+    return 0
+
+
+def greeting_of_rtde(parts):
+    """Assert that only the protocol version, the software's version, outputs and start are sent."""
+    data, kinds = b"".join(parts), ""
+    while data:
+        size, kind = struct.unpack_from(">HB", data)
+        kinds += chr(kind)
+        data = data[size:]
+    # Each connection: version, software, outputs (again without the unknown ones), start.
+    assert re.fullmatch(r"(V{1,2}v?O{0,2}S?)*", kinds), kinds
+    return len(kinds)
+
+
+def reads_of_hses(parts):
+    for each in parts:
+        assert (len(each), each[:11], each[12:24]) == (32, b"YERC\x20\0\0\0\x03\x01\0", b"\0\0\0\x0099999999")
+        assert (*struct.unpack_from("<H", each, 24), each[29]) in test_hses_driver.READS
+    return len(parts)
+
+
+def reads_of_snpx(parts):
+    """Assert that only a session, reads and the client's own assignments are sent."""
+    found = test_snpx_driver.packets(b"".join(parts))
+    for each in found:
+        if each == bytes(56) or each[42:44] == b"\x4f\x01":
+            continue
+        if each[31] == 0x80:
+            assert each[50:54] == b"\x07\x38\0\0"
+            assert re.fullmatch(r"CLRASG|SETASG 1\d{4} \d+ \S+ \d+", each[56:].decode())
+        else:
+            assert (each[31], each[42], each[48:]) == (0xC0, 0x04, bytes(8))
+    return len(found)
+
+
+SUBJECTS = (
+    Subject(
+        name="unit",
+        settings={"stop_proven": True},
+        start=lambda **settings: one_port(simulator(**settings)),
+        declared={"": nothing},
+        reads=False,
+        faults=("garbage", "split", "flood", "burst", "joints", "mute"),
+    ),
+    Subject(
+        name="rtde",
+        settings=test_rtde_driver.UR,
+        start=test_rtde_driver.controller,
+        ports=("primary",),
+        declared={"": greeting_of_rtde, "primary": nothing},
+        faults=("garbage", "split", "flood", "burst"),
+        reports_time=True,
+    ),
+    Subject(
+        name="hses",
+        settings=test_hses_driver.YASKAWA,
+        start=lambda **settings: one_port(test_hses_driver.controller(**settings)),
+        declared={"": reads_of_hses},
+        datagrams=True,
+        faults=("garbage", "flood", "busy", "loss", "joints", "mute"),
+    ),
+    Subject(
+        name="snpx",
+        settings=test_snpx_driver.FANUC,
+        start=lambda **settings: one_port(test_snpx_driver.controller(**settings)),
+        declared={"": reads_of_snpx},
+        faults=("garbage", "split", "flood", "busy", "loss", "joints", "mute"),
+    ),
+)
