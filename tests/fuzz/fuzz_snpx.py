@@ -41,11 +41,11 @@ TIMEOUT_S = 1.0
 NEW_CONNECTION_EACH = 500
 SETTINGS = FanucSettings(assignments="own", j23=1, registers=(5,), io=("DI[1-16]", "RO[2-9]"))
 # First word from 0, number of words: position, state, alarms.
-POSITION, STATE, ALARMS = (10_000, 52), (10_052, 54), (10_106, 402)
+POSITION, STATE, ALARMS = (10_000, 52), (10_052, 94), (10_146, 402)
 OPERATOR = (0x46, 6000, 24)
 ASSIGNMENT = re.compile(
     rb"CLRASG|SETASG 1\d{4} \d{1,3} (POS\[G1:0\]|PRG\[1\]|ALM\[1\]|R\[5\]|\$MNUTOOL\[1,1\]@1\.26"
-    rb"|\$MNU(TOOL|FRAME)NUM\[1\]|\$MCR\.\$GENOVERRIDE|\$SNPX_PARAM\.\$VERSION) \d{1,5}"
+    rb"|\$MNU(TOOL|FRAME)NUM\[1\]|\$MCR\.\$GENOVERRIDE|\$VERSION|\$SNPX_PARAM\.\$VERSION) \d{1,5}"
 )
 
 
@@ -134,7 +134,7 @@ class Bench:
             right = data[50:54] == b"\x07\x38\0\0" and ASSIGNMENT.fullmatch(text) is not None
             right = right and text not in self._texts and data[54] + 256 * data[55] == len(text)
             self._texts.add(text)
-            if b"VERSION" in text:
+            if b"PARAM.$VERSION" in text:
                 self._proof = int(text.split()[-1])
         else:
             right = data[31] == 0xC0 and not text and not any(data[48:])
@@ -318,10 +318,11 @@ STATES = (
     b"WELD".ljust(16, b"\0")
     + struct.pack("<2h", 42, 2)
     + b"MAIN".ljust(16, b"\0")
+    + b"V9.40P/23".ljust(80, b"\0")
     + struct.pack("<3i", 100, 0, 1)
     + _position(())[:52]
     + struct.pack("<f", 2.5),
-    bytes(36) + struct.pack("<3i", -1, 2**31 - 1, 0) + bytes(52) + struct.pack("<f", math.inf),
+    bytes(116) + struct.pack("<3i", -1, 2**31 - 1, 0) + bytes(52) + struct.pack("<f", math.inf),
 )
 ALARM_LISTS = (
     _NONE * 4,

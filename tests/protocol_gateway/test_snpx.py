@@ -186,7 +186,7 @@ def test_only_declared_pieces_are_assigned_and_each_text_is_finite():
     assert commands[0] == f"SETASG {FIRST_WORD} 50 POS[G2:0] 0"
     pattern = (
         r"SETASG \d+ \d+ (POS\[G\d:0\]|PRG\[1\]|ALM\[1\]|R\[\d+\]|\$MNUTOOL\[\d,\d+\]@1\.26"
-        r"|\$MCR\.\$GENOVERRIDE|\$MNU(FRAME|TOOL)NUM\[\d\]|\$SNPX_PARAM\.\$VERSION) \d+"
+        r"|\$MCR\.\$GENOVERRIDE|\$VERSION|\$MNU(FRAME|TOOL)NUM\[\d\]|\$SNPX_PARAM\.\$VERSION) \d+"
     )
     assert all(re.fullmatch(pattern, each) for each in commands)
     ends = [each.first_word + each.variable.words for each in table.assignments]

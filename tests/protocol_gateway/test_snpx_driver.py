@@ -22,6 +22,7 @@ from protocol_gateway.drivers.driver import (
     SetTimer,
     Severity,
     SignalsReceived,
+    SoftwareReceived,
     StatusReceived,
 )
 from protocol_gateway.drivers.fanuc.assignments import SystemVariable
@@ -73,6 +74,7 @@ class Stepped:
             "PRG[1]": task(),
             "ALM[1]": EMPTY_ALARM * 4,
             "$MCR.$GENOVERRIDE": struct.pack("<i", 75),
+            "$VERSION": b"V9.40P/23",
             f"$MNUTOOLNUM[{group}]": struct.pack("<i", 1),
         }
         self.bits = {OUTPUTS: (ENABLED | READY) << 6000, INPUTS: 0b101}
@@ -135,7 +137,7 @@ class Stepped:
         data = b""
         for each in block.assignments:
             value = self.content.get(str(each.variable), b"")
-            if each.variable is SystemVariable.VERSION:
+            if each.variable is SystemVariable.SNPX_VERSION:
                 value = struct.pack("<i", 2 * each.multiply)
             data += value.ljust(2 * each.variable.words, b"\0")
         return data
@@ -356,6 +358,7 @@ def test_program_override_frame_tool_and_registers_are_reported():
     assert (found["speed.override"], found["frame.number"], found["tool.number"]) == (75, 4, 1)
     assert found["tool.offset.z"] == pytest.approx(0.12)
     assert found["io.register.5"] == 2.5
+    assert [each.version for each in arm.events if isinstance(each, SoftwareReceived)] == ["V9.40P/23"]
     # The frame of tool 3 is not valid, that of tool 2 is not read, tool 0 is the flange.
     for tool, expected in ((3, None), (2, None), (0, 0.0)):
         arm.content["$MNUTOOLNUM[1]"] = struct.pack("<i", tool)

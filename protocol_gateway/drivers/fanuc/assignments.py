@@ -5,8 +5,8 @@ question reads a block. The last two words of a block prove that the table is th
 the controller's software, multiplied by a number of the table.
 
     10001   position   50: the current position       2: proof
-    10053   state      18: the task, 2 each: speed override, number of the frame, number of the tool,
-                       26 for each tool, 2 for each register                              2: proof
+    10053   state      18: the task, 40: the software's version, 2 each: speed override, number of the
+                       frame, number of the tool, 26 for each tool, 2 for each register   2: proof
     then    alarms     100 for each of the newest alarms                                  2: proof
 """
 
@@ -22,7 +22,8 @@ ALARMS = 4
 """Active alarms that are read, the newest first."""
 MOST_TOOLS, MOST_REGISTERS, MOST_GROUPS = 10, 60, 8
 MOST_REGISTER = 10_000
-ALARM_WORDS, POSITION_WORDS, TASK_WORDS, TOOL_WORDS, NUMBER_WORDS = 100, 50, 18, 26, 2
+ALARM_WORDS, POSITION_WORDS, TASK_WORDS, TEXT_WORDS = 100, 50, 18, 40
+TOOL_WORDS, NUMBER_WORDS = 26, 2
 _VERSIONS = range(2, 100)
 
 
@@ -98,13 +99,14 @@ class NumericRegister:
 class SystemVariable(Enum):
     """System variables of the whole controller."""
 
-    VERSION = "$SNPX_PARAM.$VERSION"
+    SNPX_VERSION = "$SNPX_PARAM.$VERSION"
+    SOFTWARE = "$VERSION"
     SPEED_OVERRIDE = "$MCR.$GENOVERRIDE"
 
     @property
     def words(self) -> int:
         """Number of its words."""
-        return NUMBER_WORDS
+        return TEXT_WORDS if self is SystemVariable.SOFTWARE else NUMBER_WORDS
 
     def __str__(self) -> str:
         return self.value
@@ -216,7 +218,7 @@ class Table:
         self.tools = tuple(ToolFrame(group, each) for each in tools)
         self.registers = tuple(NumericRegister(each) for each in registers)
         self.frame_number, self.tool_number = (OfGroup(each, group) for each in GroupVariable)
-        state: list[tuple[Variable, int]] = [(MasterTask(), 1)]
+        state: list[tuple[Variable, int]] = [(MasterTask(), 1), (SystemVariable.SOFTWARE, 1)]
         state += [(each, 1) for each in (SystemVariable.SPEED_OVERRIDE, self.frame_number, self.tool_number)]
         state += [(each, 0) for each in self.tools]
         state += [(each, 0) for each in self.registers]
@@ -231,7 +233,7 @@ class Table:
 
     def _block(self, content: Sequence[tuple[Variable, int]]) -> Block:
         found = []
-        for variable, multiply in (*content, (SystemVariable.VERSION, self._multiply)):
+        for variable, multiply in (*content, (SystemVariable.SNPX_VERSION, self._multiply)):
             found.append(Assignment(self._next_word, variable, multiply))
             self._next_word += variable.words
         return Block(found)

@@ -25,10 +25,11 @@ from protocol_gateway.drivers.driver import (
     Send,
     SetTimer,
     Severity,
+    SoftwareReceived,
     StatusReceived,
 )
 from protocol_gateway.drivers.fanuc import data, signals
-from protocol_gateway.drivers.fanuc.assignments import ALARMS, Block, Variable
+from protocol_gateway.drivers.fanuc.assignments import ALARMS, Block, SystemVariable, Variable
 from protocol_gateway.drivers.fanuc.axes import Axes, FanucSettings, SignalBits, signal_bits
 from protocol_gateway.drivers.fanuc.data import Alarm
 from protocol_gateway.drivers.fanuc.signals import Operator
@@ -46,6 +47,7 @@ from protocol_gateway.drivers.fanuc.srtp import (
 )
 from protocol_gateway.drivers.hexadecimal import hexadecimal
 from protocol_gateway.drivers.only_reads import OnlyReads
+from protocol_gateway.drivers.pendant_text import text
 from protocol_gateway.drivers.polling import Asked, Polling, Regular
 from protocol_gateway.errors import GatewaySettingsError
 from robomesh import reason_codes
@@ -131,6 +133,7 @@ class SnpxDriver(OnlyReads):
         self._complaints: set[Question] = set()
         self._unproven: Counter[Read] = Counter()
         self._invalid = False
+        self._software = ""
         self._next_pose_s = 0.0
 
     # -------------------------------------------------------------------------- seam
@@ -243,7 +246,8 @@ class SnpxDriver(OnlyReads):
         if block is self._table.position:
             return self._on_position(values[self._table.position_of], now_s)
         if block is self._table.state:
-            return [signals.of_state(self._table, values, self._refused)]
+            reported = signals.of_state(self._table, values, self._refused)
+            return [reported, *self._on_software(values[SystemVariable.SOFTWARE])]
         return self._on_alarms(next(iter(values.values())))
 
     def _not_proven(self, question: Read, words: bytes) -> list[ControllerEvent]:
@@ -292,6 +296,14 @@ class SnpxDriver(OnlyReads):
             f"axis {extra} of group {self._settings.group} belongs to no joint of the model, and is not shown"
         )
         return [AlarmReceived(Severity.WARNING, text)]
+
+    def _on_software(self, words: bytes) -> list[ControllerEvent]:
+        """Report the version of the software once for each connection; without a text it is unknown."""
+        version = text(words)
+        if not version or version == self._software:
+            return []
+        self._software = version
+        return [SoftwareReceived(version)]
 
     def _on_alarms(self, words: bytes) -> list[ControllerEvent]:
         found = data.alarms(words)

@@ -20,6 +20,7 @@ from services.simulator.demo import DemoProgram
 from services.simulator.fault_table import LEAP
 
 PROGRAM = "DEMO"
+SOFTWARE = "V0.00P/00 simulated"
 NO_SEVERITY = 128
 SERVO_SEVERITY = 54
 

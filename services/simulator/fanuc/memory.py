@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from struct import Struct
 
 from protocol_gateway.drivers.fanuc.data import POSITION
-from services.simulator.fanuc.controller import SnpxController
+from services.simulator.fanuc.controller import SOFTWARE, SnpxController
 
 MOST_ASSIGNMENTS = 80
 LAST_WORD = 16_384
@@ -138,6 +138,8 @@ def _value(
     if found := _INDEXED.fullmatch(name):
         index = _NONE if found[2] else int(found[3]) + number
         return _indexed(controller, found[1], index, multiply)
+    if name == "$VERSION":
+        return SOFTWARE.encode().ljust(_TEXT_BYTES, b"\0") if number == 0 else None
     variable = controller.numbers().get(name)
     return None if variable is None or number else _INTEGER.pack(round(variable * (multiply or 1.0)))
 
