@@ -5,16 +5,22 @@ import contextlib
 import struct
 import time
 
+import numpy as np
 import pytest
 
 from protocol_gateway.drivers.fanuc import data as values
-from protocol_gateway.drivers.fanuc.axes import FanucSettings
+from protocol_gateway.drivers.fanuc import signals
+from protocol_gateway.drivers.fanuc.axes import Axes, FanucSettings
 from protocol_gateway.drivers.fanuc.signals import Operator
 from protocol_gateway.drivers.fanuc.srtp import PORT, Area, BeginSession, Clear, Connect, Read, Service
 from robots.description import load
 from robots.joints import joints_of
+from robots.model import build_model, link_placements
+from robots.poses import axis_rotation
+from robots.verification import Sample, verify
 from services.errors import ListenError
 from services.simulator.errors import FaultError, SimulatorError
+from services.simulator.fanuc.controller import SnpxController
 from services.simulator.fanuc.service import SnpxSettings, serve_snpx
 from tests.conftest import run
 
@@ -258,6 +264,46 @@ def test_a_refusing_and_a_restarting_controller_close_their_connections():
                 assert running is (fault != "restart")
 
     run(main())
+
+
+def sample(controller, j23):
+    """Return what `robomesh robot verify` gets from the driver at the controller's position."""
+    description = controller.position(0.0), controller.tool()
+    position = values.position(description[0])
+    positions = Axes(FanucSettings(j23=j23), joints_of(PUMA).types).positions(position.axes)
+    frames = []
+    for frame in (position.cartesian, values.cartesian(description[1][:52])):
+        found = [value for _, value in signals.of_pose(frame).values][:6]
+        placement = np.eye(4)
+        vector = np.array(found[3:])
+        placement[:3, :3] = axis_rotation(vector, float(np.linalg.norm(vector)))
+        placement[:3, 3] = found[:3]
+        frames.append(placement)
+    pose, tool = frames
+    return Sample(positions=np.array(positions), tool_to_base=pose, tool_to_flange=tool)
+
+
+@pytest.mark.parametrize("j23", [1, -1])
+def test_a_wrong_relation_of_axis_3_is_found_and_named_by_a_comparison(j23):
+    joints, model = joints_of(PUMA), build_model(PUMA)
+    axes = Axes(FanucSettings(j23=j23), joints.types)
+    reach = np.random.default_rng(7).uniform(-0.5, 0.5, (10, 6))
+    controllers = []
+    for pose in joints.home + reach:
+        arm = SnpxController(PUMA, axes, group=1, tour=None)
+        arm.positions = lambda now_s, pose=pose: pose
+        controllers.append(arm)
+
+    def flange(positions):
+        return link_placements(model, positions)[-1]
+
+    right = verify(flange, joints, [sample(each, j23) for each in controllers])
+    assert right.agrees
+    assert max(each.distance_m for each in right.deviations) < 1e-6
+    wrong = verify(flange, joints, [sample(each, 0) for each in controllers])
+    assert not wrong.agrees
+    sign = "plus" if j23 == 1 else "minus"
+    assert wrong.suspects == (f"elbow is its value {sign} that of shoulder",)
 
 
 def test_settings_that_cannot_be_used_are_refused():
