@@ -7,7 +7,8 @@ ProtocolGatewayError
 ├── CommandError            a command that the controller's protocol cannot express
 ├── LinkError               a unit that did not reach the controller's socket
 │   ├── LinkDownError       there is no connection
-│   └── LinkCloggedError    the controller does not read, so the connection was closed
+│   ├── LinkCloggedError    the controller does not read, so the connection was closed
+│   └── NotReadyError       the driver sends nothing now
 ├── AuthorityError          a failure of the audit log or of the motion check
 │   ├── AuditError          an audit entry that is not on disk, or a line that is not an entry
 │   └── CheckError          a motion that could not be checked, or not in time
@@ -61,6 +62,10 @@ class LinkDownError(LinkError):
 
 class LinkCloggedError(LinkError):
     """The controller does not read, so a unit did not fit; the connection was closed."""
+
+
+class NotReadyError(LinkError):
+    """A command that a driver does not send in the controller's present state; nothing was sent."""
 
 
 class AuthorityError(ProtocolGatewayError):

@@ -144,6 +144,7 @@ class Robot:
             on_event=self._telemetry.on_event,
             on_status=self._on_link,
             on_channel=self._on_channel,
+            on_fate_unknown=lambda why: self._control.handle(events.FateUnknown(why)),
         )
         self._missing_channels: set[str] = set()
         self._link_status = self._link.status
@@ -396,6 +397,8 @@ class Robot:
             self._missing_channels.discard(name)
             text = f"the controller's {name} interface is connected again"
             self._journal.report(_S.INFO, "link.channel_back", text, channel=name)
+        if why is None and Carries.STOP in channel.carries:
+            self._control.handle(events.LinkRestored())
         self._publish_state()
 
     def _on_controller_status(self) -> None:

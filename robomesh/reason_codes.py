@@ -408,6 +408,45 @@ STOP_GATEWAY_KILLED = Code(
     "dead-man: the gateway was killed while {holder} had control, and the robot still moves",
 )
 STOP_LINK_LOST = Code("stop.link_lost", "the link was lost during a motion of {holder}: {detail}")
+STOP_FATE_UNKNOWN = Code("stop.fate_unknown", "the fate of a motion is unknown: {cause}")
+STOP_WOULD_NOT_ARRIVE = Code(
+    "stop.would_not_arrive",
+    "a stop could not be sent now, because its connection to the controller is missing",
+    "restore the connection that the event link.channel_lost names",
+)
+UR_NOT_STARTED = Code(
+    "universal_robots.not_started", "the controller has not started its program within {seconds:g} s"
+)
+UR_OTHER_PROGRAM = Code(
+    "universal_robots.other_program",
+    "another program runs or waits on the controller",
+    "end it at the controller",
+)
+UR_LOST_PROGRAM = Code(
+    "universal_robots.lost_program", "the program that runs on the controller is not the gateway's"
+)
+UR_PAUSED = Code("universal_robots.paused", "its program was paused")
+UR_ARM_STOPPED = Code("universal_robots.arm_stopped", "the controller has stopped the arm ({mode})")
+UR_TOOL_CHANGED = Code("universal_robots.tool_changed", "tool or payload were changed during a motion")
+UR_WENT_LOCAL = Code("universal_robots.went_local", "the controller was switched to local control")
+UR_CHANNEL_LOST = Code("universal_robots.channel_lost", "the connection {name} was lost during a motion")
+UR_STATE_OLD = Code("universal_robots.state_old", "the newest state of the controller is too old")
+UR_MOVES = Code("universal_robots.moves", "a motion still runs", "wait for its end, or stop the robot")
+UR_CHANNEL_MISSING = Code(
+    "universal_robots.channel_missing",
+    "the connection {name} to the controller is missing",
+    "the event link.channel_lost says why",
+)
+UR_SOFTWARE = Code(
+    "universal_robots.software",
+    "motion needs PolyScope 5.6 or a later version 5, this is {version}",
+    "move the robot from its own panel",
+)
+UR_REGISTER = Code(
+    "universal_robots.register",
+    "{name} cannot be used: {problem}",
+    "choose other registers in the site file (universal_robots)",
+)
 STOP_SENT = Code("stop.sent", "stop request {id} is on the controller's socket")
 STOP_NOT_SENT = Code("stop.not_sent", "stop request {id} is latched, but not sent: {cause}")
 STOP_READ_ONLY = Code(

@@ -11,8 +11,8 @@
     JOG                         x     x     x               x          x
     MOVE_ABSOLUTE MOVE_RELATIVE x     x     x               x          x      x
 
-A command that the driver does not have is refused before. HOLD can only slow a robot down, so an unknown
-mode does not forbid it.
+A command that the driver does not have is refused before, and motion while a stop could not be sent. HOLD can
+only slow a robot down, so an unknown mode does not forbid it.
 """
 
 from collections.abc import Sequence
@@ -95,6 +95,7 @@ def obstacle(request: CommandRequest, controller: Controller, joints: Joints) ->
     found = (
         _link_obstacle(controller)
         or _ability_obstacle(request, controller.capabilities)
+        or _stop_obstacle(request, controller)
         or _mode_obstacle(request, controller)
         or _state_obstacle(request, controller)
         or _value_obstacle(request, controller, joints)
@@ -115,19 +116,31 @@ def _link_obstacle(controller: Controller) -> Reason | None:
 
 
 def _ability_obstacle(request: CommandRequest, capabilities: Capabilities) -> Reason | None:
-    if _KINDS.get(request.command) in capabilities.commands:
+    if _kind(request.command, capabilities) in capabilities.commands:
         return None
     if request.command == _C.HOME and capabilities.absolute:
         return codes.ROBOT_HOMED_BY_NATURE()
     return codes.COMMAND_NOT_THERE(command=_C.Name(request.command))
 
 
+def _kind(command: CommandRequest.Command, capabilities: Capabilities) -> type[ControllerCommand] | None:
+    """Return the driver's command for a command; None: it is unknown."""
+    if command == _C.MOVE_RELATIVE and MoveRelative not in capabilities.commands:
+        return MoveAbsolute
+    return _KINDS.get(command)
+
+
+def _stop_obstacle(request: CommandRequest, controller: Controller) -> Reason | None:
+    moves = request.command in MOTION_COMMANDS
+    return codes.STOP_WOULD_NOT_ARRIVE() if moves and not controller.stop_arrives else None
+
+
 def commands_of(capabilities: Capabilities) -> Sequence[CommandRequest.Command]:
     """Return the commands of the mesh that can be executed with a driver."""
     return [
         command
-        for command, kind in _KINDS.items()
-        if kind in capabilities.commands and (command != _C.JOG or capabilities.jogs)
+        for command in _KINDS
+        if _kind(command, capabilities) in capabilities.commands and (command != _C.JOG or capabilities.jogs)
     ]
 
 
@@ -212,6 +225,26 @@ def predicted(request: CommandRequest, controller: Controller, joints: Joints) -
             status = replace(status, activity=Activity.MOVING)
     target = target_of(request, controller, joints)
     return replace(controller, status=status, positions=controller.positions if target is None else target)
+
+
+def controller_commands(
+    requests: Sequence[CommandRequest], controller: Controller, joints: Joints
+) -> list[ControllerCommand]:
+    """Convert commands of one unit for the driver; one without `MoveRelative` gets targets.
+
+    Raises:
+        ValueError: If drivers do not know a command.
+    """
+    found: list[ControllerCommand] = []
+    absolute = MoveRelative not in controller.capabilities.commands
+    for request in requests:
+        target = target_of(request, controller, joints)
+        if absolute and request.command == _C.MOVE_RELATIVE and target is not None:
+            found.append(MoveAbsolute(target))
+        else:
+            found.append(controller_command(request))
+        controller = predicted(request, controller, joints)
+    return found
 
 
 def controller_command(request: CommandRequest) -> ControllerCommand:

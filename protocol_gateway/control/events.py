@@ -220,6 +220,13 @@ class LinkRestored:
 
 
 @dataclass(frozen=True)
+class FateUnknown:
+    """The driver does not know what became of a motion, or what the arm does now."""
+
+    why: Reason
+
+
+@dataclass(frozen=True)
 class StatusChanged:
     """The controller's status has changed: after it, a stop or fault is not the one that was reset."""
 
@@ -262,6 +269,7 @@ Event: TypeAlias = (
     | LeaseEnded
     | LinkLost
     | LinkRestored
+    | FateUnknown
     | StatusChanged
     | StatusReported
     | UnitRefused

@@ -14,6 +14,7 @@
       RENEW, ASK
     end of a lease   stop, if its motion may run -> published -> audit later
     link restored    the latched stop on the wire -> audit later
+    fate unknown     as a stop
 
 `control` performs the effects: it hands over one command after the other, so that they reach the controller
 in the order of the audit log. Stops, HOLD, renewals and releases do not wait.
@@ -28,7 +29,13 @@ from protocol_gateway.audit.log import GATEWAY
 from protocol_gateway.authority import lease_rules, motion_owner, stop_rules
 from protocol_gateway.authority.admission import Verdict, keep_answer
 from protocol_gateway.authority.lease_rules import Answer, Authority, LeaseEnd, not_sent, refused
-from protocol_gateway.authority.preconditions import Controller, controller_command, predicted, target_of
+from protocol_gateway.authority.preconditions import (
+    Controller,
+    controller_command,
+    controller_commands,
+    predicted,
+    target_of,
+)
 from protocol_gateway.control import effects, entries, evaluation, events, reports
 from protocol_gateway.control.effects import Effects, Finding, Seen
 from protocol_gateway.control.evaluation import RunningProgram
@@ -118,6 +125,8 @@ class RobotAuthority:
                 yield from self._link_lost(event.why, seen)
             case events.LinkRestored():
                 yield from self._send_latched_stop(seen)
+            case events.FateUnknown():
+                yield from self._stop_by_gateway(codes.STOP_FATE_UNKNOWN(event.why), seen)
             case events.StatusChanged():
                 self._authority = replace(self._authority, reset_s=None)
             case events.StatusReported():
@@ -290,7 +299,7 @@ class RobotAuthority:
         unit, finding = None, Finding(start=None if command.program is None else command.program.start)
         if problem is None and sends:
             try:
-                unit = self._encode(*map(controller_command, command.requests))
+                unit = self._encode(*controller_commands(command.requests, seen.controller, self._joints))
             except CommandError as error:
                 problem = not_sent(error.reason)
         if problem is None and command.program is None:

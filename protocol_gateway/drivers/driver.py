@@ -9,6 +9,7 @@ the link performs in order:
       closed, timer_ended, command           Send: write whole bytes to a channel now
                                              SetTimer: tell the driver when a time has come
                                              Report: what the controller reported
+                                             FateUnknown: latch a stop
 
 Only the driver knows degrees, millimetres, words and codes: above it everything is SI. Times are seconds on
 the gateway's monotonic clock, unless named as the controller's.
@@ -263,7 +264,10 @@ class MoveAbsolute:
 
 @dataclass(frozen=True, slots=True)
 class MoveRelative:
-    """Command to move by joint offsets, one a joint [rad] or [m], from the actual positions."""
+    """Command to move by joint offsets, one a joint [rad] or [m], from the actual positions.
+
+    For a driver without it, the gateway computes the target and sends `MoveAbsolute`.
+    """
 
     offsets: tuple[float, ...]
 
@@ -381,10 +385,16 @@ class Close:
 
 @dataclass(frozen=True, slots=True)
 class Send:
-    """Write whole bytes to a channel now. Nothing waits in the gateway, so nothing precedes a stop."""
+    """Write whole bytes to a channel now. Nothing waits in the gateway, so nothing precedes a stop.
+
+    Attributes:
+        alternative: Another `Send` of the same command has the same purpose, as a second way to stop: the
+            command fails only if all of them fail. Otherwise the first failure ends the command.
+    """
 
     channel: Channel
     data: bytes
+    alternative: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -414,7 +424,17 @@ class Report:
     lost: int = 0
 
 
-Effect: TypeAlias = Open | Close | Send | SetTimer | Report
+@dataclass(frozen=True, slots=True)
+class FateUnknown:
+    """Latch a stop in the gateway: it is unknown what became of a motion, or what the arm does now.
+
+    The driver has already done what it can by itself, and never sends the motion again.
+    """
+
+    why: Reason
+
+
+Effect: TypeAlias = Open | Close | Send | SetTimer | Report | FateUnknown
 Effects: TypeAlias = Sequence[Effect]
 
 
@@ -472,5 +492,9 @@ class Driver(Protocol):
         ...
 
     def command(self, encoded: bytes, now_s: float) -> Effects:
-        """Send what `encode` returned."""
+        """Send what `encode` returned.
+
+        Raises:
+            NotReadyError: If the driver sends nothing now; never for `Stop`.
+        """
         ...

@@ -1,13 +1,14 @@
 """Registry of protocols. A new protocol needs one file, and a line here."""
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 from protocol_gateway.drivers.driver import Driver
 from protocol_gateway.drivers.fanuc.driver import SnpxDriver
 from protocol_gateway.drivers.opcua.driver import OpcUaDriver
 from protocol_gateway.drivers.unit import UnitDriver
 from protocol_gateway.drivers.universal_robots.driver import RtdeDriver
+from protocol_gateway.drivers.universal_robots.motion_driver import RtdeMotionDriver
 from protocol_gateway.drivers.yaskawa.driver import HsesDriver
 from robots.joints import JointType
 
@@ -37,9 +38,15 @@ class DriverMaker(Protocol):
         ...
 
 
+def _rtde(joint_types: Sequence[JointType], codes: Mapping[int, str], **given: Any) -> Driver:
+    """Create the driver that only reads, unless the site file declares motion."""
+    kind = RtdeDriver if given["options"] is None else RtdeMotionDriver
+    return kind(joint_types, codes, **given)
+
+
 DRIVERS: dict[str, DriverMaker] = {
     "unit": UnitDriver,
-    "rtde": RtdeDriver,
+    "rtde": _rtde,
     "hses": HsesDriver,
     "snpx": SnpxDriver,
     "opcua": OpcUaDriver,

@@ -29,6 +29,7 @@ from protocol_gateway.drivers.driver import (
     Driver,
     Effect,
     Effects,
+    FateUnknown,
     JointsReceived,
     MalformedReceived,
     Open,
@@ -106,7 +107,8 @@ class ControllerLink:
 
     `on_event`, `on_status` and `on_channel` are called on the event loop from the socket's callback: no
     queue, no task switch. They must return soon, and an exception in them ends `run`. `on_channel` gets each
-    change of a channel that does not carry READING: why it is not connected; None: it is.
+    change of a channel that does not carry READING: why it is not connected; None: it is. `on_fate_unknown`
+    gets why the driver wants a stop.
     """
 
     def __init__(
@@ -117,12 +119,14 @@ class ControllerLink:
         on_event: Callable[[ControllerEvent, Received], None],
         on_status: Callable[[LinkStatus], None] = lambda status: None,
         on_channel: Callable[[Channel, Reason | None], None] = lambda channel, why: None,
+        on_fate_unknown: Callable[[Reason], None] = lambda why: None,
         monotonic_s: Callable[[], float] = time.monotonic,
     ) -> None:
         self._settings = settings
         self._driver = driver
         self._on_status = on_status
         self._on_channel = on_channel
+        self._on_fate_unknown = on_fate_unknown
         self._monotonic_s = monotonic_s
         self._wall_clock = WallClock()
         self._where = f"{settings.host}:{settings.port}"
@@ -208,13 +212,24 @@ class ControllerLink:
         Raises:
             LinkDownError: If there is no connection.
             LinkCloggedError: If the socket does not take the whole unit; the connection is then aborted.
+            NotReadyError: If the driver does not send it now.
         """
         now = self._now()
+        failure: LinkError | None = None
+        sent = False
         for effect in self._driver.command(encoded, now.monotonic_s):
-            if isinstance(effect, Send):
-                self._write(effect)
-            else:
+            if not isinstance(effect, Send):
                 self._perform(effect, now)
+                continue
+            try:
+                self._write(effect)
+                sent = True
+            except LinkError as error:
+                if not effect.alternative:
+                    raise
+                failure = failure or error
+        if failure is not None and not sent:
+            raise failure
         self._response_timer.command_sent(now.monotonic_s)
 
     def carries(self, what: Carries) -> bool:
@@ -247,6 +262,8 @@ class ControllerLink:
                 self._open(effect)
             case Close(channel, why):
                 self._close(channel.name, why)
+            case FateUnknown(why_unknown):
+                self._on_fate_unknown(why_unknown)
 
     def _send_unasked(self, effect: Send, now_s: float) -> None:
         if not self._unasked.allowed(now_s):
@@ -303,6 +320,8 @@ class ControllerLink:
         if kept is not None:
             if why:
                 kept.reason = codes.LINK_REFUSED(where=kept.where, detail=why)
+                if Carries.READING not in kept.channel.carries:
+                    self._on_channel(kept.channel, kept.reason)
             self._tasks[kept].cancel()
 
     def _channel_ended(self, kept: KeptChannel, task: asyncio.Task[None]) -> None:

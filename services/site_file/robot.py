@@ -10,6 +10,7 @@ from protocol_gateway.core.codes import code_table
 from protocol_gateway.drivers.fanuc.axes import FanucSettings
 from protocol_gateway.drivers.opcua.settings import OpcUaSettings
 from protocol_gateway.drivers.registry import DRIVERS
+from protocol_gateway.drivers.universal_robots.settings import MotionSettings
 from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
 from protocol_gateway.errors import CodeTableError
 from protocol_gateway.proofs import StopProof
@@ -25,6 +26,7 @@ from services.site_file.legacy_clients import LegacyClients
 from services.site_file.listen_address import is_loopback, split_address
 from services.site_file.opcua import OpcUa
 from services.site_file.part import PART_CONFIG
+from services.site_file.universal_robots import UniversalRobots
 from services.site_file.yaskawa import Yaskawa
 
 
@@ -58,10 +60,11 @@ class Robot(BaseModel):
             `udp://HOST:PORT` with the protocol `hses`.
         ports: Ports of the controller's other interfaces, where they are not the usual ones, as in
             `{ primary = 30011 }`.
-        protocol: The controller's protocol: `unit` (docs/controllers.md), `rtde` to read a controller of
+        protocol: The controller's protocol: `unit` (docs/controllers.md), `rtde` for a controller of
             Universal Robots (docs/controllers/universal-robots.md), `hses` to read one of Yaskawa
             (docs/controllers/yaskawa.md), `snpx` to read one of FANUC (docs/controllers/fanuc.md), or `opcua`
             to read an OPC UA server (docs/controllers/opcua.md).
+        universal_robots: Motion of a robot of Universal Robots; with the protocol `rtde`.
         yaskawa: Properties of the robot that a Yaskawa controller does not report; with the protocol `hses`.
         fanuc: Properties of the robot that a FANUC controller does not report; with the protocol `snpx`.
         opcua: The OPC UA server, and what is read from it; with the protocol `opcua`.
@@ -99,6 +102,7 @@ class Robot(BaseModel):
     controller: str = "simulated"
     ports: dict[str, Annotated[int, Field(gt=0, lt=65536)]] = Field(default_factory=dict)
     protocol: str = "unit"
+    universal_robots: UniversalRobots | None = None
     yaskawa: Yaskawa | None = None
     fanuc: Fanuc | None = None
     opcua: OpcUa | None = None
@@ -194,7 +198,12 @@ class Robot(BaseModel):
     @model_validator(mode="after")
     def _of_protocol(self) -> "Robot":
         hses = self.protocol == "hses"
-        for part, protocol in (("yaskawa", "hses"), ("fanuc", "snpx"), ("opcua", "opcua")):
+        for part, protocol in (
+            ("universal_robots", "rtde"),
+            ("yaskawa", "hses"),
+            ("fanuc", "snpx"),
+            ("opcua", "opcua"),
+        ):
             if getattr(self, part) is not None and self.protocol != protocol:
                 raise ValueError(f"{part} needs the protocol {protocol!r}, this robot's is {self.protocol!r}")
         if self.protocol == "opcua" and not self.simulated:
@@ -222,7 +231,7 @@ class Robot(BaseModel):
         return (self.yaskawa or Yaskawa()).group if self.protocol == "hses" else ""
 
     @property
-    def options(self) -> YaskawaSettings | FanucSettings | OpcUaSettings | None:
+    def options(self) -> YaskawaSettings | FanucSettings | OpcUaSettings | MotionSettings | None:
         """Settings of the protocol's driver, which the gateway passes on; None: it has none."""
         match self.protocol:
             case "hses":
@@ -231,6 +240,8 @@ class Robot(BaseModel):
                 return (self.fanuc or Fanuc()).settings
             case "opcua":
                 return (self.opcua or OpcUa()).settings(simulated=self.simulated)
+            case "rtde":
+                return (self.universal_robots or UniversalRobots()).settings
             case _:
                 return None
 

@@ -5,12 +5,19 @@ from math import radians
 
 import pytest
 
-from protocol_gateway.authority.preconditions import Controller, commands_of, controller_command, obstacle
+from protocol_gateway.authority.preconditions import (
+    Controller,
+    commands_of,
+    controller_command,
+    controller_commands,
+    obstacle,
+)
 from protocol_gateway.drivers.driver import (
     Activity,
     Capabilities,
     Mode,
     MoveAbsolute,
+    MoveRelative,
     Speed,
     StatusReceived,
     Stop,
@@ -92,7 +99,7 @@ AT_REST = [name for name in ALL if name != "RESUME"]
         ("link down", []),
         ("silent", []),
         ("read only", []),
-        ("stops and moves only", ["MOVE_ABSOLUTE"]),
+        ("stops and moves only", ["MOVE_ABSOLUTE", "MOVE_RELATIVE"]),
         ("local", []),
         ("mode unknown", ["HOLD"]),
         ("mode unknown, accepted", AT_REST),
@@ -140,9 +147,28 @@ def test_a_refused_value_is_named_with_the_allowed_ones(asked, words):
 
 def test_what_the_driver_does_not_have_is_refused_in_words():
     few = SITUATIONS["stops and moves only"]
-    assert "this controller has no MOVE_RELATIVE" in obstacle(command(C.MOVE_RELATIVE), few, JOINTS).text
+    assert "this controller has no HOLD" in obstacle(command(C.HOLD), few, JOINTS).text
     assert "its encoders are absolute" in obstacle(command(C.HOME), few, JOINTS).text
-    assert set(commands_of(few.capabilities)) == {C.MOVE_ABSOLUTE, C.RUN_PROGRAM}
+    assert set(commands_of(few.capabilities)) == {C.MOVE_ABSOLUTE, C.MOVE_RELATIVE, C.RUN_PROGRAM}
+
+
+def test_a_driver_without_relative_motion_gets_targets():
+    few = SITUATIONS["stops and moves only"]
+    asked = [command(C.MOVE_RELATIVE, joint_positions=[0.1, 0, 0, 0, 0]) for _ in range(2)]
+    once, twice = ((HOME[0] + 0.1 * times, *HOME[1:]) for times in (1, 2))
+    assert obstacle(asked[0], few, JOINTS) is None
+    first, second = controller_commands(asked, few, JOINTS)
+    assert (first.positions, second.positions) == (pytest.approx(once), pytest.approx(twice))
+    assert controller_commands(asked[:1], READY, JOINTS) == [MoveRelative((0.1, 0, 0, 0, 0))]
+
+
+def test_motion_is_refused_while_a_stop_could_not_be_sent():
+    mute = replace(READY, stop_arrives=False)
+    for kind in (C.HOME, C.MOVE_ABSOLUTE, C.MOVE_RELATIVE, C.RUN_PROGRAM):
+        refusal = obstacle(command(kind), mute, JOINTS)
+        assert "a stop could not be sent" in refusal.text, kind
+    for kind in (C.HOLD, C.RESET, C.SPEED):
+        assert obstacle(command(kind), mute, JOINTS) is None
 
 
 def test_a_robot_without_positions_is_homed_but_not_moved():

@@ -12,14 +12,16 @@ from protocol_gateway.drivers.driver import (
     Carries,
     Channel,
     Close,
+    FateUnknown,
     JointsReceived,
     Open,
     Report,
     Send,
     SetTimer,
 )
-from protocol_gateway.errors import LinkDownError
+from protocol_gateway.errors import LinkDownError, NotReadyError
 from protocol_gateway.link.link import ControllerLink, LinkSettings, LinkState
+from robomesh import reason_codes as codes
 from tests.conftest import free_port, run
 from tests.protocol_gateway.test_link import Seen, controller, end, until
 
@@ -96,11 +98,13 @@ async def peer(port=0):
 @contextlib.asynccontextmanager
 async def link(driver, port, **settings):
     seen = Seen()
+    seen.fates = []
     arm_link = ControllerLink(
         LinkSettings(host="127.0.0.1", port=port, **settings),
         driver,
         on_event=seen.event,
         on_status=seen.statuses.append,
+        on_fate_unknown=seen.fates.append,
     )
     task = asyncio.create_task(arm_link.run())
     try:
@@ -204,6 +208,52 @@ def test_a_lost_stop_channel_is_no_lost_link_and_refuses_only_what_it_carries():
                 assert await reader.readexactly(4) == b"stop"
                 await end(writer)
                 await end(read_writer)
+
+    run(main())
+
+
+@pytest.mark.parametrize("alternative", [True, False])
+def test_a_command_with_two_ways_needs_one_of_them(alternative):
+    async def main():
+        async with controller() as reads:
+            nowhere = Channel(name="nowhere", carries=Carries.STOP)
+            driver = Driver(
+                started=(Open(READ), Open(nowhere, port=free_port())),
+                command=lambda encoded: (
+                    Send(nowhere, encoded, alternative=alternative),
+                    Send(READ, encoded, alternative=alternative),
+                ),
+            )
+            async with link(driver, reads.port) as (arm_link, _):
+                reader, writer = await reads.next()
+                await until(lambda: ("opened", "read") in driver.told)
+                if alternative:
+                    arm_link.send(b"stop")
+                    assert await reader.readexactly(4) == b"stop"
+                else:
+                    with pytest.raises(LinkDownError):
+                        arm_link.send(b"stop")
+                await end(writer)
+
+    run(main())
+
+
+def test_a_driver_refuses_a_command_and_reports_an_unknown_fate():
+    def not_now(encoded):
+        raise NotReadyError(codes.UR_MOVES())
+
+    async def main():
+        async with controller() as reads:
+            why = codes.UR_PAUSED()
+            driver = Driver(started=(Open(READ),), command=not_now, received=(STATE, FateUnknown(why)))
+            async with link(driver, reads.port) as (arm_link, seen):
+                _, writer = await reads.next()
+                with pytest.raises(NotReadyError, match="still runs"):
+                    arm_link.send(b"move")
+                writer.write(b"state")
+                await until(lambda: seen.fates == [why])
+                assert arm_link.counters.units_sent == 0
+                await end(writer)
 
     run(main())
 

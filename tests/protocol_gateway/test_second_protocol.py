@@ -155,7 +155,7 @@ def test_a_robot_of_another_protocol_is_shown_commanded_and_stopped_like_any_oth
             assert site.controller.homed == STATE.YES
             able = site.controller.capabilities
             assert able.stops == schema.Capabilities.ANY
-            assert set(able.commands) == {C.HOME, C.RESET, C.MOVE_ABSOLUTE, C.RUN_PROGRAM}
+            assert set(able.commands) == {C.HOME, C.RESET, C.MOVE_ABSOLUTE, C.MOVE_RELATIVE, C.RUN_PROGRAM}
             await site.lease(A.ACQUIRE, ttl_s=5)
             target = [0.2, 1.0, -0.5, 0.1, 0.3]
             await site.command(C.MOVE_ABSOLUTE, joint_positions=target)

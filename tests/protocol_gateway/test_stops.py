@@ -8,7 +8,7 @@ import zenoh
 
 from protocol_gateway.audit.log import Outcome, read_entries
 from protocol_gateway.audit.persisted_state import authority_after
-from protocol_gateway.control.events import LinkRestored, MotionObserved
+from protocol_gateway.control.events import FateUnknown, LinkRestored, MotionObserved
 from robomesh import reason_codes as codes
 from robomesh.errors import NoAnswerError
 from robomesh.schemas import robomesh_pb2 as schema
@@ -42,6 +42,21 @@ def test_a_flood_of_one_operators_stops_is_one_counted_stop(tmp_path, clock):
             assert press(bench).stop_id == 2
             assert bench.socket == [STOP, STOP]
         assert sum(1 + entry.repeated for entry in read_entries(bench.log.path)) == 51
+
+    run(main())
+
+
+def test_a_motion_of_unknown_fate_latches_a_stop(tmp_path, clock):
+    async def main():
+        async with control_bench(tmp_path) as bench:
+            bench.control.handle(FateUnknown(codes.UR_NOT_STARTED(seconds=0.5)))
+            stop = bench.control.authority.stop
+            assert stop.why.code == "stop.fate_unknown"
+            assert "has not started its program within 0.5 s" in stop.reason
+            assert bench.socket == [STOP]
+            await bench.lease(A.ACQUIRE)
+            with refused(codes.STOP_LATCHED, id="1"):
+                await bench.commands((C.HOME, {}))
 
     run(main())
 

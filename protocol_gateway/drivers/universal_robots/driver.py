@@ -1,6 +1,7 @@
 """Driver that reads a controller of Universal Robots; it sends nothing but the greeting of RTDE.
 
-RTDE has the state, the primary interface the alarms and messages. Neither takes a seat of another client.
+`motion_driver` adds motion. RTDE has the state, the primary interface the alarms and messages. Neither takes
+a seat of another client.
 """
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
@@ -61,7 +62,7 @@ JOINTS = 6
 
 # The arm follows its targets closely, and robomesh computes the tool's speed itself.
 _NOT_READ = frozenset({"target_q", "actual_TCP_speed", "tool_mode"})
-_FIELDS = {name: kind for name, kind in OUTPUTS.items() if name not in _NOT_READ}
+OUTPUT_FIELDS = {name: kind for name, kind in OUTPUTS.items() if name not in _NOT_READ}
 _RETRY_S = 2.0
 # A fault needs a restart of the controller's safety; a stop needs a person at the robot.
 _FAULTS = frozenset({SafetyMode.VIOLATION, SafetyMode.FAULT, SafetyMode.UNDEFINED})
@@ -115,7 +116,7 @@ class RtdeDriver(OnlyReads):
             )
         if codes:
             raise GatewaySettingsError("protocol 'rtde' has no type codes: remove codes")
-        self._reader = RtdeReader(FREQUENCY_HZ, _FIELDS)
+        self._reader = RtdeReader(FREQUENCY_HZ, OUTPUT_FIELDS)
         self._primary = PrimaryStream()
         self._signals = SignalReports()
         self._left: dict[str, Open] = {}
@@ -139,13 +140,15 @@ class RtdeDriver(OnlyReads):
 
     def _states(self, data: bytes, now_s: float) -> Effects:
         events: list[ControllerEvent] = []
+        followed: list[Effect] = []
         units = 0
         failure = ""
         for event in self._reader.receive(data):
             match event:
                 case ControllerState():
                     units += 1
-                    events += joints_of(event), status_of(event)
+                    events += joints_of(event), self._status(event, now_s)
+                    followed += self._follow(event, now_s)
                     if (signals := self._signals.of(event)) is not None:
                         events.append(signals)
                 case TextReceived(level, text, source):
@@ -158,12 +161,20 @@ class RtdeDriver(OnlyReads):
                     failure = reason
                 case Ready(version):
                     events.append(SoftwareReceived(str(version)))
-        effects: list[Effect] = [Report(events, units)]
+        effects: list[Effect] = [Report(events, units), *followed]
         if asked := self._reader.to_send():
             effects.append(Send(RTDE, asked))
         if failure:
             effects += self._leave(RTDE, failure, now_s)
         return effects
+
+    def _status(self, state: ControllerState, now_s: float) -> StatusReceived:
+        """Return the status that a state reports."""
+        return status_of(state)
+
+    def _follow(self, state: ControllerState, now_s: float) -> Effects:
+        """Do what a new state requires: nothing."""
+        return ()
 
     def _messages(self, data: bytes, now_s: float) -> Effects:
         events: list[ControllerEvent] = []

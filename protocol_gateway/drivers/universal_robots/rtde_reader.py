@@ -72,11 +72,15 @@ class RtdeReader:
     Args:
         frequency_hz: States a second; at most the controller's highest frequency is requested.
         fields: Output fields with their types; they contain the REQUIRED ones.
+        registers: Names of those fields that are registers, for `ControllerState.registers`.
     """
 
-    def __init__(self, frequency_hz: float, fields: Mapping[str, str] = OUTPUTS) -> None:
+    def __init__(
+        self, frequency_hz: float, fields: Mapping[str, str] = OUTPUTS, *, registers: Sequence[str] = ()
+    ) -> None:
         self._wanted_hz = frequency_hz
         self._fields = fields
+        self._registers = registers
         self._connect()
 
     def _connect(self) -> None:
@@ -88,6 +92,11 @@ class RtdeReader:
         self._missing: tuple[str, ...] = ()
         self._to_send = b""
         self._ready = self._failed = False
+
+    @property
+    def controller(self) -> ControllerVersion | None:
+        """Version of the controller's software; None: not yet known."""
+        return self._controller
 
     def connected(self) -> bytes:
         """Forget the previous connection; return the first request of a new one."""
@@ -116,7 +125,7 @@ class RtdeReader:
         match message:
             case DataReceived(values):
                 # Before the end of the handshake: a package of the previous start.
-                return controller_state(values) if self._ready else None
+                return controller_state(values, self._registers) if self._ready else None
             case TextReceived() | Malformed():
                 return message
             case ProtocolVersionAnswered(accepted) if self._controller is None:

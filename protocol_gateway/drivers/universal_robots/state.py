@@ -1,7 +1,7 @@
 """Output fields that robomesh reads by RTDE, and the controller's state that they give."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
@@ -91,6 +91,7 @@ class ControllerState:
         script_line: Line of the running script; 0: no thread of it has the robot.
         robot_voltage_v: Voltage of the arm's supply [V].
         robot_current_a: Current of the arm's supply [A].
+        registers: Integer registers by their names, those that were asked for.
     """
 
     timestamp_s: float
@@ -128,10 +129,15 @@ class ControllerState:
     script_line: int | None = None
     robot_voltage_v: float | None = None
     robot_current_a: float | None = None
+    registers: Mapping[str, int] = field(default_factory=dict)
 
 
-def controller_state(values: Mapping[str, Value]) -> ControllerState:
-    """Return the state that the values of a recipe with the REQUIRED fields give."""
+def controller_state(values: Mapping[str, Value], registers: Sequence[str] = ()) -> ControllerState:
+    """Return the state that the values of a recipe with the REQUIRED fields give.
+
+    Args:
+        registers: Names of fields that are integer registers.
+    """
     found: Mapping[str, Any] = values
     robot_status = found.get("robot_status_bits")
     safety_status = found.get("safety_status_bits")
@@ -171,6 +177,7 @@ def controller_state(values: Mapping[str, Value]) -> ControllerState:
         script_line=found.get("script_control_line"),
         robot_voltage_v=found.get("actual_robot_voltage"),
         robot_current_a=found.get("actual_robot_current"),
+        registers={name: found[name] for name in registers if name in found},
     )
 
 

@@ -613,6 +613,60 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     "stop.link_lost",
     ["the link was lost during a motion of {holder}: {detail}", "{holder} 的运动期间连接中断：{detail}"],
   ],
+  ["stop.fate_unknown", ["the fate of a motion is unknown: {cause}", "运动的结果未知：{cause}"]],
+  [
+    "stop.would_not_arrive",
+    [
+      "a stop could not be sent now, because its connection to the controller is missing: restore the connection that the event link.channel_lost names",
+      "发送停止所需的连接已断开，此时无法停止机器人：请恢复事件 link.channel_lost 指出的连接",
+    ],
+  ],
+  [
+    "universal_robots.not_started",
+    ["the controller has not started its program within {seconds} s", "控制器未在 {seconds} 秒内启动运动程序"],
+  ],
+  [
+    "universal_robots.other_program",
+    [
+      "another program runs or waits on the controller: end it at the controller",
+      "控制器上有其他程序正在运行或暂停：请在控制器上结束该程序",
+    ],
+  ],
+  [
+    "universal_robots.lost_program",
+    ["the program that runs on the controller is not the gateway's", "控制器上运行的不是网关的程序"],
+  ],
+  ["universal_robots.paused", ["its program was paused", "运动程序被暂停"]],
+  ["universal_robots.arm_stopped", ["the controller has stopped the arm ({mode})", "控制器已停止机械臂（{mode}）"]],
+  ["universal_robots.tool_changed", ["tool or payload were changed during a motion", "运动期间工具或负载被更改"]],
+  ["universal_robots.went_local", ["the controller was switched to local control", "控制器已切换到本地控制"]],
+  ["universal_robots.channel_lost", ["the connection {name} was lost during a motion", "运动期间连接 {name} 断开"]],
+  ["universal_robots.state_old", ["the newest state of the controller is too old", "控制器的最新状态已过时"]],
+  [
+    "universal_robots.moves",
+    ["a motion still runs: wait for its end, or stop the robot", "上一个运动仍在进行：请等待其结束，或停止机器人"],
+  ],
+  [
+    "universal_robots.channel_missing",
+    [
+      "the connection {name} to the controller is missing: the event link.channel_lost says why",
+      "与控制器的连接 {name} 断开：原因见事件 link.channel_lost",
+    ],
+  ],
+  [
+    "universal_robots.software",
+    [
+      "motion needs PolyScope 5.6 or a later version 5, this is {version}: move the robot from its own panel",
+      "运动需要 PolyScope 5.6 或更高的 5.x 版本，当前为 {version}：请用示教器移动机器人",
+    ],
+  ],
+  [
+    "universal_robots.register",
+    [
+      "{name} cannot be used: {problem}: choose other registers in the site file (universal_robots)",
+      "{name} 无法使用：{problem}：请在站点文件（universal_robots）中选择其他寄存器",
+    ],
+  ],
   ["stop.sent", ["stop request {id} is on the controller's socket", "停止 {id} 已发送给控制器"]],
   ["stop.not_sent", ["stop request {id} is latched, but not sent: {cause}", "停止 {id} 已锁定，但未送达：{cause}"]],
   [

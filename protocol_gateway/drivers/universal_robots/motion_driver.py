@@ -1,0 +1,533 @@
+"""Driver that also moves the arm: a program for each motion, a dead man in the controller, two ways to stop.
+
+    channel      port    carries           sent
+    ---------    -----   ---------------   -----------------------------------------------------------
+    rtde         30004   reading           the greeting, as without motion
+    primary      30011   nothing           nothing
+    dashboard    29999   stop              the question for remote control twice a second; "stop"
+    inputs       30004   motion            two registers, 50 times a second while a motion runs
+    scripts      30001   motion            the program of a motion
+
+A program is sent only while the newest state says that no program runs, and only in remote control. It must
+be seen to have started within START_S. What does not go as expected gives the motion up: its permission and
+the beats end, so that the controller stops the arm, and the gateway latches a stop. It is never sent again.
+"""
+
+import json
+import secrets
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass
+
+from protocol_gateway.drivers.driver import (
+    Activity,
+    AlarmReceived,
+    Capabilities,
+    Carries,
+    Channel,
+    Close,
+    ControllerCommand,
+    Effect,
+    Effects,
+    FateUnknown,
+    Mode,
+    MoveAbsolute,
+    Open,
+    Report,
+    Reset,
+    Send,
+    SetTimer,
+    Severity,
+    Speed,
+    StatusReceived,
+    Stop,
+    StopEnds,
+)
+from protocol_gateway.drivers.universal_robots.dashboard import Dashboard
+from protocol_gateway.drivers.universal_robots.driver import (
+    FREQUENCY_HZ,
+    JOINTS,
+    OUTPUT_FIELDS,
+    RTDE,
+    RtdeDriver,
+    activity_of,
+    status_of,
+)
+from protocol_gateway.drivers.universal_robots.inputs import InputsWriter
+from protocol_gateway.drivers.universal_robots.modes import (
+    RobotMode,
+    RuntimeState,
+    SafetyMode,
+    name_of,
+)
+from protocol_gateway.drivers.universal_robots.motion_script import Progress, Registers, motion_script
+from protocol_gateway.drivers.universal_robots.rtde_reader import RtdeReader
+from protocol_gateway.drivers.universal_robots.settings import MotionSettings
+from protocol_gateway.drivers.universal_robots.state import ControllerState
+from protocol_gateway.errors import CommandError, NotReadyError
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+from robots.joints import JointType
+
+DASHBOARD = Channel(name="dashboard", carries=Carries.STOP)
+INPUTS = Channel(name="inputs", carries=Carries.MOTION)
+SCRIPTS = Channel(name="scripts", carries=Carries.MOTION)
+_OPEN_DASHBOARD, _OPEN_SCRIPTS, _OPEN_INPUTS = Open(DASHBOARD, 29999), Open(SCRIPTS, 30001), Open(INPUTS)
+
+START_S = 0.5
+"""Time within which a program must be seen to have started."""
+_BEAT_S = 0.02
+_ASK_S = 0.5
+_ANSWER_WITHIN_S = 2.0
+_MODE_VALID_S = 1.5
+_STATE_VALID_S = 0.2
+_BLIND_S = 0.3
+_LATE_S = 0.05
+_RETRY_S = 2.0
+# A program that runs repeats the beats; so many may be on their way.
+_MOST_BEATS_BEHIND = 13
+# A program may have ended before its last registers are seen.
+_ENDED_S = 0.05
+_STILL_S, _STILL_RAD = 0.5, 1e-3
+_FIRST_PERCENT = 25.0
+_LARGEST_NUMBER = 2**30
+_MAY_MOVE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
+_NO_MOTION = 0
+
+
+@dataclass
+class _Motion:
+    """A motion that was sent, until it has ended or was given up."""
+
+    number: int
+    sent_s: float
+    tool: object
+    started: bool = False
+    stopped_s: float | None = None
+
+
+class RtdeMotionDriver(RtdeDriver):
+    """Driver of RTDE, the primary interface, the dashboard and scripts.
+
+    Raises:
+        GatewaySettingsError: As `RtdeDriver`.
+    """
+
+    capabilities = Capabilities(
+        commands=frozenset({MoveAbsolute, Speed, Stop, Reset}),
+        stop_ends=StopEnds.OURS,
+        absolute=True,
+        dies_with_link=True,
+        reports_pose=True,
+        experimental=True,
+        stop_means="dashboard stop and the program's stopj",
+    )
+    # Beats, questions, greetings.
+    requests_a_second = 100.0
+
+    def __init__(
+        self,
+        joint_types: Sequence[JointType],
+        codes: Mapping[int, str],
+        *,
+        relay: Callable[[bytes, bool, Hashable], None] | None = None,
+        options: object = None,
+    ) -> None:
+        super().__init__(joint_types, codes, relay=relay)
+        assert isinstance(options, MotionSettings)
+        self._settings = options
+        self._registers = Registers(
+            first_input=options.input_registers, first_output=options.output_registers
+        )
+        outputs = self._registers.outputs
+        self._reader = RtdeReader(
+            FREQUENCY_HZ, {**OUTPUT_FIELDS, **dict.fromkeys(outputs, "INT32")}, registers=outputs
+        )
+        # A number of an earlier gateway, which registers may still hold, does not come again.
+        self._number = secrets.randbelow(_LARGEST_NUMBER) + 1
+        self._beat = 0
+        self._forget()
+
+    def _forget(self) -> None:
+        self._inputs = InputsWriter(self._registers.inputs)
+        self._dashboard = Dashboard()
+        self._opened: set[str] = set()
+        self._scripts_wanted = False
+        self._reopen: list[Open] = []
+        self._due: dict[str, float] = {}
+        self._timer_s: float | None = None
+        self._state: ControllerState | None = None
+        self._state_s = float("-inf")
+        self._motion: _Motion | None = None
+        self._percent = _FIRST_PERCENT
+        self._rests_after_stop = True
+        self._still: tuple[tuple[float, ...], float] | None = None
+
+    # ----------------------------------------------------------------- channels
+
+    def started(self, now_s: float) -> Effects:
+        """Connect to all interfaces, but to that of scripts only in remote control."""
+        self._forget()
+        return self._with_timer((*super().started(now_s), _OPEN_DASHBOARD, _OPEN_INPUTS))
+
+    def opened(self, channel: Channel, now_s: float) -> Effects:
+        """Greet."""
+        self._opened.add(channel.name)
+        if channel is DASHBOARD:
+            self._dashboard.opened()
+            self._due["ask"] = now_s + _ASK_S
+            return self._with_timer((Send(DASHBOARD, self._dashboard.ask(now_s)),))
+        if channel is INPUTS:
+            return self._with_timer((Send(INPUTS, self._inputs.connected()),))
+        if channel is SCRIPTS:
+            return ()
+        return self._with_timer(super().opened(channel, now_s))
+
+    def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
+        """Take the next bytes; what the interface of scripts sends is not needed."""
+        if channel is DASHBOARD:
+            return self._with_timer(self._answered(data, now_s))
+        if channel is INPUTS:
+            return self._with_timer(self._inputs_received(data, now_s))
+        if channel is SCRIPTS:
+            return ()
+        return self._with_timer(super().received(channel, data, now_s))
+
+    def skipped(self, channel: Channel, now_s: float) -> Effects:
+        """Connect again: the stream cannot be read from its middle."""
+        if channel is SCRIPTS:
+            return ()
+        return self._with_timer(self._leave(channel, "it sent far too much", now_s))
+
+    def closed(self, channel: Channel, now_s: float) -> Effects:
+        """Give a motion up that needs the connection."""
+        effects: list[Effect] = []
+        if channel.name in self._opened:
+            self._opened.discard(channel.name)
+            effects += self._lost(channel)
+        return self._with_timer(effects)
+
+    def _lost(self, channel: Channel) -> Effects:
+        """Handle the end of a connection."""
+        effects: list[Effect] = []
+        if channel is RTDE:
+            # The next connection may reach another controller, where no speed was set.
+            self._percent, self._state = _FIRST_PERCENT, None
+        if channel is INPUTS:
+            self._inputs.disconnected()
+        if channel is DASHBOARD:
+            self._dashboard.opened()
+            self._due.pop("ask", None)
+        if channel is SCRIPTS:
+            # The controller closes it when it changes to local control: the mode must be asked again.
+            self._dashboard.remote = None
+        if channel in (SCRIPTS, DASHBOARD):
+            effects += self._close_scripts()
+        if self._motion is not None and channel in (INPUTS, DASHBOARD, RTDE):
+            effects += self._give_up(codes.UR_CHANNEL_LOST(name=channel.name))
+        return effects
+
+    def _leave(self, channel: Channel, why: str, now_s: float) -> Effects:
+        """End a connection that cannot be read or used, and connect again later."""
+        self._opened.discard(channel.name)
+        if channel not in (DASHBOARD, INPUTS):
+            return (*self._lost(channel), *super()._leave(channel, why, now_s))
+        self._reopen.append(_OPEN_DASHBOARD if channel is DASHBOARD else _OPEN_INPUTS)
+        self._due["reopen"] = now_s + _RETRY_S
+        return (*self._lost(channel), Close(channel, why))
+
+    def timer_ended(self, now_s: float) -> Effects:
+        """Beat, ask, and look for what has not happened."""
+        effects: list[Effect] = []
+        self._timer_s = None
+        ended = [name for name, at_s in self._due.items() if at_s <= now_s]
+        # A gateway that was late has not yet read what has arrived meanwhile.
+        late = now_s - min((self._due.pop(name) for name in ended), default=now_s) > _LATE_S
+        if "retry" in ended:
+            effects += super().timer_ended(now_s)
+        if "reopen" in ended:
+            effects += self._reopen
+            self._reopen = []
+        if "start" in ended and self._motion is not None and not self._motion.started:
+            if late:
+                self._due["start"] = now_s + _LATE_S
+            else:
+                effects += self._give_up(codes.UR_NOT_STARTED(seconds=START_S))
+        if "beat" in ended and self._motion is not None:
+            effects += self._next_beat(now_s, late=late)
+        if "ask" in ended and DASHBOARD.name in self._opened:
+            effects += self._next_question(now_s)
+        return self._with_timer(effects)
+
+    def _with_timer(self, effects: Effects) -> Effects:
+        """Return effects, before them the one timer for all that is due, if its time has changed."""
+        for effect in effects:
+            if isinstance(effect, SetTimer) and effect.at_s is not None:
+                self._due["retry"] = effect.at_s
+        others = tuple(effect for effect in effects if not isinstance(effect, SetTimer))
+        at_s = min(self._due.values(), default=None)
+        if at_s == self._timer_s:
+            return others
+        self._timer_s = at_s
+        # First, because a stop that follows from the others may set another one.
+        return (SetTimer(at_s), *others)
+
+    # ------------------------------------------------------------------ dashboard
+
+    def _next_question(self, now_s: float) -> Effects:
+        self._due["ask"] = now_s + _ASK_S
+        asked_s = self._dashboard.asked_s
+        if asked_s is None:
+            return (Send(DASHBOARD, self._dashboard.ask(now_s)),)
+        if now_s - asked_s < _ANSWER_WITHIN_S:
+            return ()
+        return self._leave(DASHBOARD, "it does not answer", now_s)
+
+    def _answered(self, data: bytes, now_s: float) -> Effects:
+        dashboard = self._dashboard
+        dashboard.receive(data, now_s)
+        effects: list[Effect] = []
+        refusals, dashboard.refusals = dashboard.refusals, []
+        if refusals and self._state is not None and self._state.runtime_state != RuntimeState.STOPPED:
+            text = f"the dashboard has not stopped the program: {refusals[-1]}"
+            effects.append(Report([AlarmReceived(Severity.ERROR, text)], 0))
+        if dashboard.lost:
+            return (*effects, *self._leave(DASHBOARD, "its answers do not fit", now_s))
+        if dashboard.remote is False:
+            effects += self._close_scripts()
+            if self._motion is not None:
+                effects += self._give_up(codes.UR_WENT_LOCAL())
+        elif dashboard.remote and dashboard.was_local:
+            # Connections from local control stay restricted.
+            self._opened.discard(DASHBOARD.name)
+            effects += (*self._lost(DASHBOARD), Close(DASHBOARD), _OPEN_DASHBOARD)
+        elif dashboard.remote and not self._scripts_wanted:
+            self._scripts_wanted = True
+            effects.append(_OPEN_SCRIPTS)
+        return effects
+
+    def _close_scripts(self) -> Effects:
+        wanted, self._scripts_wanted = self._scripts_wanted, False
+        self._opened.discard(SCRIPTS.name)
+        return (Close(SCRIPTS),) if wanted else ()
+
+    def _mode(self, now_s: float) -> Mode | None:
+        if now_s - self._dashboard.answered_s > _MODE_VALID_S or self._dashboard.remote is None:
+            return None
+        return Mode.REMOTE if self._dashboard.remote else Mode.LOCAL
+
+    # --------------------------------------------------------------------- inputs
+
+    def _inputs_received(self, data: bytes, now_s: float) -> Effects:
+        self._inputs.receive(data)
+        effects: list[Effect] = []
+        if asked := self._inputs.to_send():
+            effects.append(Send(INPUTS, asked))
+        if self._inputs.problem:
+            effects += self._leave(INPUTS, f"{self._inputs.failed}: {self._inputs.problem}", now_s)
+        return effects
+
+    def _next_beat(self, now_s: float, *, late: bool) -> Effects:
+        assert self._motion is not None
+        if now_s - self._state_s > _BLIND_S and not late:
+            return self._give_up(codes.UR_STATE_OLD())
+        self._due["beat"] = now_s + _BEAT_S
+        return (self._written(self._motion.number),)
+
+    def _written(self, go: int, *, alternative: bool = False) -> Send:
+        """Return the effect that writes the permission and the next beat."""
+        self._beat = (self._beat + 1) % _LARGEST_NUMBER
+        return Send(INPUTS, self._inputs.values(go, self._beat), alternative)
+
+    # --------------------------------------------------------------------- motion
+
+    def _status(self, state: ControllerState, now_s: float) -> StatusReceived:
+        still = self._note_stillness(state, now_s)
+        activity = activity_of(state)
+        if not self._rests_after_stop:
+            self._rests_after_stop = activity is not Activity.MOVING and still
+            if activity is Activity.IDLE and not still:
+                activity = Activity.MOVING
+        status = status_of(state)
+        return StatusReceived(activity, self._mode(now_s), status.homed, None, status.controller_time_s)
+
+    def _note_stillness(self, state: ControllerState, now_s: float) -> bool:
+        """Return whether every joint has been still for _STILL_S."""
+        if self._still is None or any(
+            abs(here - there) > _STILL_RAD
+            for here, there in zip(state.positions, self._still[0], strict=True)
+        ):
+            self._still = state.positions, now_s
+        return now_s - self._still[1] >= _STILL_S
+
+    def _follow(self, state: ControllerState, now_s: float) -> Effects:
+        """Follow the motion by a state; give it up if anything is not as expected."""
+        self._state, self._state_s = state, now_s
+        motion = self._motion
+        if motion is None:
+            return ()
+        number, progress, beat = (state.registers.get(name) for name in self._registers.outputs)
+        motion.started = motion.started or number == motion.number
+        if (problem := _problem(state, motion)) is not None:
+            return self._give_up(problem)
+        if number != motion.number:
+            # Another program may run. If it goes on, the motion is not seen to start in time.
+            return self._give_up(codes.UR_LOST_PROGRAM()) if motion.started else ()
+        if state.runtime_state == RuntimeState.PLAYING:
+            motion.stopped_s = None
+            behind = (self._beat - (beat or 0)) % _LARGEST_NUMBER
+            return self._give_up(codes.UR_LOST_PROGRAM()) if behind > _MOST_BEATS_BEHIND else ()
+        if state.runtime_state == RuntimeState.STOPPED:
+            motion.stopped_s = now_s if motion.stopped_s is None else motion.stopped_s
+            if progress == Progress.DONE or now_s - motion.stopped_s >= _ENDED_S:
+                return self._ended(progress)
+        return ()
+
+    def _ended(self, progress: int | None) -> Effects:
+        """End the motion, whose program has ended."""
+        self._motion = None
+        effects: list[Effect] = [self._written(_NO_MOTION)] if self._inputs.ready else []
+        if progress != Progress.DONE:
+            text = "the program of a motion has ended before its target"
+            effects.append(Report([AlarmReceived(Severity.WARNING, text)], 0))
+        return effects
+
+    def _give_up(self, why: Reason) -> Effects:
+        """End the permission and the beats of the motion, and have a stop latched."""
+        self._motion = None
+        self._rests_after_stop = False
+        effects: list[Effect] = []
+        if self._inputs.ready:
+            effects.append(self._written(_NO_MOTION))
+        return (*effects, FateUnknown(why))
+
+    # ------------------------------------------------------------------- commands
+
+    def encode(self, *commands: ControllerCommand) -> bytes:
+        """Encode commands; at most one motion, as the last one.
+
+        Raises:
+            CommandError: If they cannot be expressed.
+        """
+        words: list[tuple[str, object]] = []
+        for place, command in enumerate(commands):
+            match command:
+                case MoveAbsolute(positions):
+                    if len(positions) != JOINTS:
+                        raise CommandError(codes.COMMAND_VALUES(count=len(positions), joints=JOINTS))
+                    if place != len(commands) - 1:
+                        raise CommandError("a motion must be the last command: the controller queues none")
+                    words.append(("move", positions))
+                case Speed(percent):
+                    words.append(("speed", percent))
+                case Stop():
+                    words.append(("stop", None))
+                case Reset():
+                    words.append(("reset", None))
+                case _:
+                    raise CommandError(f"this controller has no {type(command).__name__}")
+        try:
+            return json.dumps(words, allow_nan=False).encode()
+        except ValueError:
+            raise CommandError("numbers must be finite") from None
+
+    def command(self, encoded: bytes, now_s: float) -> Effects:
+        """Send what `encode` returned.
+
+        Raises:
+            NotReadyError: If a motion cannot be sent now.
+        """
+        effects: list[Effect] = []
+        percent = self._percent
+        for word, value in json.loads(encoded):
+            match word:
+                case "stop":
+                    effects += self._stop()
+                case "speed":
+                    percent = value
+                case "move":
+                    effects += self._move(value, percent, now_s)
+                # A reset clears the gateway's latch only: nothing is sent to the controller.
+        self._percent = percent
+        return self._with_timer(effects)
+
+    def _stop(self) -> Effects:
+        """End permission and beats, and the program itself, by the connections that are there."""
+        self._motion = None
+        self._rests_after_stop = False
+        effects: list[Effect] = []
+        if self._inputs.ready:
+            effects.append(self._written(_NO_MOTION, alternative=True))
+        if DASHBOARD.name in self._opened or not effects:
+            effects.append(Send(DASHBOARD, self._dashboard.stop(), alternative=True))
+        return effects
+
+    def _move(self, target: Sequence[float], percent: float, now_s: float) -> Effects:
+        if (obstacle := self._obstacle(now_s)) is not None:
+            raise NotReadyError(obstacle)
+        assert self._state is not None
+        self._number = self._number % _LARGEST_NUMBER + 1
+        script = motion_script(
+            self._number,
+            target,
+            speed=self._settings.speed * percent / 100.0,
+            acceleration=self._settings.acceleration,
+            registers=self._registers,
+        )
+        self._motion = _Motion(self._number, now_s, _tool(self._state))
+        self._due |= {"beat": now_s + _BEAT_S, "start": now_s + START_S}
+        return (self._written(self._number), Send(SCRIPTS, script))
+
+    def _obstacle(self, now_s: float) -> Reason | None:
+        """Return why no motion can be sent now; None: it can."""
+        state, version = self._state, self._reader.controller
+        if version is not None and not (version.major == 5 and version.minor >= 6):
+            return codes.UR_SOFTWARE(version=version)
+        if state is None or version is None or now_s - self._state_s > _STATE_VALID_S:
+            return codes.UR_STATE_OLD()
+        if lacks := [name for name in self._registers.outputs if name not in state.registers]:
+            return codes.UR_REGISTER(name=lacks[0], problem="the controller does not have it")
+        if self._inputs.problem:
+            return codes.UR_REGISTER(name=self._inputs.failed, problem=self._inputs.problem)
+        if self._motion is not None:
+            return codes.UR_MOVES()
+        # An unknown state of the program, or of the safety system, forbids the motion.
+        if state.runtime_state != RuntimeState.STOPPED:
+            return codes.UR_OTHER_PROGRAM()
+        if (stopped := _stopped(state)) is not None:
+            return stopped
+        match self._mode(now_s):
+            case None:
+                return codes.CONTROLLER_MODE_UNKNOWN()
+            case Mode.LOCAL:
+                return codes.CONTROLLER_LOCAL()
+        if not self._inputs.ready:
+            return codes.UR_CHANNEL_MISSING(name=INPUTS.name)
+        missing = [each.name for each in (SCRIPTS, DASHBOARD) if each.name not in self._opened]
+        return codes.UR_CHANNEL_MISSING(name=missing[0]) if missing else None
+
+
+def _tool(state: ControllerState) -> object:
+    """Return what a motion was checked with."""
+    return state.tool_offset, state.payload_kg, state.payload_centre_m
+
+
+def _stopped(state: ControllerState) -> Reason | None:
+    """Return why the controller does not let the arm move; None: it does."""
+    if state.safety_mode not in _MAY_MOVE:
+        return codes.UR_ARM_STOPPED(mode=_word(SafetyMode, state.safety_mode))
+    if state.robot_mode != RobotMode.RUNNING:
+        return codes.UR_ARM_STOPPED(mode=_word(RobotMode, state.robot_mode))
+    return None
+
+
+def _word(kind: type[RobotMode] | type[SafetyMode], mode: int | None) -> str:
+    return "unknown" if mode is None else name_of(kind, mode).lower().replace("_", " ")
+
+
+def _problem(state: ControllerState, motion: _Motion) -> Reason | None:
+    """Return why a motion must not go on; None: it may."""
+    if (stopped := _stopped(state)) is not None:
+        return stopped
+    if state.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING):
+        return codes.UR_PAUSED()
+    return codes.UR_TOOL_CHANGED() if _tool(state) != motion.tool else None

@@ -1,0 +1,44 @@
+"""The site file's part on a robot of Universal Robots."""
+
+import math
+from typing import Annotated
+
+from pydantic import BaseModel, Field, StrictBool
+
+from protocol_gateway.drivers.universal_robots.motion_script import INPUTS, OUTPUTS, REGISTERS
+from protocol_gateway.drivers.universal_robots.settings import MotionSettings
+from services.site_file.part import PART_CONFIG
+
+_END = REGISTERS.stop
+
+
+class UniversalRobots(BaseModel):
+    """Motion of a robot of Universal Robots (docs/controllers/universal-robots.md#motion): experimental.
+
+    Attributes:
+        motion: The gateway moves the robot; otherwise it only reads, and sends nothing but the greeting.
+        input_registers: Number of the first of two integer input registers of the controller that no other
+            client and no fieldbus uses.
+        output_registers: Number of the first of three integer output registers that nothing else uses.
+        speed: Speed [deg/s] of the fastest joint at 100 %.
+        acceleration: Acceleration [deg/s²] of the fastest joint.
+    """
+
+    model_config = PART_CONFIG
+    motion: StrictBool = False
+    input_registers: Annotated[int, Field(ge=REGISTERS.start, le=_END - INPUTS, strict=True)] = 24
+    output_registers: Annotated[int, Field(ge=REGISTERS.start, le=_END - OUTPUTS, strict=True)] = 24
+    speed: Annotated[float, Field(ge=1, le=180)] = 60.0
+    acceleration: Annotated[float, Field(ge=1, le=800)] = 80.0
+
+    @property
+    def settings(self) -> MotionSettings | None:
+        """The settings as the driver takes them; None: it only reads."""
+        if not self.motion:
+            return None
+        return MotionSettings(
+            input_registers=self.input_registers,
+            output_registers=self.output_registers,
+            speed=math.radians(self.speed),
+            acceleration=math.radians(self.acceleration),
+        )

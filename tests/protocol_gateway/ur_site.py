@@ -1,0 +1,112 @@
+"""Site with a simulated controller of Universal Robots' kind that the gateway may move."""
+
+import asyncio
+import contextlib
+
+from protocol_gateway.drivers.universal_robots.modes import RuntimeState
+from protocol_gateway.drivers.universal_robots.settings import MotionSettings
+from services.simulator.universal_robots import service
+from services.simulator.universal_robots.service import UrSettings, serve_rtde
+from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, until
+
+UR = {"description": "puma560", "protocol": "rtde", "up": False}
+
+
+@contextlib.asynccontextmanager
+async def controller(monkeypatch, **settings):
+    """Run a simulated controller; yield its ports and its server, to look at it and to change it."""
+    servers = []
+    make = service._server
+    monkeypatch.setattr(service, "_server", lambda *given: servers.append(make(*given)) or servers[-1])
+    ready = asyncio.get_running_loop().create_future()
+    task = asyncio.create_task(serve_rtde(UrSettings(**settings), ready=ready.set_result))
+    await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
+    try:
+        yield await ready, servers[-1]
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+def others(ports):
+    """Return the ports of the interfaces other than RTDE, as the site file names them."""
+    return {"primary": ports.primary, "scripts": ports.scripts, "dashboard": ports.dashboard}
+
+
+@contextlib.asynccontextmanager
+async def movable(mesh, folder, at, *, motion=None, **robot):
+    """Run a gateway that may move the arm, until it is in remote control and connected."""
+    options = {"options": motion or MotionSettings(), "ports": others(at)}
+    async with gateway(mesh, folder, at.rtde, **UR, **options | {"simulated": True} | robot) as site:
+        yield site
+
+
+async def in_control(site):
+    """Wait until the robot can be moved, and take control."""
+    await until(lambda: site.seen.get("controller") and site.controller.mode == STATE.REMOTE)
+    await until(lambda: site.joints)
+    await site.lease(A.ACQUIRE, ttl_s=5)
+
+
+async def move(site, *offsets, **fields):
+    """Command a target by offsets from the present positions; return the target."""
+    target = [here + by for here, by in zip(site.joints, (*offsets, *[0.0] * 6), strict=False)]
+    await site.command(C.MOVE_ABSOLUTE, joint_positions=target, **fields)
+    return target
+
+
+def runs(server):
+    """Return whether a program runs on the controller."""
+    return server.controller.programs.state is not RuntimeState.STOPPED
+
+
+class Gate:
+    """A forwarder of one port: counts what passes to the controller, and can be closed.
+
+    Attributes:
+        port: Its own port.
+        sent: All bytes to the controller.
+    """
+
+    def __init__(self, to):
+        self.sent = bytearray()
+        self._to = to
+        self._server = None
+        self._writers = set()
+
+    async def __aenter__(self):
+        await self.open(0)
+        return self
+
+    async def __aexit__(self, *_):
+        await self.close()
+
+    async def open(self, port=None):
+        self._server = await asyncio.start_server(
+            self._forward, "127.0.0.1", port or getattr(self, "port", 0)
+        )
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    async def close(self):
+        """Cut all connections, and refuse new ones."""
+        if self._server is not None:
+            self._server.close()
+            self._server = None
+        for writer in tuple(self._writers):
+            writer.transport.abort()
+        await asyncio.sleep(0)
+
+    async def _forward(self, reader, writer):
+        there, back = await asyncio.open_connection("127.0.0.1", self._to)
+        self._writers |= {writer, back}
+
+        async def copy(source, target, counted):
+            with contextlib.suppress(OSError):
+                while data := await source.read(65536):
+                    if counted:
+                        self.sent += data
+                    target.write(data)
+            target.transport.abort()
+
+        await asyncio.gather(copy(reader, back, True), copy(there, writer, False))
+        self._writers -= {writer, back}
