@@ -269,7 +269,7 @@ def _examine_snpx(connection: socket.socket) -> Found:
         return Found(text=f"it {unknown} to the first packet of SNPX", sent=sent, received_bytes=len(heard))
     return Found(
         protocol="snpx",
-        text="it speaks SRTP, as a controller of FANUC does with SNPX, and a PLC of GE",
+        text="it speaks SRTP, as controllers of FANUC (SNPX) and PLCs of GE do",
         next='in the site file: protocol = "snpx", and [robot.fanuc] with j23 and assignments',
         sent=sent,
         received_bytes=len(heard),
