@@ -27,7 +27,7 @@ from protocol_gateway.control.program import Programs
 from protocol_gateway.control.robot_authority import RobotAuthority
 from protocol_gateway.core.codes import code_table
 from protocol_gateway.drivers.driver import Activity, Carries, Channel
-from protocol_gateway.drivers.registry import DRIVERS
+from protocol_gateway.drivers.registry import driver_maker
 from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.journal import Journal
 from protocol_gateway.legacy.clients import LegacyClients
@@ -84,7 +84,7 @@ class Robot:
         joints = joints_of(description)
         relay = None if settings.legacy_clients is None else self._relay
         try:
-            driver = DRIVERS[settings.protocol](
+            driver = driver_maker(settings.protocol)(
                 joints.types, settings.codes, relay=relay, options=settings.options
             )
         except GatewaySettingsError as error:

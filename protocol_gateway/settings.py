@@ -9,7 +9,7 @@ import numpy as np
 
 from protocol_gateway.audit.log import ROTATE_BYTES
 from protocol_gateway.checking.policy import Policy
-from protocol_gateway.drivers.registry import DRIVERS
+from protocol_gateway.drivers.registry import is_known, protocols
 from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.legacy.settings import LegacySettings
 from protocol_gateway.proofs import StopProof
@@ -159,9 +159,9 @@ def check(settings: Settings) -> None:
         if robot.name in names:
             raise GatewaySettingsError(f"two robots are named {robot.name!r}: names must be unique")
         names.add(robot.name)
-        if robot.protocol not in DRIVERS:
+        if not is_known(robot.protocol):
             raise GatewaySettingsError(
-                f"robot {robot.name}: unknown protocol {robot.protocol!r}; known: {', '.join(DRIVERS)}"
+                f"robot {robot.name}: unknown protocol {robot.protocol!r}; known: {', '.join(protocols())}"
             )
         if robot.check not in list(Policy):
             known = ", ".join(repr(str(each)) for each in Policy)

@@ -1,16 +1,28 @@
-"""Registry of protocols. A new protocol needs one file, and a line here."""
+"""Registry of protocols: those of robomesh, and those of installed packages.
+
+A driver of robomesh is one line here. A package installs others by the entry points `robomesh.drivers`
+(docs/controllers/own-driver.md). Only the drivers that a site uses are imported.
+"""
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from typing import Any, Protocol
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Protocol, cast
 
 from protocol_gateway.drivers.driver import Driver
-from protocol_gateway.drivers.fanuc.driver import SnpxDriver
-from protocol_gateway.drivers.opcua.driver import OpcUaDriver
-from protocol_gateway.drivers.unit import UnitDriver
-from protocol_gateway.drivers.universal_robots.driver import RtdeDriver
-from protocol_gateway.drivers.universal_robots.motion_driver import RtdeMotionDriver
-from protocol_gateway.drivers.yaskawa.driver import HsesDriver
+from protocol_gateway.errors import GatewaySettingsError
 from robots.joints import JointType
+
+ENTRY_POINTS = "robomesh.drivers"
+
+OWN: Mapping[str, str] = {
+    "unit": "protocol_gateway.drivers.unit:UnitDriver",
+    "rtde": "protocol_gateway.drivers.universal_robots.motion_driver:rtde_driver",
+    "hses": "protocol_gateway.drivers.yaskawa.driver:HsesDriver",
+    "snpx": "protocol_gateway.drivers.fanuc.driver:SnpxDriver",
+    "opcua": "protocol_gateway.drivers.opcua.driver:OpcUaDriver",
+}
+"""Drivers of robomesh by the site file's `protocol`: module and class."""
 
 
 class DriverMaker(Protocol):
@@ -38,17 +50,32 @@ class DriverMaker(Protocol):
         ...
 
 
-def _rtde(joint_types: Sequence[JointType], codes: Mapping[int, str], **given: Any) -> Driver:
-    """Create the driver that only reads, unless the site file declares motion."""
-    kind = RtdeDriver if given["options"] is None else RtdeMotionDriver
-    return kind(joint_types, codes, **given)
+def protocols() -> tuple[str, ...]:
+    """Return the names of all protocols, those of robomesh first."""
+    installed = {each.name for each in entry_points(group=ENTRY_POINTS)}
+    return (*OWN, *sorted(installed - OWN.keys()))
 
 
-DRIVERS: dict[str, DriverMaker] = {
-    "unit": UnitDriver,
-    "rtde": _rtde,
-    "hses": HsesDriver,
-    "snpx": SnpxDriver,
-    "opcua": OpcUaDriver,
-}
-"""Driver factories by the site file's `protocol`."""
+def is_known(protocol: str) -> bool:
+    """Return whether there is a driver of this name."""
+    return protocol in OWN or protocol in protocols()
+
+
+def driver_maker(protocol: str) -> DriverMaker:
+    """Return the factory of a protocol's drivers.
+
+    Raises:
+        GatewaySettingsError: If there is none, or an installed one cannot be imported.
+    """
+    if protocol in OWN:
+        module, _, name = OWN[protocol].partition(":")
+        return cast("DriverMaker", getattr(import_module(module), name))
+    for each in entry_points(group=ENTRY_POINTS, name=protocol):
+        try:
+            return cast("DriverMaker", each.load())
+        except Exception as error:
+            package = each.dist.name if each.dist is not None else each.value
+            raise GatewaySettingsError(
+                f"protocol {protocol!r}: its driver, of the package {package}, cannot be imported: {error}"
+            ) from error
+    raise GatewaySettingsError(f"unknown protocol {protocol!r}; known: {', '.join(protocols())}")

@@ -9,7 +9,7 @@ from pydantic import BaseModel, Field, StrictBool, field_validator, model_valida
 from protocol_gateway.core.codes import code_table
 from protocol_gateway.drivers.fanuc.axes import FanucSettings
 from protocol_gateway.drivers.opcua.settings import OpcUaSettings
-from protocol_gateway.drivers.registry import DRIVERS
+from protocol_gateway.drivers.registry import OWN, is_known, protocols
 from protocol_gateway.drivers.universal_robots.settings import MotionSettings
 from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
 from protocol_gateway.errors import CodeTableError
@@ -63,11 +63,13 @@ class Robot(BaseModel):
         protocol: The controller's protocol: `unit` (docs/controllers.md), `rtde` for a controller of
             Universal Robots (docs/controllers/universal-robots.md), `hses` to read one of Yaskawa
             (docs/controllers/yaskawa.md), `snpx` to read one of FANUC (docs/controllers/fanuc.md), or `opcua`
-            to read an OPC UA server (docs/controllers/opcua.md).
+            to read an OPC UA server (docs/controllers/opcua.md), or that of an installed driver
+            (docs/controllers/own-driver.md).
         universal_robots: Motion of a robot of Universal Robots; with the protocol `rtde`.
         yaskawa: Properties of the robot that a Yaskawa controller does not report; with the protocol `hses`.
         fanuc: Properties of the robot that a FANUC controller does not report; with the protocol `snpx`.
         opcua: The OPC UA server, and what is read from it; with the protocol `opcua`.
+        driver: Settings of an installed driver (docs/controllers/own-driver.md), which it gets unchanged.
         codes: Type codes of a controller that sends numbers, as in
             `{ 2 = "ABSOLUTE.DEG", 101 = "COMMAND:home" }`; they replace the default codes. Empty: the gateway
             sends types as names.
@@ -106,6 +108,7 @@ class Robot(BaseModel):
     yaskawa: Yaskawa | None = None
     fanuc: Fanuc | None = None
     opcua: OpcUa | None = None
+    driver: dict[str, Any] = Field(default_factory=dict)
     codes: dict[int, str] = Field(default_factory=dict)
     accept_unknown: tuple[Literal["mode", "homed"], ...] = ()
     check: Literal["require", "warn", "off"] = "warn"
@@ -144,8 +147,8 @@ class Robot(BaseModel):
     @field_validator("protocol")
     @classmethod
     def _protocol(cls, protocol: str) -> str:
-        if protocol not in DRIVERS:
-            raise ValueError(f"should be {' or '.join(map(repr, DRIVERS))}")
+        if not is_known(protocol):
+            raise ValueError(f"should be {' or '.join(map(repr, protocols()))}")
         return protocol
 
     @field_validator("floor", mode="before")
@@ -198,6 +201,12 @@ class Robot(BaseModel):
     @model_validator(mode="after")
     def _of_protocol(self) -> "Robot":
         hses = self.protocol == "hses"
+        if self.driver and self.protocol in OWN:
+            raise ValueError(
+                f"driver needs the protocol of an installed driver, this robot's is {self.protocol!r}"
+            )
+        if self.simulated and self.protocol not in OWN:
+            raise ValueError(f"controller: protocol {self.protocol!r} has no simulator: name its address")
         for part, protocol in (
             ("universal_robots", "rtde"),
             ("yaskawa", "hses"),
@@ -209,6 +218,8 @@ class Robot(BaseModel):
         if self.protocol == "opcua" and not self.simulated:
             host, _ = split_address(self.address)
             (self.opcua or OpcUa()).check(loopback=is_loopback(host))
+        if self.protocol not in OWN:
+            return self
         if not self.simulated and self.controller.startswith("udp://") is not hses:
             raise ValueError(
                 f"controller {self.controller}: protocol {self.protocol!r} needs "
@@ -231,7 +242,9 @@ class Robot(BaseModel):
         return (self.yaskawa or Yaskawa()).group if self.protocol == "hses" else ""
 
     @property
-    def options(self) -> YaskawaSettings | FanucSettings | OpcUaSettings | MotionSettings | None:
+    def options(
+        self,
+    ) -> YaskawaSettings | FanucSettings | OpcUaSettings | MotionSettings | dict[str, Any] | None:
         """Settings of the protocol's driver, which the gateway passes on; None: it has none."""
         match self.protocol:
             case "hses":
@@ -243,7 +256,7 @@ class Robot(BaseModel):
             case "rtde":
                 return (self.universal_robots or UniversalRobots()).settings
             case _:
-                return None
+                return self.driver or None
 
     @property
     def simulated(self) -> bool:

@@ -1,112 +1,50 @@
-"""A controller with another protocol needs one driver and one line in the registry.
-
-The protocol is a line of JSON each way: {"q": [..], "state": "idle", "remote": true, "homed": true} in
-radians from the controller, {"do": ["stop"]} or {"do": [{"to": [..]}]} to it.
-"""
+"""A controller with another protocol needs one driver in an installed package: examples/driver/."""
 
 import asyncio
 import contextlib
 import json
 import math
+import sys
+from pathlib import Path
 
 import pytest
 
 from protocol_gateway.drivers.driver import (
-    ALL,
-    Activity,
-    Capabilities,
-    Channel,
-    Home,
+    Hold,
     JointsReceived,
     MalformedReceived,
-    Mode,
     MoveAbsolute,
-    Open,
     Refused,
-    Report,
-    Reset,
-    Send,
-    StatusReceived,
     Stop,
 )
-from protocol_gateway.drivers.registry import DRIVERS
-from protocol_gateway.errors import CommandError
+from protocol_gateway.drivers.registry import driver_maker, protocols
+from protocol_gateway.errors import CommandError, GatewaySettingsError
 from robomesh.schemas import robomesh_pb2 as schema
+from robots.joints import JointType
 from services.errors import SiteFileError
 from services.site_file.site import load
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
 
-_WORDS = {Home: "home", Stop: "stop", Reset: "reset"}
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "driver"
+ENTRY_POINTS = "[robomesh.drivers]\njson-lines = json_lines:JsonLines\nbroken = no_such_module:Driver\n"
+SITE = 'site = "hall"\n[[robot]]\nname = "arm"\nmodel = "pt600"\nprotocol = "{}"\ncontroller = "{}"\n'
 
 
-LINES = Channel(name="lines", carries=ALL)
-
-
-class JsonLines:
-    """Driver of JSON lines (`protocol_gateway.drivers.driver.Driver`)."""
-
-    capabilities = Capabilities(commands=frozenset({Home, Stop, Reset, MoveAbsolute}))
-    requests_a_second = 0.0
-
-    def __init__(self, joint_types, codes, *, relay, options):
-        self._joints = len(joint_types)
-        self.ports = frozenset()
-        self._rest, self._offset = b"", 0
-
-    def started(self, now_s):
-        return (Open(LINES),)
-
-    def opened(self, channel, now_s):
-        self._rest, self._offset = b"", 0
-        return ()
-
-    skipped = opened
-
-    def closed(self, channel, now_s):
-        return ()
-
-    def received(self, channel, data, now_s):
-        assert channel is LINES
-        *lines, self._rest = (self._rest + data).split(b"\n")
-        events = [event for line in lines for event in self._events(line)]
-        refusals = sum(isinstance(event, Refused) for event in events)
-        malformed = sum(isinstance(event, MalformedReceived) for event in events)
-        return (Report(events, len(lines) - malformed, refusals),)
-
-    def command(self, encoded, now_s):
-        return (Send(LINES, encoded),)
-
-    def _events(self, line):
-        offset, self._offset = self._offset, self._offset + len(line) + 1
-        try:
-            fields = json.loads(line)
-            if "no" in fields:
-                events = [Refused(0, fields["no"])]
-            else:
-                if len(fields["q"]) != self._joints:
-                    raise ValueError
-                events = [
-                    JointsReceived(tuple(fields["q"])),
-                    StatusReceived(
-                        activity=Activity(fields["state"]),
-                        mode=Mode.REMOTE if fields["remote"] else Mode.LOCAL,
-                        homed=fields["homed"],
-                    ),
-                ]
-        except (ValueError, KeyError, TypeError):
-            return [MalformedReceived(offset, line[:80].decode("ascii", "backslashreplace"), "no state")]
-        return events
-
-    def encode(self, *commands):
-        return json.dumps({"do": [self._said(command) for command in commands]}).encode() + b"\n"
-
-    def _said(self, command):
-        if isinstance(command, MoveAbsolute):
-            return {"to": command.positions}
-        if type(command) not in _WORDS:
-            raise CommandError(f"this controller knows no {type(command).__name__}")
-        return _WORDS[type(command)]
+@pytest.fixture
+def installed(tmp_path, monkeypatch):
+    """Install the example as a package does: its module, and its entry points."""
+    folder = tmp_path / "packages"
+    information = folder / "robomesh_json_lines-0.1.0.dist-info"
+    information.mkdir(parents=True)
+    (information / "METADATA").write_text(
+        "Metadata-Version: 2.1\nName: robomesh-json-lines\nVersion: 0.1.0\n"
+    )
+    (information / "entry_points.txt").write_text(ENTRY_POINTS)
+    monkeypatch.syspath_prepend(str(EXAMPLE))
+    monkeypatch.syspath_prepend(str(folder))
+    yield
+    sys.modules.pop("json_lines", None)
 
 
 @contextlib.asynccontextmanager
@@ -140,14 +78,11 @@ async def json_controller():
         yield server.sockets[0].getsockname()[1], heard, state
 
 
-def test_a_robot_of_another_protocol_is_shown_commanded_and_stopped_like_any_other(
-    mesh, tmp_path, monkeypatch
-):
+def test_a_robot_of_another_protocol_is_shown_commanded_and_stopped_like_any_other(mesh, tmp_path, installed):
     async def main():
-        monkeypatch.setitem(DRIVERS, "json", JsonLines)
         async with (
             json_controller() as (port, heard, state),
-            gateway(mesh, tmp_path, port, protocol="json") as site,
+            gateway(mesh, tmp_path, port, protocol="json-lines") as site,
         ):
             await until(lambda: site.joints == [0.1] * 5)
             # Positions and state are two topics.
@@ -176,11 +111,54 @@ def test_a_robot_of_another_protocol_is_shown_commanded_and_stopped_like_any_oth
     run(main())
 
 
-def test_an_unknown_protocol_is_refused_with_the_known_ones(tmp_path, monkeypatch):
+def test_an_installed_driver_is_a_protocol_of_the_site_file_and_gets_its_table(tmp_path, installed):
     path = tmp_path / "site.toml"
-    path.write_text('site = "hall"\n[[robot]]\nname = "arm"\nmodel = "pt600"\nprotocol = "json"\n')
-    with pytest.raises(SiteFileError, match="'unit'") as caught:
-        load(path)
-    assert "protocol" in str(caught.value)
-    monkeypatch.setitem(DRIVERS, "json", JsonLines)
-    assert load(path).robot[0].protocol == "json"
+    path.write_text(SITE.format("json-lines", "udp://10.0.0.7:5000") + "[robot.driver]\nlimit = 100\n")
+    robot = load(path).robot[0]
+    assert (robot.protocol, robot.options) == ("json-lines", {"limit": 100})
+    assert protocols()[0] == "unit"
+    for text, words in (
+        (SITE.format("json-lines", "simulated"), "has no simulator: name its address"),
+        (SITE.format("unit", "tcp://10.0.0.7:5000") + "driver = { limit = 1 }\n", "an installed driver"),
+        (SITE.format("jsonlines", "tcp://10.0.0.7:5000"), "'unit' or 'rtde' or"),
+    ):
+        path.write_text(text)
+        with pytest.raises(SiteFileError, match=words):
+            load(path)
+
+
+def test_a_driver_that_cannot_be_imported_is_named_with_its_package(installed):
+    with pytest.raises(GatewaySettingsError, match=r"'broken'.*robomesh-json-lines.*No module named"):
+        driver_maker("broken")
+    with pytest.raises(GatewaySettingsError, match=r"unknown protocol 'x'; known: unit, .*, json-lines"):
+        driver_maker("x")
+
+
+def test_the_example_reports_what_it_can_read_and_names_what_it_cannot(installed):
+    make = driver_maker("json-lines")
+    driver = make((JointType.ROTARY,) * 2, {}, relay=None, options={"limit": 50})
+    (channel,) = (each.channel for each in driver.started(0.0))
+    state = b'{"q": [1, 2], "state": "idle", "remote": true, "homed": true}\n{"no": "too fast"}\n'
+    (report,) = driver.received(channel, state[:20], 0.0)
+    assert report.units == 0
+    (report,) = driver.received(channel, state[20:], 0.0)
+    assert (report.units, report.refusals, report.events[0]) == (2, 1, JointsReceived((1.0, 2.0)))
+    assert report.events[2] == Refused(0, "too fast")
+    for wrong in (
+        b"[",
+        b"1\n",
+        b'{"q": [1]}\n',
+        b'{"q": [1, 2], "state": "x"}\n',
+        b"x" * 60,
+        b"[" * 5000 + b"\n",
+    ):
+        (report,) = driver.received(
+            channel, wrong if wrong.endswith(b"\n") or len(wrong) > 50 else wrong + b"\n", 0.0
+        )
+        assert report.units == 0, wrong
+        assert all(isinstance(each, MalformedReceived) for each in report.events)
+    assert driver.encode(MoveAbsolute((0.5, 1.0)), Stop()) == b'{"do": [{"to": [0.5, 1.0]}, "stop"]}\n'
+    with pytest.raises(CommandError, match="has no Hold"):
+        driver.encode(Hold())
+    with pytest.raises(GatewaySettingsError, match="'limits' is unknown"):
+        make((JointType.ROTARY,), {}, relay=None, options={"limits": 1})

@@ -25,7 +25,7 @@ from protocol_gateway.drivers.driver import (
     StatusReceived,
     Stop,
 )
-from protocol_gateway.drivers.registry import DRIVERS
+from protocol_gateway.drivers.registry import driver_maker
 from protocol_gateway.drivers.universal_robots import rtde_messages as rtde
 from protocol_gateway.drivers.universal_robots.driver import PRIMARY, RTDE, RtdeDriver
 from protocol_gateway.drivers.universal_robots.motion_driver import (
@@ -165,12 +165,12 @@ class Arm:
 
 
 def test_capabilities_say_what_it_can_do():
-    driver = DRIVERS["rtde"](SIX, {}, relay=None, options=MotionSettings())
+    driver = driver_maker("rtde")(SIX, {}, relay=None, options=MotionSettings())
     assert isinstance(driver, RtdeMotionDriver)
     capabilities = driver.capabilities
     assert capabilities.commands == {MoveAbsolute, Speed, Stop, Reset}
     assert (capabilities.absolute, capabilities.dies_with_link, capabilities.jogs) == (True, True, False)
-    assert type(DRIVERS["rtde"](SIX, {}, relay=None, options=None)) is RtdeDriver
+    assert type(driver_maker("rtde")(SIX, {}, relay=None, options=None)) is RtdeDriver
 
 
 @pytest.mark.parametrize(

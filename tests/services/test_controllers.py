@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from protocol_gateway.drivers.registry import DRIVERS
+from protocol_gateway.drivers.registry import OWN
 from robots.joints import JointType
 from services.command_line.site.controllers import ControllerError, controller_addresses
 from services.command_line.site.services import SERVICES, Options
@@ -215,7 +215,7 @@ def test_two_devices_of_one_opc_ua_server_are_two_robots():
 
 def test_the_example_has_a_simulated_controller_of_each_protocol():
     example = load(Path(__file__).resolve().parents[2] / "examples" / "vendors.toml")
-    assert {robot.protocol for robot in example.robot} == {*DRIVERS}
+    assert {robot.protocol for robot in example.robot} == {*OWN}
     ways = {"unit": "tcp", "rtde": "tcp", "hses": "udp", "snpx": "tcp", "opcua": "tcp"}
     named = enumerate(example.robot, start=1)
     addresses = [f"{robot.name}={ways[robot.protocol]}://127.0.0.1:{port}" for port, robot in named]

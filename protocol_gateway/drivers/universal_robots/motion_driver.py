@@ -17,6 +17,7 @@ import json
 import secrets
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from protocol_gateway.drivers.driver import (
     Activity,
@@ -531,3 +532,9 @@ def _problem(state: ControllerState, motion: _Motion) -> Reason | None:
     if state.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING):
         return codes.UR_PAUSED()
     return codes.UR_TOOL_CHANGED() if _tool(state) != motion.tool else None
+
+
+def rtde_driver(joint_types: Sequence[JointType], codes: Mapping[int, str], **given: Any) -> RtdeDriver:
+    """Create the driver that only reads, unless the site file declares motion."""
+    kind = RtdeDriver if given["options"] is None else RtdeMotionDriver
+    return kind(joint_types, codes, **given)
