@@ -6,6 +6,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from protocol_gateway.drivers.universal_robots.settings import MotionSettings
 from tests.protocol_gateway import test_hses_driver, test_rtde_driver, test_snpx_driver
 from tests.protocol_gateway.gateway_site import simulator
 
@@ -63,6 +64,23 @@ def greeting_of_rtde(parts):
     return len(kinds)
 
 
+def greetings_with_inputs(parts):
+    """Assert that inputs are set up, on a connection of their own, but never written."""
+    data, kinds = b"".join(parts), ""
+    while data:
+        size, kind = struct.unpack_from(">HB", data)
+        kinds += chr(kind)
+        data = data[size:]
+    assert set(kinds) <= set("VvOSI"), kinds
+    return len(kinds)
+
+
+def questions_of_the_dashboard(parts):
+    lines = b"".join(parts).decode().splitlines()
+    assert set(lines) <= {"is in remote control"}
+    return len(lines)
+
+
 def reads_of_hses(parts):
     for each in parts:
         assert (len(each), each[:11], each[12:24]) == (32, b"YERC\x20\0\0\0\x03\x01\0", b"\0\0\0\x0099999999")
@@ -99,6 +117,21 @@ SUBJECTS = (
         start=test_rtde_driver.controller,
         ports=("primary",),
         declared={"": greeting_of_rtde, "primary": nothing},
+        faults=("garbage", "split", "flood", "burst"),
+        reports_time=True,
+    ),
+    # Motion is allowed, but its stop was never proven.
+    Subject(
+        name="rtde-motion",
+        settings={**test_rtde_driver.UR, "options": MotionSettings()},
+        start=test_rtde_driver.whole_controller,
+        ports=("primary", "scripts", "dashboard"),
+        declared={
+            "": greetings_with_inputs,
+            "primary": nothing,
+            "scripts": nothing,
+            "dashboard": questions_of_the_dashboard,
+        },
         faults=("garbage", "split", "flood", "burst"),
         reports_time=True,
     ),

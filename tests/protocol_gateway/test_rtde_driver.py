@@ -305,11 +305,18 @@ def test_it_refuses_other_robots_codes_and_every_command():
 @contextlib.asynccontextmanager
 async def controller(**settings):
     """Run a simulated controller; yield its ports of RTDE and of the primary interface."""
+    async with whole_controller(**settings) as ports:
+        yield ports[:2]
+
+
+@contextlib.asynccontextmanager
+async def whole_controller(**settings):
+    """Run a simulated controller; yield all its ports."""
     ready = asyncio.get_running_loop().create_future()
     task = asyncio.create_task(serve_rtde(UrSettings(**settings), ready=ready.set_result))
     await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
     try:
-        yield (await ready)[:2]
+        yield await ready
     finally:
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)

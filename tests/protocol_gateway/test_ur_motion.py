@@ -272,6 +272,29 @@ async def until_it_moves(site, server):
     await resting(site)
 
 
+@pytest.mark.parametrize("fault", ["freeze", "restart", "drop", "local", "fault"])
+def test_a_fault_of_the_controller_during_a_motion_stops_it_for_good(mesh, tmp_path, monkeypatch, fault):
+    async def main():
+        async with controller(monkeypatch) as (ports, server), movable(mesh, tmp_path, ports) as site:
+            await in_control(site)
+            target = await move(site, 2.5)
+            arm = server.controller
+            await until(lambda: arm.programs.moving(time.monotonic()))
+            server._faults.begin(fault, time.monotonic())
+            await until(lambda: site.controller.HasField("stop"))
+            await until(lambda: not arm.programs.moving(time.monotonic()) or server.controller is not arm)
+            server._faults.end(fault)
+            await until(lambda: site.controller.link == STATE.UP)
+            await until(lambda: site.controller.mode == STATE.REMOTE)
+            await until(lambda: not runs(server))
+            assert abs(positions(server)[0] - target[0]) > 0.3
+            rest = positions(server)
+            await site.units(30)
+            assert positions(server) == pytest.approx(rest)
+
+    run(main())
+
+
 def test_the_speed_slider_of_others_slows_the_motion_only(mesh, tmp_path, monkeypatch):
     async def main():
         async with controller(monkeypatch) as (ports, server), movable(mesh, tmp_path, ports) as site:
