@@ -210,6 +210,8 @@ def test_status_follows_safety_drives_and_motion():
         assert told.status.activity is None
     told.values((5, False))
     assert told.status.activity is Activity.STOPPED
+    told.values((3, 1.0), (5, 0.0))  # not booleans
+    assert told.status.activity is None
     for mode, known in ((0.0, None), (1.0, Mode.LOCAL), (3.0, Mode.LOCAL), (7.0, None), ("4", None)):
         told.values((2, mode))
         assert told.status.mode is known

@@ -268,7 +268,9 @@ class _State:
         server does not say whether it runs.
         """
         stops = [*self._values("emergency_stop"), *self._values("protective_stop")]
-        if True in stops or False in self._values("in_control"):
+        # By identity: 1.0 equals True, and a number is no answer here.
+        off = any(each is False for each in self._values("in_control"))
+        if off or any(each is True for each in stops):
             return Activity.STOPPED
         if self._moves:
             return Activity.MOVING

@@ -122,6 +122,7 @@ class _Simulator:
         server = Server()
         await server.init()
         server.set_server_name("robomesh (simulated controller)")
+        await server.set_build_info("", "robomesh", "simulated controller", "SIM 1.0", "", datetime.now(UTC))
         server.set_security_policy([ua.SecurityPolicyType.NoSecurity])
         space = AddressSpace(server)
         kinds = [ROTARY if each is JointType.ROTARY else LINEAR for each in joints_of(description).types]
@@ -191,8 +192,9 @@ class _Simulator:
             logger.warning("fault %s is over", name)
             if name == "fault":
                 self._controller.go_on(now_s)
-        if "freeze" in self._active ^ before:
+        if "freeze" in self._active | before:
             for transport in self._transports:
+                # New connections too; a second call has no effect.
                 (transport.pause_reading if "freeze" in self._active else transport.resume_reading)()
         if self._active & {"refuse", "restart"}:
             self._close_listener()

@@ -34,6 +34,8 @@ def in_words(error: BaseException) -> str:
         return "the server does not answer in time"
     if isinstance(error, OSError) and error.errno and error.errno > 0:
         return os.strerror(error.errno).lower()
+    if isinstance(error, ConnectionError):
+        return "the server has closed the connection"
     text = str(error).strip()
     if text.startswith("No matching endpoints"):
         return "the server offers no connection with the site file's security"

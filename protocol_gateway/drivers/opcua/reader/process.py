@@ -92,7 +92,7 @@ async def read(host: str, port: int, settings: OpcUaSettings, write: Any) -> Non
             ended.set_result(why)
 
     async def lost(error: Exception) -> None:
-        end(f"the connection was lost: {in_words(error)}")
+        end(in_words(error))
 
     client.connection_lost_callback = lost
     async with connected(client) as session:
