@@ -2,10 +2,10 @@
 
     python tests/fuzz/fuzz_opcua.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
-Lines of a server's items and values, changed at random, cut and in the wrong order. They may cause no exception
-and no leak. Joints and activities must be those of a strict reading that is independent of the gateway's, which
-also decides what is of one moment, and the driver may return nothing but reports. Anything else ends the run
-with exit status 1 and its input in the folder.
+Lines of a server's items and values, changed at random, cut and in the wrong order. They may cause no
+exception and no leak. Joints and stops must be those of a strict reading that is independent of the
+gateway's. It also decides what is of one moment. The driver may return nothing but reports. Anything else
+ends the run with exit status 1 and its input in the folder.
 """
 
 import json
@@ -110,7 +110,13 @@ class Bench:
         usual = chance.choice((DEGREE, RADIAN))
         exact = chance.random() < 0.8
         listed: list[list[Any]] = [
-            ["position", f"Axis_{n}", usual if exact else chance.choice(units), "", chance.choice((0, 1, 1, 1))]
+            [
+                "position",
+                f"Axis_{n}",
+                usual if exact else chance.choice(units),
+                "",
+                chance.choice((0, 1, 1, 1)),
+            ]
             for n in range(1, JOINTS + 1 + (chance.random() < 0.05))
         ]
         listed += [[kind, "", 0, "", 0] for kind in OTHER_KINDS if chance.random() < 0.7]
@@ -133,7 +139,9 @@ class Bench:
             if not position:
                 value = chance.choice((value, True, False, "text", None, 0.0, 1.0, 3.0, 4.0))
             at_s = self._time_s + chance.choice((0.0, 0.0, 0.0, 0.01, 0.2))
-            readings.append([number, value, chance.choice((at_s, at_s, at_s, at_s, None)), chance.random() < 0.97])
+            readings.append(
+                [number, value, chance.choice((at_s, at_s, at_s, at_s, None)), chance.random() < 0.97]
+            )
         line = json.dumps({"values": readings} if readings else {"alive": True}).encode() + b"\n"
         self.lines = [*self.lines[-20:], line]
         return line
@@ -191,9 +199,7 @@ class Strict:
         self.factors: list[tuple[int, float]] = []
         self.limit_s = 0.01
 
-    def read(
-        self, line: bytes, wanted: list[tuple[float, ...]], activities: list[Activity | None]
-    ) -> None:
+    def read(self, line: bytes, wanted: list[tuple[float, ...]], activities: list[Activity | None]) -> None:
         try:
             data = json.loads(line)
         except (ValueError, RecursionError):
@@ -206,7 +212,11 @@ class Strict:
             self.take([], wanted, activities)
         elif self.items is not None and set(data) == {"values"}:
             readings = data["values"]
-            if isinstance(readings, list) and 0 < len(readings) <= 512 and all(map(self.is_reading, readings)):
+            if (
+                isinstance(readings, list)
+                and 0 < len(readings) <= 512
+                and all(map(self.is_reading, readings))
+            ):
                 self.take(readings, wanted, activities)
 
     def begin(self, data: dict[str, Any]) -> None:
@@ -283,7 +293,32 @@ class Strict:
 
 KNOWN = {
     int.from_bytes(code.encode(), "big")
-    for code in "DD C81 MMT CMT MTR E96 2A C16 2M MTS P1 KGM GRM CEL KEL FAH AMP 4K VLT NU NEW SEC C26 HUR".split()
+    for code in [
+        "DD",
+        "C81",
+        "MMT",
+        "CMT",
+        "MTR",
+        "E96",
+        "2A",
+        "C16",
+        "2M",
+        "MTS",
+        "P1",
+        "KGM",
+        "GRM",
+        "CEL",
+        "KEL",
+        "FAH",
+        "AMP",
+        "4K",
+        "VLT",
+        "NU",
+        "NEW",
+        "SEC",
+        "C26",
+        "HUR",
+    ]
 }
 KINDS = {*OTHER_KINDS, "position", "speed", "motor", "declared"}
 

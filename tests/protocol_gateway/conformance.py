@@ -7,7 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from protocol_gateway.drivers.universal_robots.settings import MotionSettings
-from tests.protocol_gateway import test_hses_driver, test_rtde_driver, test_snpx_driver
+from tests.protocol_gateway import (
+    test_hses_driver,
+    test_opcua_driver,
+    test_rtde_driver,
+    test_snpx_driver,
+)
 from tests.protocol_gateway.gateway_site import simulator
 
 
@@ -102,6 +107,28 @@ def reads_of_snpx(parts):
     return len(found)
 
 
+# Encodings of requests in OPC UA's namespace: endpoints, sessions, browse, read, subscriptions, publish. Not
+# among them: 673 (Write) and 712 (Call).
+READS_OF_OPC_UA = {428, 461, 467, 473, 527, 533, 631, 751, 787, 826}
+
+
+def reads_of_opcua(parts):
+    """Assert that only these requests are sent, besides opening and closing the channel.
+
+    Returns 0: the reading process sends them, so the gateway counts none.
+    """
+    data = b"".join(parts)
+    while data:
+        kind, size = data[:3], struct.unpack_from("<I", data, 4)[0]
+        assert kind in (b"HEL", b"OPN", b"MSG", b"CLO"), kind
+        if kind == b"MSG":
+            encoding, namespace, number = struct.unpack_from("<BBH", data, 24)
+            assert (encoding, namespace) == (1, 0)
+            assert number in READS_OF_OPC_UA, number
+        data = data[size:]
+    return 0
+
+
 SUBJECTS = (
     Subject(
         name="unit",
@@ -149,5 +176,13 @@ SUBJECTS = (
         start=lambda **settings: one_port(test_snpx_driver.controller(**settings)),
         declared={"": reads_of_snpx},
         faults=("garbage", "split", "flood", "busy", "loss", "joints", "mute"),
+    ),
+    Subject(
+        name="opcua",
+        settings=test_opcua_driver.OPC_UA,
+        start=lambda **settings: one_port(test_opcua_driver.controller(**settings)),
+        declared={"": reads_of_opcua},
+        faults=("garbage",),
+        reports_time=True,
     ),
 )

@@ -22,7 +22,7 @@ ALLOWED = frozenset(
 )
 """Services that are used, besides opening and closing the secure channel."""
 
-TIMEOUT_S = 10.0
+TIMEOUT_S = 5.0
 # A server may allow fewer in one request.
 _MOST_AT_ONCE = 100
 _MOST_REFERENCES = 10_000
