@@ -239,16 +239,24 @@ def test_a_motion_that_is_not_seen_to_start_is_given_up_once():
     assert arm.sent["scripts"].count(b"def ") == 1
 
 
-def test_a_program_that_ends_before_its_target_is_reported():
+@pytest.mark.parametrize(
+    ("progress", "text"),
+    [
+        (Progress.MOVING, "ended before its target"),
+        (Progress.STOPPED, "ended before its target"),
+        (Progress.NOT_BEGUN, "moved nothing"),
+    ],
+)
+def test_a_program_that_ends_before_its_target_is_reported(progress, text):
     arm = Arm()
     arm.command(MoveAbsolute(TARGET))
-    arm.play()
+    arm.play(progress)
     arm.wait(0.1)
     arm.runtime = 1
     effects = arm.wait(0.2)
     alarms = [event for report in flat(effects, Report) for event in report.events]
     (alarm,) = flat(alarms, AlarmReceived)
-    assert "ended before its target" in alarm.text
+    assert text in alarm.text
     assert not flat(effects, FateUnknown)
 
 

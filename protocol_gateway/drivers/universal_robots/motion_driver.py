@@ -389,6 +389,8 @@ class RtdeMotionDriver(RtdeDriver):
         effects: list[Effect] = [self._written(_NO_MOTION)] if self._inputs.ready else []
         if progress != Progress.DONE:
             text = "the program of a motion has ended before its target"
+            if progress == Progress.NOT_BEGUN:
+                text = "the program of a motion found no permission, and has moved nothing"
             effects.append(Report([AlarmReceived(Severity.WARNING, text)], 0))
         return effects
 
