@@ -21,6 +21,7 @@ _EXTRAS = {
     **{name: row.packages for name, row in SERVICES.items() if name != "router"},
     "simulator": ("ruckig",),
     "keys": ("cryptography",),
+    "opcua": ("asyncua",),
     "foxglove": ("foxglove",),
     "ros2": ("rosbags",),
     "plots": ("matplotlib",),

@@ -16,7 +16,12 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any
 
-from asyncua import ua
+from robomesh.extras import missing
+
+try:
+    from asyncua import ua
+except ImportError:
+    raise SystemExit(missing("asyncua")) from None
 
 from protocol_gateway.drivers.opcua import facts
 from protocol_gateway.drivers.opcua.facts import Found, Reading, Values, encode
@@ -61,8 +66,15 @@ def main(arguments: Sequence[str]) -> None:
 
 
 async def _until_signalled(host: str, port: int, settings: OpcUaSettings) -> None:
+    loop = asyncio.get_running_loop()
     reading = asyncio.ensure_future(read(host, port, settings, _print))
-    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, reading.cancel)
+
+    def end() -> None:
+        reading.cancel()
+        # A server that does not answer must not keep it.
+        loop.call_later(_ENDS_WITHIN_S, os._exit, 0)
+
+    loop.add_signal_handler(signal.SIGTERM, end)
     with contextlib.suppress(asyncio.CancelledError):
         await reading
 
