@@ -10,7 +10,7 @@ from protocol_gateway.core.codes import code_table
 from protocol_gateway.drivers.fanuc.axes import FanucSettings
 from protocol_gateway.drivers.opcua.settings import OpcUaSettings
 from protocol_gateway.drivers.registry import OWN, is_known, protocols
-from protocol_gateway.drivers.universal_robots.settings import MotionSettings
+from protocol_gateway.drivers.universal_robots.settings import UniversalRobotsSettings
 from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
 from protocol_gateway.errors import CodeTableError
 from protocol_gateway.proofs import StopProof
@@ -244,7 +244,7 @@ class Robot(BaseModel):
     @property
     def options(
         self,
-    ) -> YaskawaSettings | FanucSettings | OpcUaSettings | MotionSettings | dict[str, Any] | None:
+    ) -> YaskawaSettings | FanucSettings | OpcUaSettings | UniversalRobotsSettings | dict[str, Any] | None:
         """Settings of the protocol's driver, which the gateway passes on; None: it has none."""
         match self.protocol:
             case "hses":

@@ -6,16 +6,17 @@ from typing import Annotated
 from pydantic import BaseModel, Field, StrictBool
 
 from protocol_gateway.drivers.universal_robots.motion_script import INPUTS, OUTPUTS, REGISTERS
-from protocol_gateway.drivers.universal_robots.settings import MotionSettings
+from protocol_gateway.drivers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
 from services.site_file.part import PART_CONFIG
 
 _END = REGISTERS.stop
 
 
 class UniversalRobots(BaseModel):
-    """Motion of a robot of Universal Robots (docs/controllers/universal-robots.md#motion): experimental.
+    """A robot of Universal Robots (docs/controllers/universal-robots.md); its motion is experimental.
 
     Attributes:
+        rate: States a second; CB3 sends at most 125.
         motion: The gateway moves the robot; otherwise it only reads, and sends nothing but the greeting.
         input_registers: Number of the first of two integer input registers of the controller that no other
             client and no fieldbus uses.
@@ -25,6 +26,7 @@ class UniversalRobots(BaseModel):
     """
 
     model_config = PART_CONFIG
+    rate: Annotated[float, Field(ge=1, le=500)] = 125.0
     motion: StrictBool = False
     input_registers: Annotated[int, Field(ge=REGISTERS.start, le=_END - INPUTS, strict=True)] = 24
     output_registers: Annotated[int, Field(ge=REGISTERS.start, le=_END - OUTPUTS, strict=True)] = 24
@@ -32,13 +34,12 @@ class UniversalRobots(BaseModel):
     acceleration: Annotated[float, Field(ge=1, le=800)] = 80.0
 
     @property
-    def settings(self) -> MotionSettings | None:
-        """The settings as the driver takes them; None: it only reads."""
-        if not self.motion:
-            return None
-        return MotionSettings(
+    def settings(self) -> UniversalRobotsSettings:
+        """The settings as the driver takes them."""
+        motion = MotionSettings(
             input_registers=self.input_registers,
             output_registers=self.output_registers,
             speed=math.radians(self.speed),
             acceleration=math.radians(self.acceleration),
         )
+        return UniversalRobotsSettings(rate_hz=self.rate, motion=motion if self.motion else None)

@@ -6,7 +6,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from protocol_gateway.drivers.universal_robots.settings import MotionSettings
+from protocol_gateway.drivers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
 from tests.protocol_gateway import (
     test_hses_driver,
     test_opcua_driver,
@@ -150,7 +150,7 @@ SUBJECTS = (
     # Motion is allowed, but its stop was never proven.
     Subject(
         name="rtde-motion",
-        settings={**test_rtde_driver.UR, "options": MotionSettings()},
+        settings={**test_rtde_driver.UR, "options": UniversalRobotsSettings(motion=MotionSettings())},
         start=test_rtde_driver.whole_controller,
         ports=("primary", "scripts", "dashboard"),
         declared={

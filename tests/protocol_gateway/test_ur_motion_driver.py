@@ -37,7 +37,7 @@ from protocol_gateway.drivers.universal_robots.motion_driver import (
 )
 from protocol_gateway.drivers.universal_robots.motion_script import Progress, Registers, motion_script
 from protocol_gateway.drivers.universal_robots.rtde_messages import PackageType, Recipe, package
-from protocol_gateway.drivers.universal_robots.settings import MotionSettings
+from protocol_gateway.drivers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
 from protocol_gateway.errors import CommandError, NotReadyError
 from robots.joints import JointType
 from services.simulator.universal_robots.fields import INPUTS as INPUT_TYPES
@@ -57,7 +57,9 @@ class Arm:
 
     def __init__(self, *, remote=True, version=VERSION, **settings):
         self.now_s = 1000.0
-        self.driver = RtdeMotionDriver(SIX, {}, options=MotionSettings(**settings))
+        self.driver = RtdeMotionDriver(
+            SIX, {}, options=UniversalRobotsSettings(motion=MotionSettings(**settings))
+        )
         self.effects = []
         self.sent = {channel.name: bytearray() for channel in (RTDE, PRIMARY, DASHBOARD, INPUTS, SCRIPTS)}
         self.timer_s = None
@@ -165,7 +167,9 @@ class Arm:
 
 
 def test_capabilities_say_what_it_can_do():
-    driver = driver_maker("rtde")(SIX, {}, relay=None, options=MotionSettings())
+    driver = driver_maker("rtde")(
+        SIX, {}, relay=None, options=UniversalRobotsSettings(motion=MotionSettings())
+    )
     assert isinstance(driver, RtdeMotionDriver)
     capabilities = driver.capabilities
     assert capabilities.commands == {MoveAbsolute, Speed, Stop, Reset}

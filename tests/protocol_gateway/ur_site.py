@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 
 from protocol_gateway.drivers.universal_robots.modes import RuntimeState
-from protocol_gateway.drivers.universal_robots.settings import MotionSettings
+from protocol_gateway.drivers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
 from services.simulator.universal_robots import service
 from services.simulator.universal_robots.service import UrSettings, serve_rtde
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, until
@@ -36,7 +36,7 @@ def others(ports):
 @contextlib.asynccontextmanager
 async def movable(mesh, folder, at, *, motion=None, **robot):
     """Run a gateway that may move the arm, until it is in remote control and connected."""
-    options = {"options": motion or MotionSettings(), "ports": others(at)}
+    options = {"options": UniversalRobotsSettings(motion=motion or MotionSettings()), "ports": others(at)}
     async with gateway(mesh, folder, at.rtde, **UR, **options | {"simulated": True} | robot) as site:
         yield site
 

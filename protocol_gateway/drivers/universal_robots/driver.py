@@ -47,6 +47,7 @@ from protocol_gateway.drivers.universal_robots.primary import (
 )
 from protocol_gateway.drivers.universal_robots.rtde_messages import TextReceived
 from protocol_gateway.drivers.universal_robots.rtde_reader import Failed, Ready, RtdeReader
+from protocol_gateway.drivers.universal_robots.settings import UniversalRobotsSettings
 from protocol_gateway.drivers.universal_robots.signals import SignalReports
 from protocol_gateway.drivers.universal_robots.state import OUTPUTS, ControllerState
 from protocol_gateway.errors import GatewaySettingsError
@@ -56,8 +57,6 @@ RTDE = Channel(name="rtde", carries=Carries.READING)
 PRIMARY = Channel(name="primary", carries=NOTHING)
 # The port for reading only, which takes no program.
 _OPEN_PRIMARY = Open(PRIMARY, 30011)
-FREQUENCY_HZ = 125.0
-"""States a second that are requested; every controller can send so many."""
 JOINTS = 6
 
 # The arm follows its targets closely, and robomesh computes the tool's speed itself.
@@ -116,7 +115,10 @@ class RtdeDriver(OnlyReads):
             )
         if codes:
             raise GatewaySettingsError("protocol 'rtde' has no type codes: remove codes")
-        self._reader = RtdeReader(FREQUENCY_HZ, OUTPUT_FIELDS)
+        self._settings = (
+            options if isinstance(options, UniversalRobotsSettings) else UniversalRobotsSettings()
+        )
+        self._reader = RtdeReader(self._settings.rate_hz, OUTPUT_FIELDS)
         self._primary = PrimaryStream()
         self._signals = SignalReports()
         self._left: dict[str, Open] = {}

@@ -45,7 +45,6 @@ from protocol_gateway.drivers.driver import (
 )
 from protocol_gateway.drivers.universal_robots.dashboard import Dashboard
 from protocol_gateway.drivers.universal_robots.driver import (
-    FREQUENCY_HZ,
     JOINTS,
     OUTPUT_FIELDS,
     RTDE,
@@ -62,7 +61,7 @@ from protocol_gateway.drivers.universal_robots.modes import (
 )
 from protocol_gateway.drivers.universal_robots.motion_script import Progress, Registers, motion_script
 from protocol_gateway.drivers.universal_robots.rtde_reader import RtdeReader
-from protocol_gateway.drivers.universal_robots.settings import MotionSettings
+from protocol_gateway.drivers.universal_robots.settings import UniversalRobotsSettings
 from protocol_gateway.drivers.universal_robots.state import ControllerState
 from protocol_gateway.errors import CommandError, NotReadyError
 from robomesh import reason_codes as codes
@@ -133,15 +132,14 @@ class RtdeMotionDriver(RtdeDriver):
         relay: Callable[[bytes, bool, Hashable], None] | None = None,
         options: object = None,
     ) -> None:
-        super().__init__(joint_types, codes, relay=relay)
-        assert isinstance(options, MotionSettings)
-        self._settings = options
-        self._registers = Registers(
-            first_input=options.input_registers, first_output=options.output_registers
-        )
+        super().__init__(joint_types, codes, relay=relay, options=options)
+        motion = self._settings.motion
+        assert motion is not None
+        self._speed, self._acceleration = motion.speed, motion.acceleration
+        self._registers = Registers(first_input=motion.input_registers, first_output=motion.output_registers)
         outputs = self._registers.outputs
         self._reader = RtdeReader(
-            FREQUENCY_HZ, {**OUTPUT_FIELDS, **dict.fromkeys(outputs, "INT32")}, registers=outputs
+            self._settings.rate_hz, {**OUTPUT_FIELDS, **dict.fromkeys(outputs, "INT32")}, registers=outputs
         )
         # A number of an earlier gateway, which registers may still hold, does not come again.
         self._number = secrets.randbelow(_LARGEST_NUMBER) + 1
@@ -472,8 +470,8 @@ class RtdeMotionDriver(RtdeDriver):
         script = motion_script(
             self._number,
             target,
-            speed=self._settings.speed * percent / 100.0,
-            acceleration=self._settings.acceleration,
+            speed=self._speed * percent / 100.0,
+            acceleration=self._acceleration,
             registers=self._registers,
         )
         self._motion = _Motion(self._number, now_s, _tool(self._state))
@@ -538,5 +536,6 @@ def _problem(state: ControllerState, motion: _Motion) -> Reason | None:
 
 def rtde_driver(joint_types: Sequence[JointType], codes: Mapping[int, str], **given: Any) -> RtdeDriver:
     """Create the driver that only reads, unless the site file declares motion."""
-    kind = RtdeDriver if given["options"] is None else RtdeMotionDriver
-    return kind(joint_types, codes, **given)
+    options = given["options"]
+    moves = isinstance(options, UniversalRobotsSettings) and options.motion is not None
+    return (RtdeMotionDriver if moves else RtdeDriver)(joint_types, codes, **given)

@@ -19,3 +19,16 @@ class MotionSettings:
     output_registers: int = 24
     speed: float = math.radians(60.0)
     acceleration: float = math.radians(80.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class UniversalRobotsSettings:
+    """Properties of a robot of Universal Robots that the site file declares.
+
+    Attributes:
+        rate_hz: States a second; the controller sends at most as many as its control loop has cycles.
+        motion: How the gateway moves the arm; None: it only reads.
+    """
+
+    rate_hz: float = 125.0
+    motion: MotionSettings | None = None
