@@ -16,7 +16,8 @@ from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
 from tests.protocol_gateway.test_program_runs import ended, start
-from tests.protocol_gateway.ur_site import UR, Gate, controller, in_control, movable, move, others, runs
+from tests.protocol_gateway.ur_site import UR, controller, in_control, movable, move, others, runs
+from tests.protocol_gateway.wire import wire
 
 pytestmark = pytest.mark.slow
 
@@ -63,7 +64,7 @@ def test_targets_are_absolute_and_programs_hold_numbers_only(mesh, tmp_path, mon
     async def main():
         async with (
             controller(monkeypatch) as (ports, server),
-            Gate(ports.scripts) as gate,
+            wire(ports.scripts) as gate,
             movable(mesh, tmp_path, ports, ports={**others(ports), "scripts": gate.port}) as site,
         ):
             await in_control(site)
@@ -80,7 +81,7 @@ def test_targets_are_absolute_and_programs_hold_numbers_only(mesh, tmp_path, mon
             assert positions(server)[0] == pytest.approx(before[0], abs=1e-5)
             assert positions(server)[1] == pytest.approx(before[1] + 0.1, abs=1e-5)
             assert not runs(server)
-            sent = gate.sent.decode()
+            sent = gate.data.decode()
             assert sent.count("def robomesh_motion():") == sent.count("movej(") == 2
             assert all("v=0.523599" in line for line in sent.splitlines() if "movej" in line)
             # Nothing but the two motions' programs, which differ in their numbers only.
@@ -98,14 +99,14 @@ def test_a_program_makes_one_motion_after_the_other(mesh, tmp_path, monkeypatch)
     async def main():
         async with (
             controller(monkeypatch) as (ports, server),
-            Gate(ports.scripts) as gate,
+            wire(ports.scripts) as gate,
             movable(mesh, tmp_path, ports, ports={**others(ports), "scripts": gate.port}) as site,
         ):
             await in_control(site)
             start_at = positions(server)
             await start(site, text)
             await ended(site, schema.ProgramState.DONE)
-            assert gate.sent.count(b"movej(") == 4
+            assert gate.data.count(b"movej(") == 4
             assert positions(server)[4] == pytest.approx(start_at[4] + math.radians(10), abs=1e-3)
             assert not site.controller.HasField("stop")
 
@@ -116,7 +117,7 @@ def test_a_stop_ends_the_motion_and_a_reset_sends_nothing(mesh, tmp_path, monkey
     async def main():
         async with (
             controller(monkeypatch) as (ports, server),
-            Gate(ports.dashboard) as gate,
+            wire(ports.dashboard) as gate,
             movable(mesh, tmp_path, ports, ports={**others(ports), "dashboard": gate.port}) as site,
         ):
             await in_control(site)
@@ -126,10 +127,10 @@ def test_a_stop_ends_the_motion_and_a_reset_sends_nothing(mesh, tmp_path, monkey
             assert answer.sent
             await until(lambda: not runs(server))
             assert abs(positions(server)[0] - target[0]) > 0.5
-            assert b"stop\n" in gate.sent
+            assert b"stop\n" in gate.data
             assert "stop 1 is latched" in await refusal(move(site, 0.1))
             await reset(site)
-            commands = set(gate.sent.decode().splitlines())
+            commands = set(gate.data.decode().splitlines())
             assert commands == {"is in remote control", "stop"}
             rest = positions(server)
             await asyncio.sleep(0.2)
@@ -146,7 +147,7 @@ def test_nothing_is_sent_while_another_program_runs(mesh, tmp_path, monkeypatch)
     async def main():
         async with (
             controller(monkeypatch, demo=True) as (ports, server),
-            Gate(ports.scripts) as gate,
+            wire(ports.scripts) as gate,
             movable(mesh, tmp_path, ports, ports={**others(ports), "scripts": gate.port}) as site,
         ):
             await in_control(site)
@@ -161,11 +162,11 @@ def test_nothing_is_sent_while_another_program_runs(mesh, tmp_path, monkeypatch)
             await move(site, 0.05)
             await moving(site)
             await resting(site)
-            programs = gate.sent.count(b"def ")
+            programs = gate.data.count(b"def ")
             server.controller.programs.play(time.monotonic())
             await until(lambda: site.events("motion.foreign"))
             await until(lambda: site.seen["lease"][-1].holder == "")
-            assert gate.sent.count(b"def ") == programs == 1
+            assert gate.data.count(b"def ") == programs == 1
 
     run(main())
 
@@ -314,14 +315,14 @@ def test_the_speed_slider_of_others_slows_the_motion_only(mesh, tmp_path, monkey
 @pytest.mark.parametrize("name", ["dashboard", "rtde"])
 def test_a_lost_connection_latches_a_stop_and_forbids_motion(mesh, tmp_path, monkeypatch, name):
     async def main():
-        async with controller(monkeypatch) as (ports, server), Gate(getattr(ports, name)) as gate:
+        async with controller(monkeypatch) as (ports, server), wire(getattr(ports, name)) as gate:
             # The connection for reading and that for inputs have one port: both are cut.
             tapped = ports._replace(**{name: gate.port})
             async with movable(mesh, tmp_path, tapped) as site:
                 await in_control(site)
                 await move(site, 2.5)
                 await until(lambda: server.controller.programs.moving(time.monotonic()))
-                await gate.close()
+                gate.cut()
                 await until(lambda: site.controller.HasField("stop"))
                 await until(lambda: not runs(server))
                 if name == "dashboard":
@@ -341,8 +342,8 @@ def test_motion_is_refused_without_the_connection_of_the_stop(mesh, tmp_path, mo
     async def main():
         async with (
             controller(monkeypatch) as (ports, _),
-            Gate(ports.dashboard) as gate,
-            Gate(ports.scripts) as scripts,
+            wire(ports.dashboard) as gate,
+            wire(ports.scripts) as scripts,
             movable(
                 mesh,
                 tmp_path,
@@ -352,10 +353,10 @@ def test_motion_is_refused_without_the_connection_of_the_stop(mesh, tmp_path, mo
             ) as site,
         ):
             await in_control(site)
-            await gate.close()
+            gate.cut()
             await until(lambda: site.controller.capabilities.stops == site.controller.capabilities.NOT_NOW)
             assert "a stop could not be sent" in await refusal(move(site, 0.1))
-            assert not scripts.sent
+            assert not scripts.data
 
     run(main())
 
@@ -399,15 +400,15 @@ def test_without_motion_in_the_site_file_no_other_connection_is_opened(mesh, tmp
     async def main():
         async with (
             controller(monkeypatch, demo=True) as (ports, server),
-            Gate(ports.rtde) as gate,
+            wire(ports.rtde) as gate,
             gateway(mesh, tmp_path, gate.port, **UR, ports=others(ports)) as site,
         ):
             await until(lambda: site.joints)
-            greeting = bytes(gate.sent)
+            greeting = gate.data
             answer = await site.stop(by="wang")
             assert not answer.sent
             await site.units(100)
-            assert bytes(gate.sent) == greeting
+            assert gate.data == greeting
             assert not server._dashboards
             assert len(server._monitors) == 1
             assert "reads" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))

@@ -21,6 +21,11 @@ class Wire:
         self._ends = set()  # what is closed when the wire is cut
         self._listening = None
 
+    @property
+    def data(self):
+        """All bytes that the gateway sent."""
+        return b"".join(self.sent)
+
     async def open(self):
         """Listen, at the same port as before."""
         loop = asyncio.get_running_loop()
