@@ -17,6 +17,7 @@ from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, u
 from tests.protocol_gateway.wire import wire
 
 every_driver = pytest.mark.parametrize("subject", SUBJECTS, ids=str)
+quick_drivers = pytest.mark.parametrize("subject", [each for each in SUBJECTS if not each.slow], ids=str)
 HOUSE = Path(__file__).resolve().parents[2]
 QUICK = {"stale_after_s": 0.5, "reconnect_after_s": 1.5}
 FAULTS = [(subject, fault) for subject in SUBJECTS for fault in subject.faults]
@@ -116,7 +117,7 @@ def test_a_cut_link_is_down_and_a_restarted_controller_is_shown_from_its_new_tim
     run(main())
 
 
-@every_driver
+@quick_drivers
 def test_a_port_without_a_controller_is_down_and_says_why(mesh, tmp_path, subject):
     async def main():
         others = {name: free_port() for name in subject.ports}
@@ -149,7 +150,7 @@ def test_a_disturbed_protocol_gives_no_joints_but_those_of_the_arm(mesh, tmp_pat
     run(main())
 
 
-@every_driver
+@quick_drivers
 def test_a_second_client_of_the_controller_changes_nothing(mesh, tmp_path, subject):
     async def main():
         async with contextlib.AsyncExitStack() as stack:
