@@ -25,9 +25,8 @@ from dataclasses import dataclass
 from protocol_gateway.audit.entry import Entry, Outcome
 from protocol_gateway.checking.cell_occupancy import CellOccupancy
 from protocol_gateway.checking.checker import Checker
-from protocol_gateway.control.entries import entry_of
+from protocol_gateway.control.entries import MESH, entry_of
 from protocol_gateway.errors import AuditError, CheckError
-from protocol_gateway.mesh_requests import MESH
 from protocol_gateway.robot import Robot
 from protocol_gateway.settings import CellFile
 from robomesh import reason_codes as codes

@@ -8,7 +8,7 @@ from functools import partial
 from protocol_gateway.audit.entry import Entry, Outcome
 from protocol_gateway.control.control import Control
 from protocol_gateway.control.deadlines import set_deadline
-from protocol_gateway.control.entries import entry_of
+from protocol_gateway.control.entries import MESH, entry_of
 from protocol_gateway.control.jog import Jogs
 from protocol_gateway.control.program import Programs
 from protocol_gateway.text_limits import LONGEST_SENTENCE, LONGEST_TEXT
@@ -21,7 +21,6 @@ from robomesh.session import Session
 from robomesh.texts import one_line
 from robomesh.topics import check_operator
 
-MESH = "mesh"
 # Request names in the audit log where the request itself could not be read.
 _LEASE, _COMMAND, _JOG = "LEASE", "COMMAND", "JOG_KEEP_ALIVE"
 
@@ -88,6 +87,8 @@ class MeshRequests:
         assert isinstance(message, schema.CommandRequest)
         operator = self._operator(_COMMAND, request)
         set_deadline(message, request)
+        if message.HasField("recover"):
+            message.recover.reason = one_line(message.recover.reason, LONGEST_TEXT).strip()
         if message.command == schema.CommandRequest.RUN_PROGRAM:
             return await self._programs.run(message, operator=operator, source=MESH)
         if message.command == schema.CommandRequest.JOG:

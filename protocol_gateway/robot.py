@@ -94,6 +94,12 @@ class Robot:
                 f"robot {settings.name}: ports {unknown[0]!r}: protocol {settings.protocol!r} has "
                 f"{', '.join(map(repr, sorted(driver.ports))) or 'no further ports'}"
             )
+        if missing := sorted(each.value for each in settings.recover - driver.capabilities.recoveries):
+            has = sorted(each.value for each in driver.capabilities.recoveries)
+            raise GatewaySettingsError(
+                f"robot {settings.name}: recover {missing[0]!r}: this robot has "
+                f"{', '.join(map(repr, has)) or 'no recoveries'}"
+            )
         self._settings = settings
         self._legacy: LegacyClients | None = None
         self._capabilities = driver.capabilities
@@ -447,6 +453,7 @@ class Robot:
             capabilities=self._capabilities,
             stop_arrives=self._link.carries(Carries.STOP),
             accept_unknown=self._settings.accept_unknown,
+            recover=self._settings.recover,
         )
 
     def _publish_state(self) -> None:

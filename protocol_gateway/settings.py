@@ -9,6 +9,7 @@ import numpy as np
 
 from protocol_gateway.audit.log import ROTATE_BYTES
 from protocol_gateway.checking.policy import Policy
+from protocol_gateway.drivers.driver import Recovery
 from protocol_gateway.drivers.registry import is_known, protocols
 from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.legacy.settings import LegacySettings
@@ -43,6 +44,7 @@ class RobotSettings:
             try it: docs/safety.md.
         verified: Comparison of its joints with the pose that its controller computes; None: there is none.
         experimental: Commands may be sent that were never tried on a real controller.
+        recover: Recoveries that an operator may send.
         stale_after_s: Without a unit for this long, the robot's state is unknown. Without positions for this
             long, motion is refused.
         reconnect_after_s: Without a unit for this long, the gateway reconnects.
@@ -65,6 +67,7 @@ class RobotSettings:
     stop_proven: StopProof | bool = False
     verified: VerificationRecord | None = None
     experimental: bool = False
+    recover: frozenset[Recovery] = frozenset()
     stale_after_s: float = 1.0
     reconnect_after_s: float = 4.0
     legacy_clients: LegacySettings | None = None

@@ -7,7 +7,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from protocol_gateway.authority.lease_rules import Authority, Lease, Now, Stop
-from protocol_gateway.authority.preconditions import Controller, commands_of
+from protocol_gateway.authority.preconditions import Controller, commands_of, recoveries_of
 from protocol_gateway.checking.policy import Policy
 from protocol_gateway.drivers.driver import Activity, JointsReceived, Mode, StopEnds, UnknownReceived
 from protocol_gateway.link.health import LinkHealth
@@ -156,9 +156,10 @@ def _capabilities(controller: Controller) -> schema.Capabilities:
         return schema.Capabilities(stops=schema.Capabilities.NONE, absolute=capabilities.absolute)
     return schema.Capabilities(
         stops=stops,
-        commands=commands_of(capabilities),
+        commands=commands_of(controller),
         absolute=capabilities.absolute,
         dies_with_link=_KNOWN[capabilities.dies_with_link],
+        recoveries=recoveries_of(controller),
     )
 
 

@@ -12,6 +12,7 @@ from protocol_gateway.drivers.driver import (
     JointsReceived,
     MalformedReceived,
     Mode,
+    RecoverAnswered,
     Refused,
     Severity,
     SignalsReceived,
@@ -198,6 +199,8 @@ class Telemetry:
                     bytes=text,
                     reason=reason,
                 )
+            case RecoverAnswered():
+                self._on_recovery(event)
             case SoftwareReceived(version):
                 self._on_software(one_line(version, LONGEST_TEXT))
             case Refused(number, text):
@@ -219,6 +222,16 @@ class Telemetry:
             self._reported_software = version
             text = f"the controller's software: {version}"
             self._journal.report(_S.INFO, "controller.software", text, software=version)
+
+    def _on_recovery(self, event: RecoverAnswered) -> None:
+        code = {True: codes.RECOVER_ANSWERED, False: codes.RECOVER_REFUSED, None: codes.RECOVER_UNKNOWN}
+        why = code[event.accepted](
+            recovery=event.recovery.value, detail=one_line(event.answer, LONGEST_TEXT) or "-"
+        )
+        severity = _S.INFO if event.accepted else _S.WARNING
+        self._journal.report(
+            severity, why.code, why.text, why=why, apart=why.text, recovery=event.recovery.value
+        )
 
     def _on_controller_status(self, status: StatusReceived, now_s: float) -> None:
         changed = status.values != self._status.values

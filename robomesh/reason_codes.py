@@ -364,6 +364,39 @@ STOP_NOT_PROVEN = Code(
     "test the stop unit on its controller (see docs/safety.md), then set stop_proven = true for this robot "
     "in the site file",
 )
+RECOVER_NOT_THERE = Code("recover.not_there", "this controller has no {recovery}", "it has: {known}")
+RECOVER_NOT_ALLOWED = Code(
+    "recover.not_allowed",
+    "the site file does not allow {recovery} for this robot",
+    "add it to the robot's `recover`, or do it at the robot",
+)
+RECOVER_REASON = Code("recover.reason", "a recovery needs a reason", "type why it is sent")
+RECOVER_LOOKED = Code(
+    "recover.looked",
+    "no person at the robot has looked",
+    "confirm it after a person at the robot has found the cause",
+)
+RECOVER_MOVES = Code("recover.moves", "the robot moves, or is not known to rest", "wait until it rests")
+RECOVER_HELD = Code(
+    "recover.held", "a motion is on hold, and could go on", "discard it (RESET), or stop the robot"
+)
+RECOVER_PROGRAM = Code(
+    "recover.program",
+    "programs and old client programs may not recover a controller",
+    "an operator sends RECOVER, as the only command of the request",
+)
+RECOVER_SENT = Code("recover.sent", "{by} has sent {recovery} to the controller: {reason}")
+RECOVER_ANSWERED = Code(
+    "recover.answered",
+    'the controller answers {recovery} with "{detail}"',
+    "what became of it shows in the robot's state",
+)
+RECOVER_REFUSED = Code("recover.refused", 'the controller refuses {recovery}: "{detail}"')
+RECOVER_UNKNOWN = Code(
+    "recover.unknown",
+    "it is unknown whether the controller has done {recovery}: {detail}",
+    "look at the robot's state; it is not sent again",
+)
 ROBOT_HOMED_BY_NATURE = Code(
     "robot.homed_by_nature", "its encoders are absolute: it is always homed", "move it to its home position"
 )
@@ -441,6 +474,18 @@ UR_SOFTWARE = Code(
     "universal_robots.software",
     "motion needs PolyScope 5.6 or a later version 5, this is {version}",
     "move the robot from its own panel",
+)
+UR_STOP_YOUNG = Code(
+    "universal_robots.stop_young",
+    "the protective stop is seen for {seen:.1f} s only; it can be unlocked after {seconds:g} s",
+    "find its cause first",
+)
+UR_NOT_NOW = Code(
+    "universal_robots.recovery_not_now",
+    "{recovery} does not fit the controller's state (safety mode {safety}, robot mode {robot})",
+)
+UR_RECOVERS = Code(
+    "universal_robots.recovers", "the controller has not answered {recovery} yet", "wait for its answer"
 )
 UR_REGISTER = Code(
     "universal_robots.register",

@@ -5,6 +5,7 @@ import re
 import sys
 from collections.abc import Iterator
 from datetime import date
+from enum import Enum
 from pathlib import Path
 from types import NoneType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -99,6 +100,9 @@ def type_text(annotation: Any, constraints: tuple[Any, ...] = ()) -> str:
         return f"{count}, each {type_text(first)}"
     if get_origin(inner) is dict:
         return "table of a number and a text"
+    if isinstance(inner, type) and issubclass(inner, Enum):
+        *most, last = (value(each.value) for each in inner)
+        return f"{', '.join(most)} or {last}"
     words = [_TYPES[inner]]
     for kind, name, text in _BOUNDS:
         words += [f"{text} {getattr(each, name):.15g}" for each in constraints if isinstance(each, kind)]

@@ -83,6 +83,7 @@ def content_of(request: CommandRequest) -> Content:
         program=request.program,
         program_name=request.program_name,
         jog=(jog.frame, jog.axis, jog.joint, jog.speed) if request.HasField("jog") else None,
+        recover=(request.recover.recovery, request.recover.reason, request.recover.looked),
     )
 
 

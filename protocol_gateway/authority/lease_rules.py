@@ -130,6 +130,7 @@ class Content(NamedTuple):
     Attributes:
         joint_positions: [rad] or [m].
         jog: Frame, axis, joint and speed [m/s] or [rad/s]; None: no jog.
+        recover: Recovery, reason, and whether a person at the robot has looked.
     """
 
     command: CommandRequest.Command
@@ -139,6 +140,7 @@ class Content(NamedTuple):
     program: str = ""
     program_name: str = ""
     jog: tuple[int, int, int, float] | None = None
+    recover: tuple[int, str, bool] = (0, "", False)
 
     def description(self) -> str:
         """Return a readable line."""

@@ -8,6 +8,7 @@
     HOME                        x     x     x               not stale
     RESUME                      x     x     x, idle         x          x, or on hold
     RUN_PROGRAM                 x     x     x               x
+    RECOVER                     x     x     rests, no hold                    reason
     JOG                         x     x     x               x          x
     MOVE_ABSOLUTE MOVE_RELATIVE x     x     x               x          x      x
 
@@ -29,6 +30,8 @@ from protocol_gateway.drivers.driver import (
     Mode,
     MoveAbsolute,
     MoveRelative,
+    Recover,
+    Recovery,
     Reset,
     Resume,
     Speed,
@@ -39,6 +42,7 @@ from protocol_gateway.link.link import LinkState, LinkStatus
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest
+from robomesh.schemas.robomesh_pb2 import Recover as RecoverMessage
 from robots.joints import Joints, violations
 
 _C = CommandRequest.Command
@@ -58,6 +62,11 @@ _KINDS: dict[CommandRequest.Command, type[ControllerCommand]] = {
     _C.JOG: MoveAbsolute,
 }
 
+# Both have the same names.
+_RECOVERIES: dict[RecoverMessage.Recovery, Recovery] = {
+    getattr(RecoverMessage, each.name): each for each in Recovery
+}
+
 _EVERYTHING = Capabilities(commands=COMMANDS, jogs=True)
 
 
@@ -75,6 +84,7 @@ class Controller:
         capabilities: What its driver can do.
         stop_arrives: What carries its stop is connected.
         accept_unknown: States that it never reports and the site file does not require: "mode", "homed".
+        recover: Recoveries that the site file allows.
     """
 
     link: LinkStatus
@@ -88,13 +98,14 @@ class Controller:
     capabilities: Capabilities = _EVERYTHING
     stop_arrives: bool = True
     accept_unknown: frozenset[str] = frozenset()
+    recover: frozenset[Recovery] = frozenset()
 
 
 def obstacle(request: CommandRequest, controller: Controller, joints: Joints) -> Answer | None:
     """Return the refusal of a command that cannot be sent now; None: it can."""
     found = (
         _link_obstacle(controller)
-        or _ability_obstacle(request, controller.capabilities)
+        or _ability_obstacle(request, controller)
         or _stop_obstacle(request, controller)
         or _mode_obstacle(request, controller)
         or _state_obstacle(request, controller)
@@ -115,12 +126,32 @@ def _link_obstacle(controller: Controller) -> Reason | None:
             return None
 
 
-def _ability_obstacle(request: CommandRequest, capabilities: Capabilities) -> Reason | None:
+def _ability_obstacle(request: CommandRequest, controller: Controller) -> Reason | None:
+    capabilities = controller.capabilities
+    if request.command == _C.RECOVER:
+        return _recovery_obstacle(request, controller)
     if _kind(request.command, capabilities) in capabilities.commands:
         return None
     if request.command == _C.HOME and capabilities.absolute:
         return codes.ROBOT_HOMED_BY_NATURE()
     return codes.COMMAND_NOT_THERE(command=_C.Name(request.command))
+
+
+def _recovery_obstacle(request: CommandRequest, controller: Controller) -> Reason | None:
+    recovery = _RECOVERIES.get(request.recover.recovery)
+    if recovery is None or recovery not in controller.capabilities.recoveries:
+        named = "recovery" if recovery is None else recovery.value
+        known = sorted(each.value for each in controller.capabilities.recoveries)
+        return codes.RECOVER_NOT_THERE(recovery=named, known=", ".join(known) or "none")
+    if recovery not in controller.recover:
+        return codes.RECOVER_NOT_ALLOWED(recovery=recovery.value)
+    return None
+
+
+def recoveries_of(controller: Controller) -> list[RecoverMessage.Recovery]:
+    """Return the recoveries that the controller has and the site file allows."""
+    allowed = controller.capabilities.recoveries & controller.recover
+    return [number for number, recovery in _RECOVERIES.items() if recovery in allowed]
 
 
 def _kind(command: CommandRequest.Command, capabilities: Capabilities) -> type[ControllerCommand] | None:
@@ -135,13 +166,15 @@ def _stop_obstacle(request: CommandRequest, controller: Controller) -> Reason | 
     return codes.STOP_WOULD_NOT_ARRIVE() if moves and not controller.stop_arrives else None
 
 
-def commands_of(capabilities: Capabilities) -> Sequence[CommandRequest.Command]:
-    """Return the commands of the mesh that can be executed with a driver."""
-    return [
+def commands_of(controller: Controller) -> Sequence[CommandRequest.Command]:
+    """Return the commands of the mesh that can be executed with a controller."""
+    capabilities = controller.capabilities
+    found = [
         command
         for command in _KINDS
         if _kind(command, capabilities) in capabilities.commands and (command != _C.JOG or capabilities.jogs)
     ]
+    return [*found, _C.RECOVER] if recoveries_of(controller) else found
 
 
 def _mode_obstacle(request: CommandRequest, controller: Controller) -> Reason | None:
@@ -154,6 +187,14 @@ def _mode_obstacle(request: CommandRequest, controller: Controller) -> Reason | 
 
 
 def _state_obstacle(request: CommandRequest, controller: Controller) -> Reason | None:
+    if request.command == _C.RECOVER:
+        match controller.status.activity:
+            case Activity.HOLDING:
+                # A held motion could go on after a recovery.
+                return codes.RECOVER_HELD()
+            case Activity.MOVING | Activity.HOMING:
+                return codes.RECOVER_MOVES()
+        return None
     if request.command not in MOTION_COMMANDS:
         return None
     status = controller.status
@@ -187,6 +228,10 @@ def _value_obstacle(request: CommandRequest, controller: Controller, joints: Joi
             return codes.SPEED_MISSING()
         if not 1.0 <= request.speed_percent <= 100.0:
             return codes.SPEED_OUTSIDE(value=request.speed_percent)
+    if request.command == _C.RECOVER and not request.recover.reason.strip():
+        return codes.RECOVER_REASON()
+    if request.command == _C.RECOVER and not request.recover.looked:
+        return codes.RECOVER_LOOKED()
     if request.command not in _MOVES:
         return None
     count = len(request.joint_positions)
@@ -272,4 +317,6 @@ def controller_command(request: CommandRequest) -> ControllerCommand:
             return MoveAbsolute(positions=tuple(request.joint_positions))
         case _C.MOVE_RELATIVE:
             return MoveRelative(offsets=tuple(request.joint_positions))
+        case _C.RECOVER if request.recover.recovery in _RECOVERIES:
+            return Recover(_RECOVERIES[request.recover.recovery])
     raise ValueError(f"{_C.Name(request.command)} is not a controller's command")

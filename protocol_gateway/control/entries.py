@@ -19,9 +19,11 @@ from protocol_gateway.control.events import (
 )
 from protocol_gateway.text_limits import LONGEST_SENTENCE, LONGEST_TEXT
 from robomesh.reasons import Reason
-from robomesh.schemas.robomesh_pb2 import CommandRequest, Jog, LeaseRequest, PageReport
+from robomesh.schemas.robomesh_pb2 import CommandRequest, Jog, LeaseRequest, PageReport, Recover
 from robomesh.texts import one_line
 
+# Source of requests over the mesh.
+MESH = "mesh"
 # Source of a program's steps.
 PROGRAM = "program"
 # Source of the end of a jog.
@@ -92,6 +94,7 @@ def command_entries(event: CommandsRequested, outcome: Outcome, answer: Answer) 
             program_name=request.program_name,
             program_sha256=sha256(request.program.encode()).hexdigest() if request.program else "",
             **_jog_values(request),
+            **_recover_values(request),
             **page_values(request.page),
         )
         for request in event.requests
@@ -107,6 +110,21 @@ def _jog_values(request: CommandRequest) -> Mapping[str, str]:
         "jog_axis": f"joint {jog.joint}" if jog.frame == Jog.JOINT else _name(Jog.Axis, jog.axis),
         "jog_speed": f"{jog.speed:.6g}",
     }
+
+
+def _recover_values(request: CommandRequest) -> Mapping[str, str]:
+    if request.command != CommandRequest.RECOVER:
+        return {}
+    return {
+        "recovery": recovery_name(request),
+        "reason": request.recover.reason,
+        "looked": "yes" if request.recover.looked else "no",
+    }
+
+
+def recovery_name(request: CommandRequest) -> str:
+    """Return the name of a recovery, as the site file has it."""
+    return _name(Recover.Recovery, request.recover.recovery).lower()
 
 
 def _name(kind: Any, number: int) -> str:

@@ -13,6 +13,7 @@ from protocol_gateway.authority.admission import (
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, Authority, Now, holds, not_sent
 from protocol_gateway.authority.preconditions import Controller, obstacle, predicted
 from protocol_gateway.control.effects import Program, Seen
+from protocol_gateway.control.entries import MESH
 from protocol_gateway.control.events import CommandsRequested
 from protocol_gateway.drivers.driver import Activity
 from robomesh import reason_codes as codes
@@ -84,6 +85,10 @@ def refusal_of(
     if len(motions) > 1 and _C.RESUME in motions:
         # Some controllers resume the held motion first, others drop it, so the path would be unknown.
         return not_sent(codes.COMMAND_TWO_UNITS())
+    # A recovery comes from an operator only, who sees what becomes of it before the next command.
+    by_program = command.step or command.source != MESH or len(command.requests) > 1
+    if by_program and any(each.command == _C.RECOVER for each in command.requests):
+        return not_sent(codes.RECOVER_PROGRAM())
     for request in command.requests:
         refusal = (
             refusal
@@ -92,6 +97,7 @@ def refusal_of(
             or _latch_refusal(request, seen)
             or _cell_refusal(request, seen)
             or (None if command.step else _program_refusal(request, program))
+            or _recover_refusal(request, authority)
             or controller_refusal(request, authority, controller, seen, joints)
         )
         if refusal is not None:
@@ -146,17 +152,26 @@ def _latch_refusal(request: CommandRequest, seen: Seen) -> Answer | None:
 
 
 def _cell_refusal(request: CommandRequest, seen: Seen) -> Answer | None:
-    if seen.cell_closed is None or request.command not in MOTION_COMMANDS:
+    if seen.cell_closed is None or request.command not in MOTION_COMMANDS | {_C.RECOVER}:
         return None
     return not_sent(seen.cell_closed)
 
 
 def _program_refusal(request: CommandRequest, program: RunningProgram | None) -> Answer | None:
     # The check of a program holds only at its speed.
-    if program is None or request.command not in MOTION_COMMANDS | {_C.SPEED}:
+    if program is None or request.command not in MOTION_COMMANDS | {_C.SPEED, _C.RECOVER}:
         return None
     if program.program.is_jog:
         return not_sent(codes.JOG_RUNS())
     if request.command == _C.RESUME:
         return None
     return not_sent(codes.COMMAND_PROGRAM_RUNS(name=program.program.name))
+
+
+def _recover_refusal(request: CommandRequest, authority: Authority) -> Answer | None:
+    """Return the refusal of a recovery that could meet motion; None: the robot is seen to rest."""
+    if request.command != _C.RECOVER:
+        return None
+    if authority.motion is not None:
+        return not_sent(codes.RECOVER_HELD() if authority.motion.held else codes.RECOVER_MOVES())
+    return None if authority.moving is False else not_sent(codes.RECOVER_MOVES())

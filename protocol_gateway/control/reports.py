@@ -3,6 +3,7 @@
 from protocol_gateway.authority.lease_rules import LeaseEnd
 from protocol_gateway.control.effects import Finding, Report
 from protocol_gateway.control.events import JogEnded, ProgramEnded, StopRequested, StopResult
+from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import Event
 
@@ -40,6 +41,12 @@ def stop_reset(stop_id: int) -> Report:
     """Report the RESET of a stop."""
     text = f"stop request {stop_id} was reset"
     return Report(_S.INFO, "stop.reset", text, values={"stop_id": stop_id})
+
+
+def recovery_sent(recovery: str, by: str, reason: str) -> Report:
+    """Report a recovery that was sent to the controller."""
+    why = codes.RECOVER_SENT(recovery=recovery, by=by, reason=reason)
+    return Report(_S.WARNING, "recover.sent", why.text, why=why, values={"recovery": recovery, "by": by})
 
 
 def _stop(severity: Event.Severity, code: str, why: Reason, stop_id: int) -> Report:

@@ -365,6 +365,10 @@ class RobotAuthority:
             if request.command == _C.RESET and latched is not None:
                 yield effects.KeepLatch(self._authority.stop, self._authority.last_stop_id)
                 yield reports.stop_reset(latched.id)
+            if request.command == _C.RECOVER:
+                recovery = entries.recovery_name(request)
+                yield reports.recovery_sent(recovery, command.operator, request.recover.reason)
+                return f"{recovery} is on the controller's socket; the robot's state shows what becomes of it"
             yield effects.Publish()
             # Each command starts from the state after the previous one.
             controller = predicted(request, controller, self._joints)

@@ -195,6 +195,32 @@ class SignalsReceived:
     valid_for_s: float = 3.0
 
 
+class Recovery(Enum):
+    """Action that brings a controller back after its own stop or fault. It resumes no motion."""
+
+    UNLOCK_PROTECTIVE_STOP = "unlock_protective_stop"
+    CLOSE_SAFETY_POPUP = "close_safety_popup"
+    RESTART_SAFETY = "restart_safety"
+    POWER_ON = "power_on"
+    BRAKE_RELEASE = "brake_release"
+    SERVO_ON = "servo_on"
+    RESET_ALARM = "reset_alarm"
+
+
+@dataclass(frozen=True, slots=True)
+class RecoverAnswered:
+    """Answer of the controller to `Recover`, or the lack of one. Only the state shows the effect.
+
+    Attributes:
+        accepted: The controller has taken it; None: unknown.
+        answer: The controller's words, or the reason for the missing answer.
+    """
+
+    recovery: Recovery
+    accepted: bool | None
+    answer: str
+
+
 @dataclass(frozen=True, slots=True)
 class SoftwareReceived:
     """Version of the controller's software, in its own words: what was proven on another one is unproven."""
@@ -211,6 +237,7 @@ ControllerEvent: TypeAlias = (
     | AlarmReceived
     | SignalsReceived
     | SoftwareReceived
+    | RecoverAnswered
 )
 
 # -------------------------------------------------------------- commands to a controller
@@ -272,12 +299,23 @@ class MoveRelative:
     offsets: tuple[float, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Recover:
+    """Command to bring the controller back after its own stop or fault, sent for an operator's request only.
+
+    The gateway has verified that the site file allows it, that the arm rests and nothing is on hold. The
+    driver sends it once, never repeats it, and reports `RecoverAnswered`.
+    """
+
+    recovery: Recovery
+
+
 ControllerCommand: TypeAlias = (
-    Home | Hold | Resume | Reset | Stop | Trace | Speed | MoveAbsolute | MoveRelative
+    Home | Hold | Resume | Reset | Stop | Trace | Speed | MoveAbsolute | MoveRelative | Recover
 )
 
-COMMANDS: frozenset[type[ControllerCommand]] = frozenset(get_args(ControllerCommand))
-"""All of them."""
+COMMANDS: frozenset[type[ControllerCommand]] = frozenset(get_args(ControllerCommand)) - {Recover}
+"""All that a driver declares in `commands`; `Recover` has `recoveries`."""
 
 
 class StopEnds(Enum):
@@ -306,6 +344,7 @@ class Capabilities:
             the joints are unproven again.
         experimental: Its commands were never tried on a real controller.
         stop_means: How its `Stop` is sent, which a proof of the stop names; empty: in one way only.
+        recoveries: Actions of `Recover`. Each is off unless the site file allows it.
     """
 
     commands: frozenset[type[ControllerCommand]]
@@ -318,6 +357,7 @@ class Capabilities:
     joint_mapping: str = ""
     experimental: bool = False
     stop_means: str = ""
+    recoveries: frozenset[Recovery] = frozenset()
 
 
 # ------------------------------------------------------------------------ effects

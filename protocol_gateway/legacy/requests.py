@@ -21,6 +21,7 @@ from protocol_gateway.core.records import (
     speed_percent,
 )
 from protocol_gateway.core.scales import si_scales
+from protocol_gateway.drivers.driver import Recovery
 from protocol_gateway.errors import UnitError
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest
@@ -53,6 +54,7 @@ _WORDS = {
     "resume": _C.RESUME,
     "reset": _C.RESET,
 }
+_RECOVERIES = frozenset(each.value for each in Recovery)
 # Limited, because all of them are audited before the first is executed, and other commands wait for that.
 _MOST_REQUESTS = 16
 # A reset must not clear a stop that was sent while the reset was in transit: its sender has not seen it.
@@ -119,6 +121,8 @@ def _word(word: str) -> CommandRequest | Error | None:
         return None
     if word in _WORDS:
         return CommandRequest(command=_WORDS[word])
+    if word == "recover" or word in _RECOVERIES:
+        return Error(READ_ONLY, f"{word}: {codes.RECOVER_PROGRAM()}")
     try:
         percent = speed_percent(word)
     except UnitError as error:

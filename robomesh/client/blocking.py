@@ -123,6 +123,16 @@ class Arm:
         """Clear a latched stop, after its cause was removed; by default the one that is latched now."""
         return self._run(self._arm.reset(stop_id))
 
+    def recover(self, recovery: str, *, reason: str, looked: bool) -> CommandResult:
+        """Bring the controller back after its own stop or fault; see `AsyncArm.recover`.
+
+        Args:
+            recovery: "unlock_protective_stop", "power_on", "brake_release", ...
+            reason: Reason for the audit log and the event.
+            looked: A person at the robot has looked, and found the cause.
+        """
+        return self._run(self._arm.recover(recovery, reason=reason, looked=looked))
+
     def stop(self, reason: str = "") -> StopResult:
         """Request a stop, which latches. A stop request is not an emergency stop."""
         return self._run(self._arm.stop(reason))

@@ -260,6 +260,26 @@ class AsyncArm:
                     raise
             await asyncio.sleep(_POLL_S)
 
+    async def recover(self, recovery: str, *, reason: str, looked: bool) -> CommandResult:
+        """Bring the controller back after its own stop or fault; no motion is resumed.
+
+        The site file must allow the action by name (`recover`). It is sent once. The answer says only that it
+        was sent: the robot's state shows the effect.
+
+        Args:
+            recovery: "unlock_protective_stop", "power_on", "brake_release", ...
+            reason: Reason for the audit log and the event.
+            looked: A person at the robot has looked, and found the cause. Without it, it is refused.
+
+        Raises:
+            MessageError: If there is no such recovery.
+        """
+        known = [name.lower() for name in schema.Recover.Recovery.keys()[1:]]
+        if recovery not in known:
+            raise MessageError(f"no recovery {recovery!r}: use {', '.join(known)}")
+        recover = schema.Recover(recovery=recovery.upper(), reason=one_line(reason), looked=looked)
+        return await self._other(_C(command=_C.RECOVER, recover=recover))
+
     async def stop(self, reason: str = "") -> StopResult:
         """Request a stop, which latches. A stop request is not an emergency stop."""
         result = await request_stop(self._session, self.site, self.robot, self.operator, reason)

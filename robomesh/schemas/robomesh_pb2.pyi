@@ -139,7 +139,7 @@ class ControllerState(_message.Message):
     def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., link: _Optional[_Union[ControllerState.Link, str]] = ..., mode: _Optional[_Union[ControllerState.Mode, str]] = ..., activity: _Optional[_Union[ControllerState.Activity, str]] = ..., homed: _Optional[_Union[ControllerState.Known, str]] = ..., trace: _Optional[_Union[ControllerState.Known, str]] = ..., fault: _Optional[str] = ..., last_unit_age_s: _Optional[float] = ..., controller_time_s: _Optional[float] = ..., counters: _Optional[_Union[LinkCounters, _Mapping]] = ..., read_only: _Optional[bool] = ..., stop: _Optional[_Union[StopState, _Mapping]] = ..., link_text: _Optional[str] = ..., rate_hz: _Optional[float] = ..., health: _Optional[_Union[LinkHealth, _Mapping]] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., legacy_clients: _Optional[_Union[LegacyClients, _Mapping]] = ..., speed_percent: _Optional[float] = ..., check: _Optional[_Union[ControllerState.Check, str]] = ..., check_text: _Optional[str] = ..., check_starting: _Optional[bool] = ..., link_reasons: _Optional[_Iterable[_Union[Reason, _Mapping]]] = ..., check_reason: _Optional[_Union[Reason, _Mapping]] = ..., program: _Optional[_Union[ControllerState.Program, _Mapping]] = ..., jog: _Optional[_Union[JogState, _Mapping]] = ..., capabilities: _Optional[_Union[Capabilities, _Mapping]] = ..., software: _Optional[str] = ..., joints_unproven: _Optional[bool] = ..., joints_sha256: _Optional[str] = ...) -> None: ...
 
 class Capabilities(_message.Message):
-    __slots__ = ("stops", "commands", "absolute", "dies_with_link")
+    __slots__ = ("stops", "commands", "absolute", "dies_with_link", "recoveries")
     class Stops(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STOPS_UNSPECIFIED: _ClassVar[Capabilities.Stops]
@@ -156,11 +156,13 @@ class Capabilities(_message.Message):
     COMMANDS_FIELD_NUMBER: _ClassVar[int]
     ABSOLUTE_FIELD_NUMBER: _ClassVar[int]
     DIES_WITH_LINK_FIELD_NUMBER: _ClassVar[int]
+    RECOVERIES_FIELD_NUMBER: _ClassVar[int]
     stops: Capabilities.Stops
     commands: _containers.RepeatedScalarFieldContainer[CommandRequest.Command]
     absolute: bool
     dies_with_link: ControllerState.Known
-    def __init__(self, stops: _Optional[_Union[Capabilities.Stops, str]] = ..., commands: _Optional[_Iterable[_Union[CommandRequest.Command, str]]] = ..., absolute: _Optional[bool] = ..., dies_with_link: _Optional[_Union[ControllerState.Known, str]] = ...) -> None: ...
+    recoveries: _containers.RepeatedScalarFieldContainer[Recover.Recovery]
+    def __init__(self, stops: _Optional[_Union[Capabilities.Stops, str]] = ..., commands: _Optional[_Iterable[_Union[CommandRequest.Command, str]]] = ..., absolute: _Optional[bool] = ..., dies_with_link: _Optional[_Union[ControllerState.Known, str]] = ..., recoveries: _Optional[_Iterable[_Union[Recover.Recovery, str]]] = ...) -> None: ...
 
 class JogState(_message.Message):
     __slots__ = ("operator", "jog")
@@ -453,7 +455,7 @@ class LeaseAnswer(_message.Message):
     def __init__(self, lease: _Optional[str] = ..., holder: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., until: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., now: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class CommandRequest(_message.Message):
-    __slots__ = ("lease", "id", "not_after", "command", "joint_positions", "speed_percent", "stop_id", "program", "program_name", "page", "jog")
+    __slots__ = ("lease", "id", "not_after", "command", "joint_positions", "speed_percent", "stop_id", "program", "program_name", "page", "jog", "recover")
     class Command(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         COMMAND_UNSPECIFIED: _ClassVar[CommandRequest.Command]
@@ -468,6 +470,7 @@ class CommandRequest(_message.Message):
         MOVE_RELATIVE: _ClassVar[CommandRequest.Command]
         RUN_PROGRAM: _ClassVar[CommandRequest.Command]
         JOG: _ClassVar[CommandRequest.Command]
+        RECOVER: _ClassVar[CommandRequest.Command]
     COMMAND_UNSPECIFIED: CommandRequest.Command
     HOME: CommandRequest.Command
     HOLD: CommandRequest.Command
@@ -480,6 +483,7 @@ class CommandRequest(_message.Message):
     MOVE_RELATIVE: CommandRequest.Command
     RUN_PROGRAM: CommandRequest.Command
     JOG: CommandRequest.Command
+    RECOVER: CommandRequest.Command
     LEASE_FIELD_NUMBER: _ClassVar[int]
     ID_FIELD_NUMBER: _ClassVar[int]
     NOT_AFTER_FIELD_NUMBER: _ClassVar[int]
@@ -491,6 +495,7 @@ class CommandRequest(_message.Message):
     PROGRAM_NAME_FIELD_NUMBER: _ClassVar[int]
     PAGE_FIELD_NUMBER: _ClassVar[int]
     JOG_FIELD_NUMBER: _ClassVar[int]
+    RECOVER_FIELD_NUMBER: _ClassVar[int]
     lease: str
     id: int
     not_after: _timestamp_pb2.Timestamp
@@ -502,7 +507,36 @@ class CommandRequest(_message.Message):
     program_name: str
     page: PageReport
     jog: Jog
-    def __init__(self, lease: _Optional[str] = ..., id: _Optional[int] = ..., not_after: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., command: _Optional[_Union[CommandRequest.Command, str]] = ..., joint_positions: _Optional[_Iterable[float]] = ..., speed_percent: _Optional[float] = ..., stop_id: _Optional[int] = ..., program: _Optional[str] = ..., program_name: _Optional[str] = ..., page: _Optional[_Union[PageReport, _Mapping]] = ..., jog: _Optional[_Union[Jog, _Mapping]] = ...) -> None: ...
+    recover: Recover
+    def __init__(self, lease: _Optional[str] = ..., id: _Optional[int] = ..., not_after: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., command: _Optional[_Union[CommandRequest.Command, str]] = ..., joint_positions: _Optional[_Iterable[float]] = ..., speed_percent: _Optional[float] = ..., stop_id: _Optional[int] = ..., program: _Optional[str] = ..., program_name: _Optional[str] = ..., page: _Optional[_Union[PageReport, _Mapping]] = ..., jog: _Optional[_Union[Jog, _Mapping]] = ..., recover: _Optional[_Union[Recover, _Mapping]] = ...) -> None: ...
+
+class Recover(_message.Message):
+    __slots__ = ("recovery", "reason", "looked")
+    class Recovery(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        RECOVERY_UNSPECIFIED: _ClassVar[Recover.Recovery]
+        UNLOCK_PROTECTIVE_STOP: _ClassVar[Recover.Recovery]
+        CLOSE_SAFETY_POPUP: _ClassVar[Recover.Recovery]
+        RESTART_SAFETY: _ClassVar[Recover.Recovery]
+        POWER_ON: _ClassVar[Recover.Recovery]
+        BRAKE_RELEASE: _ClassVar[Recover.Recovery]
+        SERVO_ON: _ClassVar[Recover.Recovery]
+        RESET_ALARM: _ClassVar[Recover.Recovery]
+    RECOVERY_UNSPECIFIED: Recover.Recovery
+    UNLOCK_PROTECTIVE_STOP: Recover.Recovery
+    CLOSE_SAFETY_POPUP: Recover.Recovery
+    RESTART_SAFETY: Recover.Recovery
+    POWER_ON: Recover.Recovery
+    BRAKE_RELEASE: Recover.Recovery
+    SERVO_ON: Recover.Recovery
+    RESET_ALARM: Recover.Recovery
+    RECOVERY_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    LOOKED_FIELD_NUMBER: _ClassVar[int]
+    recovery: Recover.Recovery
+    reason: str
+    looked: bool
+    def __init__(self, recovery: _Optional[_Union[Recover.Recovery, str]] = ..., reason: _Optional[str] = ..., looked: _Optional[bool] = ...) -> None: ...
 
 class Jog(_message.Message):
     __slots__ = ("frame", "axis", "joint", "speed")

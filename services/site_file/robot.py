@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
 
 from protocol_gateway.core.codes import code_table
+from protocol_gateway.drivers.driver import Recovery
 from protocol_gateway.drivers.fanuc.axes import FanucSettings
 from protocol_gateway.drivers.opcua.settings import OpcUaSettings
 from protocol_gateway.drivers.registry import OWN, is_known, protocols
@@ -89,6 +90,8 @@ class Robot(BaseModel):
             controller's. Without it, the joints of a controller that reports its tool's pose are shown as
             unproven, and count for no check.
         experimental: Send commands although this protocol's were never tried on a real controller.
+        recover: Actions that an operator may send after a stop or fault of the controller's own, as in
+            `["unlock_protective_stop", "power_on"]` (docs/safety.md#recovery).
         stale_after_s: The stale time [s]: without a unit of the controller for this long, the robot's state
             is stale; without joint positions for this long, the gateway refuses motion. It reconnects after
             twice this time, at least 4 s.
@@ -118,6 +121,7 @@ class Robot(BaseModel):
     stop_proven: StrictBool | StopTrial | None = None
     verified: Path | None = None
     experimental: StrictBool = False
+    recover: tuple[Recovery, ...] = ()
     stale_after_s: Annotated[float, Field(gt=0.05, le=60)] = 1.0
     demo: StrictBool = False
     legacy_clients: LegacyClients | None = None
@@ -143,6 +147,15 @@ class Robot(BaseModel):
                 '{ driver = "rtde", means = "...", software = "5.12.4", date = 2026-11-26 }'
             )
         return proven
+
+    @field_validator("recover", mode="before")
+    @classmethod
+    def _recover(cls, names: Any) -> Any:
+        known = [each.value for each in Recovery]
+        names = names if isinstance(names, list | tuple) else [names]
+        if wrong := [name for name in names if name not in known]:
+            raise ValueError(f"{wrong[0]!r} is none of {', '.join(map(repr, known))}")
+        return names
 
     @field_validator("protocol")
     @classmethod

@@ -11,6 +11,7 @@ from protocol_gateway.authority.preconditions import (
     controller_command,
     controller_commands,
     obstacle,
+    recoveries_of,
 )
 from protocol_gateway.drivers.driver import (
     Activity,
@@ -18,6 +19,8 @@ from protocol_gateway.drivers.driver import (
     Mode,
     MoveAbsolute,
     MoveRelative,
+    Recover,
+    Recovery,
     Speed,
     StatusReceived,
     Stop,
@@ -27,6 +30,7 @@ from protocol_gateway.link.link import LinkState, LinkStatus
 from protocol_gateway.motion import MotionDetector, has_arrived, is_moving, motion_may_be_held
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest
+from robomesh.schemas.robomesh_pb2 import Recover as RecoverMessage
 from robots.description import load
 from robots.joints import JointType, joints_of
 
@@ -149,7 +153,65 @@ def test_what_the_driver_does_not_have_is_refused_in_words():
     few = SITUATIONS["stops and moves only"]
     assert "this controller has no HOLD" in obstacle(command(C.HOLD), few, JOINTS).text
     assert "its encoders are absolute" in obstacle(command(C.HOME), few, JOINTS).text
-    assert set(commands_of(few.capabilities)) == {C.MOVE_ABSOLUTE, C.MOVE_RELATIVE, C.RUN_PROGRAM}
+    assert set(commands_of(few)) == {C.MOVE_ABSOLUTE, C.MOVE_RELATIVE, C.RUN_PROGRAM}
+
+
+RECOVERABLE = replace(
+    in_state(activity=Activity.STOPPED),
+    capabilities=Capabilities(
+        commands=frozenset({Stop}), recoveries=frozenset({Recovery.POWER_ON, Recovery.BRAKE_RELEASE})
+    ),
+    recover=frozenset({Recovery.POWER_ON}),
+)
+
+
+def recover(recovery=RecoverMessage.POWER_ON, reason="the fuse was changed", looked=True):
+    return CommandRequest(
+        command=C.RECOVER, recover=RecoverMessage(recovery=recovery, reason=reason, looked=looked)
+    )
+
+
+@pytest.mark.parametrize(
+    ("request_", "controller", "code"),
+    [
+        (recover(), RECOVERABLE, None),
+        (recover(), replace(RECOVERABLE, stop_arrives=False, positions=None), None),
+        (recover(), READY, codes.RECOVER_NOT_THERE),
+        (recover(RecoverMessage.SERVO_ON), RECOVERABLE, codes.RECOVER_NOT_THERE),
+        (CommandRequest(command=C.RECOVER), RECOVERABLE, codes.RECOVER_NOT_THERE),
+        (recover(RecoverMessage.BRAKE_RELEASE), RECOVERABLE, codes.RECOVER_NOT_ALLOWED),
+        (recover(reason=" "), RECOVERABLE, codes.RECOVER_REASON),
+        (recover(looked=False), RECOVERABLE, codes.RECOVER_LOOKED),
+        *(
+            (recover(), replace(RECOVERABLE, status=replace(READY.status, **status)), code)
+            for status, code in (
+                ({"mode": Mode.LOCAL}, codes.CONTROLLER_LOCAL),
+                ({"mode": None}, codes.CONTROLLER_MODE_UNKNOWN),
+                ({"activity": Activity.MOVING}, codes.RECOVER_MOVES),
+                ({"activity": Activity.HOMING}, codes.RECOVER_MOVES),
+                ({"activity": Activity.HOLDING}, codes.RECOVER_HELD),
+                ({"activity": Activity.FAULT}, None),
+            )
+        ),
+        (recover(), replace(RECOVERABLE, read_only=codes.STOP_NOT_PROVEN()), codes.ROBOT_READ_ONLY),
+        (recover(), replace(RECOVERABLE, link=SITUATIONS["silent"].link), codes.LINK_SILENT),
+    ],
+)
+def test_a_recovery_is_refused_by_site_file_state_and_missing_words(request_, controller, code):
+    refusal = obstacle(request_, controller, JOINTS)
+    assert (refusal and _code(refusal)) == (code and code.name)
+
+
+def _code(refusal):
+    # Some refusals name the command, and have the reason as their cause.
+    return refusal.reason.code
+
+
+def test_only_allowed_recoveries_are_offered():
+    assert commands_of(RECOVERABLE) == [C.RECOVER]
+    assert recoveries_of(RECOVERABLE) == [RecoverMessage.POWER_ON]
+    assert C.RECOVER not in commands_of(replace(RECOVERABLE, recover=frozenset()))
+    assert controller_command(recover()) == Recover(Recovery.POWER_ON)
 
 
 def test_a_driver_without_relative_motion_gets_targets():

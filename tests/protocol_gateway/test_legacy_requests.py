@@ -13,7 +13,14 @@ from protocol_gateway.authority.preconditions import Controller
 from protocol_gateway.control.events import LeaseEnded, MotionObserved
 from protocol_gateway.core.records import Error, read_records, write_unit
 from protocol_gateway.core.stream import Unit, UnitStream
-from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
+from protocol_gateway.drivers.driver import (
+    COMMANDS,
+    Activity,
+    Capabilities,
+    Mode,
+    Recovery,
+    StatusReceived,
+)
 from protocol_gateway.legacy.requests import (
     asks_for_more,
     asks_to_stop,
@@ -24,7 +31,7 @@ from protocol_gateway.legacy.requests import (
 from protocol_gateway.legacy.settings import plain_address
 from protocol_gateway.link.link import LinkState, LinkStatus
 from robomesh import reason_codes as codes
-from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
+from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest, Recover
 from robots.description import load
 from robots.joints import joints_of
 from tests.conftest import run
@@ -207,3 +214,34 @@ def test_any_unit_is_requests_or_a_refusal(records):
             assert write_unit((asked,))
         else:
             assert not asked or asks_for_more(event.records)
+
+
+@pytest.mark.parametrize("word", ["recover", "unlock_protective_stop", "power_on", "servo_on"])
+def test_recoveries_are_refused_in_words(word):
+    answer = requests(f"1#COMMAND*{word}")
+    assert isinstance(answer, Error)
+    assert "may not recover a controller" in answer.text
+
+
+def test_a_recovery_of_another_source_than_the_mesh_or_beside_others_is_refused(tmp_path):
+    capabilities = Capabilities(commands=COMMANDS, recoveries=frozenset(Recovery))
+    recover = Recover(recovery=Recover.POWER_ON, reason="fuse", looked=True)
+    mine = {"command": C.RECOVER, "recover": recover}
+
+    async def main():
+        async with control_bench(tmp_path) as bench:
+            bench.known = replace(READY, capabilities=capabilities, recover=frozenset(Recovery))
+            await bench.lease(A.ACQUIRE)
+            bench.control.handle(MotionObserved(moving=False))
+            for source, alone in (("tcp 10.0.0.9", True), ("program", True), ("mesh", False)):
+                request = CommandRequest(lease=bench.secret, id=1, **mine)
+                others = [] if alone else [CommandRequest(lease=bench.secret, id=2, command=C.HOLD)]
+                answer = await bench.control.attempt([request, *others], operator="li", source=source)
+                assert answer.reason.code == codes.RECOVER_PROGRAM.name, source
+                await bench.lease(A.RELEASE, lease=bench.secret)
+                await bench.lease(A.ACQUIRE)
+            step = await bench.control.step(CommandRequest(lease=bench.secret, **mine), operator="li")
+            assert step.reason.code == codes.RECOVER_PROGRAM.name
+            assert bench.socket == []
+
+    run(main())

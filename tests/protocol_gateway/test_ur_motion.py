@@ -247,7 +247,7 @@ def test_what_others_do_during_a_motion_latches_a_stop(mesh, tmp_path, monkeypat
             assert abs(positions(server)[0] - target[0]) > 0.3
             # Whatever ends the obstacle, the motion does not go on.
             rest = positions(server)
-            server.controller.unlock(time.monotonic())
+            server.controller.end_protective_stop(time.monotonic())
             server.controller.remote = True
             server.controller.programs.play(time.monotonic())
             await until(lambda: server.controller.programs.state is RuntimeState.STOPPED)

@@ -17,6 +17,9 @@ from protocol_gateway.drivers.driver import (
     MoveAbsolute,
     MoveRelative,
     Open,
+    Recover,
+    RecoverAnswered,
+    Recovery,
     Report,
     Reset,
     Send,
@@ -465,3 +468,150 @@ def test_inputs_that_are_used_exist():
     names = Registers(first_input=46, first_output=45)
     assert all(INPUT_TYPES[name] == "INT32" for name in names.inputs)
     assert all(OFFERED[name] == "INT32" for name in names.outputs)
+
+
+UNLOCK = Recovery.UNLOCK_PROTECTIVE_STOP
+FITTING = {
+    UNLOCK: {"safety_status": 3},
+    Recovery.CLOSE_SAFETY_POPUP: {},
+    Recovery.RESTART_SAFETY: {"safety_status": 8, "robot_mode": 3},
+    Recovery.POWER_ON: {"robot_mode": 3},
+    Recovery.BRAKE_RELEASE: {"robot_mode": 5},
+}
+WORDS = {
+    UNLOCK: (b"unlock protective stop\n", b"Protective stop releasing"),
+    Recovery.CLOSE_SAFETY_POPUP: (b"close safety popup\n", b"closing safety popup"),
+    Recovery.RESTART_SAFETY: (b"restart safety\n", b"Restarting safety"),
+    Recovery.POWER_ON: (b"power on\n", b"Powering on"),
+    Recovery.BRAKE_RELEASE: (b"brake release\n", b"Brake releasing"),
+}
+
+
+def in_state(seconds=6.0, *, remote=True, **state):
+    """Return an arm after a time in a state of its controller."""
+    arm = Arm()
+    arm.safety = state.get("safety_status", 1)
+    end_s, answered = arm.now_s + seconds, 1
+    while arm.now_s < end_s:
+        arm.now_s += 0.1
+        arm.state(**state)
+        if arm.timer_s is not None and arm.timer_s <= arm.now_s:
+            arm._do(arm.driver.timer_ended(arm.now_s))
+        if arm.sent["dashboard"].count(b"is in remote control") > answered:
+            answered += 1
+            arm.answer(remote)
+    return arm
+
+
+def answers(effects):
+    return [each for effect in flat(effects, Report) for each in effect.events]
+
+
+@pytest.mark.parametrize("recovery", FITTING)
+def test_a_recovery_is_sent_once_and_its_answer_reported(recovery):
+    arm = in_state(**FITTING[recovery])
+    command, answer = WORDS[recovery]
+    assert flat(arm.command(Recover(recovery)), Send) == [Send(DASHBOARD, command)]
+    with pytest.raises(NotReadyError, match="has not answered"):
+        arm.command(Recover(recovery))
+    effects = arm.receive(DASHBOARD, answer + b"\n")
+    assert answers(effects) == [RecoverAnswered(recovery, True, answer.decode())]
+    assert not flat(effects, Send)
+    assert arm.sent["dashboard"].count(command) == 1
+    assert recovery in arm.driver.capabilities.recoveries
+
+
+@pytest.mark.parametrize("recovery", [each for each in FITTING if FITTING[each]])
+def test_a_recovery_that_does_not_fit_the_state_is_refused(recovery):
+    for state in ({}, *(each for other, each in FITTING.items() if other is not recovery)):
+        with pytest.raises(NotReadyError, match="does not fit"):
+            in_state(**state).command(Recover(recovery))
+
+
+def test_a_protective_stop_is_unlocked_after_5_s_as_seen_by_the_driver():
+    arm = in_state(4.8, safety_status=3)
+    with pytest.raises(NotReadyError, match="seen for 4"):
+        arm.command(Recover(UNLOCK))
+    arm = in_state(5.1, safety_status=3)
+    assert arm.command(Recover(UNLOCK))
+    # After a lost connection its begin is not known any longer.
+    arm = in_state(5.1, safety_status=3)
+    arm._do(arm.driver.closed(RTDE, arm.now_s))
+    arm.sent["rtde"].clear()
+    arm._do(arm.driver.opened(RTDE, arm.now_s))
+    arm.greet(VERSION)
+    arm.state(safety_status=3)
+    with pytest.raises(NotReadyError, match=r"seen for 0\.0 s only"):
+        arm.command(Recover(UNLOCK))
+
+
+def test_a_recovery_is_refused_while_a_program_runs_or_waits_and_without_state_or_mode():
+    arm = in_state(**FITTING[UNLOCK])
+    for runtime in (2, 3, 4, 5):
+        arm.state(runtime_state=runtime, safety_status=3)
+        with pytest.raises(NotReadyError, match="another program runs or waits"):
+            arm.command(Recover(UNLOCK))
+    arm.state(safety_status=3)
+    arm.now_s += 0.3
+    with pytest.raises(NotReadyError, match="too old"):
+        arm.command(Recover(UNLOCK))
+    arm = in_state(**FITTING[UNLOCK], remote=False)
+    with pytest.raises(NotReadyError, match="local"):
+        arm.command(Recover(UNLOCK))
+    arm = in_state(**FITTING[UNLOCK])
+    arm._do(arm.driver.closed(DASHBOARD, arm.now_s))
+    with pytest.raises(NotReadyError, match="dashboard"):
+        arm.command(Recover(UNLOCK))
+    assert b"unlock" not in arm.sent["dashboard"]
+    with pytest.raises(CommandError, match="Recover"):
+        arm.driver.encode(Recover(Recovery.SERVO_ON))
+
+
+def test_a_refused_recovery_is_reported_with_the_controller_s_words():
+    arm = in_state(**FITTING[UNLOCK])
+    arm.command(Recover(UNLOCK))
+    effects = arm.receive(DASHBOARD, b"Cannot unlock protective stop until 5s after occurrence.\n")
+    (answer,) = answers(effects)
+    assert (answer.accepted, answer.answer[:13]) == (False, "Cannot unlock")
+    assert arm.command(Recover(UNLOCK))
+
+
+def test_a_recovery_without_an_answer_is_unknown_and_not_sent_again():
+    arm = in_state(**FITTING[UNLOCK])
+    arm.command(Recover(UNLOCK))
+    effects = arm.wait(9.5)
+    assert not answers(effects) or not [e for e in answers(effects) if isinstance(e, RecoverAnswered)]
+    # A stop does not wait for it.
+    assert Send(DASHBOARD, b"stop\n", alternative=True) in arm.command(Stop())
+    effects = arm.wait(1.0)
+    (answer,) = (each for each in answers(effects) if isinstance(each, RecoverAnswered))
+    assert (answer.recovery, answer.accepted) == (UNLOCK, None)
+    assert Close(DASHBOARD, "it does not answer") in effects
+    arm.wait(5.0)
+    assert arm.sent["dashboard"].count(b"unlock") == 1
+
+
+@pytest.mark.parametrize("lost", ["closed", "started"])
+def test_a_connection_that_ends_before_the_answer_leaves_it_unknown(lost):
+    arm = in_state(**FITTING[UNLOCK])
+    arm.command(Recover(UNLOCK))
+    if lost == "closed":
+        effects = arm._do(arm.driver.closed(DASHBOARD, arm.now_s))
+    else:
+        effects = arm._do(arm.driver.started(arm.now_s))
+    (answer,) = answers(effects)
+    assert (answer.recovery, answer.accepted) == (UNLOCK, None)
+
+
+def test_nothing_is_recovered_by_itself():
+    """Not at the connection, by a reset, by a stop, nor by a motion that is refused."""
+    for state in FITTING.values():
+        arm = in_state(**state)
+        arm.command(Reset())
+        arm.command(Stop())
+        if state:
+            with pytest.raises(NotReadyError):
+                arm.command(MoveAbsolute(TARGET))
+        arm.wait(1.0)
+        assert set(bytes(arm.sent["dashboard"]).splitlines()) <= {b"is in remote control", b"stop"}
+        assert not arm.sent["scripts"]

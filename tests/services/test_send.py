@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from robomesh import reason_codes as codes
-from robomesh.errors import RefusedError
+from robomesh.errors import MessageError, RefusedError
 from robomesh.requests import ask_all
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
@@ -200,3 +200,37 @@ def test_the_advice_of_a_refusal_is_a_command():
     assert sentence("link down") == "link down"
     # An earlier gateway sends no codes.
     assert sentence(str(other)) == str(other)
+
+
+@pytest.mark.parametrize(
+    ("words", "options", "text"),
+    [
+        (["recover"], {}, "recover needs one name: unlock_protective_stop"),
+        (["recover", "power_on"], {}, "--reason"),
+        (["recover", "power_on"], {"reason": " "}, "--reason"),
+        (["recover", "power_on"], {"reason": "fuse"}, "--looked"),
+        (["home"], {"reason": "fuse"}, "belong to recover"),
+    ],
+)
+def test_a_recovery_needs_a_name_a_reason_and_a_look(words, options, text):
+    with pytest.raises(send.WordsError, match=text):
+        send.run("hall/arm", words, "", "li", False, **options)
+
+
+def test_a_recovery_is_sent_with_its_reason(mesh):
+    async def main():
+        async with open_session(mesh) as session, open_session(mesh) as own:
+            gateway = Gateway(own, text="power_on is on the controller's socket")
+            gateway.ready.set()
+            command = send._recovery(["power_on"], "fuse\nchanged", True)
+            sent = await send.send_and_wait(session, discovery.Robot("hall", "arm"), "li", command)
+            assert (sent.accepted, sent.text) == (True, "power_on is on the controller's socket")
+            (asked,) = gateway.asked
+            recover = schema.Recover(recovery=schema.Recover.POWER_ON, reason="fuse changed", looked=True)
+            assert asked.recover == recover
+            with pytest.raises(MessageError, match="no recovery 'dance': use unlock_protective_stop"):
+                await send.send_and_wait(
+                    session, discovery.Robot("hall", "arm"), "li", send._recovery(["dance"], "x", True)
+                )
+
+    run(main())

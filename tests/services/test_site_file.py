@@ -92,6 +92,11 @@ def test_codes_are_numbers(tmp_path):
         (f'site = "hall"\n{ROBOT}stop_proven = "yes"', "robot.arm.stop_proven = 'yes'"),
         (f'site = "hall"\n{ROBOT}accept_unknown = ["link"]', "robot.arm.accept_unknown"),
         (
+            f'site = "hall"\n{ROBOT}recover = ["power"]',
+            "robot.arm.recover: 'power' is none of 'unlock_protective_stop', 'close_safety_popup'",
+        ),
+        (f'site = "hall"\n{ROBOT}recover = 7', "robot.arm.recover = 7: 7 is none of"),
+        (
             'site = "hall"\n[renderer]\nsize = [333, 200]',
             "renderer.size.0 = 333: should be a multiple of 2",
         ),

@@ -320,6 +320,57 @@ def test_dashboard_stops_and_plays_the_loaded_program():
     assert "could not understand" in arm.ask("dance")
 
 
+def test_dashboard_ends_a_protective_stop_and_leaves_the_program_paused():
+    arm = Simulated(tour=demo_tour(PUMA))
+    arm.run(0.5)
+    arm.controller.protective_stop(arm.now_s)
+    arm.run(4.9)
+    assert arm.ask("unlock protective stop") == dashboard.STOP_TOO_YOUNG
+    assert arm.ask("safetystatus") == "Safetystatus: PROTECTIVE_STOP"
+    assert arm.ask("play") == "Failed to execute: play"
+    arm.run(0.2)
+    rest = arm.positions
+    assert arm.ask("unlock protective stop") == "Protective stop releasing"
+    arm.run(0.5)
+    assert arm.ask("safetystatus") == "Safetystatus: NORMAL"
+    assert arm.ask("programState") == "PAUSED demo"
+    assert arm.positions == pytest.approx(rest)
+    assert arm.ask("close safety popup") == "closing safety popup"
+    assert arm.ask("play") == "Starting program"
+
+
+def test_dashboard_restarts_safety_and_powers_the_arm_on_brake_by_brake():
+    arm = Simulated(tour=demo_tour(PUMA))
+    arm.run(0.5)
+    arm.controller.violate(arm.now_s)
+    arm.run(0.5)
+    modes = ("robot_mode", "safety_mode", "safety_status_bits", "runtime_state")
+    assert [*arm.controller.values(modes, arm.now_s).values()] == [3, 8, 1 << 8 | 1 << 10, 1]
+    # Answered alike, without an effect.
+    assert arm.ask("power on") == "Powering on"
+    arm.run(2.0)
+    assert arm.ask("robotmode") == "Robotmode: POWER_OFF"
+    assert arm.ask("restart safety") == "Restarting safety"
+    assert (arm.ask("safetystatus"), arm.ask("robotmode")) == (
+        "Safetystatus: NORMAL",
+        "Robotmode: POWER_OFF",
+    )
+    assert arm.ask("power on") == "Powering on"
+    assert arm.ask("robotmode") == "Robotmode: POWER_ON"
+    arm.run(1.0)
+    assert arm.ask("robotmode") == "Robotmode: IDLE"
+    assert arm.ask("play") == "Failed to execute: play"
+    assert arm.ask("brake release") == "Brake releasing"
+    arm.run(1.0)
+    assert arm.ask("robotmode") == "Robotmode: RUNNING"
+    assert arm.state is RuntimeState.STOPPED
+    assert arm.ask("power off") == "Powering off"
+    # It gets its power on the way.
+    assert arm.ask("brake release") == "Brake releasing"
+    arm.run(2.0)
+    assert arm.ask("robotmode") == "Robotmode: RUNNING"
+
+
 def test_dashboard_executes_nothing_in_local_control():
     arm = Simulated(tour=demo_tour(PUMA))
     arm.run(0.1)

@@ -70,6 +70,36 @@ while receive.getRuntimeState() != 1:
 print(json.dumps([target, there, stopped]))
 """
 
+RECOVER = """
+import json, sys, time
+from dashboard_client import DashboardClient
+client = DashboardClient(sys.argv[1])
+client.connect()
+said = [client.isInRemoteControl(), client.safetystatus(), client.robotmode()]
+try:
+    client.unlockProtectiveStop()
+    said.append("unlocked")
+except RuntimeError as error:
+    said.append(str(error))
+began = time.monotonic()
+while time.monotonic() < began + 5.5:
+    time.sleep(0.1)
+client.closeSafetyPopup()
+client.unlockProtectiveStop()
+said += [client.safetystatus(), client.programState()]
+client.stop()
+client.restartSafety()
+said.append(client.robotmode())
+client.powerOn()
+while "IDLE" not in client.robotmode():
+    time.sleep(0.05)
+client.brakeRelease()
+while "RUNNING" not in client.robotmode():
+    time.sleep(0.05)
+said += [client.robotmode(), client.running()]
+print(json.dumps(said))
+"""
+
 
 async def client_of(address, program, *words):
     """Return the last line that a program prints, read as JSON."""
@@ -105,7 +135,7 @@ async def signals_of(address, port):
 
 
 @contextlib.asynccontextmanager
-async def simulator(address, *, demo=True):
+async def simulator(address, *, demo=True, faults=()):
     ready = asyncio.get_running_loop().create_future()
     settings = UrSettings(
         listen=f"{address}:30004",
@@ -113,6 +143,7 @@ async def simulator(address, *, demo=True):
         scripts=f"{address}:30003",  # where ur_rtde sends its program
         dashboard=f"{address}:29999",
         demo=demo,
+        faults=faults,
     )
     task = asyncio.create_task(serve_rtde(settings, ready=ready.set_result))
     await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
@@ -197,3 +228,16 @@ def test_program_of_ur_rtde_moves_and_stops_the_arm_and_its_watchdog_ends_it():
         assert stopped[1:] == pytest.approx(target[1:], abs=1e-9)
 
     run(main())
+
+
+def test_dashboard_client_of_ur_rtde_recovers_the_arm():
+    async def main():
+        async with simulator("127.0.31.6", faults=("fault@0+600",)):
+            return await client_of("127.0.31.6", RECOVER)
+
+    remote, safety, mode, young, unlocked, program, restarted, running, plays = run(main())
+    assert remote
+    assert ("PROTECTIVE_STOP" in safety, "RUNNING" in mode) == (True, True)
+    assert "5s after occurrence" in young
+    assert ("NORMAL" in unlocked, "PAUSED" in program) == (True, True)
+    assert ("POWER_OFF" in restarted, "RUNNING" in running, plays) == (True, True, False)

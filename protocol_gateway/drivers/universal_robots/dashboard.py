@@ -1,16 +1,26 @@
-"""Client of the dashboard server, without I/O: whether the robot is in remote control, and the stop.
+"""Client of the dashboard server, without I/O: whether the robot is in remote control, stop, recoveries.
 
 One line each way; answers come in the order of the commands. A connection that was opened in local control
 stays restricted, so it is used for the question only.
 """
 
 from collections import deque
+from collections.abc import Mapping
 from enum import Enum, auto
 
+from protocol_gateway.drivers.driver import RecoverAnswered, Recovery
 from robomesh.texts import one_line
 
 QUESTION = b"is in remote control\n"
 STOP = b"stop\n"
+RECOVERIES: Mapping[Recovery, tuple[bytes, str]] = {
+    Recovery.UNLOCK_PROTECTIVE_STOP: (b"unlock protective stop\n", "Protective stop releasing"),
+    Recovery.CLOSE_SAFETY_POPUP: (b"close safety popup\n", "closing safety popup"),
+    Recovery.RESTART_SAFETY: (b"restart safety\n", "Restarting safety"),
+    Recovery.POWER_ON: (b"power on\n", "Powering on"),
+    Recovery.BRAKE_RELEASE: (b"brake release\n", "Brake releasing"),
+}
+"""Command of each recovery, and the answer of a controller that has taken it."""
 _LONGEST_LINE = 1000
 
 
@@ -18,6 +28,7 @@ class _Expected(Enum):
     GREETING = auto()
     MODE = auto()
     STOP = auto()
+    RECOVERY = auto()
 
 
 class Dashboard:
@@ -30,9 +41,15 @@ class Dashboard:
         was_local: The connection was answered in local control, so it is restricted.
         lost: The connection cannot be read.
         refusals: Answers to a stop other than that it was done, since the last look.
+        recovery: Recovery without an answer; None: there is none.
+        recovery_s: Time at which it was sent.
+        answers: Answers to recoveries since the last look, with the lost ones.
     """
 
     def __init__(self) -> None:
+        self.recovery: Recovery | None = None
+        self.recovery_s = float("-inf")
+        self.answers: list[RecoverAnswered] = []
         self.opened()
 
     def opened(self) -> None:
@@ -43,6 +60,8 @@ class Dashboard:
         self.was_local = self.lost = False
         self.refusals: list[str] = []
         self._line = b""
+        if self.recovery is not None:
+            self._answer(None, "no answer before the connection ended")
         self._expected = deque([_Expected.GREETING])
 
     def ask(self, now_s: float) -> bytes:
@@ -55,6 +74,17 @@ class Dashboard:
         """Return the command that ends the running program."""
         self._expected.append(_Expected.STOP)
         return STOP
+
+    def recover(self, recovery: Recovery, now_s: float) -> bytes:
+        """Return the command of a recovery."""
+        self.recovery, self.recovery_s = recovery, now_s
+        self._expected.append(_Expected.RECOVERY)
+        return RECOVERIES[recovery][0]
+
+    def _answer(self, accepted: bool | None, answer: str) -> None:
+        assert self.recovery is not None
+        self.answers.append(RecoverAnswered(self.recovery, accepted, answer))
+        self.recovery = None
 
     def receive(self, data: bytes, now_s: float) -> None:
         """Take the next bytes, split anywhere."""
@@ -73,6 +103,9 @@ class Dashboard:
                 self.was_local = self.was_local or self.remote is False
             case _Expected.STOP if line != "Stopped":
                 self.refusals.append(line)
+            case _Expected.RECOVERY if self.recovery is not None:
+                expected = RECOVERIES[self.recovery][1].lower()
+                self._answer(line.lower().startswith(expected), line)
             case None:
                 # Which answer belongs to which command is not known any longer.
                 self.lost = True

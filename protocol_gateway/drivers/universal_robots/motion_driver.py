@@ -4,7 +4,7 @@
     ---------    -----   ---------------   -----------------------------------------------------------
     rtde         30004   reading           the greeting, as without motion
     primary      30011   nothing           nothing
-    dashboard    29999   stop              the question for remote control twice a second; "stop"
+    dashboard    29999   stop              the question for remote control twice a second; "stop"; recoveries
     inputs       30004   motion            two registers, 50 times a second while a motion runs
     scripts      30001   motion            the program of a motion
 
@@ -33,6 +33,8 @@ from protocol_gateway.drivers.driver import (
     Mode,
     MoveAbsolute,
     Open,
+    Recover,
+    Recovery,
     Report,
     Reset,
     Send,
@@ -43,7 +45,7 @@ from protocol_gateway.drivers.driver import (
     Stop,
     StopEnds,
 )
-from protocol_gateway.drivers.universal_robots.dashboard import Dashboard
+from protocol_gateway.drivers.universal_robots.dashboard import RECOVERIES, Dashboard
 from protocol_gateway.drivers.universal_robots.driver import (
     JOINTS,
     OUTPUT_FIELDS,
@@ -78,6 +80,10 @@ START_S = 0.5
 _BEAT_S = 0.02
 _ASK_S = 0.5
 _ANSWER_WITHIN_S = 2.0
+# A controller answers a recovery after it was begun; nothing else is answered meanwhile.
+_RECOVERY_WITHIN_S = 10.0
+UNLOCK_AFTER_S = 5.0
+"""Age of a protective stop from which on controllers unlock it."""
 _MODE_VALID_S = 1.5
 _STATE_VALID_S = 0.2
 _BLIND_S = 0.3
@@ -92,6 +98,7 @@ _FIRST_PERCENT = 25.0
 _LARGEST_NUMBER = 2**30
 _MAY_MOVE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
 _NO_MOTION = 0
+_FAULTS = frozenset({SafetyMode.VIOLATION, SafetyMode.FAULT})
 
 
 @dataclass
@@ -120,6 +127,7 @@ class RtdeMotionDriver(RtdeDriver):
         reports_pose=True,
         experimental=True,
         stop_means="dashboard stop and the program's stopj",
+        recoveries=frozenset(RECOVERIES),
     )
     # Beats, questions, greetings.
     requests_a_second = 100.0
@@ -160,13 +168,16 @@ class RtdeMotionDriver(RtdeDriver):
         self._percent = _FIRST_PERCENT
         self._rests_after_stop = True
         self._still: tuple[tuple[float, ...], float] | None = None
+        self._protective_s: float | None = None
 
     # ----------------------------------------------------------------- channels
 
     def started(self, now_s: float) -> Effects:
         """Connect to all interfaces, but to that of scripts only in remote control."""
+        self._dashboard.opened()
+        unanswered = self._recoveries()
         self._forget()
-        return self._with_timer((*super().started(now_s), _OPEN_DASHBOARD, _OPEN_INPUTS))
+        return self._with_timer((*unanswered, *super().started(now_s), _OPEN_DASHBOARD, _OPEN_INPUTS))
 
     def opened(self, channel: Channel, now_s: float) -> Effects:
         """Greet."""
@@ -210,12 +221,13 @@ class RtdeMotionDriver(RtdeDriver):
         effects: list[Effect] = []
         if channel is RTDE:
             # The next connection may reach another controller, where no speed was set.
-            self._percent, self._state = _FIRST_PERCENT, None
+            self._percent, self._state, self._protective_s = _FIRST_PERCENT, None, None
         if channel is INPUTS:
             self._inputs.disconnected()
         if channel is DASHBOARD:
             self._dashboard.opened()
             self._due.pop("ask", None)
+            effects += self._recoveries()
         if channel is SCRIPTS:
             # The controller closes it when it changes to local control: the mode must be asked again.
             self._dashboard.remote = None
@@ -274,17 +286,20 @@ class RtdeMotionDriver(RtdeDriver):
 
     def _next_question(self, now_s: float) -> Effects:
         self._due["ask"] = now_s + _ASK_S
-        asked_s = self._dashboard.asked_s
-        if asked_s is None:
-            return (Send(DASHBOARD, self._dashboard.ask(now_s)),)
-        if now_s - asked_s < _ANSWER_WITHIN_S:
+        dashboard = self._dashboard
+        if dashboard.recovery is not None:
+            if now_s - dashboard.recovery_s < _RECOVERY_WITHIN_S:
+                return ()
+        elif dashboard.asked_s is None:
+            return (Send(DASHBOARD, dashboard.ask(now_s)),)
+        elif now_s - dashboard.asked_s < _ANSWER_WITHIN_S:
             return ()
         return self._leave(DASHBOARD, "it does not answer", now_s)
 
     def _answered(self, data: bytes, now_s: float) -> Effects:
         dashboard = self._dashboard
         dashboard.receive(data, now_s)
-        effects: list[Effect] = []
+        effects: list[Effect] = [*self._recoveries()]
         refusals, dashboard.refusals = dashboard.refusals, []
         if refusals and self._state is not None and self._state.runtime_state != RuntimeState.STOPPED:
             text = f"the dashboard has not stopped the program: {refusals[-1]}"
@@ -303,6 +318,11 @@ class RtdeMotionDriver(RtdeDriver):
             self._scripts_wanted = True
             effects.append(_OPEN_SCRIPTS)
         return effects
+
+    def _recoveries(self) -> Effects:
+        """Report answers to recoveries."""
+        answers, self._dashboard.answers = self._dashboard.answers, []
+        return (Report(answers, 0),) if answers else ()
 
     def _close_scripts(self) -> Effects:
         wanted, self._scripts_wanted = self._scripts_wanted, False
@@ -361,6 +381,10 @@ class RtdeMotionDriver(RtdeDriver):
     def _follow(self, state: ControllerState, now_s: float) -> Effects:
         """Follow the motion by a state; give it up if anything is not as expected."""
         self._state, self._state_s = state, now_s
+        if state.safety_mode != SafetyMode.PROTECTIVE_STOP:
+            self._protective_s = None
+        elif self._protective_s is None:
+            self._protective_s = now_s
         motion = self._motion
         if motion is None:
             return ()
@@ -424,6 +448,8 @@ class RtdeMotionDriver(RtdeDriver):
                     words.append(("stop", None))
                 case Reset():
                     words.append(("reset", None))
+                case Recover(recovery) if recovery in RECOVERIES:
+                    words.append(("recover", recovery.value))
                 case _:
                     raise CommandError(f"this controller has no {type(command).__name__}")
         try:
@@ -435,7 +461,7 @@ class RtdeMotionDriver(RtdeDriver):
         """Send what `encode` returned.
 
         Raises:
-            NotReadyError: If a motion cannot be sent now.
+            NotReadyError: If a motion or a recovery cannot be sent now.
         """
         effects: list[Effect] = []
         percent = self._percent
@@ -447,6 +473,8 @@ class RtdeMotionDriver(RtdeDriver):
                     percent = value
                 case "move":
                     effects += self._move(value, percent, now_s)
+                case "recover":
+                    effects.append(self._recover(Recovery(value), now_s))
                 # A reset clears the gateway's latch only: nothing is sent to the controller.
         self._percent = percent
         return self._with_timer(effects)
@@ -478,6 +506,41 @@ class RtdeMotionDriver(RtdeDriver):
         self._due |= {"beat": now_s + _BEAT_S, "start": now_s + START_S}
         return (self._written(self._number), Send(SCRIPTS, script))
 
+    def _recover(self, recovery: Recovery, now_s: float) -> Send:
+        if (obstacle := self._recovery_obstacle(recovery, now_s)) is not None:
+            raise NotReadyError(obstacle)
+        return Send(DASHBOARD, self._dashboard.recover(recovery, now_s))
+
+    def _recovery_obstacle(self, recovery: Recovery, now_s: float) -> Reason | None:
+        """Return why a recovery cannot be sent now; None: it can."""
+        state = self._state
+        if state is None or now_s - self._state_s > _STATE_VALID_S:
+            return codes.UR_STATE_OLD()
+        if self._motion is not None:
+            return codes.UR_MOVES()
+        # A program that waits could go on after the recovery.
+        if state.runtime_state != RuntimeState.STOPPED:
+            return codes.UR_OTHER_PROGRAM()
+        if DASHBOARD.name not in self._opened:
+            return codes.UR_CHANNEL_MISSING(name=DASHBOARD.name)
+        if self._dashboard.recovery is not None:
+            return codes.UR_RECOVERS(recovery=self._dashboard.recovery.value)
+        match self._mode(now_s):
+            case None:
+                return codes.CONTROLLER_MODE_UNKNOWN()
+            case Mode.LOCAL:
+                return codes.CONTROLLER_LOCAL()
+        if not _fits(recovery, state):
+            return codes.UR_NOT_NOW(
+                recovery=recovery.value,
+                safety=_word(SafetyMode, state.safety_mode),
+                robot=_word(RobotMode, state.robot_mode),
+            )
+        seen_s = 0.0 if self._protective_s is None else now_s - self._protective_s
+        if recovery is Recovery.UNLOCK_PROTECTIVE_STOP and seen_s < UNLOCK_AFTER_S:
+            return codes.UR_STOP_YOUNG(seen=seen_s, seconds=UNLOCK_AFTER_S)
+        return None
+
     def _obstacle(self, now_s: float) -> Reason | None:
         """Return why no motion can be sent now; None: it can."""
         state, version = self._state, self._reader.controller
@@ -505,6 +568,21 @@ class RtdeMotionDriver(RtdeDriver):
             return codes.UR_CHANNEL_MISSING(name=INPUTS.name)
         missing = [each.name for each in (SCRIPTS, DASHBOARD) if each.name not in self._opened]
         return codes.UR_CHANNEL_MISSING(name=missing[0]) if missing else None
+
+
+def _fits(recovery: Recovery, state: ControllerState) -> bool:
+    """Return whether the controller is in a state that a recovery is for."""
+    match recovery:
+        case Recovery.UNLOCK_PROTECTIVE_STOP:
+            return state.safety_mode == SafetyMode.PROTECTIVE_STOP
+        case Recovery.RESTART_SAFETY:
+            return state.safety_mode in _FAULTS
+        case Recovery.POWER_ON:
+            return state.safety_mode in _MAY_MOVE and state.robot_mode == RobotMode.POWER_OFF
+        case Recovery.BRAKE_RELEASE:
+            # Without power, a controller would also power the arm on.
+            return state.safety_mode in _MAY_MOVE and state.robot_mode == RobotMode.IDLE
+    return True
 
 
 def _tool(state: ControllerState) -> object:

@@ -67,11 +67,15 @@ def send(
         typer.Argument(
             metavar="COMMAND",
             help="home, stop, hold, resume, reset, trace on, trace off, speed N, move Q... (degrees, mm), "
-            "run FILE (a teach program)",
+            "run FILE (a teach program), recover NAME (unlock_protective_stop, power_on, ...)",
         ),
     ],
     connect: Connect = DEFAULT_ROUTER,
     operator: Annotated[str, typer.Option(help="The operator's name; else yours.")] = "",
+    reason: Annotated[str, typer.Option(help="Of recover: why, for the audit log.")] = "",
+    looked: Annotated[
+        bool, typer.Option("--looked", help="Of recover: a person at the robot has found the cause.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Send a command to a robot and wait until it ends; Ctrl-C stops the robot.
@@ -82,7 +86,7 @@ def send(
     """
     from services.command_line.live import send as command
 
-    command.run(robot, words, connect, operator, as_json)
+    command.run(robot, words, connect, operator, as_json, reason=reason, looked=looked)
 
 
 @app.command()

@@ -33,7 +33,10 @@ _WORDS: dict[tuple[str, ...], _Command] = {
     ("trace", "on"): lambda arm: arm.trace(True),
     ("trace", "off"): lambda arm: arm.trace(False),
 }
-_USAGE = "home, stop, hold, resume, reset, trace on, trace off, speed N, move Q... (degrees, mm), or run FILE"
+_USAGE = (
+    "home, stop, hold, resume, reset, trace on, trace off, speed N, move Q... (degrees, mm), run FILE, or "
+    "recover NAME"
+)
 _RECORDER_TIMEOUT_S = 0.5
 
 
@@ -49,9 +52,28 @@ class WordsError(ServiceError):
     """The words are not a command."""
 
 
-def run(robot: str, words: list[str], router: str, operator: str, as_json: bool) -> None:
-    """Send a command; exit status 1 when it is refused."""
-    command = None if words == _STOP else _parse(words)  # before any request
+def run(
+    robot: str,
+    words: list[str],
+    router: str,
+    operator: str,
+    as_json: bool,
+    *,
+    reason: str = "",
+    looked: bool = False,
+) -> None:
+    """Send a command; exit status 1 when it is refused.
+
+    Args:
+        reason, looked: Of a recovery.
+    """
+    # Before any request.
+    if words[:1] == ["recover"]:
+        command: _Command | None = _recovery(words[1:], reason, looked)
+    elif reason or looked:
+        raise WordsError("--reason and --looked belong to recover NAME only")
+    else:
+        command = None if words == _STOP else _parse(words)
     sent = discovery.run(_send(robot, words, command, router, check_chunk(operator or discovery.own_name())))
     print_or_discard(discovery.json_line(sent._asdict()) if as_json else sent.text, sys.stdout)
     if not sent.accepted:
@@ -169,6 +191,22 @@ def _parse(words: list[str]) -> _Command:
     if command is None:
         raise WordsError(f"{' '.join(words)!r} is not a command: {_USAGE}")
     return command
+
+
+def _recovery(words: list[str], reason: str, looked: bool) -> _Command:
+    """Return the command that recovers a controller.
+
+    Raises:
+        WordsError: If a name, the reason or the confirmation is missing.
+    """
+    if len(words) != 1:
+        names = ", ".join(name.lower() for name in schema.Recover.Recovery.keys()[1:])
+        raise WordsError(f"recover needs one name: {names}")
+    if not reason.strip():
+        raise WordsError("recover needs a reason: --reason TEXT")
+    if not looked:
+        raise WordsError("recover needs --looked, after a person at the robot has found the cause")
+    return lambda arm: arm.recover(words[0], reason=reason, looked=looked)
 
 
 def _number(text: str) -> float:

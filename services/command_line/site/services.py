@@ -76,6 +76,7 @@ def _gateway(site: "Site", options: Options) -> Any:
             stop_proven=robot.proof_of_stop,
             verified=robot.comparison,
             experimental=robot.experimental,
+            recover=frozenset(robot.recover),
             jog_speed=robot.jog_speed / 1000,
             stale_after_s=robot.stale_after_s,
             reconnect_after_s=max(4.0, 2.0 * robot.stale_after_s),

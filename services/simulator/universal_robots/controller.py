@@ -60,6 +60,9 @@ _TORQUES_A = np.array((12.0, 12.0, 11.0, 9.0, 9.0, 9.0))
 # Analog types: 0 current, 1 voltage; only input 1 is a current, of a sensor with 4 to 20 mA.
 _ANALOG_TYPES, _SENSOR_A = 0b1101, 0.012
 _CONTROLLER, _BASE = -2, 0
+# Invented.
+_POWER_ON_S, _BRAKE_RELEASE_S = 0.6, 0.4
+_UNLOCK_AFTER_S = 5.0
 _ALARM_CODE, _ALARM_ARGUMENT = 153, 0
 # A script on a connection that only reads.
 _ONLY_READS_CODE = 210
@@ -109,7 +112,9 @@ class UrController:
         self.tool_offset = _pose(np.linalg.inv(flange_to_base) @ tool_to_base)
         self._announce = announce
         self._boot_s = now_s
-        self._powered = powered
+        self._mode = RobotMode.RUNNING if powered else RobotMode.POWER_OFF
+        self._mode_after: list[tuple[float, RobotMode]] = []
+        self._stopped_s = now_s
         self._safety = SafetyMode.NORMAL
         self._slider = 1.0
         self._outputs = 0
@@ -126,6 +131,8 @@ class UrController:
     def tick(self, now_s: float) -> None:
         """Execute the program."""
         self._now_s = now_s
+        while self._mode_after and self._mode_after[0][0] <= now_s:
+            self._mode = self._mode_after.pop(0)[1]
         self.programs.tick(now_s)
 
     def take_script(self, source: str, now_s: float) -> None:
@@ -149,6 +156,7 @@ class UrController:
     def protective_stop(self, now_s: float) -> None:
         """Stop the arm, pause the program and send an alarm."""
         self._safety = SafetyMode.PROTECTIVE_STOP
+        self._stopped_s = now_s
         self.programs.pause(now_s)
         self._announce(
             Alarm(
@@ -163,12 +171,48 @@ class UrController:
         )
         self._announce_safety_mode(now_s)
 
-    def unlock(self, now_s: float) -> None:
-        """End the protective stop and continue the program."""
-        self._safety = SafetyMode.NORMAL
-        self._announce_safety_mode(now_s)
-        if self.programs.state is RuntimeState.PAUSED:
-            self.programs.play(now_s)
+    def end_protective_stop(self, now_s: float) -> None:
+        """End the protective stop and continue the program, as a person at the pendant does."""
+        if self._safety is SafetyMode.PROTECTIVE_STOP:
+            self._set_safety(SafetyMode.NORMAL, now_s)
+            if self.programs.state is RuntimeState.PAUSED:
+                self.programs.play(now_s)
+
+    def unlock(self, now_s: float) -> bool:
+        """End the protective stop, not the pause of the program; return False if it is too young."""
+        if self._safety is SafetyMode.PROTECTIVE_STOP:
+            if now_s - self._stopped_s < _UNLOCK_AFTER_S:
+                return False
+            self._set_safety(SafetyMode.NORMAL, now_s)
+        return True
+
+    def violate(self, now_s: float) -> None:
+        """Violate a limit of the safety system: no program and no power until it is restarted."""
+        self.power_off(now_s)
+        self._set_safety(SafetyMode.VIOLATION, now_s)
+
+    def restart_safety(self, now_s: float) -> None:
+        """Restart the safety system; the arm has no power afterwards."""
+        self.power_off(now_s)
+        self._set_safety(SafetyMode.NORMAL, now_s)
+
+    def power_on(self, now_s: float) -> None:
+        """Power the arm on, with its brakes on."""
+        if self._safety is SafetyMode.NORMAL and self._mode is RobotMode.POWER_OFF:
+            self._mode = RobotMode.POWER_ON
+            self._mode_after = [(now_s + _POWER_ON_S, RobotMode.IDLE)]
+
+    def power_off(self, now_s: float) -> None:
+        """End the program, and take the power from the arm."""
+        self.programs.stop(now_s)
+        self._mode, self._mode_after = RobotMode.POWER_OFF, []
+
+    def release_brakes(self, now_s: float) -> None:
+        """Release the brakes; an arm without power is powered on."""
+        self.power_on(now_s)
+        if self._safety is SafetyMode.NORMAL and self._mode is not RobotMode.RUNNING:
+            begin_s = max([now_s, *(at_s for at_s, _ in self._mode_after)])
+            self._mode_after.append((begin_s + _BRAKE_RELEASE_S, RobotMode.RUNNING))
 
     def write(self, values: Mapping[str, Value], now_s: float) -> None:
         """Take a client's inputs: speed slider, digital outputs and registers; others have no effect."""
@@ -196,6 +240,10 @@ class UrController:
     def _report_fault(self, line: int, text: str) -> None:
         self._announce(RuntimeFault(self._origin(_CONTROLLER, self._now_s), line, 0, text))
 
+    def _set_safety(self, mode: SafetyMode, now_s: float) -> None:
+        self._safety = mode
+        self._announce_safety_mode(now_s)
+
     def _announce_safety_mode(self, now_s: float) -> None:
         self._announce(SafetyModeChanged(self._origin(_CONTROLLER, now_s), 0, 0, self._safety))
 
@@ -211,7 +259,11 @@ class UrController:
     @property
     def robot_mode(self) -> RobotMode:
         """Mode of the robot."""
-        return RobotMode.RUNNING if self._powered else RobotMode.POWER_OFF
+        return self._mode
+
+    @property
+    def _powered(self) -> bool:
+        return self._mode is RobotMode.RUNNING
 
     @property
     def safety_mode(self) -> SafetyMode:
@@ -263,16 +315,13 @@ class UrController:
 
     def _modes(self) -> dict[str, Value]:
         normal = self._safety is SafetyMode.NORMAL
-        status = RobotStatus.POWER_ON if self._powered else RobotStatus(0)
+        off = self._mode is RobotMode.POWER_OFF
+        status = RobotStatus(0) if off else RobotStatus.POWER_ON
         if self.runtime_state is RuntimeState.PLAYING:
             status |= RobotStatus.PROGRAM_RUNNING
-        safety = (
-            SafetyStatus.NORMAL_MODE
-            if normal
-            else SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.STOPPED_DUE_TO_SAFETY
-        )
+        safety = _SAFETY_BITS[self._safety]
         return {
-            "joint_mode": (int(JointMode.RUNNING if self._powered else JointMode.POWER_OFF),) * JOINTS,
+            "joint_mode": (int(_JOINT_MODES.get(self._mode, JointMode.IDLE)),) * JOINTS,
             "robot_mode": int(self.robot_mode),
             "safety_mode": int(self._safety),
             "safety_status": int(self._safety),
@@ -325,6 +374,12 @@ class UrController:
         }
 
 
+_SAFETY_BITS = {
+    SafetyMode.NORMAL: SafetyStatus.NORMAL_MODE,
+    SafetyMode.PROTECTIVE_STOP: SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.STOPPED_DUE_TO_SAFETY,
+    SafetyMode.VIOLATION: SafetyStatus.VIOLATION | SafetyStatus.STOPPED_DUE_TO_SAFETY,
+}
+_JOINT_MODES = {RobotMode.RUNNING: JointMode.RUNNING, RobotMode.POWER_OFF: JointMode.POWER_OFF}
 _ZEROS: Mapping[str, Value] = {
     "BOOL": False,
     "UINT8": 0,

@@ -15,6 +15,10 @@ REMOTE_ONLY = (
     "Command is not allowed due to safety reasons, please switch robot to Remote Control mode and "
     "reconnect to port 29999"
 )
+STOP_TOO_YOUNG = (
+    "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop before "
+    "unlocking"
+)
 LONGEST_COMMAND = 1000
 """Characters."""
 
@@ -71,6 +75,20 @@ def _pause(controller: UrController, now_s: float) -> str:
     return "Pausing program"
 
 
+def _unlock(controller: UrController, now_s: float) -> str:
+    return "Protective stop releasing" if controller.unlock(now_s) else STOP_TOO_YOUNG
+
+
+def _done(act: Callable[[UrController, float], None], words: str) -> Callable[[UrController, float], str]:
+    """Return an order with a fixed answer, also where it has no effect."""
+
+    def order(controller: UrController, now_s: float) -> str:
+        act(controller, now_s)
+        return words
+
+    return order
+
+
 def _program_state(controller: UrController, version: ControllerVersion) -> str:
     state = controller.programs.state
     word = {RuntimeState.PLAYING: "PLAYING", RuntimeState.PAUSED: "PAUSED"}.get(state, "STOPPED")
@@ -98,4 +116,10 @@ _ORDERS: Mapping[str, Callable[[UrController, float], str]] = {
     "play": _play,
     "stop": _stop,
     "pause": _pause,
+    "unlock protective stop": _unlock,
+    "close safety popup": lambda controller, now_s: "closing safety popup",
+    "restart safety": _done(UrController.restart_safety, "Restarting safety"),
+    "power on": _done(UrController.power_on, "Powering on"),
+    "power off": _done(UrController.power_off, "Powering off"),
+    "brake release": _done(UrController.release_brakes, "Brake releasing"),
 }

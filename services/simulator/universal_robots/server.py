@@ -179,7 +179,7 @@ class UrServer:
         for name in before - self.active:
             logger.warning("fault %s is over", name)
             if name == "fault":
-                self.controller.unlock(now_s)
+                self.controller.end_protective_stop(now_s)
             if name == "freeze":
                 for client in (*self.rtde_clients, *self._monitors, *self._dashboards):
                     client.pause_reading(False)

@@ -492,6 +492,62 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ],
   ],
   [
+    "recover.not_there",
+    ["this controller has no {recovery}: it has: {known}", "此控制器没有 {recovery}；它有：{known}"],
+  ],
+  [
+    "recover.not_allowed",
+    [
+      "the site file does not allow {recovery} for this robot: add it to the robot's `recover`, or do it at the robot",
+      "站点文件不允许对此机器人执行 {recovery}：请将其加入该机器人的 `recover`，或在机器人处操作",
+    ],
+  ],
+  ["recover.reason", ["a recovery needs a reason: type why it is sent", "恢复操作需要原因：请填写原因"]],
+  [
+    "recover.looked",
+    [
+      "no person at the robot has looked: confirm it after a person at the robot has found the cause",
+      "尚未有人在机器人旁查看：请在有人到场查明原因后再确认",
+    ],
+  ],
+  [
+    "recover.moves",
+    ["the robot moves, or is not known to rest: wait until it rests", "机器人在运动，或未知是否静止：请待其静止"],
+  ],
+  [
+    "recover.held",
+    [
+      "a motion is on hold, and could go on: discard it (RESET), or stop the robot",
+      "有运动处于保持状态，可能会继续：请复位以放弃该运动，或停止机器人",
+    ],
+  ],
+  [
+    "recover.program",
+    [
+      "programs and old client programs may not recover a controller: an operator sends RECOVER, as the only command of the request",
+      "程序和旧客户端程序不得恢复控制器：须由操作员发送 RECOVER，且请求中只有这一个命令",
+    ],
+  ],
+  [
+    "recover.sent",
+    ["{by} has sent {recovery} to the controller: {reason}", "{by} 已向控制器发送 {recovery}：{reason}"],
+  ],
+  [
+    "recover.answered",
+    [
+      'the controller answers {recovery} with "{detail}": what became of it shows in the robot\'s state',
+      "控制器对 {recovery} 的回答为“{detail}”：结果以机器人的状态为准",
+    ],
+  ],
+  ["recover.refused", ['the controller refuses {recovery}: "{detail}"', "控制器拒绝 {recovery}：“{detail}”"]],
+  [
+    "recover.unknown",
+    [
+      "it is unknown whether the controller has done {recovery}: {detail}: look at the robot's state; it is not sent again",
+      "控制器是否已执行 {recovery} 未知：{detail}。请查看机器人的状态；不会再次发送",
+    ],
+  ],
+  [
     "robot.homed_by_nature",
     [
       "its encoders are absolute: it is always homed: move it to its home position",
@@ -659,6 +715,24 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "motion needs PolyScope 5.6 or a later version 5, this is {version}: move the robot from its own panel",
       "运动需要 PolyScope 5.6 或更高的 5.x 版本，当前为 {version}：请用示教器移动机器人",
     ],
+  ],
+  [
+    "universal_robots.stop_young",
+    [
+      "the protective stop is seen for {seen} s only; it can be unlocked after {seconds} s: find its cause first",
+      "保护性停止仅出现 {seen} 秒；{seconds} 秒后才能解锁：请先查明原因",
+    ],
+  ],
+  [
+    "universal_robots.recovery_not_now",
+    [
+      "{recovery} does not fit the controller's state (safety mode {safety}, robot mode {robot})",
+      "{recovery} 与控制器状态不符（安全模式 {safety}，机器人模式 {robot}）",
+    ],
+  ],
+  [
+    "universal_robots.recovers",
+    ["the controller has not answered {recovery} yet: wait for its answer", "控制器尚未回答 {recovery}：请等待其回答"],
   ],
   [
     "universal_robots.register",
