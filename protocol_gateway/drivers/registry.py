@@ -5,12 +5,13 @@ A driver of robomesh is one line here. A package installs others by the entry po
 """
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from functools import partial
 from importlib import import_module
-from importlib.metadata import entry_points
-from typing import Protocol, cast
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Protocol, cast
 
-from protocol_gateway.drivers.driver import Driver
-from protocol_gateway.errors import GatewaySettingsError
+from protocol_gateway.drivers.driver import Capabilities, Driver
+from protocol_gateway.errors import GatewaySettingsError, ProtocolGatewayError
 from robots.joints import JointType
 
 ENTRY_POINTS = "robomesh.drivers"
@@ -65,17 +66,46 @@ def driver_maker(protocol: str) -> DriverMaker:
     """Return the factory of a protocol's drivers.
 
     Raises:
-        GatewaySettingsError: If there is none, or an installed one cannot be imported.
+        GatewaySettingsError: If no package, or more than one, has it, or its driver cannot be imported.
     """
     if protocol in OWN:
         module, _, name = OWN[protocol].partition(":")
         return cast("DriverMaker", getattr(import_module(module), name))
-    for each in entry_points(group=ENTRY_POINTS, name=protocol):
+    found = {(_package(each), each.value): each for each in entry_points(group=ENTRY_POINTS, name=protocol)}
+    if len(found) > 1:
+        # Which of them is first depends on the file system, and may be another one tomorrow.
+        packages = ", ".join(sorted(package for package, _ in found))
+        raise GatewaySettingsError(
+            f"protocol {protocol!r}: several packages have it: remove all but one of {packages}"
+        )
+    for (package, _), each in found.items():
         try:
-            return cast("DriverMaker", each.load())
-        except Exception as error:
-            package = each.dist.name if each.dist is not None else each.value
+            return partial(
+                _created, each.load(), f"protocol {protocol!r}: its driver, of the package {package},"
+            )
+        except (Exception, SystemExit) as error:
             raise GatewaySettingsError(
                 f"protocol {protocol!r}: its driver, of the package {package}, cannot be imported: {error}"
             ) from error
     raise GatewaySettingsError(f"unknown protocol {protocol!r}; known: {', '.join(protocols())}")
+
+
+def _package(driver: EntryPoint) -> str:
+    return driver.dist.name if driver.dist is not None else driver.value
+
+
+def _created(maker: DriverMaker, whose: str, *given: Any, **named: Any) -> Driver:
+    """Return a new driver of an installed package.
+
+    Raises:
+        GatewaySettingsError: If the call fails, or returns no driver.
+    """
+    try:
+        driver = maker(*given, **named)
+        if isinstance(driver.capabilities, Capabilities):
+            return driver
+        raise TypeError("its capabilities have another type than Capabilities")
+    except ProtocolGatewayError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise GatewaySettingsError(f"{whose} cannot be created: {error}") from error

@@ -5,6 +5,8 @@ import contextlib
 import json
 import math
 import sys
+import types
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -132,6 +134,33 @@ def test_a_driver_that_cannot_be_imported_is_named_with_its_package(installed):
         driver_maker("broken")
     with pytest.raises(GatewaySettingsError, match=r"unknown protocol 'x'; known: unit, .*, json-lines"):
         driver_maker("x")
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ("raise SystemExit('no licence')", "cannot be imported: no licence"),
+        ("Driver = 3", "cannot be created: 'int' object is not callable"),
+        ("def Driver(*given, **named): raise KeyError('limit')", "cannot be created: 'limit'"),
+        ("def Driver(*given, **named): return None", "cannot be created: .*NoneType"),
+        ("def Driver(*given, **named): raise SystemExit", "cannot be created"),
+    ],
+)
+def test_a_driver_that_fails_at_the_start_is_named_with_its_package(installed, monkeypatch, lines, words):
+    module = types.ModuleType("no_such_module")
+    monkeypatch.setattr(metadata.EntryPoint, "load", lambda each: exec(lines, vars(module)) or module.Driver)
+    with pytest.raises(GatewaySettingsError, match=f"'broken'.*robomesh-json-lines.*{words}"):
+        driver_maker("broken")((), {}, relay=None, options=None)
+
+
+def test_a_protocol_of_two_packages_is_refused(installed, tmp_path, monkeypatch):
+    information = tmp_path / "more" / "other-1.0.dist-info"
+    information.mkdir(parents=True)
+    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: other\nVersion: 1.0\n")
+    (information / "entry_points.txt").write_text("[robomesh.drivers]\njson-lines = other:Driver\n")
+    monkeypatch.syspath_prepend(str(tmp_path / "more"))
+    with pytest.raises(GatewaySettingsError, match=r"'json-lines'.*remove all but one of other, robomesh-"):
+        driver_maker("json-lines")
 
 
 def test_the_example_reports_what_it_can_read_and_names_what_it_cannot(installed):
