@@ -201,7 +201,7 @@ class RobotAuthority:
     def _check_heeded(self, moving: bool, seen: Seen) -> Effects[None]:
         """Report a robot that still moves after its stop, and send the stop again."""
         latched, first_s = self._authority.stop, self._authority.stopping_s
-        if not moving or latched is None or first_s is None:
+        if not moving or latched is None or first_s is None or seen.controller.read_only is not None:
             return
         if seen.now.monotonic_s - max(first_s, self._disobeyed_reported_s) < HEED_TIMEOUT_S:
             return

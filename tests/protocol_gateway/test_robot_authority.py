@@ -275,3 +275,18 @@ def test_hold_at_rest_is_sent_only_if_a_program_runs(runs):
     bench.performed.clear()
     assert bench.command(C.HOLD, 2).accepted
     assert ("Send" in bench.performed) == runs
+
+
+def test_nothing_is_sent_again_to_a_robot_that_has_become_read_only():
+    bench = Bench()
+    bench.give(STOP)
+    other = codes.STOP_OTHER_SOFTWARE(before="5.12", now="5.21")
+    later = Now(NOW.monotonic_s + 10.0, NOW.wall_ns + 10_000_000_000)
+    bench.seen = replace(SEEN, now=later, controller=replace(SEEN.controller, read_only=other))
+    bench.performed.clear()
+    bench.give(events.MotionObserved(True))
+    bench.give(events.LinkRestored())
+    assert "Stop" not in bench.performed
+    bench.seen = replace(bench.seen, controller=SEEN.controller)
+    bench.give(events.MotionObserved(True))
+    assert "Stop" in bench.performed
