@@ -146,6 +146,19 @@ class Arm:
                 effects += self._do(self.driver.timer_ended(self.now_s))
         return effects
 
+    def late(self, seconds, *, states=True):
+        """Let time pass on a busy machine: each timer ends 60 ms late."""
+        end_s, effects = self.now_s + seconds, []
+        while True:
+            if self.timer_s is not None:
+                self.now_s = max(self.now_s, self.timer_s) + 0.06
+                self.timer_s = None
+                effects += self._do(self.driver.timer_ended(self.now_s))
+            if states:
+                effects += self.state()
+            if self.now_s >= end_s:
+                return effects
+
     @property
     def written(self):
         """All values of the inputs so far: permission and beat."""
@@ -304,6 +317,30 @@ def test_without_states_the_beats_end():
     effects = arm.wait(0.5, states=False)
     assert [fate.why.code for fate in flat(effects, FateUnknown)] == ["universal_robots.state_old"]
     assert arm.number == 0
+
+
+def test_a_gateway_that_is_always_late_gives_up_too():
+    arm = Arm()
+    arm.command(MoveAbsolute(TARGET))
+    effects = arm.late(2.5 * START_S)
+    assert [fate.why.code for fate in flat(effects, FateUnknown)] == ["universal_robots.not_started"]
+    arm = Arm()
+    arm.command(MoveAbsolute(TARGET))
+    arm.play()
+    arm.state()
+    effects = arm.late(1.0, states=False)
+    assert [fate.why.code for fate in flat(effects, FateUnknown)] == ["universal_robots.state_old"]
+
+
+def test_a_gateway_that_was_late_reads_first_what_has_arrived():
+    arm = Arm()
+    arm.command(MoveAbsolute(TARGET))
+    arm.play()
+    arm.state()
+    arm.now_s += 0.4
+    assert not flat(arm.late(0.0, states=False), FateUnknown)
+    arm.play()
+    assert not flat(arm.wait(0.05), FateUnknown)
 
 
 @pytest.mark.parametrize("channel", [RTDE, INPUTS, DASHBOARD])

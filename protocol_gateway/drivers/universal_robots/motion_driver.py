@@ -163,7 +163,7 @@ class RtdeMotionDriver(RtdeDriver):
         self._due: dict[str, float] = {}
         self._timer_s: float | None = None
         self._state: ControllerState | None = None
-        self._state_s = float("-inf")
+        self._state_s = self._excused_s = float("-inf")
         self._motion: _Motion | None = None
         self._percent = _FIRST_PERCENT
         self._rests_after_stop = True
@@ -259,7 +259,7 @@ class RtdeMotionDriver(RtdeDriver):
             effects += self._reopen
             self._reopen = []
         if "start" in ended and self._motion is not None and not self._motion.started:
-            if late:
+            if late and now_s < self._motion.sent_s + 2.0 * START_S:
                 self._due["start"] = now_s + _LATE_S
             else:
                 effects += self._give_up(codes.UR_NOT_STARTED(seconds=START_S))
@@ -347,8 +347,11 @@ class RtdeMotionDriver(RtdeDriver):
 
     def _next_beat(self, now_s: float, *, late: bool) -> Effects:
         assert self._motion is not None
-        if now_s - self._state_s > _BLIND_S and not late:
-            return self._give_up(codes.UR_STATE_OLD())
+        if now_s - self._state_s > _BLIND_S:
+            if not late or self._excused_s == self._state_s:
+                return self._give_up(codes.UR_STATE_OLD())
+            # Once: what has arrived is read before the next beat.
+            self._excused_s = self._state_s
         self._due["beat"] = now_s + _BEAT_S
         return (self._written(self._motion.number),)
 
