@@ -3,6 +3,7 @@
 Plain JSON. The site file names it, and the gateway compares it with what runs now.
 """
 
+import errno
 import json
 from pathlib import Path
 
@@ -62,10 +63,14 @@ def read_record(path: Path) -> VerificationRecord:
         VerificationRecordError: If the file cannot be read, or is not a record.
     """
     try:
+        if path.is_fifo():
+            raise OSError(errno.EINVAL, "it is a pipe")
         with path.open("rb") as file:
             data = file.read(_MOST_BYTES + 1)
     except OSError as error:
         raise VerificationRecordError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError as error:
+        raise VerificationRecordError(f"{str(path)!r}: cannot be read: {error}") from None
     try:
         if len(data) > _MOST_BYTES:
             raise ValueError
