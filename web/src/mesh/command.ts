@@ -3,7 +3,7 @@
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { timestampFromMs } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
-import type { JogSchema } from "../gen/robomesh_pb";
+import type { JogSchema, RecoverSchema } from "../gen/robomesh_pb";
 import { CommandRequest_Command as Command, CommandAnswerSchema, CommandRequestSchema } from "../gen/robomesh_pb";
 import { reasonText } from "../i18n/reasons";
 import { t } from "../i18n/texts";
@@ -20,6 +20,7 @@ export interface CommandValues {
   program?: string;
   programName?: string;
   jog?: MessageInitShape<typeof JogSchema>;
+  recover?: MessageInitShape<typeof RecoverSchema>;
 }
 
 const VALID_MS = 1000;

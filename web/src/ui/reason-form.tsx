@@ -9,21 +9,26 @@ export function ReasonForm(props: {
   text: string;
   does: string;
   required?: boolean;
+  /** Something else is missing. */
+  incomplete?: boolean;
   /** Other choices, between the text and the reason. */
   children?: ComponentChildren;
   close: () => void;
   done: (reason: string) => void;
 }) {
   const [reason, setReason] = useState("");
+  const form = useRef<HTMLFormElement>(null);
   const input = useRef<HTMLInputElement>(null);
   const opener = useRef(document.activeElement);
   useLayoutEffect(() => {
-    input.current?.focus();
+    // The first input, if there is more than the reason: the form must not scroll past it.
+    (props.incomplete === undefined ? input.current : form.current?.querySelector("input"))?.focus();
     return () => opener.current instanceof HTMLElement && opener.current.focus();
   }, []);
-  const missing = props.required === true && !reason.trim();
+  const missing = props.incomplete === true || (props.required === true && !reason.trim());
   return (
     <form
+      ref={form}
       class="reason"
       aria-label={props.title}
       onKeyDown={(event) => event.key === "Escape" && props.close()}

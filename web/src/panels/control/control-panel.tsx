@@ -1,5 +1,6 @@
 // The operator in control of the robot, and that operator's commands.
 
+import { useState } from "preact/hooks";
 import type { ControllerState, Description, Lease } from "../../gen/robomesh_pb";
 import { ControllerState_Activity as Activity, ControllerState_Known as Known } from "../../gen/robomesh_pb";
 import { t } from "../../i18n/texts";
@@ -17,6 +18,7 @@ import { now } from "../../mesh/topics";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
 import { mayNotCommand } from "./no-control";
+import { RecoverButton, RecoverForm } from "./recover";
 import { Speed } from "./speed";
 import { Stopped } from "./stopped";
 import { Holder, WhoControls } from "./who-controls";
@@ -34,6 +36,7 @@ export function ControlPanel(props: {
   const { robotKey, holder } = props;
   const state = props.controller?.message;
   const mine = holds(robotKey);
+  const [recovering, setRecovering] = useState(false);
   const frozen = whyFrozen(robotKey, now.value);
   const why = reachable.value ? whyNoNewMotion(state) || frozen : t("no_connection");
   const canSend = mine && reachable.value && !state?.stop && !state?.readOnly;
@@ -97,8 +100,10 @@ export function ControlPanel(props: {
           >
             {t(tracing ? "trace_off" : "trace_on")}
           </button>
+          <RecoverButton state={state} mine={mine} open={() => setRecovering(true)} />
         </div>
       )}
+      {recovering && mine && <RecoverForm robotKey={robotKey} state={state} close={() => setRecovering(false)} />}
       <div class="slot">
         {state && (state.stop || stoppedByItself(state)) ? (
           <Stopped state={state} mine={mine} disobeyed={props.disobeyed} send={send} />
