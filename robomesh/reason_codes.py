@@ -492,6 +492,27 @@ UR_REGISTER = Code(
     "{name} cannot be used: {problem}",
     "choose other registers in the site file (universal_robots)",
 )
+HSES_NOT_STARTED = Code("hses.not_started", "the controller has not started it within {seconds:g} s")
+HSES_OTHER_JOB = Code("hses.other_job", "a job runs on the controller", "end it at the controller")
+HSES_ENDED_ELSEWHERE = Code("hses.ended_elsewhere", "it has ended before its target")
+HSES_HELD = Code("hses.held", "it was held")
+HSES_ARM_STOPPED = Code("hses.arm_stopped", "the controller lets no arm move: {state}")
+HSES_TOOL_CHANGED = Code("hses.tool_changed", "the tool was changed during a motion")
+HSES_WENT_LOCAL = Code("hses.went_local", "the controller was switched to local control")
+HSES_CHANNEL_LOST = Code("hses.channel_lost", "the connection {name} was lost during a motion")
+HSES_CHANNEL_MISSING = Code(
+    "hses.channel_missing",
+    "the connection {name} to the controller is missing",
+    "the event link.channel_lost says why",
+)
+HSES_STATE_OLD = Code("hses.state_old", "the newest state of the controller is too old")
+HSES_MOVES = Code("hses.moves", "a motion still runs", "wait for its end, or stop the robot")
+HSES_AXES = Code("hses.axes", "{detail}", "move the robot from its own panel")
+HSES_HELD_MOTION = Code(
+    "hses.held_motion",
+    "a held motion may go on when HOLD ends",
+    "switch the servos off at the robot, as its emergency stop does, then reset the stop",
+)
 STOP_SENT = Code("stop.sent", "stop request {id} is on the controller's socket")
 STOP_NOT_SENT = Code("stop.not_sent", "stop request {id} is latched, but not sent: {cause}")
 STOP_READ_ONLY = Code(

@@ -19,7 +19,7 @@ ENTRY_POINTS = "robomesh.drivers"
 OWN: Mapping[str, str] = {
     "unit": "protocol_gateway.drivers.unit:UnitDriver",
     "rtde": "protocol_gateway.drivers.universal_robots.motion_driver:rtde_driver",
-    "hses": "protocol_gateway.drivers.yaskawa.driver:HsesDriver",
+    "hses": "protocol_gateway.drivers.yaskawa.motion_driver:hses_driver",
     "snpx": "protocol_gateway.drivers.fanuc.driver:SnpxDriver",
     "opcua": "protocol_gateway.drivers.opcua.driver:OpcUaDriver",
 }

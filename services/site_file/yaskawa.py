@@ -2,7 +2,7 @@
 
 from typing import Annotated, TypeAlias
 
-from pydantic import BaseModel, Field, field_validator
+from pydantic import BaseModel, Field, StrictBool, field_validator
 
 from protocol_gateway.drivers.yaskawa.axes import MOST_AXES, Coupling, YaskawaSettings, instance_of
 from protocol_gateway.errors import GatewaySettingsError
@@ -40,6 +40,8 @@ class Yaskawa(BaseModel):
         rate: Positions a second.
         io: Groups of eight inputs or outputs to read twice a second: 1 to 512 are the user's inputs, 1001 to
             1512 the outputs; at most 16.
+        motion: The gateway moves the robot, experimentally (docs/controllers/yaskawa.md#motion); otherwise
+            it only reads.
     """
 
     model_config = PART_CONFIG
@@ -53,6 +55,7 @@ class Yaskawa(BaseModel):
         1,
         1001,
     )
+    motion: StrictBool = False
 
     @field_validator("group")
     @classmethod
@@ -74,4 +77,5 @@ class Yaskawa(BaseModel):
             group=self.group,
             rate_hz=self.rate,
             io=self.io,
+            motion=self.motion,
         )

@@ -4,7 +4,7 @@ import contextlib
 import re
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from protocol_gateway.drivers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
 from tests.protocol_gateway import (
@@ -167,6 +167,19 @@ SUBJECTS = (
     Subject(
         name="hses",
         settings=test_hses_driver.YASKAWA,
+        start=lambda **settings: one_port(test_hses_driver.controller(**settings)),
+        declared={"": reads_of_hses},
+        datagrams=True,
+        faults=("garbage", "flood", "busy", "loss", "joints", "mute"),
+    ),
+    # Motion is allowed, but its stop was never proven.
+    Subject(
+        name="hses-motion",
+        settings={
+            **test_hses_driver.YASKAWA,
+            "options": replace(test_hses_driver.YASKAWA["options"], motion=True),
+            "stop_proven": False,
+        },
         start=lambda **settings: one_port(test_hses_driver.controller(**settings)),
         declared={"": reads_of_hses},
         datagrams=True,

@@ -11,6 +11,7 @@ class Wire:
         port: The gateway connects here.
         sent: Bytes that the gateway sent, in the parts in which they arrived; datagrams are whole.
         swallows: Connections stay open, but nothing arrives at either side.
+        commands, answers: Of datagrams: functions that return those to pass on in place of one.
     """
 
     def __init__(self, target, *, datagrams=False):
@@ -18,6 +19,7 @@ class Wire:
         self.port = 0
         self.sent = []
         self.swallows = False
+        self.commands = self.answers = lambda data: [data]
         self._ends = set()  # what is closed when the wire is cut
         self._listening = None
 
@@ -96,7 +98,8 @@ class _Gateway(asyncio.DatagramProtocol):
 
     def _send(self, back, data):
         if not self.wire.swallows and not back.cancelled() and back.exception() is None:
-            back.result().sendto(data)
+            for each in self.wire.commands(data):
+                back.result().sendto(each)
 
 
 class _Controller(asyncio.DatagramProtocol):
@@ -105,7 +108,8 @@ class _Controller(asyncio.DatagramProtocol):
 
     def datagram_received(self, data, _):
         if not self.gateway.wire.swallows:
-            self.gateway.transport.sendto(data, self.address)
+            for each in self.gateway.wire.answers(data):
+                self.gateway.transport.sendto(each, self.address)
 
 
 @contextlib.asynccontextmanager

@@ -10,8 +10,10 @@ import sys
 import pytest
 
 from protocol_gateway.drivers.driver import JointsReceived, MalformedReceived, SignalsReceived, StatusReceived
+from protocol_gateway.drivers.yaskawa import commands
 from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
 from protocol_gateway.drivers.yaskawa.driver import HsesDriver
+from protocol_gateway.drivers.yaskawa.hses import decode
 from protocol_gateway.link.link import ControllerLink, LinkSettings
 from robots.description import load
 from robots.joints import joints_of, violations
@@ -43,8 +45,62 @@ for name, read in {
 io = FS100.Variable(FS100.VarType.IO, 1)
 assert robot.read_variable(io) == 0
 found["io"] = io.val
-assert robot.switch_power(FS100.POWER_TYPE_SERVO, FS100.POWER_SWITCH_ON) == 8
+if found["status"]["running"]:
+    now = tuple(found["position"]["pos"])
+    assert robot.pmov(1, 0, 5000, now) != 0
+    assert robot.errno == 0x2010
+    assert robot.switch_power(FS100.POWER_TYPE_HOLD, FS100.POWER_SWITCH_ON) == 0
+    held = {}
+    assert robot.get_status(held) == 0
+    assert (held["hold_by_cmd"], held["running"]) == (True, False)
+    assert robot.pmov(1, 0, 5000, now) != 0
+    assert robot.errno == 0x2050
+    assert robot.switch_power(FS100.POWER_TYPE_HOLD, FS100.POWER_SWITCH_OFF) == 0
+    # Until it has braked.
+    while robot.pmov(1, 0, 5000, now) != 0:
+        assert robot.errno == 0x2010
 print(json.dumps(found))
+"""
+
+
+MOVE = """
+import json, sys, time
+from yrcom.hses_client import HsesClient, HsesError, PulseMove
+robot = HsesClient("127.0.0.1", int(sys.argv[1]), 5.0)
+robot.open()
+
+def refused(action):
+    # This client reads the number of words of the added status as the status: 1 for any refusal.
+    try:
+        action()
+    except HsesError as error:
+        assert error.status == 1
+    else:
+        raise AssertionError("not refused")
+
+def until(condition):
+    end = time.monotonic() + 30
+    while not condition(robot.read_status()):
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+target = [30000, -80000, 170000, 10000, 40000, 5000]
+robot.move_pulse(PulseMove(robot_axes=target, speed=5000))
+until(lambda status: status["running"])
+refused(lambda: robot.move_pulse(PulseMove(robot_axes=target, speed=5000)))
+robot.hold(True)
+until(lambda status: status["hold_cmd"] and not status["running"])
+refused(lambda: robot.move_pulse(PulseMove(robot_axes=target, speed=5000)))
+robot.hold(False)
+until(lambda status: not status["hold_cmd"] and not status["running"])
+robot.move_pulse(PulseMove(robot_axes=target, speed=10000))
+until(lambda status: not status["running"])
+print(json.dumps(robot.read_position(1)))
+refused(lambda: robot.move_pulse(PulseMove(robot_axes=target, speed=20000)))
+refused(lambda: robot.move_pulse(PulseMove(robot_axes=target, speed=100, base_axes=[1, 0, 0])))
+robot.servo(False)
+until(lambda status: not status["servo_on"])
+refused(lambda: robot.move_pulse(PulseMove(robot_axes=target, speed=5000)))
 """
 
 
@@ -81,6 +137,17 @@ def test_fs100_reads_the_simulated_controller():
     run(main())
 
 
+@pytest.mark.skipif(importlib.util.find_spec("yrcom") is None, reason="yrcom is not installed")
+def test_yrcom_moves_and_holds_the_simulated_controller():
+    async def main():
+        async with simulator() as port:
+            lines = (await output_of(sys.executable, "-c", MOVE, str(port))).splitlines()
+            found = json.loads(next(each for each in lines if each.startswith("{")))
+        assert {30000, -80000, 170000, 10000, 40000, 5000} <= {*found.values()}
+
+    run(main())
+
+
 @pytest.mark.skipif(
     not CLIENT, reason="MOTO_HSES_EXAMPLES does not name a folder with moto-hses-client's examples"
 )
@@ -91,6 +158,10 @@ def test_moto_hses_client_reads_the_simulated_controller():
                 name: await output_of(f"{CLIENT}/{name}", "127.0.0.1", str(port))
                 for name in ("read_status", "position_operations", "alarm_operations")
             }
+            held = await output_of(f"{CLIENT}/hold_servo_control", "127.0.0.1", str(port))
+        # As published the example switches the servos; with COMMAND_NAME = "hold" it sets and ends HOLD.
+        assert "to ON" in held
+        assert "Failed" not in held
         assert "4107" in read["alarm_operations"]
         assert "OUT OF RANGE" in read["alarm_operations"]
         for text in (read["read_status"], read["position_operations"]):
@@ -130,8 +201,53 @@ def test_moto_hses_mock_is_read():
             2,
             True,
         )
-        # Its names of axes are of eight bytes instead of four.
-        malformed = [each.reason for each in events if isinstance(each, MalformedReceived)]
-        assert malformed in ([], ["names of axes with 56 bytes; 24, 28 and 32 are right"])
+        # Its names of axes are of eight bytes instead of four, and it answers the tool's pose in pulses.
+        malformed = {each.reason for each in events if isinstance(each, MalformedReceived)}
+        assert all("with 56 bytes" in each or "a tool's pose of type 0" in each for each in malformed)
 
     run(main())
+
+
+@pytest.mark.skipif(not MOCK, reason="MOTO_HSES_MOCK does not name moto-hses-mock's program")
+def test_moto_hses_mock_takes_hold_and_motions_as_they_are_sent():
+    """Framing only: it moves nothing."""
+
+    async def main():
+        port = free_port()
+        mock = await asyncio.create_subprocess_exec(MOCK, "127.0.0.1", str(port), str(free_port()))
+        try:
+            sent = (
+                (commands.hold(128, on=True), 0x10),
+                (commands.hold(129, on=False), 0x10),
+                (commands.motion(7, robot=1, percent=5, pulses=(0,) * 8, tool=0), 0x02),
+            )
+            return [(await answered(port, datagram), datagram[11], service) for datagram, service in sent]
+        finally:
+            mock.terminate()
+            await mock.wait()
+
+    for answer, number, service in run(main()):
+        assert (answer.number, answer.service, answer.status) == (number, service, 0)
+
+
+async def answered(port, datagram):
+    """Send a datagram until it is answered; return the answer."""
+    loop = asyncio.get_running_loop()
+    received = asyncio.Queue()
+
+    class Client(asyncio.DatagramProtocol):
+        def datagram_received(self, data, address):
+            received.put_nowait(decode(data))
+
+        def error_received(self, error):
+            pass
+
+    client, _ = await loop.create_datagram_endpoint(Client, remote_addr=("127.0.0.1", port))
+    try:
+        async with asyncio.timeout(20.0):
+            while True:
+                client.sendto(datagram)
+                with contextlib.suppress(TimeoutError):
+                    return await asyncio.wait_for(received.get(), 0.3)
+    finally:
+        client.close()

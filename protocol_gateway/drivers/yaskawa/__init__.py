@@ -1,1 +1,1 @@
-"""High-Speed Ethernet Server of Yaskawa's controllers (HSES), read only, without I/O."""
+"""High-Speed Ethernet Server of Yaskawa's controllers (HSES), without I/O."""

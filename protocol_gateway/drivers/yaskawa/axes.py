@@ -51,6 +51,7 @@ class YaskawaSettings:
         rate_hz: Positions a second.
         io: Groups of eight inputs or outputs that are read: 1 is the first of the user's inputs, 1001 of the
             outputs.
+        motion: The gateway may move the robot (`motion_driver`).
     """
 
     pulses_per_degree: Sequence[float] = ()
@@ -60,6 +61,7 @@ class YaskawaSettings:
     group: str = "R1"
     rate_hz: float = 20.0
     io: Sequence[int] = (1, 1001)
+    motion: bool = False
 
 
 def instance_of(group: str) -> int:

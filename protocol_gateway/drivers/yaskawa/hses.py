@@ -38,7 +38,7 @@ ANSWERED = 0x80
 """Added to a service in its answer."""
 
 HEADER = Struct("<4sHHBBBBI8s")
-_QUESTION = Struct("<HHBBH")
+QUESTION = Struct("<HHBBH")
 _ANSWER = Struct("<BBBxI")
 
 
@@ -79,7 +79,7 @@ class Read:
     def encode(self, number: int) -> bytes:
         """Return the datagram with a number, 0 to 255."""
         head = HEADER.pack(IDENTIFIER, HEADER_BYTES, 0, 3, ROBOT_CONTROL, 0, number, 0, RESERVED)
-        return head + _QUESTION.pack(self.command, self.instance, self.attribute, self.service, 0)
+        return head + QUESTION.pack(self.command, self.instance, self.attribute, self.service, 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,14 +153,25 @@ _STATUS_TEXTS: Mapping[int, str] = MappingProxyType(
 )
 _ADDED_TEXTS: Mapping[int, str] = MappingProxyType(
     {
+        0x1012: "a value is out of its range",
+        0x1013: "the data have a wrong length",
         0x2010: "the robot is in operation",
+        0x2020: "held at the pendant",
+        0x2030: "held at the playback panel",
+        0x2040: "held externally",
+        0x2050: "held by a command",
+        0x2060: "an alarm or error is active",
+        0x2070: "the servos are off",
         0x2080: "the mode is wrong",
         0x2100: "remote control by commands is off",
         0x2110: "the data cannot be accessed",
+        0x3010: "the servos are off",
+        0x3450: "the servos cannot be switched on",
         0xA000: "the command is unknown",
         0xA001: "there is no such instance",
         0xA002: "the attribute is unknown",
         0xB008: "there is no such control group",
+        0xB009: "the speed is wrong",
         0xD8F1: "busy with another command",
         0xD8FA: "busy",
         0xE444: "busy with another command",

@@ -1,1 +1,1 @@
-"""Simulated controller of Yaskawa's kind with the High-Speed Ethernet Server, for reading."""
+"""Simulated controller of Yaskawa's kind with the High-Speed Ethernet Server."""

@@ -11,14 +11,13 @@ from protocol_gateway.drivers.yaskawa.hses import (
     HEADER_BYTES,
     IDENTIFIER,
     LAST_BLOCK,
+    QUESTION,
     RESERVED,
     ROBOT_CONTROL,
 )
 
 ALARM_HISTORY = 0x71
 """A further command that reads; the gateway does not use it."""
-
-_QUESTION = struct.Struct("<HHBBH")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +40,7 @@ def decode(datagram: bytes) -> Question | None:
     right = (IDENTIFIER, HEADER_BYTES, len(datagram) - HEADER_BYTES, ROBOT_CONTROL, 0)
     if (identifier, header_bytes, size, division, kind) != right:
         return None
-    command, instance, attribute, service, _ = _QUESTION.unpack_from(datagram, HEADER.size)
+    command, instance, attribute, service, _ = QUESTION.unpack_from(datagram, HEADER.size)
     return Question(number, command, instance, attribute, service, datagram[HEADER_BYTES:])
 
 

@@ -6,12 +6,13 @@ import time
 from collections.abc import Callable
 from typing import Any, cast
 
+from protocol_gateway.drivers.yaskawa import commands
 from protocol_gateway.drivers.yaskawa.hses import Command, Service
 from services.simulator import faults as effects
 from services.simulator.fault_table import FAULTS
 from services.simulator.faults import Faults
 from services.simulator.yaskawa import messages
-from services.simulator.yaskawa.controller import NO_ALARM, HsesController
+from services.simulator.yaskawa.controller import NO_ALARM, HsesController, Refusal
 from services.simulator.yaskawa.messages import Question
 
 logger = logging.getLogger(__name__)
@@ -135,7 +136,9 @@ class HsesServer(asyncio.DatagramProtocol):
     # -------------------------------------------------------------------------- answers
 
     def answer(self, question: Question, now_s: float) -> bytes:
-        """Return the answer to a question; a command that writes is unknown here."""
+        """Return the answer to a question, or to a command, which is executed."""
+        if question.command in (commands.POWER, commands.MOVE_PULSES):
+            return self._execute(question, now_s)
         found = self._fields(question, now_s)
         if isinstance(found, int):
             return messages.answer(question, status=found)
@@ -147,6 +150,46 @@ class HsesServer(asyncio.DatagramProtocol):
             case Service.ALL | Service.SINGLE, _:
                 return messages.answer(question, status=_NO_ATTRIBUTE)
         return messages.answer(question, status=_NO_COMMAND)
+
+    def _execute(self, question: Question, now_s: float) -> bytes:
+        """Execute a command that writes; return its answer."""
+        single = question.command == commands.POWER
+        if question.service != (commands.WRITE_SINGLE if single else commands.WRITE_ALL):
+            return messages.answer(question, status=_NO_COMMAND)
+        if question.attribute != 1:
+            return messages.answer(question, status=_NO_ATTRIBUTE)
+        known = (*commands.Switch,) if single else (commands.JOINT_ABSOLUTE,)
+        if question.instance not in known:
+            return messages.answer(question, status=_NO_INSTANCE)
+        refusal = self._switch(question, now_s) if single else self._move(question, now_s)
+        if refusal is None:
+            return messages.answer(question)
+        return messages.answer(question, status=_SINGLE_FAILURE, added_status=refusal)
+
+    def _switch(self, question: Question, now_s: float) -> Refusal | None:
+        if len(question.data) != 4:
+            return Refusal.LENGTH
+        value = int.from_bytes(question.data, "little")
+        if value not in (commands.ON, commands.OFF):
+            return Refusal.VALUE
+        match question.instance:
+            case commands.Switch.HOLD:
+                return self.controller.hold(value == commands.ON, now_s, self.active)
+            case commands.Switch.SERVO:
+                return self.controller.servo(value == commands.ON, now_s, self.active)
+        return None
+
+    def _move(self, question: Question, now_s: float) -> Refusal | None:
+        if len(question.data) != commands.MOTION.size:
+            return Refusal.LENGTH
+        robot, station, kind, speed, *rest = commands.MOTION.unpack(question.data)
+        # A base is moved by the same command as its robot; this controller has none.
+        others = rest[-commands.STATION_AXES - commands.BASE_AXES :]
+        if (robot, station) != (self._instance, 0) or any(others):
+            return Refusal.GROUP
+        if kind != commands.PERCENT:
+            return Refusal.SPEED
+        return self.controller.move(rest[:8], speed / 100, now_s, self.active)
 
     def _fields(self, question: Question, now_s: float) -> list[bytes] | int:
         """Return the attributes of what was asked for, or the status of an error."""
@@ -162,7 +205,7 @@ class HsesServer(asyncio.DatagramProtocol):
             case Command.TORQUE if of_group:
                 return messages.words(arm.torques(now_s))
             case Command.STATUS if instance == 1:
-                return messages.fields_of(arm.status(self.active))
+                return messages.fields_of(arm.status(now_s, self.active))
             case Command.ALARM if 1 <= instance <= 4:
                 return messages.fields_of(arm.alarm(instance), sub_codes=self._sub_codes)
             case messages.ALARM_HISTORY if 1 <= instance % 1000 <= 100:

@@ -36,6 +36,8 @@ class HsesSettings:
         axis_count: Values of axes that it sends: 7 as FS100, 8 as later ones.
         sub_codes: Alarms have the texts of their sub-codes, as on DX200 and later.
         demo: A job runs and moves the arm.
+        held_motions_go_on: A held motion goes on when HOLD ends; otherwise it is given up. Which of them a
+            real controller does is not known.
         faults: Faults in the syntax of `services.simulator.faults`, of `HSES_FAULTS`.
         insecure: May listen beyond loopback; this protocol has no TLS.
         mesh: Where to answer fault requests; None to stay off the mesh.
@@ -47,6 +49,7 @@ class HsesSettings:
     axis_count: int = len(AXIS_NAMES)
     sub_codes: bool = True
     demo: bool = False
+    held_motions_go_on: bool = False
     faults: tuple[str, ...] = ()
     insecure: bool = False
     mesh: Mesh | None = None
@@ -130,6 +133,7 @@ def _server(settings: HsesSettings, faults: Faults) -> HsesServer:
             tour=demo_tour(description) if settings.demo and not restarted else None,
             servo_on=not restarted,
             axis_count=settings.axis_count,
+            held_motions_go_on=settings.held_motions_go_on,
         )
 
     return HsesServer(boot, faults, instance=instance, sub_codes=settings.sub_codes)

@@ -741,6 +741,37 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "{name} 无法使用：{problem}：请在站点文件（universal_robots）中选择其他寄存器",
     ],
   ],
+  ["hses.not_started", ["the controller has not started it within {seconds} s", "控制器未在 {seconds} 秒内开始运动"]],
+  [
+    "hses.other_job",
+    ["a job runs on the controller: end it at the controller", "控制器上有作业正在运行：请在控制器上结束该作业"],
+  ],
+  ["hses.ended_elsewhere", ["it has ended before its target", "运动在到达目标前结束"]],
+  ["hses.held", ["it was held", "运动被暂停"]],
+  ["hses.arm_stopped", ["the controller lets no arm move: {state}", "控制器不允许机械臂运动：{state}"]],
+  ["hses.tool_changed", ["the tool was changed during a motion", "运动期间工具被更改"]],
+  ["hses.went_local", ["the controller was switched to local control", "控制器已切换到本地控制"]],
+  ["hses.channel_lost", ["the connection {name} was lost during a motion", "运动期间连接 {name} 断开"]],
+  [
+    "hses.channel_missing",
+    [
+      "the connection {name} to the controller is missing: the event link.channel_lost says why",
+      "与控制器的连接 {name} 断开：原因见事件 link.channel_lost",
+    ],
+  ],
+  ["hses.state_old", ["the newest state of the controller is too old", "控制器的最新状态已过时"]],
+  [
+    "hses.moves",
+    ["a motion still runs: wait for its end, or stop the robot", "上一个运动仍在进行：请等待其结束，或停止机器人"],
+  ],
+  ["hses.axes", ["{detail}: move the robot from its own panel", "{detail}：请用示教器移动机器人"]],
+  [
+    "hses.held_motion",
+    [
+      "a held motion may go on when HOLD ends: switch the servos off at the robot, as its emergency stop does, then reset the stop",
+      "HOLD 结束后，被暂停的运动可能继续：请在机器人处关闭伺服（例如按下急停），然后复位停止",
+    ],
+  ],
   ["stop.sent", ["stop request {id} is on the controller's socket", "停止 {id} 已发送给控制器"]],
   ["stop.not_sent", ["stop request {id} is latched, but not sent: {cause}", "停止 {id} 已锁定，但未送达：{cause}"]],
   [
