@@ -441,6 +441,7 @@ class Robot:
     def _controller(self) -> Controller:
         now_s, software = time.monotonic(), self._telemetry.software
         unproven = self._proofs.joints_unproven(software)
+        changes = self._signals.unconfirmed
         return Controller(
             link=self._link.status,
             status=self._telemetry.status(now_s),
@@ -449,6 +450,7 @@ class Robot:
             positions_stale=self._no_joints or self._telemetry.positions_stale(now_s),
             unproven=unproven,
             software=software,
+            set_up=codes.CHECK_TOOL_CHANGED(changes=", ".join(changes)) if changes else None,
             read_only=self._read_only,
             capabilities=self._capabilities,
             stop_arrives=self._link.carries(Carries.STOP),

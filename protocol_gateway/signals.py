@@ -103,10 +103,13 @@ class Signals:
     def __init__(self, publisher: Publisher, journal: Journal, joint_names: Sequence[str]) -> None:
         self._publisher, self._journal = publisher, journal
         self._joint_names = joint_names
+        # Tool, payload and frame: as reported last, and as they were first or confirmed.
+        self._setup: dict[str, SignalValue] = {}
+        self._confirmed: dict[str, SignalValue] = {}
         self.forget()
 
     def forget(self) -> None:
-        """Drop all values after the link was lost: another controller may answer next."""
+        """Drop all values after the link was lost, but not the tool, payload and frame to compare with."""
         self._entries: dict[str, _Entry] = {}
         self._by_signal: dict[Signal, _Entry] = {}
         self._message = schema.Signals()
@@ -127,22 +130,39 @@ class Signals:
                 continue
             # 1 and True are equal, but one is a number.
             if raw != entry.raw or type(raw) is not type(entry.raw):
-                before, moved = entry.value, False
+                before = entry.value
                 entry.take(raw)
                 if isinstance(before, float) and isinstance(entry.value, float):
                     self._numbers_changed = True
-                    moved = abs(entry.value - before) > _LEAST_CHANGE
                 elif entry.value != before or type(entry.value) is not type(before):
-                    self._states_changed = moved = True
-                if moved and entry.event and before is not None and entry.value is not None:
-                    change = f"{entry.name} {_shown(before)} → {_shown(entry.value)} {entry.unit}"
-                    changes.setdefault(entry.event, []).append(change.rstrip())
+                    self._states_changed = True
+                if entry.event and entry.value is not None and (change := self._set_up(entry, entry.value)):
+                    changes.setdefault(entry.event, []).append(change)
             entry.received, entry.valid_until_s = received, valid_until_s
         self._newest, self._unpublished = received, True
         self.publish_due(received.monotonic_s)
         for code, some in changes.items():
             text = f"the {_SETUP[code][0]} was changed at the controller: {', '.join(some)}"
             self._journal.report(_S.INFO, code, text, changes=", ".join(some))
+
+    def _set_up(self, entry: _Entry, value: SignalValue) -> str:
+        """Keep a value of tool, payload or frame; return its change in words, empty if there is none."""
+        before = self._setup.get(entry.name)
+        if before is None and len(self._setup) >= MOST_SIGNALS:
+            return ""
+        self._setup[entry.name] = value
+        self._confirmed.setdefault(entry.name, value)
+        return _change(entry.name, before, value, entry.unit) if before is not None else ""
+
+    @property
+    def unconfirmed(self) -> tuple[str, ...]:
+        """Changes of tool, payload and frame since they were first reported or confirmed, in words."""
+        found = (_change(name, self._confirmed[name], value) for name, value in self._setup.items())
+        return tuple(each for each in found if each)
+
+    def confirm(self) -> None:
+        """Take tool, payload and frame as they are now for right."""
+        self._confirmed = dict(self._setup)
 
     def publish_due(self, now_s: float) -> None:
         """Publish what was reported since the last message, if it is time; call it repeatedly."""
@@ -234,6 +254,15 @@ class Signals:
             elif entry.row.HasField("age_s"):
                 entry.row.ClearField("age_s")
         self._publisher.put(message, source_time_ns=newest.wall_ns, dated_by=newest.clock)
+
+
+def _change(name: str, before: SignalValue, now: SignalValue, unit: str = "") -> str:
+    """Return a change in words; empty if there is none."""
+    if isinstance(before, float) and isinstance(now, float):
+        same = abs(now - before) <= _LEAST_CHANGE
+    else:
+        same = now == before and type(now) is type(before)
+    return "" if same else f"{name} {_shown(before)} → {_shown(now)} {unit}".rstrip()
 
 
 def _shown(value: SignalValue) -> str:

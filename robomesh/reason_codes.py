@@ -979,6 +979,11 @@ CHECK_HELD_WAY_UNKNOWN = Code(
     "the target of the held motion is unknown",
     "cancel it (RESET), then send a new motion",
 )
+CHECK_TOOL_CHANGED = Code(
+    "check.tool_changed",
+    "tool, payload or frame were changed at the controller: {changes}",
+    "set them back there, or confirm that they are right",
+)
 CHECK_OTHERS_UNKNOWN = Code("check.others_unknown", "unknown: {cause}")
 CHECK_OTHER_UNKNOWN = Code("check.other_unknown", "the position or the target of {name} ({cause})")
 CHECK_OTHERS_LEFT_OUT = Code("check.others_left_out", "unknown, so not included: {cause}")

@@ -80,6 +80,8 @@ class Controller:
         unproven: Reason why the joints that it sends may not be those of the model, so that `positions` has
             none; None: they are.
         software: Version of its software, in its words; empty: not reported.
+        set_up: Reason why motions are not checked for what the arm carries now: somebody has changed tool,
+            payload or frame at the controller; None: they are.
         read_only: Reason why nothing is sent to it; None: commands may be sent.
         capabilities: What its driver can do.
         stop_arrives: What carries its stop is connected.
@@ -94,6 +96,7 @@ class Controller:
     positions_stale: Reason | None = None
     unproven: Reason | None = None
     software: str = ""
+    set_up: Reason | None = None
     read_only: Reason | None = None
     capabilities: Capabilities = _EVERYTHING
     stop_arrives: bool = True

@@ -81,7 +81,9 @@ class Checks:
     @property
     def problem(self) -> Reason | None:
         """Reason why motions cannot be checked now; None: they can, or need not."""
-        return None if self.policy is Policy.OFF else self._checker.problem(self._name)
+        if self.policy is Policy.OFF:
+            return None
+        return self._checker.problem(self._name) or self._controller().set_up
 
     @property
     def starting(self) -> bool:
@@ -255,11 +257,14 @@ class Checks:
         return tuple(targets)
 
     def _others(self) -> tuple[dict[str, tuple[Positions, ...]], Reason | None]:
-        """Return the known paths of the cell's other robots, and the reason for those that are left out.
+        """Return the known paths of the cell's other robots, and the reason for what the check leaves out.
 
         Raises:
-            CheckError: If a path is unknown, and checks are required.
+            CheckError: If checks are required, and a path or what the arm carries is unknown.
         """
+        set_up = self._controller().set_up
+        if set_up is not None and self.policy is Policy.REQUIRE:
+            raise CheckError(set_up)
         others = self._cell_occupancy.others(self._name, self._cell)
         unknown = [
             codes.CHECK_OTHER_UNKNOWN(each.unknown, name=name)
@@ -269,7 +274,8 @@ class Checks:
         if unknown and self.policy is Policy.REQUIRE:
             raise CheckError(codes.CHECK_OTHERS_UNKNOWN(*unknown))
         known = {name: each.path for name, each in others.items() if each.unknown is None}
-        return known, codes.CHECK_OTHERS_LEFT_OUT(*unknown) if unknown else None
+        left_out = [codes.CHECK_OTHERS_LEFT_OUT(*unknown)] if unknown else []
+        return known, _combined([*([] if set_up is None else [set_up]), *left_out])
 
     def _not_checked(self, *why: Reason) -> Finding:
         if self.policy is Policy.REQUIRE:

@@ -167,10 +167,36 @@ def test_a_change_of_tool_or_payload_at_the_controller_is_an_event(robot):
     assert robot.codes == ["controller.payload_changed", "controller.tool_changed"]
     assert robot.events[0].values["changes"] == "payload.mass 1.2 → 2.5 kg"
     assert robot.events[1].values["changes"] == "tool.offset.z 0.1 → 0.15 m, tool.number 1 → 2"
-    # Another controller may have answered.
+    # Also while the link was lost.
     robot.signals.forget()
-    robot.reports((LOAD, 3.0), after_s=1.0)
-    assert len(robot.codes) == 2
+    robot.reports((LOAD, 2.5), (offset, 0.1), after_s=1.0)
+    assert robot.codes[2:] == ["controller.tool_changed"]
+    assert robot.events[2].values["changes"] == "tool.offset.z 0.15 → 0.1 m"
+
+
+def test_changes_of_the_tool_are_unconfirmed_until_they_are_undone_or_confirmed(robot):
+    number = Signal("tool.number")
+    robot.reports((LOAD, 1.2), (number, 1))
+    assert robot.signals.unconfirmed == ()
+    robot.reports((LOAD, 2.5), (number, 2), after_s=0.1)
+    robot.signals.forget()
+    assert robot.signals.unconfirmed == ("payload.mass 1.2 → 2.5", "tool.number 1 → 2")
+    robot.reports((LOAD, 1.2), (number, 3), after_s=0.1)
+    assert robot.signals.unconfirmed == ("tool.number 1 → 3",)
+    # Unknown is no confirmation.
+    robot.reports((number, None), after_s=0.1)
+    assert robot.signals.unconfirmed == ("tool.number 1 → 3",)
+    robot.signals.confirm()
+    assert robot.signals.unconfirmed == ()
+    robot.reports((number, 1), after_s=0.1)
+    assert robot.signals.unconfirmed == ("tool.number 3 → 1",)
+
+
+def test_names_of_tools_without_end_are_bounded(robot):
+    for number in range(2000):
+        robot.signals.forget()
+        robot.reports((Signal(f"tool.offset.n{number}", "m"), 1.0), after_s=0.1)
+    assert len(robot.signals._setup) <= 256
 
 
 def test_the_unit_may_change(robot):

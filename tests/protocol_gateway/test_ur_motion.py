@@ -261,6 +261,28 @@ def test_what_others_do_during_a_motion_latches_a_stop(mesh, tmp_path, monkeypat
     run(main())
 
 
+def test_motions_are_unchecked_after_a_change_of_the_payload_at_rest(mesh, tmp_path, monkeypatch):
+    """What the arm carries is not what its check knows: with "require" nothing moves, until it is undone."""
+
+    async def main():
+        async with (
+            controller(monkeypatch) as (ports, server),
+            movable(mesh, tmp_path, ports, check="require") as site,
+        ):
+            await until(lambda: site.controller.check == STATE.REQUIRE and not site.controller.check_text)
+            before = server.controller.payload_kg
+            server.controller.payload_kg = 4.0
+            await until(lambda: "payload.mass" in site.controller.check_text)
+            assert site.controller.check_reason.code == "check.tool_changed"
+            await in_control(site)
+            assert "were changed at the controller: payload.mass" in await refusal(move(site, 0.1))
+            server.controller.payload_kg = before
+            await until(lambda: not site.controller.check_text)
+            await until_it_moves(site, server)
+
+    run(main())
+
+
 async def until_it_moves(site, server):
     async with asyncio.timeout(30.0):
         while True:

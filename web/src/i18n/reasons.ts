@@ -837,6 +837,13 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ],
   ],
   [
+    "check.tool_changed",
+    [
+      "tool, payload or frame were changed at the controller: {changes}: set them back there, or confirm that they are right",
+      "控制器上的工具、负载或坐标系已更改：{changes}：请在控制器上改回，或确认其正确",
+    ],
+  ],
+  [
     "joints.not_verified",
     [
       "its joints are unproven: they were never compared with the pose that its controller computes: run robomesh robot verify {robot} --out FILE, then set verified = FILE for this robot in the site file",
