@@ -166,6 +166,7 @@ class Robot:
             send=self._link.send,
             controller=self._controller,
             publish=self._publish_state,
+            confirm_set_up=self._signals.confirm,
         )
         self._checks = Checks(
             settings.name,

@@ -385,6 +385,10 @@ RECOVER_PROGRAM = Code(
     "programs and old client programs may not recover a controller",
     "an operator sends RECOVER, as the only command of the request",
 )
+RECOVER_UNCHANGED = Code(
+    "recover.unchanged", "tool, payload and frame are as they were: there is nothing to confirm"
+)
+RECOVER_CONFIRMED = Code("recover.confirmed", "{by} has confirmed {changes}: {reason}")
 RECOVER_SENT = Code("recover.sent", "{by} has sent {recovery} to the controller: {reason}")
 RECOVER_ANSWERED = Code(
     "recover.answered",

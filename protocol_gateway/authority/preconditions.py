@@ -141,6 +141,8 @@ def _ability_obstacle(request: CommandRequest, controller: Controller) -> Reason
 
 
 def _recovery_obstacle(request: CommandRequest, controller: Controller) -> Reason | None:
+    if request.recover.recovery == RecoverMessage.CONFIRM_TOOL:
+        return None if controller.set_up is not None else codes.RECOVER_UNCHANGED()
     recovery = _RECOVERIES.get(request.recover.recovery)
     if recovery is None or recovery not in controller.capabilities.recoveries:
         named = "recovery" if recovery is None else recovery.value
@@ -152,9 +154,10 @@ def _recovery_obstacle(request: CommandRequest, controller: Controller) -> Reaso
 
 
 def recoveries_of(controller: Controller) -> list[RecoverMessage.Recovery]:
-    """Return the recoveries that the controller has and the site file allows."""
+    """Return the recoveries that the controller has and the site file allows, and what can be confirmed."""
     allowed = controller.capabilities.recoveries & controller.recover
-    return [number for number, recovery in _RECOVERIES.items() if recovery in allowed]
+    found = [number for number, recovery in _RECOVERIES.items() if recovery in allowed]
+    return found if controller.set_up is None else [*found, RecoverMessage.CONFIRM_TOOL]
 
 
 def _kind(command: CommandRequest.Command, capabilities: Capabilities) -> type[ControllerCommand] | None:

@@ -51,6 +51,7 @@ class Ports:
         send: Writes a unit to the controller's socket immediately, or raises LinkError.
         controller: Returns the current state of the controller.
         publish: Publishes the state of lease, stop and program.
+        confirm_set_up: Takes tool, payload and frame as they are now for right.
     """
 
     audit_trail: AuditTrail
@@ -59,6 +60,7 @@ class Ports:
     send: Callable[[bytes], None]
     controller: Callable[[], Controller]
     publish: Callable[[], None]
+    confirm_set_up: Callable[[], None] = lambda: None
 
 
 class Control:
@@ -257,6 +259,8 @@ class Control:
                 ports.latch.keep(effect.stop, effect.last_stop_id)
             case effects.Publish():
                 ports.publish()
+            case effects.ConfirmSetUp():
+                ports.confirm_set_up()
             case effects.Report():
                 ports.journal.report(
                     effect.severity, effect.code, effect.text, why=effect.why, **effect.values

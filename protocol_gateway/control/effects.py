@@ -129,6 +129,11 @@ class Publish:
 
 
 @dataclass(frozen=True)
+class ConfirmSetUp:
+    """Take tool, payload and frame as they are now for right."""
+
+
+@dataclass(frozen=True)
 class Report:
     """Publish an event."""
 
@@ -181,6 +186,7 @@ Effect: TypeAlias = (
     | NumberStop
     | KeepLatch
     | Publish
+    | ConfirmSetUp
     | Report
     | SetTimer
     | EnterCell

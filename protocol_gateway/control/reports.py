@@ -49,6 +49,12 @@ def recovery_sent(recovery: str, by: str, reason: str) -> Report:
     return Report(_S.WARNING, "recover.sent", why.text, why=why, values={"recovery": recovery, "by": by})
 
 
+def tool_confirmed(changes: str, by: str, reason: str) -> Report:
+    """Report that an operator has confirmed the tool, payload or frame."""
+    why = codes.RECOVER_CONFIRMED(changes=changes, by=by, reason=reason)
+    return Report(_S.INFO, "recover.confirmed", why.text, why=why, values={"changes": changes, "by": by})
+
+
 def _stop(severity: Event.Severity, code: str, why: Reason, stop_id: int) -> Report:
     return Report(severity, code, why.text, why=why, values={"stop_id": stop_id})
 

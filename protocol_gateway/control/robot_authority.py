@@ -46,7 +46,7 @@ from protocol_gateway.link.link import LinkState
 from protocol_gateway.motion import has_arrived, motion_may_be_held
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
-from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
+from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest, Recover
 from robots.joints import Joints
 
 _A = LeaseRequest.Action
@@ -287,7 +287,7 @@ class RobotAuthority:
         problem = command.refused or (None if verdict.answer.accepted else verdict.answer)
         if verdict.answer.accepted and not command.step:
             yield from self._end_jog(codes.JOG_COMMANDED(names=command.names), seen)
-        sends = command.program is None
+        sends = command.program is None and not _confirms(command)
         if problem is None and command.is_immediate:
             cancelled = yield effects.CancelPrograms(codes.PROGRAM_HOLD())
             rests = self._authority.moving is False and self._authority.motion is None
@@ -349,6 +349,13 @@ class RobotAuthority:
         if command.program is not None:
             self._program = RunningProgram(program=command.program)
             return f"{command.names}: it runs"
+        if _confirms(command):
+            changes = "" if controller.set_up is None else controller.set_up.values["changes"]
+            (request,) = command.requests
+            yield effects.ConfirmSetUp()
+            yield reports.tool_confirmed(changes, command.operator, request.recover.reason)
+            yield effects.Publish()
+            return f"{changes}: confirmed"
         if unit is None:
             return f"{command.names}: the program was not started, and nothing is on hold"
         for request in command.requests:
@@ -491,6 +498,14 @@ class RobotAuthority:
         if motion is None or controller.status.homed is False:
             return False  # at its home position, but not homed yet
         return has_arrived(motion.target, controller.positions, self._joints.types)
+
+
+def _confirms(command: events.CommandsRequested) -> bool:
+    """Return whether a command only confirms what the arm carries: nothing is sent."""
+    return any(
+        each.command == _C.RECOVER and each.recover.recovery == Recover.CONFIRM_TOOL
+        for each in command.requests
+    )
 
 
 def _record(command: events.CommandsRequested, outcome: Outcome, answer: Answer) -> Effects[None]:

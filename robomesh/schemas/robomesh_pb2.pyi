@@ -522,6 +522,7 @@ class Recover(_message.Message):
         BRAKE_RELEASE: _ClassVar[Recover.Recovery]
         SERVO_ON: _ClassVar[Recover.Recovery]
         RESET_ALARM: _ClassVar[Recover.Recovery]
+        CONFIRM_TOOL: _ClassVar[Recover.Recovery]
     RECOVERY_UNSPECIFIED: Recover.Recovery
     UNLOCK_PROTECTIVE_STOP: Recover.Recovery
     CLOSE_SAFETY_POPUP: Recover.Recovery
@@ -530,6 +531,7 @@ class Recover(_message.Message):
     BRAKE_RELEASE: Recover.Recovery
     SERVO_ON: Recover.Recovery
     RESET_ALARM: Recover.Recovery
+    CONFIRM_TOOL: Recover.Recovery
     RECOVERY_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
     LOOKED_FIELD_NUMBER: _ClassVar[int]

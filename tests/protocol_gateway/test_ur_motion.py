@@ -12,6 +12,7 @@ import pytest
 
 from protocol_gateway.drivers.universal_robots import motion_script
 from protocol_gateway.drivers.universal_robots.modes import RuntimeState
+from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
@@ -261,8 +262,14 @@ def test_what_others_do_during_a_motion_latches_a_stop(mesh, tmp_path, monkeypat
     run(main())
 
 
-def test_motions_are_unchecked_after_a_change_of_the_payload_at_rest(mesh, tmp_path, monkeypatch):
-    """What the arm carries is not what its check knows: with "require" nothing moves, until it is undone."""
+def test_motions_are_unchecked_after_a_change_of_the_payload_until_it_is_undone_or_confirmed(
+    mesh, tmp_path, monkeypatch
+):
+    """What the arm carries is not what its check knows: with "require" nothing moves."""
+
+    def confirmation(**fields):
+        given = {"recovery": schema.Recover.CONFIRM_TOOL, "reason": "new gripper", "looked": True} | fields
+        return {"recover": schema.Recover(**given)}
 
     async def main():
         async with (
@@ -278,9 +285,32 @@ def test_motions_are_unchecked_after_a_change_of_the_payload_at_rest(mesh, tmp_p
             assert "were changed at the controller: payload.mass" in await refusal(move(site, 0.1))
             server.controller.payload_kg = before
             await until(lambda: not site.controller.check_text)
+            assert "nothing to confirm" in await refusal(site.command(C.RECOVER, **confirmation()))
+            await until_it_moves(site, server)
+            server.controller.payload_kg = 4.0
+            await until(lambda: "payload.mass" in site.controller.check_text)
+            assert schema.Recover.CONFIRM_TOOL in site.controller.capabilities.recoveries
+            await site.lease(A.RENEW, ttl_s=5)
+            for wrong in ({"reason": ""}, {"looked": False}):
+                assert "Not sent" in await refusal(site.command(C.RECOVER, **confirmation(**wrong)))
+            async with asyncio.timeout(30.0):
+                # The arm must be seen to rest.
+                while "moves" in await answer_of(site.command(C.RECOVER, **confirmation())):
+                    await site.lease(A.RENEW, ttl_s=5)
+            await until(lambda: not site.controller.check_text)
+            event = await site.event("recover.confirmed", -1)
+            assert re.fullmatch(r"li has confirmed payload.mass .* → 4: new gripper", event.text)
+            assert not site.controller.capabilities.recoveries
             await until_it_moves(site, server)
 
     run(main())
+
+
+async def answer_of(asked):
+    try:
+        return (await asked).text
+    except RefusedError as error:
+        return str(error)
 
 
 async def until_it_moves(site, server):

@@ -837,6 +837,14 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ],
   ],
   [
+    "recover.unchanged",
+    [
+      "tool, payload and frame are as they were: there is nothing to confirm",
+      "工具、负载和坐标系与原先相同，无需确认",
+    ],
+  ],
+  ["recover.confirmed", ["{by} has confirmed {changes}: {reason}", "{by} 已确认 {changes}：{reason}"]],
+  [
     "check.tool_changed",
     [
       "tool, payload or frame were changed at the controller: {changes}: set them back there, or confirm that they are right",
