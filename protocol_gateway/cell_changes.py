@@ -1,4 +1,4 @@
-"""Changes of what stands in a cell: the check, the picture and the saved file change together or not at all.
+"""Changes of a cell: the check, the picture and the saved file change together or not at all.
 
     step                                            after a kill of the gateway
     ----------------------------------------------  ----------------------------------------

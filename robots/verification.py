@@ -222,7 +222,7 @@ def _of_joint(
 def _of_coupling(
     placement: Placement, samples: Sequence[Sample], index: int, names: Sequence[str]
 ) -> Iterator[str]:
-    """Yield a joint whose value contains that of the joint before, as J3 of some arms contains J2."""
+    """Yield a joint with a value that contains that of the joint before, as J3 of some arms contains J2."""
     for sign, words in ((1.0, "plus"), (-1.0, "minus")):
 
         def coupled(positions: FloatArray, sign: float = sign) -> float:

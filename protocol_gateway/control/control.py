@@ -44,7 +44,7 @@ def read_clocks() -> Now:
 
 @dataclass(kw_only=True)
 class Ports:
-    """What the effects of one robot's authority are performed on.
+    """Targets of the effects of one robot's authority.
 
     Attributes:
         latch: File that keeps the latched stop and its number across a restart.
@@ -189,7 +189,7 @@ class Control:
     # ---------------------------------------------------------------- effects
 
     def handle(self, event: events.Event) -> Any:
-        """Hand over an event whose effects wait for nothing, and perform them; return its result."""
+        """Hand over an event, and perform its effects, which wait for nothing; return its result."""
         handled, result = self._robot_authority.handle(event, self._seen()), None
         while True:
             try:

@@ -126,7 +126,7 @@ def refusal_meanwhile(
     seen: Seen,
     joints: Joints,
 ) -> Answer | None:
-    """Return the refusal of commands whose audit entry has just been written; None: send them."""
+    """Return the refusal of commands after their audit entry was written; None: send them."""
     if not holds(authority, command.operator, command.requests[0].lease):
         return not_sent(codes.COMMAND_CONTROL_ENDED_MEANWHILE())
     overtaken = _overtaken_by_hold(command, authority, program)

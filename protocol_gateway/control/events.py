@@ -182,7 +182,7 @@ class ProgramEnded:
 
     @property
     def outcome(self) -> Reason:
-        """How it ended."""
+        """End of it."""
         if self.problem is None:
             return codes.PROGRAM_DONE(program=self.name)
         return codes.PROGRAM_ENDED(self.problem, program=self.name, line=self.line)

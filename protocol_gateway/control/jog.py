@@ -314,7 +314,7 @@ class Jogs:
             self._timer = asyncio.get_running_loop().call_later(left_s + 0.0005, self._check_deadline, run)
 
     def _check_deadline(self, run: _Run) -> None:
-        """End a jog whose deadline has passed."""
+        """End a jog after its deadline."""
         if run is not self._run or run.why is not None or time.monotonic() < run.deadline_s:
             return
         if run.keep_alives:

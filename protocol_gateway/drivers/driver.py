@@ -416,7 +416,7 @@ class Close:
     """End a channel, and do not connect it again.
 
     Attributes:
-        why: What is wrong with the controller's bytes, shown as the reason; empty: nothing.
+        why: Description of the error in the controller's bytes, shown as the reason; empty: no error.
     """
 
     channel: Channel
@@ -446,7 +446,7 @@ class SetTimer:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What the controller reported in the bytes of one read.
+    """Report of a controller, from the bytes of one read.
 
     Attributes:
         units: Number of well-formed units; one may give several events, or none.
@@ -466,7 +466,7 @@ class Report:
 
 @dataclass(frozen=True, slots=True)
 class FateUnknown:
-    """Latch a stop in the gateway: it is unknown what became of a motion, or what the arm does now.
+    """Latch a stop in the gateway: the outcome of a motion, or the present motion of the arm, is unknown.
 
     The driver has already done what it can by itself, and never sends the motion again.
     """

@@ -24,7 +24,7 @@ _LONGEST_PROGRAM_PAUSE_S = 30.0
 
 
 class Listener(Protocol):
-    """What a channel calls, on the event loop; an exception ends the channel's `run`."""
+    """Callbacks of a channel, on the event loop; an exception ends the channel's `run`."""
 
     def on_opened(self, kept: "KeptChannel") -> None:
         """Handle a new connection."""

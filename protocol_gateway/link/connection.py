@@ -28,7 +28,7 @@ _ROUND_TRIP_AT = 68
 
 
 class _Socket(asyncio.BaseProtocol):
-    """What a TCP connection and a UDP socket share: the link's callbacks, and the future of the end."""
+    """Common part of a TCP connection and a UDP socket: the link's callbacks, and the future of the end."""
 
     _transport: asyncio.Transport | asyncio.DatagramTransport
 

@@ -522,7 +522,7 @@ class ControllerLink:
 
 
 class UnaskedSends:
-    """Limit for what a driver sends by itself: as many a second as it declares, and that many at once."""
+    """Limit for unasked sends of a driver: as many a second as it declares, and that many together."""
 
     def __init__(self, most_a_second: float) -> None:
         self._most = self._left = most_a_second

@@ -140,7 +140,7 @@ class Changes:
     # ------------------------------------------------------------------
 
     async def _described(self, file: str, author: str, within_s: float | None) -> schema.Recording:
-        """Return what is known of a recording; of a damaged one, its file's name.
+        """Return the known facts of a recording; of a damaged one, its file's name.
 
         Raises:
             BusyError: If reading it takes too long.

@@ -1,4 +1,4 @@
-"""A target that would collide, or lies beyond a limit, is told while it is chosen, before it is sent."""
+"""A target that would collide, or is beyond a limit, is reported while it is chosen, before it is sent."""
 
 import re
 

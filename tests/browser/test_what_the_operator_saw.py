@@ -1,4 +1,4 @@
-"""A frozen picture lets nobody start a motion, and the audit log tells which picture an operator saw."""
+"""With a frozen picture no operator can start a motion; the audit log has the picture that was seen."""
 
 import asyncio
 import json

@@ -212,7 +212,7 @@ class RtdeDriver(OnlyReads):
 
 
 def alarm_of(event: PrimaryEvent) -> AlarmReceived | None:
-    """Return an event of the primary interface as an alarm; None: it is none.
+    """Return an event of the primary interface as an alarm; None: not an alarm.
 
     The safety mode also comes by RTDE.
     """

@@ -409,7 +409,7 @@ class RtdeMotionDriver(RtdeDriver):
         return ()
 
     def _ended(self, progress: int | None) -> Effects:
-        """End the motion, whose program has ended."""
+        """End the motion after the end of its program."""
         self._motion = None
         effects: list[Effect] = [self._written(_NO_MOTION)] if self._inputs.ready else []
         if progress != Progress.DONE:

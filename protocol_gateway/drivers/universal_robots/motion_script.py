@@ -27,7 +27,7 @@ OUTPUTS = 3
 
 
 class Progress(IntEnum):
-    """How far a program is."""
+    """Progress of a program."""
 
     MOVING = 1
     DONE = 2

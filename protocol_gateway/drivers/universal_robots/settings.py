@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class MotionSettings:
-    """How the gateway moves an arm of Universal Robots.
+    """Settings of motion of an arm of Universal Robots.
 
     Attributes:
         input_registers: Number of the first of two integer input registers, from 24.

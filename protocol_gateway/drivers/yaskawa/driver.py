@@ -1,6 +1,6 @@
 """Driver that reads a controller of Yaskawa by HSES; it only sends questions.
 
-The controller sends nothing unasked and no time. Each answer is reported by itself, with the time of its
+The controller sends only answers, without a time. Each answer is reported by itself, with the time of its
 question: positions and status of different answers are never combined.
 """
 
