@@ -451,6 +451,7 @@ class Robot:
             positions_stale=self._no_joints or self._telemetry.positions_stale(now_s),
             unproven=unproven,
             software=software,
+            reports_set_up=self._signals.has_set_up,
             set_up=codes.CHECK_TOOL_CHANGED(changes=", ".join(changes)) if changes else None,
             read_only=self._read_only,
             capabilities=self._capabilities,

@@ -155,6 +155,11 @@ class Signals:
         return _change(entry.name, before, value, entry.unit) if before is not None else ""
 
     @property
+    def has_set_up(self) -> bool:
+        """True if tool, payload or frame were reported."""
+        return bool(self._setup)
+
+    @property
     def unconfirmed(self) -> tuple[str, ...]:
         """Changes of tool, payload and frame since they were first reported or confirmed, in words."""
         found = (_change(name, self._confirmed[name], value) for name, value in self._setup.items())

@@ -80,6 +80,7 @@ class Controller:
         unproven: Reason why the joints that it sends may not be those of the model, so that `positions` has
             none; None: they are.
         software: Version of its software, in its words; empty: not reported.
+        reports_set_up: It reports tool, payload or frame.
         set_up: Reason why motions are not checked for what the arm carries now: somebody has changed tool,
             payload or frame at the controller; None: they are.
         read_only: Reason why nothing is sent to it; None: commands may be sent.
@@ -96,6 +97,7 @@ class Controller:
     positions_stale: Reason | None = None
     unproven: Reason | None = None
     software: str = ""
+    reports_set_up: bool = False
     set_up: Reason | None = None
     read_only: Reason | None = None
     capabilities: Capabilities = _EVERYTHING
@@ -157,7 +159,7 @@ def recoveries_of(controller: Controller) -> list[RecoverMessage.Recovery]:
     """Return the recoveries that the controller has and the site file allows, and what can be confirmed."""
     allowed = controller.capabilities.recoveries & controller.recover
     found = [number for number, recovery in _RECOVERIES.items() if recovery in allowed]
-    return found if controller.set_up is None else [*found, RecoverMessage.CONFIRM_TOOL]
+    return [*found, RecoverMessage.CONFIRM_TOOL] if controller.reports_set_up else found
 
 
 def _kind(command: CommandRequest.Command, capabilities: Capabilities) -> type[ControllerCommand] | None:

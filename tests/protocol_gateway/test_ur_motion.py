@@ -300,7 +300,6 @@ def test_motions_are_unchecked_after_a_change_of_the_payload_until_it_is_undone_
             await until(lambda: not site.controller.check_text)
             event = await site.event("recover.confirmed", -1)
             assert re.fullmatch(r"li has confirmed payload.mass .* → 4: new gripper", event.text)
-            assert not site.controller.capabilities.recoveries
             await until_it_moves(site, server)
 
     run(main())

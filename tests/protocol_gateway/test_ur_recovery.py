@@ -68,7 +68,12 @@ def test_a_protective_stop_is_unlocked_once_and_nothing_else_changes(mesh, tmp_p
         async with recoverable(mesh, tmp_path, monkeypatch) as (site, server, gate):
             capabilities = site.controller.capabilities
             assert C.RECOVER in capabilities.commands
-            assert set(capabilities.recoveries) == {R.UNLOCK_PROTECTIVE_STOP, R.POWER_ON, R.BRAKE_RELEASE}
+            # And a changed tool can be confirmed, which sends nothing.
+            assert set(capabilities.recoveries) - {R.CONFIRM_TOOL} == {
+                R.UNLOCK_PROTECTIVE_STOP,
+                R.POWER_ON,
+                R.BRAKE_RELEASE,
+            }
             # A motion is under way, and a program of the gateway runs, until the controller stops it.
             await move(site, 2.0)
             await until(lambda: server.controller.programs.moving(time.monotonic()))

@@ -25,6 +25,7 @@ const CHINESE: Record<string, string> = {
   "controller.payload_changed": "控制器上的负载已更改：{changes}。",
   "controller.frame_changed": "控制器上的用户坐标系已更改：{changes}。",
   "controller.software": "控制器软件：{software}。",
+  "recover.confirmed": "{by} 已确认 {changes}{cause}。",
   "controller.remote": "控制器恢复远程模式。",
   "joints.unproven": "请核对关节{cause}。",
   "robot.read_only": "机器人只读{cause}。",

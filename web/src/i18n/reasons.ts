@@ -838,10 +838,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ],
   [
     "recover.unchanged",
-    [
-      "tool, payload and frame are as they were: there is nothing to confirm",
-      "工具、负载和坐标系与原先相同，无需确认",
-    ],
+    ["tool, payload and frame are as they were: there is nothing to confirm", "工具、负载和坐标系与原先相同，无需确认"],
   ],
   ["recover.confirmed", ["{by} has confirmed {changes}: {reason}", "{by} 已确认 {changes}：{reason}"]],
   [

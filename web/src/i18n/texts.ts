@@ -322,6 +322,10 @@ const TEXTS = {
   recover_brakes: ["Release the brakes", "释放制动器"],
   recover_servo: ["Servo on", "伺服上电"],
   recover_alarm: ["Reset the alarm", "复位报警"],
+  recover_tool: [
+    "Confirm the changed tool, payload or frame (sends nothing)",
+    "确认已更改的工具、负载或坐标系（不发送）",
+  ],
   take_from: ["Take over from {name}", "从 {name} 接管"],
   take_says: [
     "{name} loses control at once and is told your reason. If a motion runs, it is stopped.",

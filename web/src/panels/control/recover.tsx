@@ -17,6 +17,7 @@ const NAMES = {
   [Recovery.BRAKE_RELEASE]: "recover_brakes",
   [Recovery.SERVO_ON]: "recover_servo",
   [Recovery.RESET_ALARM]: "recover_alarm",
+  [Recovery.CONFIRM_TOOL]: "recover_tool",
 } as const;
 
 type Named = keyof typeof NAMES;
