@@ -167,6 +167,7 @@ class Robot:
             controller=self._controller,
             publish=self._publish_state,
             confirm_set_up=self._signals.confirm,
+            controlled=self._link.controlled,
         )
         self._checks = Checks(
             settings.name,
@@ -271,7 +272,7 @@ class Robot:
 
     @property
     def use(self) -> Reason | None:
-        """Why the cell must not change now: the robot is controlled or moves, or may move; None: it rests."""
+        """Reason to refuse a change of the cell: the robot is controlled, or may move; None: it rests."""
         name, authority, controller = self._settings.name, self._control.authority, self._controller()
         if authority.lease is not None:
             return codes.CELL_CONTROLLED(robot=name, holder=authority.lease.holder)

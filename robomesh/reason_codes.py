@@ -517,6 +517,28 @@ HSES_HELD_MOTION = Code(
     "a held motion may go on when HOLD ends",
     "switch the servos off at the robot, as its emergency stop does, then reset the stop",
 )
+FANUC_NOT_CONNECTED = Code(
+    "fanuc.not_connected", "RMI is not connected", "wait for it, or see why in the event link.channel_lost"
+)
+FANUC_MOVES = Code("fanuc.moves", "a motion still runs", "wait for its end, or stop the robot")
+FANUC_STATE_OLD = Code("fanuc.state_old", "the newest state of the controller is too old")
+FANUC_OTHER_PROGRAM = Code(
+    "fanuc.other_program", "another program runs on the controller", "end it at the controller"
+)
+FANUC_EXTRA_AXES = Code(
+    "fanuc.extra_axes",
+    "axis {axes} belongs to no joint of the model and is not at 0, so a motion would move it",
+    "declare it, or move it to 0",
+)
+FANUC_ARM_STOPPED = Code("fanuc.arm_stopped", "the controller does not let the arm move ({activity})")
+FANUC_WENT_LOCAL = Code("fanuc.went_local", "the controller is not in remote control any more")
+FANUC_TOOL_CHANGED = Code("fanuc.tool_changed", "the tool was changed during a motion")
+FANUC_LOST_PROGRAM = Code("fanuc.lost_program", "the gateway's program has ended on the controller")
+FANUC_NO_ANSWER = Code("fanuc.no_answer", "the controller has not answered {name}")
+FANUC_REFUSED = Code("fanuc.refused", "the controller refuses {name}: {problem}")
+FANUC_SYSTEM_FAULT = Code("fanuc.system_fault", "the controller reports a fault during a motion")
+FANUC_CONNECTION_LOST = Code("fanuc.connection_lost", "RMI was disconnected during a motion")
+FANUC_MOVED_BEFORE = Code("fanuc.moved_before", "the arm has moved before its motion was sent")
 STOP_SENT = Code("stop.sent", "stop request {id} is on the controller's socket")
 STOP_NOT_SENT = Code("stop.not_sent", "stop request {id} is latched, but not sent: {cause}")
 STOP_READ_ONLY = Code(

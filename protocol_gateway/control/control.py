@@ -52,6 +52,7 @@ class Ports:
         controller: Returns the current state of the controller.
         publish: Publishes the state of lease, stop and program.
         confirm_set_up: Takes tool, payload and frame as they are now for right.
+        controlled: Tells the driver whether an operator controls the robot.
     """
 
     audit_trail: AuditTrail
@@ -61,6 +62,7 @@ class Ports:
     controller: Callable[[], Controller]
     publish: Callable[[], None]
     confirm_set_up: Callable[[], None] = lambda: None
+    controlled: Callable[[bool], None] = lambda taken: None
 
 
 class Control:
@@ -267,6 +269,8 @@ class Control:
                 )
             case effects.SetTimer():
                 self._set_timer(effect.at_s)
+            case effects.Controlled():
+                ports.controlled(effect.taken)
         return None
 
     def _seen(self) -> Seen:

@@ -8,7 +8,7 @@
     NumberStop                            number of the stop; None: the next one
     CancelPrograms                        whether a program was cancelled
     AppendLater, KeepLatch, Publish,      none
-      Report, SetTimer
+      Report, SetTimer, Controlled
 
 If an effect of the last three rows fails, that is logged, and the next effect is performed.
 Only commands and lease requests may yield an awaited effect. A stop yields none.
@@ -152,6 +152,13 @@ class SetTimer:
 
 
 @dataclass(frozen=True)
+class Controlled:
+    """Notify the driver of the begin or end of control."""
+
+    taken: bool
+
+
+@dataclass(frozen=True)
 class EnterCell:
     """Wait until no other robot of the cell has a motion checked, if these commands move the robot."""
 
@@ -189,6 +196,7 @@ Effect: TypeAlias = (
     | ConfirmSetUp
     | Report
     | SetTimer
+    | Controlled
     | EnterCell
     | CheckMotion
     | Recheck

@@ -273,6 +273,7 @@ class RobotAuthority:
         if ended is not None and ended.stop:
             yield from self._stop_by_gateway(codes.STOP_CONTROL_ENDED(ended.why), seen)
         yield effects.SetTimer(None if authority.lease is None else authority.lease.until_s)
+        yield effects.Controlled(authority.lease is not None)
         yield effects.Publish()
         if ended is not None:
             yield reports.lease_ended(ended)

@@ -6,7 +6,8 @@ the link performs in order:
     told                                     effects
     ---------------------------------------  ------------------------------------------------------
     started, opened, received, skipped,      Open, Close: keep a channel connected, or end it
-      closed, timer_ended, command           Send: write whole bytes to a channel now
+      closed, timer_ended, command,          Send: write whole bytes to a channel now
+      controlled (`FollowsControl`)
                                              SetTimer: tell the driver when a time has come
                                              Report: what the controller reported
                                              FateUnknown: latch a stop
@@ -19,7 +20,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, Flag, auto
-from typing import Protocol, TypeAlias, get_args
+from typing import Protocol, TypeAlias, get_args, runtime_checkable
 
 from robomesh.reasons import Reason
 
@@ -478,8 +479,17 @@ Effect: TypeAlias = Open | Close | Send | SetTimer | Report | FateUnknown
 Effects: TypeAlias = Sequence[Effect]
 
 
+@runtime_checkable
+class FollowsControl(Protocol):
+    """Addition to `Driver` that receives the state of control."""
+
+    def controlled(self, taken: bool, now_s: float) -> Effects:
+        """Handle the begin or end of control; idempotent. The stop of a lost lease precedes it."""
+        ...
+
+
 class Driver(Protocol):
-    """Driver of a controller's protocol, without I/O."""
+    """Driver of a controller's protocol, without I/O. `FollowsControl` adds a method that it may have."""
 
     @property
     def ports(self) -> frozenset[str]:

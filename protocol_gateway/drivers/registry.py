@@ -20,7 +20,7 @@ OWN: Mapping[str, str] = {
     "unit": "protocol_gateway.drivers.unit:UnitDriver",
     "rtde": "protocol_gateway.drivers.universal_robots.motion_driver:rtde_driver",
     "hses": "protocol_gateway.drivers.yaskawa.motion_driver:hses_driver",
-    "snpx": "protocol_gateway.drivers.fanuc.driver:SnpxDriver",
+    "snpx": "protocol_gateway.drivers.fanuc.motion_driver:fanuc_driver",
     "opcua": "protocol_gateway.drivers.opcua.driver:OpcUaDriver",
 }
 """Drivers of robomesh by the site file's `protocol`: module and class."""

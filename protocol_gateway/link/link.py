@@ -30,6 +30,7 @@ from protocol_gateway.drivers.driver import (
     Effect,
     Effects,
     FateUnknown,
+    FollowsControl,
     JointsReceived,
     MalformedReceived,
     Open,
@@ -135,6 +136,7 @@ class ControllerLink:
         self._in_a_hurry: set[str] = set()
         self._failed: asyncio.Future[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
+        self._is_controlled = False
         self._unasked = UnaskedSends(driver.requests_a_second)
         self._connected_s = self._units_at_connect = 0.0
         self._status = LinkStatus(LinkState.DOWN, codes.LINK_CONNECTING(where=self._where))
@@ -192,6 +194,7 @@ class ControllerLink:
         self._failed = asyncio.get_running_loop().create_future()
         try:
             self._tell(self._driver.started(self._monotonic_s()))
+            self.controlled(self._is_controlled)
             await self._failed
         finally:
             self._failed.cancel()
@@ -231,6 +234,13 @@ class ControllerLink:
         if failure is not None and not sent:
             raise failure
         self._response_timer.command_sent(now.monotonic_s)
+
+    def controlled(self, taken: bool) -> None:
+        """Tell the driver whether an operator controls the robot, if it wants to know and has started."""
+        self._is_controlled = taken
+        running = self._failed is not None and not self._failed.done()
+        if running and isinstance(self._driver, FollowsControl):
+            self._tell(self._driver.controlled(taken, self._monotonic_s()))
 
     def carries(self, what: Carries) -> bool:
         """Return whether a channel that carries it is connected."""

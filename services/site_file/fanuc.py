@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal, TypeAlias
 
-from pydantic import BaseModel, Field, field_validator, model_validator
+from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
 
 from protocol_gateway.drivers.fanuc.assignments import (
     MOST_GROUPS,
@@ -37,6 +37,9 @@ class Fanuc(BaseModel):
         tools: Numbers of the tools with a frame to read.
         registers: Numbers of the registers R[] to read twice a second.
         io: Inputs and outputs to read twice a second: `DI[1-16]`; DO, RI, RO, UI and UO likewise; at most 16.
+        motion: The gateway moves the robot by RMI (option R912), experimental; otherwise it only reads, and
+            sends nothing to RMI.
+        speed: Speed of a motion at 100 %, in percent of the arm's greatest; the override slows it further.
     """
 
     model_config = PART_CONFIG
@@ -50,6 +53,8 @@ class Fanuc(BaseModel):
     tools: Annotated[tuple[_Tool, ...], Field(max_length=MOST_TOOLS)] = (1,)
     registers: Annotated[tuple[_Register, ...], Field(max_length=MOST_REGISTERS)] = ()
     io: Annotated[tuple[str, ...], Field(max_length=16)] = ("DI[1-16]", "DO[1-16]", "RI[1-8]", "RO[1-8]")
+    motion: StrictBool = False
+    speed: Annotated[float, Field(ge=1, le=100)] = 20.0
 
     @field_validator("io")
     @classmethod
@@ -65,6 +70,8 @@ class Fanuc(BaseModel):
     def _of_table(self) -> "Fanuc":
         try:
             assert self.settings.table
+            if (problem := self.settings.motion_problem if self.motion else None) is not None:
+                raise GatewaySettingsError(problem)
         except GatewaySettingsError as error:
             raise ValueError(str(error)) from None
         return self
@@ -73,4 +80,4 @@ class Fanuc(BaseModel):
     def settings(self) -> FanucSettings:
         """The settings as the driver takes them."""
         values = self.model_dump()
-        return FanucSettings(rate_hz=values.pop("rate"), **values)
+        return FanucSettings(rate_hz=values.pop("rate"), speed_percent=values.pop("speed"), **values)

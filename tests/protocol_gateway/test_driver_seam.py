@@ -342,3 +342,34 @@ def test_an_exception_at_a_timer_ends_the_link():
                 await arm_link.run()
 
     run(main())
+
+
+class Follower(Driver):
+    """A driver that connects only while the robot is controlled."""
+
+    def __init__(self, **effects):
+        super().__init__(**effects)
+        self.controls = []
+
+    def controlled(self, taken, now_s):
+        self.controls.append(taken)
+        return (Open(POLLED) if taken else Close(POLLED),)
+
+
+def test_a_driver_may_follow_who_controls_the_robot():
+    async def main():
+        async with peer() as controller:
+            driver = Follower(started=(), opened=lambda channel: (Send(POLLED, b"?"),))
+            async with link(driver, controller.port) as (arm_link, _):
+                await until(lambda: driver.controls == [False])
+                arm_link.controlled(True)
+                await until(lambda: controller.questions)
+                assert arm_link.carries(POLLED.carries)
+                arm_link.controlled(False)
+                assert not arm_link.carries(POLLED.carries)
+                assert driver.controls == [False, True, False]
+            # A driver without the method is not told.
+            async with link(polling(), controller.port) as (arm_link, _):
+                arm_link.controlled(True)
+
+    run(main())

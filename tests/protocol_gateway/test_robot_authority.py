@@ -103,7 +103,7 @@ class Bench:
 
 
 STOPPED = ["Stop", "NumberStop", "KeepLatch", "CancelPrograms", "Publish", "Report", "AppendLater"]
-APPLIED = ["SetTimer", "Publish"]
+APPLIED = ["SetTimer", "Controlled", "Publish"]
 CHECKED = ["EnterCell", "CheckMotion", "Append", "Recheck"]
 
 
@@ -251,7 +251,7 @@ def test_expired_control_ends_before_a_command_is_evaluated():
     bench = Bench().moving()
     bench.seen = replace(SEEN, now=Now(NOW.monotonic_s + 6.0, NOW.wall_ns + 6_000_000_000))
     assert bench.command(C.HOME, 2).reason.code == "lease.none"
-    assert bench.performed[: len(STOPPED) + 2] == [*STOPPED, *APPLIED]
+    assert bench.performed[: len(STOPPED) + len(APPLIED)] == [*STOPPED, *APPLIED]
 
 
 def test_a_request_for_control_expires_after_the_lease():

@@ -515,7 +515,7 @@ async def controller(**settings):
     task = asyncio.create_task(serve_snpx(SnpxSettings(**settings), ready=ready.set_result))
     await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
     try:
-        yield await ready
+        yield (await ready).snpx
     finally:
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)

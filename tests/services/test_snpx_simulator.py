@@ -38,7 +38,7 @@ async def simulator(**options):
     if task.done():
         await task
     try:
-        yield ready.result()
+        yield ready.result().snpx
     finally:
         task.cancel()
         with contextlib.suppress(asyncio.CancelledError):

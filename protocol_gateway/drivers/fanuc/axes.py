@@ -22,6 +22,7 @@ from robots.joints import FloatArray, JointType
 
 _SIGNALS = re.compile(r"(DI|DO|RI|RO|UI|UO)\[([1-9]\d{0,3})(?:-([1-9]\d{0,3}))?\]")
 MOST_SIGNALS = 128
+LEAST_MOTION_RATE_HZ = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +81,8 @@ class FanucSettings:
         tools: Numbers of the tools with a frame to read.
         registers: Numbers of the numeric registers to read.
         io: Inputs and outputs to read: "DI[1-16]".
+        motion: The gateway moves the robot by RMI; otherwise it only reads.
+        speed_percent: Speed of a motion at 100 percent, in percent of the arm's greatest.
     """
 
     assignments: Literal["own", "pendant"] | None = None
@@ -92,6 +95,17 @@ class FanucSettings:
     tools: Sequence[int] = (1,)
     registers: Sequence[int] = ()
     io: Sequence[str] = ("DI[1-16]", "DO[1-16]", "RI[1-8]", "RO[1-8]")
+    motion: bool = False
+    speed_percent: float = 20.0
+
+    @property
+    def motion_problem(self) -> str | None:
+        """Error of settings that do not suffice for motion; None: they do."""
+        if self.assignments is None or self.j23 is None:
+            return "motion: needs assignments and j23, because a motion is followed by the joints"
+        if self.rate_hz < LEAST_MOTION_RATE_HZ:
+            return f"motion: needs a rate of at least {LEAST_MOTION_RATE_HZ:g} positions a second"
+        return None
 
     @property
     def table(self) -> Table:

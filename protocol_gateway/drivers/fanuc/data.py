@@ -33,7 +33,7 @@ class Cartesian:
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """The current position. A part is None if it is invalid or not finite.
+    """Current position. Invalid or infinite parts are None.
 
     Attributes:
         axes: Nine values [degree] or [mm], 0 where there is no axis.

@@ -2,7 +2,7 @@
 
 A client reads words of memory. An assignment copies a position, an alarm or a variable into such words. With
 the setting "own" the driver sends assignments, and each answer proves that they are still its own. It sends
-only questions otherwise. The driver reports each answer by itself, and never combines positions and status.
+only questions otherwise. The driver reports each answer separately, and never combines positions and status.
 """
 
 from collections import Counter
@@ -114,6 +114,7 @@ class SnpxDriver(OnlyReads):
         self._alarms: frozenset[Alarm] = frozenset()
         self._table_lost = False
         self._extra_axes = ""
+        self._axes_read: Sequence[float] = ()
         self._begin()
 
     def _begin(self) -> None:
@@ -277,6 +278,7 @@ class SnpxDriver(OnlyReads):
         if position.axes is None and not self._invalid:
             events.append(_malformed(words, "the controller reports no valid, finite joint position"))
         self._invalid = position.axes is None
+        self._axes_read = position.axes or ()
         if position.axes is not None and self._settings.j23 is not None:
             events.append(JointsReceived(self._axes.positions(position.axes)))
             events += self._report_extra_axes(position.axes)

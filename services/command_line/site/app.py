@@ -194,6 +194,12 @@ def simulate(
     fanuc: Annotated[
         str, typer.Option(metavar="JSON", help="The site file's table `fanuc` as JSON; with snpx.")
     ] = "",
+    rmi: Annotated[
+        str,
+        typer.Option(
+            metavar="HOST:PORT", help="RMI, on a real controller port 16001; empty: none; with snpx."
+        ),
+    ] = "",
     path: Annotated[
         str, typer.Option(metavar="PATH", help="Path of the server's address, as /server; with opcua.")
     ] = "",
@@ -236,6 +242,7 @@ def simulate(
         launch.launch_snpx_simulator(
             robot=robot or "puma560",
             listen=listen or "127.0.0.1:60008",
+            rmi=rmi,
             fanuc=fanuc,
             demo=demo,
             faults=tuple(fault or ()),

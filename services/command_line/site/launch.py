@@ -236,26 +236,29 @@ def launch_snpx_simulator(
     *,
     robot: str,
     listen: str,
+    rmi: str,
     fanuc: str,
     demo: bool,
     faults: tuple[str, ...],
     insecure: bool,
     mesh: "Mesh | None",
 ) -> None:
-    """Run a simulated controller with SNPX."""
-    from services.simulator.fanuc.service import SnpxSettings, serve_snpx
+    """Run a simulated controller with SNPX and RMI."""
+    from services.simulator.fanuc.service import FanucPorts, SnpxSettings, serve_snpx
     from services.site_file.fanuc import Fanuc
     from services.site_file.listen_address import split_address
 
     declared = _declared(Fanuc, "fanuc", fanuc)
 
-    def ready(port: int) -> None:
-        print(f"listening on {split_address(listen)[0]}:{port}", flush=True)
+    def ready(ports: FanucPorts) -> None:
+        and_rmi = f", RMI on {ports.rmi}" if ports.rmi else ""
+        print(f"listening on {split_address(listen)[0]}:{ports.snpx}{and_rmi}", flush=True)
 
     service.log_to_stderr()
     settings = SnpxSettings(
         robot=robot,
         listen=listen,
+        rmi=rmi,
         fanuc=None if declared is None else declared.settings,
         demo=demo,
         faults=faults,

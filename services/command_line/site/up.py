@@ -129,6 +129,10 @@ def _simulator(robot: Robot, site: str, attach: tuple[str, ...]) -> tuple[Progra
     if robot.protocol == "snpx":
         declared = robot.fanuc.model_dump_json(exclude_defaults=True) if robot.fanuc else ""
         protocol = ("--protocol", "snpx", *(("--fanuc", declared) if declared else ()))
+        if robot.fanuc is not None and robot.fanuc.motion:
+            rmi = _free_port()
+            protocol = (*protocol, "--rmi", f"127.0.0.1:{rmi}")
+            controller += f",rmi={rmi}"
     if robot.protocol == "opcua":
         path = robot.opcua.path if robot.opcua else ""
         protocol = ("--protocol", "opcua", *(("--path", path) if path else ()))

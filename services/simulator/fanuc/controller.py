@@ -4,25 +4,29 @@ The program is the demo's tour. Inputs and outputs are invented: they count its 
 """
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from datetime import datetime
 
 import numpy as np
 
 from protocol_gateway.drivers.fanuc.axes import Axes
-from protocol_gateway.drivers.fanuc.data import ALARM, AXES, POSITION, TASK
+from protocol_gateway.drivers.fanuc.data import ALARM, AXES, POSITION, TASK, alarms
 from protocol_gateway.drivers.fanuc.signals import Operator
 from robots.description import RobotDescription
-from robots.joints import FloatArray, joints_of
+from robots.joints import FloatArray, joints_of, violations
 from robots.model import build_model, link_placements, tool_placement
 from robots.poses import rotation_rpy
 from services.simulator.demo import DemoProgram
+from services.simulator.fanuc.rmi_program import NAME as RMI_MOVE
+from services.simulator.fanuc.rmi_program import ProgramStatus, RmiProgram
 from services.simulator.fault_table import LEAP
 
 PROGRAM = "DEMO"
 SOFTWARE = "V0.00P/00 simulated"
 NO_SEVERITY = 128
 SERVO_SEVERITY = 54
+CANNOT_EXECUTE, SERVO_OFF, PENDANT_ENABLED, PROGRAM_EXISTS = 2556934, 2556935, 2556936, 7015
+"""Numbers of RMI's errors."""
 
 _SPEED = 0.6
 _MOVED_DEGREES = 12.345
@@ -37,6 +41,10 @@ class SnpxController:
         group: Number of its motion group.
         tour: Targets [rad] or [m] of the running program; None: none runs.
         servo_on: A restarted controller waits for an operator to switch the servos on.
+
+    Attributes:
+        rmi: The program of RMI, which then moves the arm; None: there was none.
+        pendant_enabled: The teach pendant is on, so RMI does not work.
     """
 
     def __init__(
@@ -54,6 +62,9 @@ class SnpxController:
         self._program = DemoProgram(self._joints, tour, speed=_SPEED)
         self._servo_on = servo_on
         self._alarms: list[bytes] = []
+        self.rmi: RmiProgram | None = None
+        self.pendant_enabled = False
+        self.tool_number = 1
         self.group = group
         self.registers: dict[int, float] = {1: 12.5}
 
@@ -61,11 +72,65 @@ class SnpxController:
 
     def tick(self, now_s: float) -> None:
         """Begin the next motion of the program if the current one has ended."""
-        self._program.tick(now_s)
+        if self.rmi is None:
+            self._program.tick(now_s)
+
+    def begin_rmi(self, now_s: float) -> int:
+        """Create and start RMI_MOVE; return an error's number, 0: done."""
+        if self.rmi is not None and self.rmi.status is not ProgramStatus.ABORTED:
+            return PROGRAM_EXISTS
+        if self.pendant_enabled:
+            return PENDANT_ENABLED
+        if not self.servo_ready:
+            return SERVO_OFF
+        if self.program_runs:
+            return CANNOT_EXECUTE
+        self.rmi = RmiProgram(self._joints, self.positions(now_s))
+        return 0
+
+    def target_of(self, axes: Sequence[float]) -> FloatArray | None:
+        """Return joint positions of nine axes [degree] or [mm]; None: beyond the limits."""
+        target = np.array(self._axes.positions(axes))
+        return None if violations(self._joints, target) else target
+
+    def start_program(self, tour: Iterator[FloatArray], now_s: float) -> None:
+        """Start a program from the present position."""
+        start = self.positions(now_s)
+        self.rmi = None
+        self._program = DemoProgram(self._joints, tour, speed=_SPEED, start=start)
+
+    def end_program(self, now_s: float) -> None:
+        """End the program."""
+        self._program.stop(now_s)
+
+    @property
+    def servo_ready(self) -> bool:
+        """True if the servos have power and there is no alarm."""
+        return self._servo_on and not self._alarms
+
+    @property
+    def program_runs(self) -> bool:
+        """True if a program other than RMI_MOVE runs."""
+        return self.rmi is None and self._program.runs
+
+    def axes(self, now_s: float) -> tuple[float, ...]:
+        """Return nine axes [degree] or [mm]."""
+        return self._axes.values(self.positions(now_s))
+
+    @property
+    def newest_alarm(self) -> str:
+        """Code of the newest alarm, such as SRVO-001."""
+        return alarms(self._alarms[0])[0].number if self._alarms else "No Error"
+
+    def pause_rmi(self, now_s: float, *, fault: bool) -> None:
+        """Pause RMI_MOVE, as an operator or a fault does."""
+        if self.rmi is not None and self.rmi.pause(now_s):
+            self.rmi.reports_fault = fault
 
     def raise_alarm(self, facility: int, code: int, message: str, now_s: float) -> None:
         """Stop the arm and report a servo alarm until `reset`."""
         self._program.stop(now_s)
+        self.pause_rmi(now_s, fault=True)
         time = datetime.now().astimezone().timetuple()[:6]
         self._alarms.insert(0, _alarm(facility, code, SERVO_SEVERITY, time, message, "SERVO"))
 
@@ -78,7 +143,7 @@ class SnpxController:
 
     def positions(self, now_s: float) -> FloatArray:
         """Return the joint positions [rad] or [m]."""
-        return self._program.state(now_s).positions
+        return (self._program if self.rmi is None else self.rmi).state(now_s).positions
 
     def position(self, now_s: float, active: Collection[str] = ()) -> bytes:
         """Return the current position in the world frame, with the tool.
@@ -119,6 +184,11 @@ class SnpxController:
         """Return the state of a task; only the first has a program."""
         if number != 1:
             return bytes(TASK.size)
+        if self.rmi is not None:
+            state = {ProgramStatus.RUNNING: 2, ProgramStatus.PAUSED: 1, ProgramStatus.ABORTED: 0}[
+                self.rmi.status
+            ]
+            return TASK.pack(RMI_MOVE.encode(), 3, state, b"")
         state = 2 if self._program.runs else 1 if self._alarms else 0
         return TASK.pack(PROGRAM.encode(), 1 + self._program.leg % 16, state, b"")
 
@@ -127,7 +197,7 @@ class SnpxController:
         return {
             "$MCR.$GENOVERRIDE": 100,
             f"$MNUFRAMENUM[{self.group}]": 0,
-            f"$MNUTOOLNUM[{self.group}]": 1,
+            f"$MNUTOOLNUM[{self.group}]": self.tool_number,
             "$SNPX_PARAM.$VERSION": 2,
             "$SNPX_PARAM.$NUM_ASG": 80,
         }
@@ -142,12 +212,16 @@ class SnpxController:
         Args:
             active: Of the faults: `local`.
         """
-        found = 1 << Operator.PENDANT_ENABLED if "local" in active else 0
-        if self._servo_on and not self._alarms:
+        local = "local" in active or self.pendant_enabled
+        found = 1 << Operator.PENDANT_ENABLED if local else 0
+        if self.servo_ready:
             found |= 1 << Operator.SYSTEM_READY
-            found |= 0 if "local" in active else 1 << Operator.COMMANDS_ENABLED
-        if self._program.runs:
+            found |= 0 if local else 1 << Operator.COMMANDS_ENABLED
+        status = None if self.rmi is None else self.rmi.status
+        if self.program_runs or status is ProgramStatus.RUNNING:
             found |= 1 << Operator.PROGRAM_RUNNING
+        if status is ProgramStatus.PAUSED:
+            found |= 1 << Operator.PAUSED
         if self._alarms:
             found |= 1 << Operator.FAULT
         return found

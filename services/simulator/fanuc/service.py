@@ -1,13 +1,16 @@
-"""Service of the simulated controller: listens for SNPX."""
+"""Service of the simulated controller: listens for SNPX and RMI."""
 
 import asyncio
+import contextlib
 import logging
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from protocol_gateway.drivers.fanuc.axes import Axes, FanucSettings
 from protocol_gateway.drivers.fanuc.data import AXES
+from protocol_gateway.drivers.fanuc.rmi import PORT
 from protocol_gateway.errors import GatewaySettingsError
 from robots.description import load
 from robots.joints import JointType, joints_of
@@ -16,6 +19,7 @@ from services.simulator.demo import demo_tour
 from services.simulator.errors import SimulatorError
 from services.simulator.fanuc.controller import SnpxController
 from services.simulator.fanuc.memory import Entry
+from services.simulator.fanuc.rmi_server import RmiServer
 from services.simulator.fanuc.server import SNPX_FAULTS, SnpxServer
 from services.simulator.fault_requests import Mesh, answer_requests
 from services.simulator.faults import Faults
@@ -32,6 +36,8 @@ class SnpxSettings:
         robot: A library robot, or a path to a robot.toml or URDF, of at most eight joints.
         listen: `HOST:PORT`; a real controller has 60008; port 0 takes a free one.
         fanuc: As in the site file; undeclared: as `with_defaults` says.
+        rmi: `HOST:PORT` of RMI; a real controller has 16001, and then sessions have 16002, here otherwise any
+            free one. Empty: it has no RMI.
         shared: All connections have one table of assignments.
         demo: A program runs and moves the arm.
         faults: Faults in the syntax of `services.simulator.faults`, of `SNPX_FAULTS`.
@@ -41,6 +47,7 @@ class SnpxSettings:
 
     robot: str = "puma560"
     listen: str = "127.0.0.1:0"
+    rmi: str = ""
     fanuc: FanucSettings | None = None
     shared: bool = False
     demo: bool = False
@@ -63,40 +70,66 @@ def with_defaults(declared: FanucSettings | None, joint_types: tuple[JointType, 
     return settings
 
 
-async def serve_snpx(settings: SnpxSettings, *, ready: Callable[[int], None] | None = None) -> None:
+class FanucPorts(NamedTuple):
+    """Ports of a simulated controller; 0: it has no RMI."""
+
+    snpx: int
+    rmi: int = 0
+    session: int = 0
+
+
+async def serve_snpx(settings: SnpxSettings, *, ready: Callable[[FanucPorts], None] | None = None) -> None:
     """Simulate a controller until cancelled.
 
     Args:
-        ready: Called with the port once clients can connect.
+        ready: Called with the ports once clients can connect.
 
     Raises:
         ListenError: If it cannot listen on the address.
         SimulatorError: If a setting is invalid.
         DescriptionError: If the robot is unknown.
     """
-    host, port = split_address(settings.listen)
-    remedy = "listen on 127.0.0.1, or take the risk with --insecure: this protocol has no TLS"
-    if warning := check_reach(
-        "the simulator", host, secured=False, insecure=settings.insecure, remedy=remedy
-    ):
-        logger.warning("%s", warning)
+    remedy = "listen on 127.0.0.1, or take the risk with --insecure: these protocols have no TLS"
+    addresses = [settings.listen, *([settings.rmi] if settings.rmi else ())]
+    for address in addresses:
+        host, _ = split_address(address)
+        if warning := check_reach(
+            "the simulator", host, secured=False, insecure=settings.insecure, remedy=remedy
+        ):
+            logger.warning("%s", warning)
     faults = Faults(settings.faults, known=SNPX_FAULTS)
     server = _server(settings, faults)
-    try:
-        listening = await asyncio.get_running_loop().create_server(server.new_client, host, port)
-    except OSError as error:
-        reason = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
-        raise ListenError(f"the simulator cannot listen on {host}:{port}: {reason.lower()}") from None
-    try:
+    rmi = RmiServer(server)
+    made = [server.new_client, *([rmi.new_starter, rmi.new_session] if settings.rmi else ())]
+    if settings.rmi:
+        host, port = split_address(settings.rmi)
+        addresses.append(f"{host}:{PORT + 1 if port == PORT else 0}")
+    async with contextlib.AsyncExitStack() as listeners:
+        listeners.callback(server.close)
+        listeners.callback(rmi.close)
+        ports = []
+        for each, address in zip(made, addresses, strict=True):
+            listening = await _listen(each, address)
+            listeners.callback(listening.close)
+            ports.append(listening.sockets[0].getsockname()[1])
+        found = FanucPorts(*ports)
+        rmi.session_port = found.session
         if ready is not None:
-            ready(listening.sockets[0].getsockname()[1])
+            ready(found)
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(server.run())
+            tasks.create_task(rmi.run())
             if settings.mesh is not None:
                 tasks.create_task(answer_requests(settings.mesh, faults))
-    finally:
-        listening.close()
-        server.close()
+
+
+async def _listen(made: Callable[[], asyncio.Protocol], address: str) -> asyncio.Server:
+    host, port = split_address(address)
+    try:
+        return await asyncio.get_running_loop().create_server(made, host, port)
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
+        raise ListenError(f"the simulator cannot listen on {address}: {reason.lower()}") from None
 
 
 def _server(settings: SnpxSettings, faults: Faults) -> SnpxServer:

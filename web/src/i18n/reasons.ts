@@ -772,6 +772,44 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "HOLD 结束后，被暂停的运动可能继续：请在机器人处关闭伺服（例如按下急停），然后复位停止",
     ],
   ],
+  [
+    "fanuc.not_connected",
+    [
+      "RMI is not connected: wait for it, or see why in the event link.channel_lost",
+      "RMI 未连接：请等待连接，或在事件 link.channel_lost 中查看原因",
+    ],
+  ],
+  [
+    "fanuc.moves",
+    ["a motion still runs: wait for its end, or stop the robot", "上一个运动仍在进行：请等待其结束，或停止机器人"],
+  ],
+  ["fanuc.state_old", ["the newest state of the controller is too old", "控制器的最新状态已过时"]],
+  [
+    "fanuc.other_program",
+    [
+      "another program runs on the controller: end it at the controller",
+      "控制器上正在运行其他程序：请在控制器上结束它",
+    ],
+  ],
+  [
+    "fanuc.extra_axes",
+    [
+      "axis {axes} belongs to no joint of the model and is not at 0, so a motion would move it: declare it, or move it to 0",
+      "轴 {axes} 不属于模型的任何关节且不在 0 位，运动会带动它：请声明该轴，或将其移到 0 位",
+    ],
+  ],
+  [
+    "fanuc.arm_stopped",
+    ["the controller does not let the arm move ({activity})", "控制器不允许机械臂运动（{activity}）"],
+  ],
+  ["fanuc.went_local", ["the controller is not in remote control any more", "控制器已不再处于远程控制"]],
+  ["fanuc.tool_changed", ["the tool was changed during a motion", "运动期间工具被更改"]],
+  ["fanuc.lost_program", ["the gateway's program has ended on the controller", "网关的程序已在控制器上结束"]],
+  ["fanuc.no_answer", ["the controller has not answered {name}", "控制器未应答 {name}"]],
+  ["fanuc.refused", ["the controller refuses {name}: {problem}", "控制器拒绝 {name}：{problem}"]],
+  ["fanuc.system_fault", ["the controller reports a fault during a motion", "控制器在运动期间报告故障"]],
+  ["fanuc.connection_lost", ["RMI was disconnected during a motion", "运动期间 RMI 连接断开"]],
+  ["fanuc.moved_before", ["the arm has moved before its motion was sent", "机械臂在运动发出之前已移动"]],
   ["stop.sent", ["stop request {id} is on the controller's socket", "停止 {id} 已发送给控制器"]],
   ["stop.not_sent", ["stop request {id} is latched, but not sent: {cause}", "停止 {id} 已锁定，但未送达：{cause}"]],
   [
