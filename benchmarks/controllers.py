@@ -41,6 +41,7 @@ from plant import until
 from robomesh.endpoints import client_config
 from robomesh.schemas import robomesh_pb2 as schema
 
+_PULSES = [1000.0] * 6
 _STOP_EACH_S = 0.15  # those within 0.1 s are one
 _MOST_STOPS = 10_000
 _LATE_S = 2.0
@@ -62,6 +63,7 @@ class Kind:
     model: str
     serve: Callable[[Callable[[Sequence[int]], None]], Any]
     stop: tuple[int, bytes] | None = None
+    datagrams: bool = False
 
 
 async def _unit(ready: Callable[[Sequence[int]], None]) -> None:
@@ -95,6 +97,12 @@ async def _hses(ready: Callable[[Sequence[int]], None]) -> None:
     await serve_hses(HsesSettings(demo=True), ready=lambda port: ready([port]))
 
 
+async def _hses_at_rest(ready: Callable[[Sequence[int]], None]) -> None:
+    from services.simulator.yaskawa.service import HsesSettings, serve_hses
+
+    await serve_hses(HsesSettings(), ready=lambda port: ready([port]))
+
+
 async def _snpx(ready: Callable[[Sequence[int]], None]) -> None:
     from services.simulator.fanuc.service import SnpxSettings, serve_snpx
 
@@ -123,6 +131,11 @@ KINDS = {
         model="puma560",
         serve=_rtde,
     ),
+    "rtde-500": Kind(
+        lines=lambda ports: KINDS["rtde"].lines(ports) + "universal_robots = { rate = 500 }\n",
+        model="puma560",
+        serve=_rtde,
+    ),
     "rtde-motion": Kind(
         lines=lambda ports: (
             f'protocol = "rtde"\ncontroller = "tcp://127.0.0.1:{ports[0]}"\n'
@@ -138,10 +151,22 @@ KINDS = {
     "hses": Kind(
         lines=lambda ports: (
             f'protocol = "hses"\ncontroller = "udp://127.0.0.1:{ports[0]}"\n'
-            "yaskawa = { pulses_per_degree = [1000.0, 1000.0, 1000.0, 1000.0, 1000.0, 1000.0] }\n"
+            f"yaskawa = {{ pulses_per_degree = {_PULSES} }}\n"
         ),
         model="puma560",
         serve=_hses,
+    ),
+    "hses-motion": Kind(
+        lines=lambda ports: (
+            f'protocol = "hses"\ncontroller = "udp://127.0.0.1:{ports[0]}"\nexperimental = true\n'
+            'stop_proven = { driver = "hses", means = "HOLD, kept until RESET", '
+            'software = "SIM1.00.00A, model PUMA560", date = 2026-11-26 }\n'
+            f"yaskawa = {{ motion = true, pulses_per_degree = {_PULSES} }}\n"
+        ),
+        model="puma560",
+        serve=_hses_at_rest,
+        stop=(0, b"\x83\x00"),
+        datagrams=True,
     ),
     "snpx": Kind(
         lines=lambda ports: (
@@ -175,7 +200,7 @@ def main() -> None:
         parser.error(f"--protocols {unknown[0]}: {', '.join(KINDS)} are right")
     result: dict[str, Any] = {"cores": os.cpu_count(), "states": [], "stops": []}
     for name in kinds:
-        if name != "rtde-motion":
+        if not name.endswith("-motion"):
             for robots in map(int, arguments.robots.split(",")):
                 result["states"].append(states(name, robots, arguments.seconds))
         if KINDS[name].stop is not None and arguments.stops:
@@ -357,7 +382,7 @@ def controllers(name: str, robots: int, ports: Any, arrivals: Any) -> None:
         own = [*(await found)]
         if kind.stop is not None:
             place, _ = kind.stop
-            wire = Wire(own[place])
+            wire = Wire(own[place], datagrams=kind.datagrams)
             wire.sent = Recorded()
             await wire.open()
             own[place] = wire.port
