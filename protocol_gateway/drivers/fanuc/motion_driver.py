@@ -18,7 +18,6 @@ the one before: the state is read by SNPX. What does not go as expected ends the
 latches a stop. No motion is sent again; FRC_Abort is, until it is answered.
 """
 
-import json
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum, auto
@@ -46,7 +45,6 @@ from protocol_gateway.drivers.driver import (
     Report,
     Reset,
     Send,
-    SetTimer,
     Severity,
     Signal,
     SignalsReceived,
@@ -62,8 +60,9 @@ from protocol_gateway.drivers.fanuc.rmi import Answer, LineStream
 from protocol_gateway.drivers.fanuc.srtp import Answer as Packet
 from protocol_gateway.drivers.fanuc.srtp import Question
 from protocol_gateway.drivers.hexadecimal import hexadecimal
+from protocol_gateway.drivers.one_motion import Timers, encode_words, words_of
 from protocol_gateway.drivers.polling import Asked
-from protocol_gateway.errors import CommandError, GatewaySettingsError, NotReadyError
+from protocol_gateway.errors import GatewaySettingsError, NotReadyError
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.joints import JointType
@@ -169,8 +168,7 @@ class FanucMotionDriver(SnpxDriver):
     def _forget(self) -> None:
         self._line = _Line.CLOSED
         self._lines = LineStream()
-        self._due: dict[str, float] = {}
-        self._timer_s: float | None = None
+        self._due = Timers("snpx")
         self._phase = _Phase.NONE
         self._motion: _Motion | None = None
         self._sent_s = float("-inf")
@@ -192,23 +190,23 @@ class FanucMotionDriver(SnpxDriver):
         """Connect to SNPX, and to RMI if a stop is pending."""
         self._forget()
         self._running = True
-        return self._with_timer((*super().started(now_s), *self._settle(now_s)))
+        return self._due.with_timer((*super().started(now_s), *self._settle(now_s)))
 
     def controlled(self, taken: bool, now_s: float) -> Effects:
         """Connect to RMI while the robot is controlled."""
         self._controlled = taken
         if not taken:
             self._percent = _FIRST_PERCENT
-        return self._with_timer(self._settle(now_s))
+        return self._due.with_timer(self._settle(now_s))
 
     def opened(self, channel: Channel, now_s: float) -> Effects:
         """Greet."""
         if channel is SNPX:
-            return self._with_timer(super().opened(channel, now_s))
+            return self._due.with_timer(super().opened(channel, now_s))
         self._lines = LineStream()
         if channel is RMI:
             self._due["connect"] = now_s + ANSWER_S
-            return self._with_timer((Send(RMI, rmi.connect()),))
+            return self._due.with_timer((Send(RMI, rmi.connect()),))
         if self._line is not _Line.JOINING:
             # The port of an earlier session, after this one was lost.
             return (Close(SESSION),)
@@ -216,14 +214,14 @@ class FanucMotionDriver(SnpxDriver):
         self._due.pop("join", None)
         if self._stop_owed:
             self._phase = _Phase.STOPPING
-            return self._with_timer(self._abort(now_s))
-        return self._with_timer(self._settle(now_s))
+            return self._due.with_timer(self._abort(now_s))
+        return self._due.with_timer(self._settle(now_s))
 
     def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
         """Take the next bytes."""
         if channel is SNPX:
             effects = [*super().received(channel, data, now_s)]
-            return self._with_timer((*effects, *self._follow(now_s)))
+            return self._due.with_timer((*effects, *self._follow(now_s)))
         effects = []
         for line in self._lines.receive(data):
             try:
@@ -234,13 +232,13 @@ class FanucMotionDriver(SnpxDriver):
                 effects += self._on_connect(answer, now_s) if channel is RMI else self._on(answer, now_s)
         if self._lines.broken:
             effects += self._leave(channel, "its lines are too long", now_s)
-        return self._with_timer((*effects, *self._settle(now_s)))
+        return self._due.with_timer((*effects, *self._settle(now_s)))
 
     def skipped(self, channel: Channel, now_s: float) -> Effects:
         """Read SNPX on; connect RMI again, which cannot be read from its middle."""
         if channel is SNPX:
-            return self._with_timer(super().skipped(channel, now_s))
-        return self._with_timer(self._leave(channel, "it sent far too much", now_s))
+            return self._due.with_timer(super().skipped(channel, now_s))
+        return self._due.with_timer(self._leave(channel, "it sent far too much", now_s))
 
     def closed(self, channel: Channel, now_s: float) -> Effects:
         """Handle a lost connection."""
@@ -249,19 +247,18 @@ class FanucMotionDriver(SnpxDriver):
             effects = [*super().closed(channel, now_s)]
             if self._phase in _OPEN_MOTION:
                 effects += self._give_up(codes.FANUC_STATE_OLD(), now_s)
-            return self._with_timer(effects)
+            return self._due.with_timer(effects)
         if channel is RMI:
             self._due.pop("connect", None)
-            return self._with_timer(())
+            return self._due.with_timer(())
         if self._line in (_Line.OPEN, _Line.LEAVING):
-            return self._with_timer(self._lost(now_s))
-        return self._with_timer(())
+            return self._due.with_timer(self._lost(now_s))
+        return self._due.with_timer(())
 
     def timer_ended(self, now_s: float) -> Effects:
         """Handle the timers that have expired."""
-        self._timer_s = None
         effects: list[Effect] = []
-        ended = {name: self._due.pop(name) for name, at_s in [*self._due.items()] if at_s <= now_s}
+        ended = self._due.ended(now_s)
         # A late gateway has unread messages.
         late = now_s - min(ended.values(), default=now_s) > _LATE_S
         if "snpx" in ended:
@@ -282,23 +279,7 @@ class FanucMotionDriver(SnpxDriver):
             effects += self._abort(now_s)
         if "watch" in ended and self._phase in _OPEN_MOTION:
             effects += self._watch(now_s, late=late)
-        return self._with_timer((*effects, *self._settle(now_s)))
-
-    def _with_timer(self, effects: Effects) -> Effects:
-        """Return effects, before them the one timer for all that is due, if its time has changed."""
-        for effect in effects:
-            if isinstance(effect, SetTimer):
-                if effect.at_s is None:
-                    self._due.pop("snpx", None)
-                else:
-                    self._due["snpx"] = effect.at_s
-        others = tuple(effect for effect in effects if not isinstance(effect, SetTimer))
-        at_s = min(self._due.values(), default=None)
-        if at_s == self._timer_s:
-            return others
-        self._timer_s = at_s
-        # First, because a stop that follows from the others may set another one.
-        return (SetTimer(at_s), *others)
+        return self._due.with_timer((*effects, *self._settle(now_s)))
 
     # ------------------------------------------------------------------- connections
 
@@ -512,29 +493,7 @@ class FanucMotionDriver(SnpxDriver):
         Raises:
             CommandError: If they cannot be expressed.
         """
-        words: list[tuple[str, object]] = []
-        for place, command in enumerate(commands):
-            match command:
-                case MoveAbsolute(positions):
-                    if len(positions) != len(self._axes.used):
-                        raise CommandError(
-                            codes.COMMAND_VALUES(count=len(positions), joints=len(self._axes.used))
-                        )
-                    if place != len(commands) - 1:
-                        raise CommandError("a motion must be the last command: the gateway queues none")
-                    words.append(("move", positions))
-                case Speed(percent):
-                    words.append(("speed", percent))
-                case Stop():
-                    words.append(("stop", None))
-                case Reset():
-                    words.append(("reset", None))
-                case _:
-                    raise CommandError(f"this controller has no {type(command).__name__}")
-        try:
-            return json.dumps(words, allow_nan=False).encode()
-        except ValueError:
-            raise CommandError("numbers must be finite") from None
+        return encode_words(commands, len(self._axes.used))
 
     def command(self, encoded: bytes, now_s: float) -> Effects:
         """Send what `encode` returned.
@@ -544,7 +503,7 @@ class FanucMotionDriver(SnpxDriver):
         """
         effects: list[Effect] = []
         percent = self._percent
-        for word, value in json.loads(encoded):
+        for word, value in words_of(encoded):
             match word:
                 case "stop":
                     effects += self._stop_arm(now_s)
@@ -556,7 +515,7 @@ class FanucMotionDriver(SnpxDriver):
                     # It clears the gateway's latch only, and cancels a stop that was not delivered.
                     self._stop_owed = False
         self._percent = percent
-        return self._with_timer((*effects, *self._settle(now_s)))
+        return self._due.with_timer((*effects, *self._settle(now_s)))
 
     def _stop_arm(self, now_s: float) -> Effects:
         """Abort the motion immediately."""

@@ -13,7 +13,6 @@ be seen to have started within START_S. What does not go as expected gives the m
 the beats end, so that the controller stops the arm, and the gateway latches a stop. It is never sent again.
 """
 
-import json
 import secrets
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
@@ -33,18 +32,17 @@ from protocol_gateway.drivers.driver import (
     Mode,
     MoveAbsolute,
     Open,
-    Recover,
     Recovery,
     Report,
     Reset,
     Send,
-    SetTimer,
     Severity,
     Speed,
     StatusReceived,
     Stop,
     StopEnds,
 )
+from protocol_gateway.drivers.one_motion import Timers, encode_words, words_of
 from protocol_gateway.drivers.universal_robots.dashboard import RECOVERIES, Dashboard
 from protocol_gateway.drivers.universal_robots.driver import (
     JOINTS,
@@ -65,7 +63,7 @@ from protocol_gateway.drivers.universal_robots.motion_script import Progress, Re
 from protocol_gateway.drivers.universal_robots.rtde_reader import RtdeReader
 from protocol_gateway.drivers.universal_robots.settings import UniversalRobotsSettings
 from protocol_gateway.drivers.universal_robots.state import ControllerState
-from protocol_gateway.errors import CommandError, NotReadyError
+from protocol_gateway.errors import NotReadyError
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.joints import JointType
@@ -160,8 +158,7 @@ class RtdeMotionDriver(RtdeDriver):
         self._opened: set[str] = set()
         self._scripts_wanted = False
         self._reopen: list[Open] = []
-        self._due: dict[str, float] = {}
-        self._timer_s: float | None = None
+        self._due = Timers("retry")
         self._state: ControllerState | None = None
         self._state_s = self._excused_s = float("-inf")
         self._motion: _Motion | None = None
@@ -177,7 +174,7 @@ class RtdeMotionDriver(RtdeDriver):
         self._dashboard.opened()
         unanswered = self._recoveries()
         self._forget()
-        return self._with_timer((*unanswered, *super().started(now_s), _OPEN_DASHBOARD, _OPEN_INPUTS))
+        return self._due.with_timer((*unanswered, *super().started(now_s), _OPEN_DASHBOARD, _OPEN_INPUTS))
 
     def opened(self, channel: Channel, now_s: float) -> Effects:
         """Greet."""
@@ -185,28 +182,28 @@ class RtdeMotionDriver(RtdeDriver):
         if channel is DASHBOARD:
             self._dashboard.opened()
             self._due["ask"] = now_s + _ASK_S
-            return self._with_timer((Send(DASHBOARD, self._dashboard.ask(now_s)),))
+            return self._due.with_timer((Send(DASHBOARD, self._dashboard.ask(now_s)),))
         if channel is INPUTS:
-            return self._with_timer((Send(INPUTS, self._inputs.connected()),))
+            return self._due.with_timer((Send(INPUTS, self._inputs.connected()),))
         if channel is SCRIPTS:
             return ()
-        return self._with_timer(super().opened(channel, now_s))
+        return self._due.with_timer(super().opened(channel, now_s))
 
     def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
         """Take the next bytes; what the interface of scripts sends is not needed."""
         if channel is DASHBOARD:
-            return self._with_timer(self._answered(data, now_s))
+            return self._due.with_timer(self._answered(data, now_s))
         if channel is INPUTS:
-            return self._with_timer(self._inputs_received(data, now_s))
+            return self._due.with_timer(self._inputs_received(data, now_s))
         if channel is SCRIPTS:
             return ()
-        return self._with_timer(super().received(channel, data, now_s))
+        return self._due.with_timer(super().received(channel, data, now_s))
 
     def skipped(self, channel: Channel, now_s: float) -> Effects:
         """Connect again: the stream cannot be read from its middle."""
         if channel is SCRIPTS:
             return ()
-        return self._with_timer(self._leave(channel, "it sent far too much", now_s))
+        return self._due.with_timer(self._leave(channel, "it sent far too much", now_s))
 
     def closed(self, channel: Channel, now_s: float) -> Effects:
         """Give a motion up that needs the connection."""
@@ -214,7 +211,7 @@ class RtdeMotionDriver(RtdeDriver):
         if channel.name in self._opened:
             self._opened.discard(channel.name)
             effects += self._lost(channel)
-        return self._with_timer(effects)
+        return self._due.with_timer(effects)
 
     def _lost(self, channel: Channel) -> Effects:
         """Handle the end of a connection."""
@@ -249,10 +246,9 @@ class RtdeMotionDriver(RtdeDriver):
     def timer_ended(self, now_s: float) -> Effects:
         """Beat, ask, and look for what has not happened."""
         effects: list[Effect] = []
-        self._timer_s = None
-        ended = [name for name, at_s in self._due.items() if at_s <= now_s]
+        ended = self._due.ended(now_s)
         # A gateway that was late has not yet read what has arrived meanwhile.
-        late = now_s - min((self._due.pop(name) for name in ended), default=now_s) > _LATE_S
+        late = now_s - min(ended.values(), default=now_s) > _LATE_S
         if "retry" in ended:
             effects += super().timer_ended(now_s)
         if "reopen" in ended:
@@ -267,20 +263,7 @@ class RtdeMotionDriver(RtdeDriver):
             effects += self._next_beat(now_s, late=late)
         if "ask" in ended and DASHBOARD.name in self._opened:
             effects += self._next_question(now_s)
-        return self._with_timer(effects)
-
-    def _with_timer(self, effects: Effects) -> Effects:
-        """Return effects, before them the one timer for all that is due, if its time has changed."""
-        for effect in effects:
-            if isinstance(effect, SetTimer) and effect.at_s is not None:
-                self._due["retry"] = effect.at_s
-        others = tuple(effect for effect in effects if not isinstance(effect, SetTimer))
-        at_s = min(self._due.values(), default=None)
-        if at_s == self._timer_s:
-            return others
-        self._timer_s = at_s
-        # First, because a stop that follows from the others may set another one.
-        return (SetTimer(at_s), *others)
+        return self._due.with_timer(effects)
 
     # ------------------------------------------------------------------ dashboard
 
@@ -436,29 +419,7 @@ class RtdeMotionDriver(RtdeDriver):
         Raises:
             CommandError: If they cannot be expressed.
         """
-        words: list[tuple[str, object]] = []
-        for place, command in enumerate(commands):
-            match command:
-                case MoveAbsolute(positions):
-                    if len(positions) != JOINTS:
-                        raise CommandError(codes.COMMAND_VALUES(count=len(positions), joints=JOINTS))
-                    if place != len(commands) - 1:
-                        raise CommandError("a motion must be the last command: the controller queues none")
-                    words.append(("move", positions))
-                case Speed(percent):
-                    words.append(("speed", percent))
-                case Stop():
-                    words.append(("stop", None))
-                case Reset():
-                    words.append(("reset", None))
-                case Recover(recovery) if recovery in RECOVERIES:
-                    words.append(("recover", recovery.value))
-                case _:
-                    raise CommandError(f"this controller has no {type(command).__name__}")
-        try:
-            return json.dumps(words, allow_nan=False).encode()
-        except ValueError:
-            raise CommandError("numbers must be finite") from None
+        return encode_words(commands, JOINTS, RECOVERIES)
 
     def command(self, encoded: bytes, now_s: float) -> Effects:
         """Send what `encode` returned.
@@ -468,7 +429,7 @@ class RtdeMotionDriver(RtdeDriver):
         """
         effects: list[Effect] = []
         percent = self._percent
-        for word, value in json.loads(encoded):
+        for word, value in words_of(encoded):
             match word:
                 case "stop":
                     effects += self._stop()
@@ -480,7 +441,7 @@ class RtdeMotionDriver(RtdeDriver):
                     effects.append(self._recover(Recovery(value), now_s))
                 # A reset clears the gateway's latch only: nothing is sent to the controller.
         self._percent = percent
-        return self._with_timer(effects)
+        return self._due.with_timer(effects)
 
     def _stop(self) -> Effects:
         """End permission and beats, and the program itself, by the connections that are there."""

@@ -16,7 +16,6 @@ All are sockets to the same port, so each has its own numbers and answers. UDP l
   motion does is not known, so HOLD ends over one only while the servos are off.
 """
 
-import json
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -43,7 +42,6 @@ from protocol_gateway.drivers.driver import (
     Report,
     Reset,
     Send,
-    SetTimer,
     Severity,
     SoftwareReceived,
     Speed,
@@ -51,6 +49,7 @@ from protocol_gateway.drivers.driver import (
     Stop,
     StopEnds,
 )
+from protocol_gateway.drivers.one_motion import Timers, encode_words, words_of
 from protocol_gateway.drivers.polling import Polling, Regular
 from protocol_gateway.drivers.yaskawa import commands
 from protocol_gateway.drivers.yaskawa import data as payloads
@@ -58,7 +57,7 @@ from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings, instance_of
 from protocol_gateway.drivers.yaskawa.data import HELD, Position, Status, Status1, Status2
 from protocol_gateway.drivers.yaskawa.driver import HSES, STATUS, HsesDriver, mode_of
 from protocol_gateway.drivers.yaskawa.hses import Answer, Command, Read, decode
-from protocol_gateway.errors import CommandError, GatewaySettingsError, NotReadyError
+from protocol_gateway.errors import GatewaySettingsError, NotReadyError
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.joints import JointType
@@ -158,8 +157,7 @@ class HsesMotionDriver(HsesDriver):
 
     def _forget(self) -> None:
         self._opened: set[str] = set()
-        self._due: dict[str, float] = {}
-        self._timer_s: float | None = None
+        self._due = Timers("read")
         self._stop_polling: Polling[Read] = Polling((), ())
         self._number = 0
         self._hold_number = _FIRST_HOLD
@@ -187,14 +185,14 @@ class HsesMotionDriver(HsesDriver):
     def started(self, now_s: float) -> Effects:
         """Open the sockets."""
         self._forget()
-        return self._with_timer((*super().started(now_s), Open(STOP), Open(MOTION)))
+        return self._due.with_timer((*super().started(now_s), Open(STOP), Open(MOTION)))
 
     def opened(self, channel: Channel, now_s: float) -> Effects:
         """Begin to ask."""
         self._opened.add(channel.name)
         if channel is HSES:
             self._same = not self._software
-            return self._with_timer(super().opened(channel, now_s))
+            return self._due.with_timer(super().opened(channel, now_s))
         if channel is STOP:
             self._has_base = None
             regular = [Regular(STATUS, _STATUS_S), Regular(self._base_axes, _BASE_EACH_S)]
@@ -202,8 +200,8 @@ class HsesMotionDriver(HsesDriver):
             self._answered_s = now_s
             self._due["blind"] = now_s + _BLIND_S
             effects: list[Effect] = [*self._ask(now_s)]
-            return self._with_timer(effects)
-        return self._with_timer(())
+            return self._due.with_timer(effects)
+        return self._due.with_timer(())
 
     def closed(self, channel: Channel, now_s: float) -> Effects:
         """Give a motion up that needs the connection."""
@@ -211,7 +209,7 @@ class HsesMotionDriver(HsesDriver):
         if channel.name in self._opened:
             self._opened.discard(channel.name)
             effects += self._lost(channel, now_s)
-        return self._with_timer(effects)
+        return self._due.with_timer(effects)
 
     def _lost(self, channel: Channel, now_s: float) -> Effects:
         if channel is HSES:
@@ -227,27 +225,24 @@ class HsesMotionDriver(HsesDriver):
 
     def skipped(self, channel: Channel, now_s: float) -> Effects:
         """Go on: each datagram is whole."""
-        return self._with_timer(super().skipped(channel, now_s) if channel is HSES else ())
+        return self._due.with_timer(super().skipped(channel, now_s) if channel is HSES else ())
 
     def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
         """Take an answer."""
         if channel is HSES:
-            return self._with_timer(super().received(channel, data, now_s))
+            return self._due.with_timer(super().received(channel, data, now_s))
         try:
             answer = decode(data)
         except ValueError:
             return ()
         if channel is MOTION:
-            return self._with_timer(self._motion_answered(answer, now_s))
-        return self._with_timer(self._stop_answered(answer, now_s))
+            return self._due.with_timer(self._motion_answered(answer, now_s))
+        return self._due.with_timer(self._stop_answered(answer, now_s))
 
     def timer_ended(self, now_s: float) -> Effects:
         """Ask, repeat HOLD, and look for what has not happened."""
-        self._timer_s = None
         effects: list[Effect] = []
-        ended = [name for name, at_s in self._due.items() if at_s <= now_s]
-        for name in ended:
-            del self._due[name]
+        ended = self._due.ended(now_s)
         if "hold" in ended:
             effects += self._keep_hold(now_s)
         if "ask" in ended and STOP.name in self._opened:
@@ -258,22 +253,7 @@ class HsesMotionDriver(HsesDriver):
             effects.append(Open(STOP))
         if "read" in ended:
             effects += super().timer_ended(now_s)
-        return self._with_timer(effects)
-
-    def _with_timer(self, effects: Effects) -> Effects:
-        """Return effects, before them the one timer for all that is due, if its time has changed."""
-        for effect in effects:
-            if isinstance(effect, SetTimer):
-                self._due.pop("read", None)
-                if effect.at_s is not None:
-                    self._due["read"] = effect.at_s
-        others = tuple(effect for effect in effects if not isinstance(effect, SetTimer))
-        at_s = min(self._due.values(), default=None)
-        if at_s == self._timer_s:
-            return others
-        self._timer_s = at_s
-        # First, because a stop that follows from the others may set another one.
-        return (SetTimer(at_s), *others)
+        return self._due.with_timer(effects)
 
     # ------------------------------------------------------------ the channel of the stop
 
@@ -501,35 +481,13 @@ class HsesMotionDriver(HsesDriver):
 
     # ---------------------------------------------------------------------- commands
 
-    def encode(self, *given: ControllerCommand) -> bytes:
+    def encode(self, *commands: ControllerCommand) -> bytes:
         """Encode commands; at most one motion, as the last one.
 
         Raises:
             CommandError: If they cannot be expressed.
         """
-        words: list[tuple[str, object]] = []
-        for place, command in enumerate(given):
-            match command:
-                case MoveAbsolute(positions):
-                    if len(positions) != len(self._arrived_by):
-                        raise CommandError(
-                            codes.COMMAND_VALUES(count=len(positions), joints=len(self._arrived_by))
-                        )
-                    if place != len(given) - 1:
-                        raise CommandError("a motion must be the last command: the controller queues none")
-                    words.append(("move", positions))
-                case Speed(percent):
-                    words.append(("speed", percent))
-                case Stop():
-                    words.append(("stop", None))
-                case Reset():
-                    words.append(("reset", None))
-                case _:
-                    raise CommandError(f"this controller has no {type(command).__name__}")
-        try:
-            return json.dumps(words, allow_nan=False).encode()
-        except ValueError:
-            raise CommandError("numbers must be finite") from None
+        return encode_words(commands, len(self._arrived_by))
 
     def command(self, encoded: bytes, now_s: float) -> Effects:
         """Send what `encode` returned.
@@ -539,7 +497,7 @@ class HsesMotionDriver(HsesDriver):
         """
         effects: list[Effect] = []
         percent = self._percent
-        for word, value in json.loads(encoded):
+        for word, value in words_of(encoded):
             match word:
                 case "stop":
                     effects += self._stop(now_s)
@@ -550,7 +508,7 @@ class HsesMotionDriver(HsesDriver):
                 case "move":
                     effects += self._move(value, percent, now_s)
         self._percent = percent
-        return self._with_timer(effects)
+        return self._due.with_timer(effects)
 
     def _stop(self, now_s: float) -> Effects:
         if self._motion is not None or not self._at_rest(now_s):
