@@ -27,6 +27,7 @@ from protocol_gateway.drivers.driver import (
     Send,
     SetTimer,
     Severity,
+    SignalsReceived,
     StatusReceived,
 )
 from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
@@ -148,11 +149,20 @@ class Bench:
             self._question = b""
         events = self.perform(self.driver.received(HSES, data, self.now_s))
         self._counts.update(type(event).__name__ for event in events)
-        return self._compare(events, question[24], answer)
+        return self._compare(events, question, answer)
 
-    def _compare(self, events: list[ControllerEvent], command: int, answer: bytes | None) -> str:
+    def _compare(self, events: list[ControllerEvent], question: bytes, answer: bytes | None) -> str:
+        command, of_tool = question[24], question[24] == 0x75 and question[26] > 100
         joints = [each.positions for each in events if isinstance(each, JointsReceived)]
-        right = strict_joints(answer) if command == 0x75 and answer else None
+        right = strict_joints(answer) if command == 0x75 and not of_tool and answer else None
+        place = strict_place(answer) if of_tool and answer else None
+        places = [
+            [value for signal, value in each.values if signal.name in ("tool.pose.x", "tool.pose.z")]
+            for each in events
+            if isinstance(each, SignalsReceived) and any(s.name == "tool.pose.x" for s, _ in each.values)
+        ]
+        if places != ([] if place is None else [place]):
+            return f"poses {places}, a strict reading gives {place}"
         if len(joints) != (right is not None):
             return f"joints {joints}, a strict reading gives {right}"
         if right is not None and any(abs(a - b) > 1e-9 for a, b in zip(joints[0], right, strict=True)):
@@ -198,6 +208,13 @@ def strict_joints(data: bytes) -> list[float] | None:
     return [value / 1000 * 0.017453292519943295 for value in pulses]
 
 
+def strict_place(data: bytes) -> list[float] | None:
+    """Return x and z of a tool's pose in the base's or the robot's frame [m]; None: it has none."""
+    if len(data) not in (44, 48, 52) or data[:4] not in (b"\x10\0\0\0", b"\x11\0\0\0"):
+        return None
+    return [int.from_bytes(data[at : at + 4], "little", signed=True) * 1e-6 for at in (20, 28)]
+
+
 # -------------------------------------------------------------------------------- inputs
 
 
@@ -217,6 +234,7 @@ DATA = {
         struct.pack("<5I7i", 0, 0, 1, 0, 0, 1, 2, 3, 4, 5, 6, 7),
         struct.pack("<5I6i", 0, 0, 1, 0, 0, 1, 2, 3, 4, 5, 6),
         struct.pack("<5I8i", 16, 0, 1, 0, 0, 500_000, 0, 700_000, 0, 0, 0, 0, 0),
+        struct.pack("<5I6i", 17, 0, 2, 0, 0, -500_000, 1, 2**31 - 1, 1_800_000, -900_000, 2**31 - 1),
     ),
     0x77: (struct.pack("<8i", 1, -2, 3, 0, 0, 0, 0, 0), bytes(28)),
     0x78: (b"\x05",),
