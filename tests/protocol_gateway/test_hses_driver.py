@@ -32,7 +32,7 @@ from robots.joints import JointType
 from services.simulator.yaskawa.service import HsesSettings, serve_hses, with_factors
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
-from tests.protocol_gateway.hses_tap import tap
+from tests.protocol_gateway.wire import wire
 
 YASKAWA = {"description": "puma560", "protocol": "hses", "options": with_factors(None, 6)}
 SIX = (JointType.ROTARY,) * 6
@@ -408,8 +408,8 @@ def test_a_controller_with_hses_is_shown_and_only_reads_are_sent(mesh, tmp_path)
     async def main():
         async with (
             controller(demo=True, faults=("fault@4",)) as port,
-            tap(port) as (relay, tapped),
-            gateway(mesh, tmp_path, tapped, **YASKAWA) as site,
+            wire(port, datagrams=True) as relay,
+            gateway(mesh, tmp_path, relay.port, **YASKAWA) as site,
         ):
             await until(lambda: site.controller.activity == STATE.MOVING)
             assert site.controller.mode == STATE.REMOTE
@@ -452,10 +452,10 @@ def test_lost_late_doubled_and_reordered_answers_give_no_joints_of_another_momen
 
         async with (
             controller(demo=True) as port,
-            tap(port) as (relay, tapped),
-            gateway(mesh, tmp_path, tapped, **YASKAWA) as site,
+            wire(port, datagrams=True) as relay,
+            gateway(mesh, tmp_path, relay.port, **YASKAWA) as site,
         ):
-            relay.change = disturb
+            relay.answers = disturb
             await until(lambda: site.controller.counters.units_lost >= 10)
             seen = len(site.seen["joints"])
             positions = sum(len(each) in (84,) for each in kept)

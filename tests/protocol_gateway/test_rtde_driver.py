@@ -41,6 +41,7 @@ from robots.model import build_model, tool_placement
 from services.simulator.universal_robots.service import UrSettings, serve_rtde
 from tests.conftest import free_port, last_value, run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
+from tests.protocol_gateway.wire import wire
 
 UR = {"description": "puma560", "protocol": "rtde"}
 SIX = (JointType.ROTARY,) * 6
@@ -322,29 +323,6 @@ async def whole_controller(**settings):
         await asyncio.gather(task, return_exceptions=True)
 
 
-@contextlib.asynccontextmanager
-async def tap(port):
-    """Forward one connection to a port; yield the port of the tap, and all bytes that went there."""
-    sent = bytearray()
-
-    async def forward(reader, writer, copy=None):
-        with contextlib.suppress(OSError):
-            while data := await reader.read(65536):
-                if copy is not None:
-                    copy += data
-                writer.write(data)
-        writer.transport.abort()
-
-    async def joined(reader, writer):
-        there, back = await asyncio.open_connection("127.0.0.1", port)
-        await asyncio.gather(forward(reader, back, sent), forward(there, writer))
-
-    server = await asyncio.start_server(joined, "127.0.0.1", 0)
-    async with server:
-        yield server.sockets[0].getsockname()[1], sent
-        server.close()
-
-
 def test_the_controllers_cartesian_position_is_that_of_its_joints(mesh, tmp_path):
     async def main():
         async with (
@@ -365,9 +343,9 @@ def test_a_controller_with_rtde_is_shown_and_never_commanded(mesh, tmp_path):
     async def main():
         async with (
             controller(demo=True, faults=("fault@4",)) as (port, primary),
-            tap(port) as (tapped, sent),
-            tap(primary) as (tapped_primary, sent_to_primary),
-            gateway(mesh, tmp_path, tapped, **UR, ports={"primary": tapped_primary}) as site,
+            wire(port) as relay,
+            wire(primary) as of_primary,
+            gateway(mesh, tmp_path, relay.port, **UR, ports={"primary": of_primary.port}) as site,
         ):
             await until(lambda: site.controller.activity == STATE.MOVING)
             assert site.controller.homed == STATE.YES
@@ -376,19 +354,19 @@ def test_a_controller_with_rtde_is_shown_and_never_commanded(mesh, tmp_path):
             first, last = (site.seen["joints"][at] for at in (0, -1))
             assert len(last.joints) == 6
             assert [joint.position for joint in first.joints] != [joint.position for joint in last.joints]
-            greeting = bytes(sent)
+            greeting = relay.data
             assert "only reads" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
             assert "Not sent" in await refusal(site.command(C.HOME))
             # A stop is asked for, and is not sent: the answer says so.
             answer = await site.stop(by="wang")
             assert not answer.sent
             await site.units(50)
-            assert bytes(sent) == greeting
+            assert relay.data == greeting
             assert len(greeting) < 1000
             alarm = await site.event("controller.alarm", -1)
             assert alarm.values["number"] == "C153A0", alarm.text
             await until(lambda: site.controller.activity == STATE.STOPPED)
-            assert not sent_to_primary
+            assert not of_primary.sent
 
     run(main())
 

@@ -37,8 +37,8 @@ from robots.poses import axis_rotation
 from services.simulator.fanuc.service import SnpxSettings, serve_snpx, with_defaults
 from tests.conftest import last_value, run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
-from tests.protocol_gateway.test_rtde_driver import tap
 from tests.protocol_gateway.test_snpx import EMPTY_ALARM, alarm, position
+from tests.protocol_gateway.wire import wire
 
 SIX = (JointType.ROTARY,) * 6
 FANUC = {"description": "puma560", "protocol": "snpx", "options": with_defaults(None, SIX)}
@@ -535,8 +535,8 @@ def test_a_controller_with_snpx_is_shown_and_nothing_is_written_but_its_own_assi
     async def main():
         async with (
             controller(demo=True, faults=("fault@4",)) as port,
-            tap(port) as (tapped, sent),
-            gateway(mesh, tmp_path, tapped, **FANUC) as site,
+            wire(port) as relay,
+            gateway(mesh, tmp_path, relay.port, **FANUC) as site,
         ):
             await until(lambda: site.controller.activity == STATE.MOVING)
             assert site.controller.mode == STATE.REMOTE
@@ -553,7 +553,7 @@ def test_a_controller_with_snpx_is_shown_and_nothing_is_written_but_its_own_assi
             await until(lambda: site.controller.activity == STATE.FAULT)
             assert 0.0 < site.controller.health.stamp_uncertainty_s < 0.5
             # Proven by a decode of all that was sent.
-            found = packets(sent)
+            found = packets(relay.data)
             assert (found[0], found[1][42:44]) == (bytes(56), b"\x4f\x01")
             texts = [each[56:].decode() for each in found if each[31] == 0x80]
             # A text goes to %G, by the service that writes; everything else reads.

@@ -11,7 +11,8 @@ class Wire:
         port: The gateway connects here.
         sent: Bytes that the gateway sent, in the parts in which they arrived; datagrams are whole.
         swallows: Connections stay open, but nothing arrives at either side.
-        commands, answers: Of datagrams: functions that return those to pass on in place of one.
+        commands, answers: Functions that return the datagrams to send in place of one of the gateway, or of the
+            controller.
     """
 
     def __init__(self, target, *, datagrams=False):

@@ -11,6 +11,7 @@ import json
 import logging
 import math
 import time
+from abc import ABC, abstractmethod
 from typing import Any
 
 from protocol_gateway.drivers.fanuc.data import AXES
@@ -107,7 +108,7 @@ class RmiServer:
             self.session.transport.abort()
 
 
-class _Packets(asyncio.Protocol):
+class _Packets(asyncio.Protocol, ABC):
     """Packets of one connection."""
 
     transport: asyncio.Transport
@@ -140,9 +141,9 @@ class _Packets(asyncio.Protocol):
         else:
             self.handle(kind, name, packet, time.monotonic())
 
+    @abstractmethod
     def handle(self, kind: str, name: str, packet: dict[str, Any], now_s: float) -> None:
         """Execute and answer a packet."""
-        raise NotImplementedError
 
     def send(self, kind: str, name: str, **values: object) -> None:
         """Send a packet."""
