@@ -11,8 +11,8 @@ class Wire:
         port: The gateway connects here.
         sent: Bytes that the gateway sent, in the parts in which they arrived; datagrams are whole.
         swallows: Connections stay open, but nothing arrives at either side.
-        commands, answers: Functions that return the datagrams to send in place of one of the gateway, or of the
-            controller.
+        commands, answers: Functions that return the datagrams to send in place of one of the gateway, or
+            of the controller.
     """
 
     def __init__(self, target, *, datagrams=False):
