@@ -3,13 +3,13 @@
 It listens before it sends, and sends at most one question: the RTDE version to port 30004, the read of the
 system's information to UDP port 10040, the first packet of a connection to ports 60008 and 18245. To any
 other port it sends nothing. An address that begins with opc.tcp is asked for its endpoints, which needs no
-user and no session.
+user and no session. A UDP port sends nothing before it is asked, so it is asked immediately.
 """
 
 import socket
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Annotated
 
 import typer
@@ -69,10 +69,10 @@ def probe(
 ) -> None:
     """Show which protocol a controller's port speaks.
 
-    It contacts this port only, listens for 2 s, and sends nothing but the RTDE version to port 30004, a read
-    of the system's information to UDP port 10040, and the first packet of SNPX, 56 zero bytes, to ports
-    60008 and 18245. Of an OPC UA server it asks the endpoints, and shows the certificate's fingerprint. Exit
-    status 1: no protocol that robomesh reads.
+    It contacts this port only, listens for 2 s before it sends, and sends nothing but the RTDE version to
+    port 30004, the first packet of SNPX, 56 zero bytes, to ports 60008 and 18245, and a read of the system's
+    information to UDP port 10040, where it does not listen first. Of an OPC UA server it asks the endpoints,
+    and shows the certificate's fingerprint. Exit status 1: no protocol that robomesh reads.
     """
     from services.command_line.discovery import print_json
 
@@ -97,18 +97,24 @@ def examine(address: str) -> Found:
     """
     scheme, host, port = _split(address)
     if scheme == _OPC:
-        return _examine_opcua(address)
+        _require_opcua()
     if scheme == "udp":
         if port != _HSES_PORT:
             raise ProbeError(f"{address}: of UDP ports only {_HSES_PORT} is known (Yaskawa's HSES)")
         return _examine_hses(host, port)
     try:
         with socket.create_connection((host, port), timeout=_ANSWER_S) as connection:
-            return _examine(connection, port)
+            if scheme == "tcp":
+                return _examine(connection, port)
+            heard = _listen(connection, _LISTEN_S, _is_known)
     except TimeoutError:
         raise ProbeError(f"{address}: no answer within {_ANSWER_S:g} s") from None
     except OSError as error:
         raise ProbeError(f"{address}: {_reason(error)}") from None
+    # An OPC UA server sends nothing before it is asked.
+    if heard or port in (*_PRIMARY_PORTS, _RMI_PORT):
+        return replace(_recognized(heard, port), received_bytes=len(heard))
+    return _examine_opcua(address)
 
 
 def _split(address: str) -> tuple[str, str, int]:
@@ -136,8 +142,7 @@ def _examine(connection: socket.socket, port: int) -> Found:
         return _examine_rtde(connection)
     if port in _SNPX_PORTS and not heard:
         return _examine_snpx(connection)
-    found = _recognized(heard, port)
-    return Found(**asdict(found) | {"received_bytes": len(heard)})
+    return replace(_recognized(heard, port), received_bytes=len(heard))
 
 
 def _listen(connection: socket.socket, seconds: float, enough: Callable[[bytes], bool]) -> bytes:
@@ -184,7 +189,8 @@ def _recognized(heard: bytes, port: int) -> Found:
     if port == _RMI_PORT:
         return Found(
             text="it accepts a connection on the port of FANUC's RMI, to which nothing is ever sent here",
-            next="RMI takes one client, and is for motion; robomesh does not speak it yet",
+            next="RMI takes one client, and is for motion; robomesh reads SNPX, and moves by RMI if the site "
+            "file says so (docs/controllers/fanuc.md): probe tcp://HOST:60008",
         )
     if port == _OPC_PORT and not heard:
         return Found(
@@ -310,14 +316,17 @@ def _examine_hses(host: str, port: int) -> Found:
     )
 
 
-def _examine_opcua(url: str) -> Found:
-    import asyncio
-    import logging
-
+def _require_opcua() -> None:
     from robomesh.extras import is_missing, missing
 
     if is_missing("asyncua"):
         raise ProbeError(missing("asyncua"))
+
+
+def _examine_opcua(url: str) -> Found:
+    import asyncio
+    import logging
+
     from protocol_gateway.drivers.opcua.reader.problems import ReadingError
     from protocol_gateway.drivers.opcua.reader.security import endpoints_of, offers_of
 

@@ -62,9 +62,9 @@ class Robot(BaseModel):
         ports: Ports of the controller's other interfaces, where they are not the usual ones, as in
             `{ primary = 30011 }`.
         protocol: The controller's protocol: `unit` (docs/controllers.md), `rtde` for a controller of
-            Universal Robots (docs/controllers/universal-robots.md), `hses` to read one of Yaskawa
-            (docs/controllers/yaskawa.md), `snpx` to read one of FANUC (docs/controllers/fanuc.md), or `opcua`
-            to read an OPC UA server (docs/controllers/opcua.md), or that of an installed driver
+            Universal Robots (docs/controllers/universal-robots.md), `hses` for one of Yaskawa
+            (docs/controllers/yaskawa.md), `snpx` for one of FANUC (docs/controllers/fanuc.md), `opcua` to
+            read an OPC UA server (docs/controllers/opcua.md), or that of an installed driver
             (docs/controllers/own-driver.md).
         universal_robots: Motion of a robot of Universal Robots; with the protocol `rtde`.
         yaskawa: Properties of the robot that a Yaskawa controller does not report; with the protocol `hses`.
@@ -91,7 +91,8 @@ class Robot(BaseModel):
             unproven, and count for no check.
         experimental: Send commands although this protocol's were never tried on a real controller.
         recover: Actions that an operator may send after a stop or fault of the controller's own, as in
-            `["unlock_protective_stop", "power_on"]` (docs/safety.md#recovery).
+            `["unlock_protective_stop", "power_on"]` (docs/safety.md#recovery). `servo_on` and `reset_alarm`
+            are for installed drivers: no driver of robomesh has them.
         stale_after_s: The stale time [s]: without a unit of the controller for this long, the robot's state
             is stale; without joint positions for this long, the gateway refuses motion. It reconnects after
             twice this time, at least 4 s.

@@ -99,10 +99,34 @@ def test_an_opc_ua_server_is_asked_for_its_endpoints_only():
             found = await examined(f"opc.tcp://127.0.0.1:{port}")
         assert (found.protocol, found.sent) == ("opcua", "the request for its endpoints")
         assert "robomesh (simulated controller); no security" in found.text
-        with pytest.raises(ProbeError, match="does not list its endpoints: connection refused"):
+        with pytest.raises(ProbeError, match="Connection refused"):
             await examined(f"opc.tcp://127.0.0.1:{port}")
 
     run(main())
+
+
+@pytest.mark.parametrize(
+    ("name", "says", "words"),
+    [
+        ("_PRIMARY_PORTS", b"", "sends no package of Universal Robots"),
+        ("_RMI_PORT", b"", "the port of FANUC's RMI, to which nothing is ever sent"),
+        (None, b"SSH-2.0-OpenSSH_9.2\r\n", "sends something unknown: SSH-2.0"),
+    ],
+)
+def test_a_port_that_moves_an_arm_or_speaks_first_is_not_asked_for_endpoints(monkeypatch, name, says, words):
+    with server(says=says) as (port, heard):
+        if name is not None:
+            monkeypatch.setattr(probe, name, (port,) if name == "_PRIMARY_PORTS" else port)
+        found = examine(f"opc.tcp://127.0.0.1:{port}")
+    assert words in found.text
+    assert (found.protocol, found.sent, found.received_bytes, heard) == ("", "nothing", len(says), b"")
+
+
+def test_the_port_of_rmi_is_described_as_it_is_used(monkeypatch):
+    with server() as (port, _):
+        monkeypatch.setattr(probe, "_RMI_PORT", port)
+        found = examine(f"tcp://127.0.0.1:{port}")
+    assert "moves by RMI if the site file says so" in found.next
 
 
 @pytest.mark.parametrize(
