@@ -97,6 +97,8 @@ def examine(address: str) -> Found:
     """
     scheme, host, port = _split(address)
     if scheme == _OPC:
+        if port in (*_PRIMARY_PORTS, _RMI_PORT, _RTDE_PORT, *_SNPX_PORTS):
+            raise ProbeError(f"{address}: this port has another protocol: probe tcp://{host}:{port}")
         _require_opcua()
     if scheme == "udp":
         if port != _HSES_PORT:
@@ -112,7 +114,7 @@ def examine(address: str) -> Found:
     except OSError as error:
         raise ProbeError(f"{address}: {_reason(error)}") from None
     # An OPC UA server sends nothing before it is asked.
-    if heard or port in (*_PRIMARY_PORTS, _RMI_PORT):
+    if heard:
         return replace(_recognized(heard, port), received_bytes=len(heard))
     return _examine_opcua(address)
 

@@ -105,21 +105,18 @@ def test_an_opc_ua_server_is_asked_for_its_endpoints_only():
     run(main())
 
 
-@pytest.mark.parametrize(
-    ("name", "says", "words"),
-    [
-        ("_PRIMARY_PORTS", b"", "sends no package of Universal Robots"),
-        ("_RMI_PORT", b"", "the port of FANUC's RMI, to which nothing is ever sent"),
-        (None, b"SSH-2.0-OpenSSH_9.2\r\n", "sends something unknown: SSH-2.0"),
-    ],
-)
-def test_a_port_that_moves_an_arm_or_speaks_first_is_not_asked_for_endpoints(monkeypatch, name, says, words):
-    with server(says=says) as (port, heard):
-        if name is not None:
-            monkeypatch.setattr(probe, name, (port,) if name == "_PRIMARY_PORTS" else port)
+def test_a_port_that_sends_first_is_not_asked_for_endpoints():
+    with server(says=b"SSH-2.0-OpenSSH_9.2\r\n") as (port, heard):
         found = examine(f"opc.tcp://127.0.0.1:{port}")
-    assert words in found.text
-    assert (found.protocol, found.sent, found.received_bytes, heard) == ("", "nothing", len(says), b"")
+    assert "sends something unknown: SSH-2.0" in found.text
+    assert (found.protocol, found.sent, found.received_bytes, heard) == ("", "nothing", 21, b"")
+
+
+@pytest.mark.parametrize("port", [30001, 30002, 30003, 30004, 30011, 16001, 60008, 18245])
+def test_ports_of_other_protocols_are_not_contacted_for_endpoints(monkeypatch, port):
+    monkeypatch.setattr(socket, "create_connection", lambda *given, **named: pytest.fail("contacted"))
+    with pytest.raises(ProbeError, match=rf"another protocol: probe tcp://10\.0\.0\.7:{port}"):
+        examine(f"opc.tcp://10.0.0.7:{port}")
 
 
 def test_the_port_of_rmi_is_described_as_it_is_used(monkeypatch):
