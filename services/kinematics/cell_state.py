@@ -1,6 +1,6 @@
 """Last known positions of a cell's arms, and their clearances."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 
 from robots.collision import Cell, Nearest, outside_clearance, outside_nearest, own_nearest
@@ -36,9 +36,9 @@ class _Arm:
     """
 
     fresh_for_s: float
+    unproven: bool
     positions: FloatArray | None = None
     received_at: float = 0.0
-    unproven: bool = False
     cached: tuple[tuple[object, ...], Proximity] | None = None
 
 
@@ -48,10 +48,13 @@ class CellState:
     Args:
         fresh_for_s: Time until a robot's positions are stale, by name [s].
         now_s: Monotonic clock.
+        real: Names of the robots that are not simulated: their joints are unproven until `update_proof`.
     """
 
-    def __init__(self, fresh_for_s: Mapping[str, float], now_s: Callable[[], float]) -> None:
-        self._arms = {name: _Arm(seconds) for name, seconds in fresh_for_s.items()}
+    def __init__(
+        self, fresh_for_s: Mapping[str, float], now_s: Callable[[], float], *, real: Collection[str] = ()
+    ) -> None:
+        self._arms = {name: _Arm(seconds, unproven=name in real) for name, seconds in fresh_for_s.items()}
         self._now_s = now_s
 
     def update(self, robot: str, positions: FloatArray) -> None:

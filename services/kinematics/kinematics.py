@@ -64,7 +64,11 @@ async def _serve_cell(
     checks: Quota,
     shown: dict[str, ShownCell],
 ) -> None:
-    cell_state = CellState({robot.name: robot.stale_after_s for robot in robots}, time.monotonic)
+    cell_state = CellState(
+        {robot.name: robot.stale_after_s for robot in robots},
+        time.monotonic,
+        real={robot.name for robot in robots if not robot.simulated},
+    )
     first = await asyncio.to_thread(first_content, cell, settings.cell_content)
     shown_cell = ShownCell(first, settings.cell_content, workers)
     async with asyncio.TaskGroup() as group:

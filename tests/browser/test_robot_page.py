@@ -1,10 +1,20 @@
 """The robot's page in a real Chromium on a real site: display, control, stop."""
 
+import asyncio
+import contextlib
 import re
+import time
 
 import pytest
 from playwright.sync_api import expect
 
+from protocol_gateway import gateway
+from protocol_gateway.drivers.driver import Recovery
+from protocol_gateway.drivers.universal_robots.modes import RobotMode
+from protocol_gateway.drivers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
+from protocol_gateway.settings import RobotSettings
+from robomesh.session import SessionSettings, open_session
+from services.kinematics import kinematics
 from tests.browser.robot_page import (
     ARM,
     HOME,
@@ -22,6 +32,7 @@ from tests.browser.robot_page import (
     region,
     scene,
     scene_stale,
+    serious,
     state_word,
     stop_button,
     stop_notice,
@@ -32,6 +43,8 @@ from tests.browser.robot_page import (
     wait_to_move,
     who_controls,
 )
+from tests.cells import single_arm
+from tests.protocol_gateway import ur_site
 from tests.site import wait_until
 
 pytestmark = pytest.mark.browser
@@ -264,3 +277,71 @@ def test_the_language_and_the_colours_can_be_switched_and_are_kept(open_page):
     page.reload()
     expect(stop_button(page)).to_contain_text("停止请求")
     assert page.evaluate("document.documentElement.dataset.theme") == "light"
+
+
+@contextlib.asynccontextmanager
+async def robot_of_ur(plant, folder, monkeypatch):
+    """Run another robot of the site, whose controller may be recovered; yield its simulated controller."""
+    mesh = SessionSettings(connect=(plant.endpoint,))
+    async with (
+        ur_site.controller(monkeypatch) as (ports, server),
+        open_session(mesh) as for_gateway,
+        open_session(mesh) as for_kinematics,
+    ):
+        for_gateway.declare_presence("hall", "ur", "gateway")
+        for_kinematics.declare_presence("hall", "ur", "kinematics")
+        robot = RobotSettings(
+            name="ur",
+            description="puma560",
+            host="127.0.0.1",
+            port=ports.rtde,
+            ports=ur_site.others(ports),
+            protocol="rtde",
+            options=UniversalRobotsSettings(motion=MotionSettings()),
+            simulated=True,
+            stop_proven=True,
+            recover=frozenset({Recovery.POWER_ON, Recovery.BRAKE_RELEASE}),
+        )
+        cell = kinematics.Settings(site="hall", robots=(single_arm("ur", "puma560", simulated=True),))
+        site = gateway.Settings(site="hall", robots=(robot,), audit_folder=folder)
+        serving = [
+            plant.loop.create_task(gateway.serve(for_gateway, site)),
+            plant.loop.create_task(kinematics.serve(for_kinematics, cell)),
+        ]
+        try:
+            yield server
+        finally:
+            for each in serving:
+                each.cancel()
+            await asyncio.gather(*serving, return_exceptions=True)
+
+
+def test_a_controller_is_recovered_only_with_a_choice_a_look_and_a_reason(
+    open_page, plant, tmp_path, monkeypatch
+):
+    running = robot_of_ur(plant, tmp_path, monkeypatch)
+    server = plant.call(running.__aenter__())
+    try:
+        server.controller.power_off(time.monotonic())
+        page = open_page("#/hall/ur", drawn=False)
+        expect(button(page, "Recover…")).to_be_disabled()
+        take(page)
+        button(page, "Recover…").click()
+        form = page.get_by_role("form", name="Recover the controller")
+        send = form.get_by_role("button", name="Send to the controller")
+        # Nothing is chosen before, and what the site file does not allow is not there.
+        expect(form.get_by_role("radio", checked=True)).to_have_count(0)
+        expect(form.get_by_role("radio")).to_have_count(3)
+        assert serious(page, "form.reason") == []
+        form.get_by_label("Power on").check()
+        expect(send).to_be_disabled()
+        form.get_by_label("A person at the robot has looked").check()
+        expect(send).to_be_disabled()
+        form.get_by_role("textbox").fill("the breaker was off; it is on again")
+        assert server.controller.robot_mode == RobotMode.POWER_OFF
+        send.click()
+        expect(form).to_have_count(0)
+        wait_until(lambda: server.controller.robot_mode != RobotMode.POWER_OFF)
+        expect(events(page).filter(has_text="the breaker was off").first).to_be_visible()
+    finally:
+        plant.call(running.__aexit__(None, None, None))

@@ -46,11 +46,11 @@ BUILT = build_cell(CELL)
 
 
 @asynccontextmanager
-async def cell_service(mesh):
+async def cell_service(mesh, *, simulated=True):
     """Run the service of the cell; yield a session for its gateways and one for a monitor."""
     async with open_session(mesh) as service, open_session(mesh) as gateway, open_session(mesh) as monitor:
         robots = tuple(
-            kinematics.RobotSettings(name=robot.name, cell_description=CELL, cell="a", simulated=True)
+            kinematics.RobotSettings(name=robot.name, cell_description=CELL, cell="a", simulated=simulated)
             for robot in CELL.robots
         )
         task = asyncio.create_task(kinematics.serve(service, kinematics.Settings(site="hall", robots=robots)))
@@ -167,6 +167,23 @@ def test_an_arm_with_unproven_joints_has_no_clearance_and_counts_for_no_other(me
             assert not state.HasField("own_clearance")
             for each in controllers.values():
                 each.put(schema.ControllerState())
+            await until(monitor, "kinematics", lambda m: m.HasField("clearance") and not m.not_counted)
+
+    run(main())
+
+
+def test_the_joints_of_a_real_arm_count_only_after_its_gateway_has_said_that_they_are_proven(mesh):
+    async def main():
+        async with (
+            cell_service(mesh, simulated=False) as (gateway, monitor),
+            publishing(gateway, {"left": HOME, "right": HOME}),
+        ):
+            state = await until(monitor, "kinematics", lambda m: m.joints_unproven)
+            assert not state.HasField("clearance")
+            gateway.declare_publisher("hall", "left", "controller").put(schema.ControllerState())
+            state = await until(monitor, "kinematics", lambda m: m.HasField("clearance"))
+            assert list(state.not_counted) == ["right"]
+            gateway.declare_publisher("hall", "right", "controller").put(schema.ControllerState())
             await until(monitor, "kinematics", lambda m: m.HasField("clearance") and not m.not_counted)
 
     run(main())
