@@ -7,8 +7,8 @@ Router, gateway, and the simulated controllers, all in one process, are separate
 States: the joints that a monitor receives while the controllers' demos run; the gateway's processor time has
 its child processes (the reader of OPC UA).
 
-Stops: of each protocol with a stop, asked every 0.15 s by a client over the mesh, until its bytes are on the
-controller's connection, while all questions are asked at the declared rate; without load, and beside two
+Stops: of each protocol with a stop, asked every 0.15 s by an operator over the mesh, until its bytes are on
+the controller's connection, while all questions are asked at the declared rate; without load, and beside two
 processes that compute. The peer in the same seconds is a bare Zenoh question to a process that only answers,
 over the same router: what is left is the gateway's part.
 
@@ -38,6 +38,7 @@ if __name__ == "__main__":
 from latency import free_port, process, service, summary, until_connectable
 from plant import until
 
+import robomesh
 from robomesh.endpoints import client_config
 from robomesh.schemas import robomesh_pb2 as schema
 
@@ -106,7 +107,13 @@ async def _hses_at_rest(ready: Callable[[Sequence[int]], None]) -> None:
 async def _snpx(ready: Callable[[Sequence[int]], None]) -> None:
     from services.simulator.fanuc.service import SnpxSettings, serve_snpx
 
-    await serve_snpx(SnpxSettings(demo=True), ready=lambda port: ready([port]))
+    await serve_snpx(SnpxSettings(demo=True), ready=lambda ports: ready([ports.snpx]))
+
+
+async def _rmi(ready: Callable[[Sequence[int]], None]) -> None:
+    from services.simulator.fanuc.service import SnpxSettings, serve_snpx
+
+    await serve_snpx(SnpxSettings(rmi="127.0.0.1:0"), ready=ready)
 
 
 async def _opcua(ready: Callable[[Sequence[int]], None]) -> None:
@@ -175,6 +182,18 @@ KINDS = {
         ),
         model="puma560",
         serve=_snpx,
+    ),
+    "rmi-motion": Kind(
+        lines=lambda ports: (
+            f'protocol = "snpx"\ncontroller = "tcp://127.0.0.1:{ports[0]}"\nexperimental = true\n'
+            f"ports = {{ rmi = {ports[1]}, rmi_session = {ports[2]} }}\n"
+            'stop_proven = { driver = "snpx", means = "FRC_Abort of RMI", '
+            'software = "V0.00P/00 simulated", date = 2026-11-26 }\n'
+            'fanuc = { assignments = "own", j23 = 1, motion = true }\n'
+        ),
+        model="puma560",
+        serve=_rmi,
+        stop=(2, b"FRC_Abort"),
     ),
     "opcua": Kind(
         lines=lambda ports: (
@@ -272,13 +291,16 @@ def stops(name: str, number: int) -> list[dict[str, Any]]:
         running(name, 1) as (endpoint, _, arrivals),
         process(answer_bare, (endpoint,)),
         zenoh.open(client_config((endpoint,))) as session,
+        robomesh.connect(endpoint, timeout_s=20.0) as mesh,
     ):
         until(lambda: asked(session, "robomesh/bench/arm-0/stop", _stop_request()) is not None)
         until(lambda: asked(session, "bare", b"") is not None)
-        for load in ("idle", "burners"):
-            with burning(2 if load == "burners" else 0):
-                time.sleep(1.0)
-                rows.append({"protocol": name, "load": load, **delays(session, arrivals, number)})
+        # The session of RMI, on which its stop goes, is open only while somebody is in control.
+        with mesh.robot("bench/arm-0").control("bench"):
+            for load in ("idle", "burners"):
+                with burning(2 if load == "burners" else 0):
+                    time.sleep(1.0)
+                    rows.append({"protocol": name, "load": load, **delays(session, arrivals, number)})
     return rows
 
 
