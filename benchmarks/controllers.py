@@ -295,17 +295,18 @@ def stops(name: str, number: int) -> list[dict[str, Any]]:
     ):
         until(lambda: asked(session, "robomesh/bench/arm-0/stop", _stop_request()) is not None)
         until(lambda: asked(session, "bare", b"") is not None)
-        # The session of RMI, on which its stop goes, is open only while somebody is in control.
-        with mesh.robot("bench/arm-0").control("bench"):
-            for load in ("idle", "burners"):
-                with burning(2 if load == "burners" else 0):
-                    time.sleep(1.0)
-                    rows.append({"protocol": name, "load": load, **delays(session, arrivals, number)})
+        for load in ("idle", "burners"):
+            with burning(2 if load == "burners" else 0):
+                time.sleep(1.0)
+                # The session of RMI, on which its stop goes, is open only while somebody is in control.
+                with mesh.robot("bench/arm-0").control("bench") as arm:
+                    time.sleep(0.5)
+                    rows.append({"protocol": name, "load": load, **delays(session, arrivals, number, arm)})
     return rows
 
 
-def delays(session: Any, arrivals: Any, number: int) -> dict[str, Any]:
-    """Ask for stops and bare answers in turn."""
+def delays(session: Any, arrivals: Any, number: int, arm: robomesh.Arm) -> dict[str, Any]:
+    """Ask for stops and bare answers in turn, in control."""
     wire, bare = [], []
     for _ in range(number):
         begun_s, count, begun_ns = time.monotonic(), arrivals[0], time.monotonic_ns()
@@ -317,6 +318,7 @@ def delays(session: Any, arrivals: Any, number: int) -> dict[str, Any]:
         begun_ns = time.monotonic_ns()
         if asked(session, "bare", b"") is not None:
             bare.append(time.monotonic_ns() - begun_ns)
+        arm.renew()
         time.sleep(max(0.0, begun_s + _STOP_EACH_S - time.monotonic()))
     return {"wire": summary(wire), "bare": summary(bare)}
 

@@ -40,6 +40,7 @@ HERE = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 IDLE = StatusReceived(Activity.IDLE, Mode.REMOTE)
 CONNECTED = b'{"Communication" : "FRC_Connect", "ErrorID" : 0, "PortNumber" : 16002, "MajorVersion" : 7} \r\n'
 INITIALIZED = b'{"Command": "FRC_Initialize", "ErrorID": 0, "GroupMask": 1}\r\n'
+ABORTED = b'{"Command": "FRC_Abort", "ErrorID": 2556937}\r\n'
 DONE = b'{"Instruction": "FRC_JointMotionJRep", "ErrorID": 0, "SequenceID": 1}\r\n'
 
 
@@ -111,8 +112,37 @@ def test_a_stop_before_the_motion_was_sent_discards_it():
     driver.command(driver.encode(MoveAbsolute(HERE)), 1.0)
     assert sent(driver.command(driver.encode(Stop()), 1.05)) == [rmi.abort()]
     # The controller aborted before it created the program, so a second abort ends the program.
-    driver.received(SESSION, b'{"Command": "FRC_Abort", "ErrorID": 2556937}\r\n', 1.06)
+    driver.received(SESSION, ABORTED, 1.06)
     assert sent(driver.received(SESSION, INITIALIZED, 1.1)) == [rmi.abort()]
+
+
+def activity(driver, now_s, joints=HERE):
+    """Return the reported activity of a controller that says that no program runs."""
+    driver._noted(JointsReceived(joints), now_s, now_s)
+    return driver._noted(IDLE, now_s, now_s).activity
+
+
+def test_a_stop_of_an_arm_at_rest_does_not_make_it_move():
+    driver = ready()
+    activity(driver, 1.5)
+    driver.command(driver.encode(Stop()), 1.6)
+    # The abort is not answered yet.
+    assert activity(driver, 1.61) is Activity.IDLE
+    driver.received(SESSION, ABORTED, 1.62)
+    assert activity(driver, 1.65) is Activity.IDLE
+
+
+def test_a_stop_of_a_motion_that_has_not_begun_is_proven_by_rest_after_it():
+    driver = ready()
+    activity(driver, 1.5)
+    driver.command(driver.encode(MoveAbsolute(HERE)), 1.5)
+    driver.received(SESSION, INITIALIZED, 1.6)
+    driver.command(driver.encode(Stop()), 1.61)
+    driver.received(SESSION, ABORTED, 1.62)
+    assert activity(driver, 1.65) is Activity.MOVING
+    assert activity(driver, 1.9, (*HERE[:5], 0.7)) is Activity.MOVING
+    assert activity(driver, 2.3, (*HERE[:5], 0.7)) is Activity.MOVING
+    assert activity(driver, 2.5, (*HERE[:5], 0.7)) is Activity.IDLE
 
 
 @pytest.mark.parametrize(

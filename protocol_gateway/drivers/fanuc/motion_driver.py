@@ -327,7 +327,7 @@ class FanucMotionDriver(SnpxDriver):
         # Before the channel connects to the old session's port again.
         self._due["reopen"] = now_s + _REOPEN_S
         if before in _OPEN_MOTION:
-            self._rests_after_stop = False
+            self._must_rest()
             return (FateUnknown(codes.FANUC_CONNECTION_LOST()),)
         return ()
 
@@ -425,7 +425,8 @@ class FanucMotionDriver(SnpxDriver):
                 event = replace(event, homed=None if activity in (None, Activity.FAULT) else True)
                 self._status, self._status_s, self._asked_s = event, now_s, asked_s
                 still = self._still is not None and now_s - self._still[1] >= _STILL_S
-                at_rest = self._phase is _Phase.NONE and event.activity is not Activity.MOVING
+                ended = self._phase in (_Phase.NONE, _Phase.STOPPING)
+                at_rest = ended and event.activity is not Activity.MOVING
                 self._rests_after_stop = self._rests_after_stop or (at_rest and still)
                 if event.activity is Activity.IDLE and not (at_rest and self._rests_after_stop):
                     return replace(event, activity=Activity.MOVING)
@@ -471,13 +472,19 @@ class FanucMotionDriver(SnpxDriver):
 
     def _end(self, now_s: float) -> Effects:
         """Abort the program of the gateway."""
+        at_rest = self._status is not None and self._status.activity is Activity.IDLE
+        if self._phase is not _Phase.NONE or not at_rest:
+            self._must_rest()
         self._motion = None
-        self._rests_after_stop = False
         self._due.pop("watch", None)
         if self._line is not _Line.OPEN:
             return ()
         self._phase = _Phase.STOPPING
         return () if self._abort_open else self._abort(now_s)
+
+    def _must_rest(self) -> None:
+        """Report a moving arm until it has rested from now on: the motion may still begin."""
+        self._rests_after_stop, self._still = False, None
 
     def _abort(self, now_s: float) -> Effects:
         self._abort_open = True
