@@ -89,8 +89,9 @@ class Proofs:
             return codes.JOINTS_DISAGREE(time=found.time)
         if found.joints_sha256 != self.joints_sha256:
             return codes.JOINTS_OTHER_MODEL(time=found.time)
-        if found.software and software != found.software:
-            return codes.JOINTS_OTHER_SOFTWARE(before=found.software, now=software or "not known")
+        if software != found.software:
+            before, now = (each or "not known" for each in (found.software, software))
+            return codes.JOINTS_OTHER_SOFTWARE(before=before, now=now)
         return None
 
     def read_only(self, software: str) -> Reason | None:
@@ -110,14 +111,25 @@ class Proofs:
             return codes.EXPERIMENTAL(protocol=self._protocol)
         if not proof:
             return codes.STOP_NOT_PROVEN()
-        if not capabilities.stop_means:
+        if not capabilities.stop_means and proof is True:
             return None
         if not isinstance(proof, StopProof):
             return codes.STOP_PROOF_SHORT(driver=self._protocol, means=capabilities.stop_means)
         tried, used = f"{proof.driver}, {proof.means}", f"{self._protocol}, {capabilities.stop_means}"
         if tried != used:
             return codes.STOP_OTHER_MEANS(before=tried, now=used)
-        # Before the controller has answered, nothing can be sent to it either.
+        # Before the controller has told it, a stop is sent, and no motion (`software_unknown`).
         if software not in ("", proof.software):
             return codes.STOP_OTHER_SOFTWARE(before=proof.software, now=software)
         return None
+
+    def software_unknown(self, software: str) -> Reason | None:
+        """Return why no motion may be sent: the stop was proven with a version that is not confirmed yet.
+
+        Args:
+            software: See `joints_unproven`.
+        """
+        proof = self._stop
+        if software or self._simulated or not isinstance(proof, StopProof) or not proof.software:
+            return None
+        return codes.STOP_OTHER_SOFTWARE(before=proof.software, now="not known")

@@ -410,16 +410,22 @@ class Robot:
         self._publish_state()
 
     def _on_controller_status(self) -> None:
-        before, self._read_only = self._read_only, self._proofs.read_only(self._telemetry.software)
+        before, self._read_only = (
+            self._read_only,
+            self._proofs.read_only(self._telemetry.software) or self._telemetry.undeclared_axes,
+        )
         if self._read_only != before:
             self._report_read_only()
-        unproven = self._proofs.joints_unproven(self._telemetry.software)
+        unproven = self._joints_unproven()
         if unproven is not None and unproven != self._reported_unproven and self._telemetry.software:
             self._reported_unproven = unproven
             self._journal.report(_S.WARNING, "joints.unproven", str(unproven), why=unproven)
         self._control.handle(events.StatusChanged())
         self._observe()
         self._publish_state()
+
+    def _joints_unproven(self) -> Reason | None:
+        return self._telemetry.undeclared_axes or self._proofs.joints_unproven(self._telemetry.software)
 
     def _on_activity(self, activity: Activity | None, dated_s: float) -> None:
         self._control.handle(events.StatusReported(activity, dated_s))
@@ -442,7 +448,7 @@ class Robot:
 
     def _controller(self) -> Controller:
         now_s, software = time.monotonic(), self._telemetry.software
-        unproven = self._proofs.joints_unproven(software)
+        unproven = self._joints_unproven()
         changes = self._signals.unconfirmed
         return Controller(
             link=self._link.status,
@@ -452,6 +458,7 @@ class Robot:
             positions_stale=self._no_joints or self._telemetry.positions_stale(now_s),
             unproven=unproven,
             software=software,
+            software_unknown=self._proofs.software_unknown(software),
             reports_set_up=self._signals.has_set_up,
             set_up=codes.CHECK_TOOL_CHANGED(changes=", ".join(changes)) if changes else None,
             read_only=self._read_only,

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from protocol_gateway.drivers.driver import (
     Activity,
     AlarmReceived,
+    AxesUndeclared,
     ControllerEvent,
     JointsReceived,
     MalformedReceived,
@@ -71,6 +72,7 @@ class Telemetry:
         motion_detector: Detects motion in the positions.
         controller_time_s: Time on the controller's own clock; None: it reports none.
         software: Version of the controller's software; empty: not reported since the link came up.
+        undeclared_axes: Reason why its axes are more than the joints of the model; None: they are not.
     """
 
     def __init__(
@@ -113,6 +115,7 @@ class Telemetry:
         self._joints_notice, self._status_notice = _LossNotice(), _LossNotice()
         self.controller_time_s: float | None = None
         self.software = ""
+        self.undeclared_axes: Reason | None = None
         self.motion_detector.forget()
         self._signals.forget()
 
@@ -203,6 +206,9 @@ class Telemetry:
                 self._on_recovery(event)
             case SoftwareReceived(version):
                 self._on_software(one_line(version, LONGEST_TEXT))
+            case AxesUndeclared(why):
+                self.undeclared_axes = why
+                self._on_status()
             case Refused(number, text):
                 self._on_refused(number, text)
             case AlarmReceived(severity, text, number):

@@ -586,6 +586,17 @@ AXES_UNDECLARED = Code(
     "may be assigned",
     "declare j23 and assignments in [robot.fanuc] of the site file",
 )
+AXES_EXTRA = Code(
+    "joints.axes_extra",
+    "axis {axes} of its controller belongs to no joint of the model",
+    "put it into the model, or name its number in other_axes of the site file if it neither carries nor "
+    "moves the arm",
+)
+BASE_UNDECLARED = Code(
+    "joints.base_undeclared",
+    "its controller moves it on a base ({axes}), which the model does not have: where the arm stands is not "
+    "known",
+)
 JOINTS_NOT_VERIFIED = Code(
     "joints.not_verified",
     "its joints are unproven: they were never compared with the pose that its controller computes",

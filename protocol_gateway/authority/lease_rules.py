@@ -230,7 +230,8 @@ class Authority:
         moving: The robot moved at the last observation; None: not observed yet.
         ended: Reason for the end of the previous lease; None: there was none.
         asked_by: Operators who request control from the holder, oldest first.
-        speed_percent: Speed last set by the gateway since the link came up; None: unknown.
+        speed_percent: Speed last set by the gateway since the link came up, or `first_speed_percent` of the
+            driver; None: unknown.
         reset_s: Time of the last RESET that no status has followed (monotonic).
         stopping_s: Time at which the first stop since the last RESET was sent (monotonic). A repeated stop
             does not change it, because it must not hide that the robot ignores its stop.

@@ -80,6 +80,7 @@ class Controller:
         unproven: Reason why the joints that it sends may not be those of the model, so that `positions` has
             none; None: they are.
         software: Version of its software, in its words; empty: not reported.
+        software_unknown: Reason why it must be reported before a motion is sent; None: it need not be.
         reports_set_up: It reports tool, payload or frame.
         set_up: Reason why motions are not checked for what the arm carries now: somebody has changed tool,
             payload or frame at the controller; None: they are.
@@ -97,6 +98,7 @@ class Controller:
     positions_stale: Reason | None = None
     unproven: Reason | None = None
     software: str = ""
+    software_unknown: Reason | None = None
     reports_set_up: bool = False
     set_up: Reason | None = None
     read_only: Reason | None = None
@@ -212,6 +214,8 @@ def _state_obstacle(request: CommandRequest, controller: Controller) -> Reason |
         return codes.CONTROLLER_FAULT(fault=controller.fault or "it does not say which")
     if status.activity is Activity.HOLDING and request.command != _C.RESUME:
         return codes.CONTROLLER_HOLDING()
+    if controller.software_unknown is not None:
+        return controller.software_unknown
     if (unknown := controller.unproven or controller.positions_stale) is not None:
         return codes.POSITIONS_UNKNOWN(unknown)
     # Many arms have no positions before they are homed. An arm with stale positions is not moved.

@@ -153,7 +153,7 @@ class SetTimer:
 
 @dataclass(frozen=True)
 class Controlled:
-    """Notify the driver of the begin or end of control."""
+    """Notify the driver of the begin of control by an operator, also after another one, or of its end."""
 
     taken: bool
 

@@ -269,11 +269,17 @@ class RobotAuthority:
 
     def _set_authority(self, authority: Authority, ended: LeaseEnd | None, seen: Seen) -> Effects[None]:
         """Set the state; stop the motion of a lease that has ended, before anything else."""
+        changed = _secret(authority) != _secret(self._authority)
+        first_percent = seen.controller.capabilities.first_speed_percent
+        if changed and first_percent is not None:
+            # The speed of one operator is not that of the next one.
+            authority = replace(authority, speed_percent=first_percent)
         self._authority = authority
         if ended is not None and ended.stop:
             yield from self._stop_by_gateway(codes.STOP_CONTROL_ENDED(ended.why), seen)
         yield effects.SetTimer(None if authority.lease is None else authority.lease.until_s)
-        yield effects.Controlled(authority.lease is not None)
+        if changed:
+            yield effects.Controlled(authority.lease is not None)
         yield effects.Publish()
         if ended is not None:
             yield reports.lease_ended(ended)
@@ -467,7 +473,8 @@ class RobotAuthority:
     def _link_lost(self, why: str, seen: Seen) -> Effects[None]:
         """Stop the robot if motion of the holder runs: its position is unknown now."""
         # The next connection may reach another controller.
-        self._authority = replace(self._authority, speed_percent=None)
+        first_percent = seen.controller.capabilities.first_speed_percent
+        self._authority = replace(self._authority, speed_percent=first_percent)
         lease = self._authority.lease
         if lease is not None and lease.motion is not None:
             yield from self._stop_by_gateway(codes.STOP_LINK_LOST(holder=lease.holder, detail=why), seen)
@@ -499,6 +506,10 @@ class RobotAuthority:
         if motion is None or controller.status.homed is False:
             return False  # at its home position, but not homed yet
         return has_arrived(motion.target, controller.positions, self._joints.types)
+
+
+def _secret(authority: Authority) -> str:
+    return "" if authority.lease is None else authority.lease.secret
 
 
 def _confirms(command: events.CommandsRequested) -> bool:

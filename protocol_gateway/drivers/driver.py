@@ -229,6 +229,19 @@ class SoftwareReceived:
     version: str
 
 
+@dataclass(frozen=True, slots=True)
+class AxesUndeclared:
+    """The controller has axes that the site file does not know, which may move the arm or carry it.
+
+    Meanwhile the robot is read-only, and its joints are unproven.
+
+    Attributes:
+        why: Their names, and what to do; None: there are none.
+    """
+
+    why: Reason | None
+
+
 ControllerEvent: TypeAlias = (
     JointsReceived
     | StatusReceived
@@ -238,6 +251,7 @@ ControllerEvent: TypeAlias = (
     | AlarmReceived
     | SignalsReceived
     | SoftwareReceived
+    | AxesUndeclared
     | RecoverAnswered
 )
 
@@ -336,6 +350,8 @@ class Capabilities:
         jogs: `Reset` gives a held motion up without a latch, and a new target replaces a running motion: the
             arm goes on smoothly from where it is, without a stop between the targets.
         absolute: The arm has absolute encoders: it is homed by nature.
+        first_speed_percent: Speed of motions when an operator takes control, because it is sent with each
+            motion (`FollowsControl`); None: the controller keeps its speed.
         dies_with_link: Whether the controller itself ends a motion when the gateway or its link is gone;
             None: unknown.
         no_joints: Reason for missing joint positions; None: the driver reports them.
@@ -352,6 +368,7 @@ class Capabilities:
     stop_ends: StopEnds = StopEnds.ANY
     jogs: bool = False
     absolute: bool = False
+    first_speed_percent: float | None = None
     dies_with_link: bool | None = None
     no_joints: Reason | None = None
     reports_pose: bool = False
@@ -484,7 +501,10 @@ class FollowsControl(Protocol):
     """Addition to `Driver` that receives the state of control."""
 
     def controlled(self, taken: bool, now_s: float) -> Effects:
-        """Handle the begin or end of control; idempotent. The stop of a lost lease precedes it."""
+        """Handle the begin of control by an operator, also after another one, or its end.
+
+        The stop of a lost lease precedes it.
+        """
         ...
 
 
@@ -500,7 +520,8 @@ class Driver(Protocol):
     def requests_a_second(self) -> float:
         """Most `Send` effects a second that are not the answer to `command`: greetings and questions.
 
-        The link sends no more: 0 means that nothing is ever sent unasked.
+        The link sends no more: 0 means that nothing is ever sent unasked. Those beside `FateUnknown` do not
+        count.
         """
         ...
 

@@ -18,6 +18,9 @@ from protocol_gateway.drivers.driver import (
 from protocol_gateway.errors import CommandError
 from robomesh import reason_codes as codes
 
+FIRST_PERCENT = 25.0
+"""Speed of motions until an operator sets another one; it is sent with each motion."""
+
 
 def encode_words(
     commands: Sequence[ControllerCommand], joints: int, recoveries: Collection[Recovery] = ()

@@ -6,7 +6,7 @@ An answer to an older question, or a second one to the same, is not used. No I/O
 """
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
@@ -14,9 +14,11 @@ TIMEOUT_S = 0.3
 """Time after which an answer is lost: a controller answers within some tens of milliseconds."""
 _SLOWEST = 16
 _CALM_S = 10.0
+# Of a question that is asked once, without an answer: not so often that it keeps others waiting.
+_AGAIN_S = 1.0
 
 
-R = TypeVar("R")
+R = TypeVar("R", bound=Hashable)
 R_contra = TypeVar("R_contra", contravariant=True)
 
 
@@ -65,7 +67,7 @@ class Polling(Generic[R]):
     """Questions of one connection.
 
     Args:
-        once: Asked first, in this order.
+        once: Asked first, in this order; again later if the answer is lost or the controller is busy.
         timeout_s: Time after which an answer is lost.
         numbers: Questions are numbered from 0 to one less than this, again and again.
 
@@ -86,6 +88,8 @@ class Polling(Generic[R]):
     ) -> None:
         self._regular = list(regular)
         self._once = deque(once)
+        self._asks_once = False
+        self._again: dict[R, float] = {}
         self.slowness = 1
         self._calm_since_s = 0.0
         self._timeout_s = timeout_s
@@ -109,6 +113,7 @@ class Polling(Generic[R]):
             if now_s < self.asked.at_s + self._timeout_s:
                 return None
             self.lost += 1
+            self._ask_again(self.asked, now_s)
             self.asked = None
         if self.slowness > 1 and now_s - self._calm_since_s >= _CALM_S:
             self.slowness //= 2
@@ -119,7 +124,18 @@ class Polling(Generic[R]):
             self._number = (self._number + 1) % self._numbers
         return self.asked
 
+    def _ask_again(self, asked: Asked[R], now_s: float) -> None:
+        """Ask a question again later that is not asked again and again."""
+        if self._asks_once:
+            self._again[asked.read] = now_s + _AGAIN_S * self.slowness
+
     def _due(self, now_s: float) -> R | None:
+        again = next((read for read, at_s in self._again.items() if at_s <= now_s), None)
+        if again is not None:
+            del self._again[again]
+        self._asks_once = again is not None or bool(self._once)
+        if again is not None:
+            return again
         if self._once:
             return self._once.popleft()
         due = [each for each in self._regular if each.next_s <= now_s]
@@ -136,7 +152,7 @@ class Polling(Generic[R]):
         """Return when to call `next_question` again; None: there are no questions."""
         if self.asked is not None:
             return self.asked.at_s + self._timeout_s
-        return min((each.next_s for each in self._regular), default=None)
+        return min((*(each.next_s for each in self._regular), *self._again.values()), default=None)
 
     def take(self, answer: Answered[R], now_s: float) -> Asked[R] | None:
         """Return the question that an answer belongs to; None: it is late, or a duplicate."""
@@ -147,6 +163,7 @@ class Polling(Generic[R]):
         if answer.busy:
             self.slowness = min(self.slowness * 2, _SLOWEST)
             self._calm_since_s = now_s
+            self._ask_again(asked, now_s)
             for each in self._regular:
                 each.next_s = max(each.next_s, now_s + each.period_s * self.slowness / 2)
         return asked

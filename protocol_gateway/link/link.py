@@ -257,15 +257,17 @@ class ControllerLink:
     def _tell(self, effects: Effects) -> None:
         """Perform what the driver returns when something happened."""
         now = self._now()
+        # What ends a motion that is given up is no question, and is always sent.
+        gives_up = any(isinstance(effect, FateUnknown) for effect in effects)
         for effect in effects:
-            self._perform(effect, now)
+            self._perform(effect, now, counted=not gives_up)
 
-    def _perform(self, effect: Effect, now: Received) -> None:
+    def _perform(self, effect: Effect, now: Received, *, counted: bool = True) -> None:
         match effect:
             case Report():
                 self._report(effect, now)
             case Send():
-                self._send_unasked(effect, now.monotonic_s)
+                self._send_unasked(effect, now.monotonic_s, counted=counted)
             case SetTimer(at_s):
                 self._set_timer(at_s)
             case Open():
@@ -275,8 +277,8 @@ class ControllerLink:
             case FateUnknown(why_unknown):
                 self._on_fate_unknown(why_unknown)
 
-    def _send_unasked(self, effect: Send, now_s: float) -> None:
-        if not self._unasked.allowed(now_s):
+    def _send_unasked(self, effect: Send, now_s: float, *, counted: bool) -> None:
+        if counted and not self._unasked.allowed(now_s):
             logger.error("%s: the driver sends more questions than it declares", self._where)
             return
         try:

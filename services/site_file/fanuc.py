@@ -30,6 +30,8 @@ class Fanuc(BaseModel):
         j23: Factor of axis 2 in the angle of joint 3: 1 if axis 3 is measured against the horizontal, as in
             most arms; 0 if it is measured against link 2; -1. Absent: the joints are not shown.
         axes: Number of each joint's axis in the controller's order, from 1; empty: 1, 2, 3, ...
+        other_axes: Numbers of axes of the group that are no joints of the model, and neither carry nor move
+            the arm, as a servo gun's. With other axes than these the robot is read-only.
         reversed: Numbers of the joints, from 1, that turn the other way than the controller's axes.
         zero: Position of each joint where its axis is at 0 [deg], or [mm]; empty: 0.
         group: Motion group, 1 to 8.
@@ -46,6 +48,7 @@ class Fanuc(BaseModel):
     assignments: Literal["own", "pendant"] | None = None
     j23: Literal[-1, 0, 1] | None = None
     axes: tuple[_Axis, ...] = ()
+    other_axes: tuple[_Axis, ...] = ()
     reversed: tuple[_Axis, ...] = ()
     zero: tuple[float, ...] = ()
     group: Annotated[int, Field(ge=1, le=MOST_GROUPS, strict=True)] = 1

@@ -34,6 +34,8 @@ class Yaskawa(BaseModel):
             way; of a linear joint, a millimetre. Empty: the joints are not shown.
         axes: Number of each joint's axis in the controller's order (S, L, U, R, B, T, E, W), from 1; empty:
             1, 2, 3, ...
+        other_axes: Numbers of axes of the group that are no joints of the model, and neither carry nor move
+            the arm, as a servo gun's. With other axes than these the robot is read-only.
         zero: Position of each joint at 0 pulses [deg], or [mm]; empty: 0.
         coupling: Axes that turn with another joint.
         group: Control group: R1 to R8, B1 to B8, S1 to S24.
@@ -47,6 +49,7 @@ class Yaskawa(BaseModel):
     model_config = PART_CONFIG
     pulses_per_degree: tuple[float, ...] = ()
     axes: tuple[_Axis, ...] = ()
+    other_axes: tuple[_Axis, ...] = ()
     zero: tuple[float, ...] = ()
     coupling: tuple[CoupledAxis, ...] = ()
     group: str = "R1"
@@ -72,6 +75,7 @@ class Yaskawa(BaseModel):
         return YaskawaSettings(
             pulses_per_degree=self.pulses_per_degree,
             axes=self.axes,
+            other_axes=self.other_axes,
             zero=self.zero,
             coupling=[Coupling(**each.model_dump()) for each in self.coupling],
             group=self.group,

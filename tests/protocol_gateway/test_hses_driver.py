@@ -10,6 +10,7 @@ import pytest
 from protocol_gateway.drivers.driver import (
     Activity,
     AlarmReceived,
+    AxesUndeclared,
     JointsReceived,
     MalformedReceived,
     Mode,
@@ -28,6 +29,7 @@ from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
 from protocol_gateway.drivers.yaskawa.data import Status
 from protocol_gateway.drivers.yaskawa.driver import HSES, HsesDriver, activity_of, mode_of
 from protocol_gateway.errors import CommandError, GatewaySettingsError
+from robomesh import reason_codes as codes
 from robots.joints import JointType
 from services.simulator.yaskawa.service import HsesSettings, serve_hses, with_factors
 from tests.conftest import run
@@ -105,6 +107,9 @@ class Stepped:
             return
         self.answered = len(self.sent)
         _, command, instance, _, _ = self.question
+        if command == 0x74 and instance > 10:
+            self.answer(status=0x28)  # it has no base
+            return
         healthy = POSE if command == 0x75 and instance > 100 else HEALTHY[command]
         self.answer(healthy if data is None else data)
 
@@ -167,7 +172,8 @@ def test_it_asks_for_status_system_and_axes_first_and_then_again_and_again():
     # Pulses, and twice a second the tool's pose.
     assert asked.count(0x75) / seconds == pytest.approx(22, rel=0.05)
     assert asked.count(0x72) / seconds == pytest.approx(5, rel=0.1)
-    assert asked.count(0x89) == asked.count(0x74) == 1
+    # The axes of the robot and of its base.
+    assert (asked.count(0x89), asked.count(0x74)) == (1, 2)
     assert len(asked) / seconds < arm.driver.requests_a_second
     assert {(command, each[29]) for command, each in zip(asked, arm.sent, strict=True)} <= READS
     assert {len(each) for each in arm.sent} == {32}
@@ -363,20 +369,36 @@ def test_a_lost_answer_is_counted_and_the_next_question_follows():
 def test_extra_axes_are_reported_once_and_missing_ones_give_no_joints():
     arm = Stepped()
     (event,) = arm.give(0x74, names("SLURBTE"))
-    assert event == AlarmReceived(
-        Severity.WARNING, "axis E of R1 belongs to no joint of the model, and is not shown"
-    )
+    assert event == AxesUndeclared(codes.AXES_EXTRA(axes="E"))
     assert isinstance(arm.give(0x75, position(*(0,) * 8))[0], JointsReceived)
     # A controller that does not say the names shows an axis by its pulses.
     arm = Stepped()
     arm.give(0x74, status=0x28)
     events = arm.give(0x75, position(0, 0, 0, 0, 0, 0, 9999, 0))
-    assert "axis 7 of R1" in events[-1].text
+    assert events[-1] == AxesUndeclared(codes.AXES_EXTRA(axes="7"))
     assert len(arm.give(0x75, position(0, 0, 0, 0, 0, 0, 9999, 0))) == 1
     arm = Stepped()
     arm.give(0x74, names("SLURB"))
     (event,) = arm.give(0x75, position(*(0,) * 8))
     assert "axis 6 is declared, but R1 of the controller has none" in event.reason
+
+
+def test_axes_that_the_site_file_declares_are_no_others_but_a_base_always_is():
+    arm = Stepped(other_axes=(7,))
+    assert arm.give(0x74, names("SLURBTE")) == []
+    # The second question is for the base.
+    (event,) = arm.give(0x74, names("X"))
+    assert event == AxesUndeclared(codes.BASE_UNDECLARED(axes="X"))
+
+
+def test_a_question_without_an_answer_is_asked_again_although_it_is_asked_once():
+    arm = Stepped()
+    arm.until(0x89)
+    arm.answered = len(arm.sent)
+    arm.now_s += 0.5  # the answer is lost
+    arm.perform(arm.driver.timer_ended(arm.now_s))
+    (event,) = arm.give(0x89, HEALTHY[0x89])
+    assert isinstance(event, SoftwareReceived)
 
 
 def test_it_refuses_codes_every_command_and_settings_of_another_model():

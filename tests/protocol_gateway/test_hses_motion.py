@@ -459,9 +459,9 @@ def test_axes_of_others_forbid_motion_also_after_a_restart(mesh, tmp_path, monke
             await until(lambda: site.controller.link == STATE.DOWN)
             await relay.lead_to(other)
             await until(lambda: site.controller.link == STATE.UP)
-            await site.units(40)
-            await site.lease(A.ACQUIRE, ttl_s=5)
-            assert "axis E belongs to no joint" in await refusal(move(site, 0.1))
+            await until(lambda: site.controller.joints_unproven)
+            assert "axis E of its controller" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
+            assert not site.controller.capabilities.commands
             assert not motions(relay)
 
     run(main())

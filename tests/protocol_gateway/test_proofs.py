@@ -63,7 +63,8 @@ def proofs(capabilities=READS, **settings):
             "5.12.4",
             codes.JOINTS_OF_OTHER_ROBOT,
         ),
-        ({"verified": RECORD.model_copy(update={"software": ""})}, "5.13.0", None),
+        ({"verified": RECORD.model_copy(update={"software": ""})}, "", None),
+        ({"verified": RECORD.model_copy(update={"software": ""})}, "5.13.0", codes.JOINTS_OTHER_SOFTWARE),
     ],
 )
 def test_joints_are_proven_for_one_robot_model_and_software(changes, software, code):
@@ -90,7 +91,7 @@ def test_the_hash_is_of_what_places_the_tool_and_of_nothing_else():
     ("capabilities", "changes", "software", "code"),
     [
         (MOVES, {"stop": TRIAL}, "5.12.4", None),
-        # Nothing can be sent before the controller has answered.
+        # A stop is sent before the controller has told its software.
         (MOVES, {"stop": TRIAL}, "", None),
         (MOVES, {"stop": TRIAL}, "5.13.0", codes.STOP_OTHER_SOFTWARE),
         (MOVES, {"stop": TRIAL, "experimental": False}, "5.12.4", codes.EXPERIMENTAL),
@@ -103,6 +104,7 @@ def test_the_hash_is_of_what_places_the_tool_and_of_nothing_else():
         (READS, {"stop": TRIAL}, "5.12.4", codes.READS_ONLY),
         (Capabilities(commands=frozenset({Hold})), {"stop": True}, "", codes.NO_STOP_CODE),
         (Capabilities(commands=COMMANDS), {"stop": True, "experimental": False}, "", None),
+        (Capabilities(commands=COMMANDS), {"stop": TRIAL, "protocol": "unit"}, "", codes.STOP_OTHER_MEANS),
     ],
 )
 def test_commands_need_a_stop_that_was_tried_with_this_driver_means_and_software(
@@ -110,6 +112,23 @@ def test_commands_need_a_stop_that_was_tried_with_this_driver_means_and_software
 ):
     why = proofs(capabilities, **changes).read_only(software)
     assert (why and why.code) == (code and code.name)
+
+
+@pytest.mark.parametrize(
+    ("stop", "simulated", "software", "waits"),
+    [
+        (TRIAL, False, "", True),
+        (TRIAL, False, "5.12.4", False),
+        (TRIAL, True, "", False),
+        (True, False, "", False),
+        (replace(TRIAL, software=""), False, "", False),
+    ],
+)
+def test_a_motion_waits_until_the_software_is_known_with_which_the_stop_was_tried(
+    stop, simulated, software, waits
+):
+    why = proofs(MOVES, stop=stop, simulated=simulated).software_unknown(software)
+    assert (why is not None) == waits
 
 
 def hses_samples(axes, joints):

@@ -77,10 +77,10 @@ class Bench:
                 "CancelPrograms": self.cancelled,
             }.get(name)
 
-    def lease(self, action, operator="li", secret="secret"):
-        request = LeaseRequest(action=action, lease=secret, ttl_s=5.0)
+    def lease(self, action, operator="li", secret="secret", **fields):
+        request = LeaseRequest(action=action, lease=secret, ttl_s=5.0, **fields)
         return self.give(
-            events.LeaseRequested(request=request, operator=operator, source="test", secret="secret")
+            events.LeaseRequested(request=request, operator=operator, source="test", secret=secret)
         )
 
     def command(self, command, number=1, checked=None, **fields):
@@ -261,8 +261,35 @@ def test_a_request_for_control_expires_after_the_lease():
     bench.performed.clear()
     bench.seen = replace(SEEN, now=Now(NOW.monotonic_s + 31.0, NOW.wall_ns + 31_000_000_000))
     bench.give(events.TimePassed())
-    assert bench.performed == APPLIED
+    assert bench.performed == ["SetTimer", "Publish"]
     assert bench.robot_authority.authority.asked_by == ()
+
+
+def test_the_speed_of_one_operator_is_not_that_of_the_next():
+    bench = Bench()
+    capabilities = replace(SEEN.controller.capabilities, first_speed_percent=25.0)
+    bench.seen = replace(SEEN, controller=replace(SEEN.controller, capabilities=capabilities))
+
+    def speed():
+        return bench.robot_authority.authority.speed_percent
+
+    bench.in_control()
+    assert speed() == 25.0
+    bench.command(C.SPEED, speed_percent=80.0)
+    bench.performed.clear()
+    bench.lease(A.RENEW)
+    # The driver is not told again of the same control.
+    assert (speed(), bench.performed) == (80.0, ["SetTimer", "Publish"])
+    bench.lease(A.TAKE, "wang", secret="another", reason="shift")
+    assert speed() == 25.0
+    assert "Controlled" in bench.performed
+
+
+def test_a_speed_that_stays_in_the_controller_stays_over_a_change_of_control():
+    bench = Bench().in_control()
+    bench.command(C.SPEED, speed_percent=80.0)
+    bench.lease(A.RELEASE)
+    assert bench.robot_authority.authority.speed_percent == 80.0
 
 
 @pytest.mark.parametrize("runs", [False, True])

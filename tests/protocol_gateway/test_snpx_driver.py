@@ -12,6 +12,7 @@ import pytest
 from protocol_gateway.drivers.driver import (
     Activity,
     AlarmReceived,
+    AxesUndeclared,
     JointsReceived,
     MalformedReceived,
     Mode,
@@ -29,6 +30,7 @@ from protocol_gateway.drivers.fanuc.assignments import SystemVariable
 from protocol_gateway.drivers.fanuc.axes import FanucSettings
 from protocol_gateway.drivers.fanuc.driver import SNPX, TIMEOUT_S, SnpxDriver, activity_of, mode_of
 from protocol_gateway.errors import CommandError, GatewaySettingsError
+from robomesh import reason_codes as codes
 from robomesh.session import open_session
 from robots.description import load
 from robots.joints import JointType, joints_of
@@ -485,14 +487,15 @@ def test_extra_axes_that_are_not_at_0_are_reported_once():
     arm = Stepped(group=2)
     arm.content["POS[G2:0]"] = position((0, 0, 0, 0, 0, 0, 12.5))
     events = arm.give("position")
-    assert (
-        AlarmReceived(
-            Severity.WARNING, "axis 7 of group 2 belongs to no joint of the model, and is not shown"
-        )
-        in events
-    )
+    assert AxesUndeclared(codes.AXES_EXTRA(axes="7")) in events
     assert len(joints(events)) == 1
-    assert not any(isinstance(each, AlarmReceived) for each in arm.give("position"))
+    assert not any(isinstance(each, AxesUndeclared) for each in arm.give("position"))
+    arm.content["POS[G2:0]"] = position((0,) * 6)
+    assert AxesUndeclared(None) in arm.give("position")
+    # The site file says that it neither carries nor moves the arm.
+    arm = Stepped(group=2, other_axes=(7,))
+    arm.content["POS[G2:0]"] = position((0, 0, 0, 0, 0, 0, 12.5))
+    assert not any(isinstance(each, AxesUndeclared) for each in arm.give("position"))
 
 
 def test_it_refuses_codes_every_command_and_settings_of_another_model():

@@ -74,6 +74,7 @@ class FanucSettings:
             operator has entered the assignments. None: undeclared, joints are not shown.
         j23: Factor of axis 2 in the angle of axis 3: 1, 0 or -1. None: undeclared, joints are not shown.
         axes: Number of each joint's axis in the controller's order, from 1; empty: 1, 2, 3, ...
+        other_axes: Numbers of axes that are no joints of the model, and neither carry nor move the arm.
         reversed: Numbers of the joints that turn the other way, from 1.
         zero: Position of each joint where its axis is at 0 [degree] or [mm]; empty: 0.
         group: Motion group, 1 to 8.
@@ -88,6 +89,7 @@ class FanucSettings:
     assignments: Literal["own", "pendant"] | None = None
     j23: Literal[-1, 0, 1] | None = None
     axes: Sequence[int] = ()
+    other_axes: Sequence[int] = ()
     reversed: Sequence[int] = ()
     zero: Sequence[float] = ()
     group: int = 1

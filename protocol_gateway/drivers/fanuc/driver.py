@@ -11,6 +11,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from protocol_gateway.drivers.driver import (
     Activity,
     AlarmReceived,
+    AxesUndeclared,
     Capabilities,
     Carries,
     Channel,
@@ -113,7 +114,7 @@ class SnpxDriver(OnlyReads):
         # not replaced again.
         self._alarms: frozenset[Alarm] = frozenset()
         self._table_lost = False
-        self._extra_axes = ""
+        self._declared = frozenset(settings.other_axes)
         self._axes_read: Sequence[float] = ()
         self._begin()
 
@@ -134,7 +135,7 @@ class SnpxDriver(OnlyReads):
         self._complaints: set[Question] = set()
         self._unproven: Counter[Read] = Counter()
         self._invalid = False
-        self._software = ""
+        self._software = self._undeclared = ""
         self._next_pose_s = 0.0
 
     # -------------------------------------------------------------------------- seam
@@ -195,6 +196,9 @@ class SnpxDriver(OnlyReads):
     # ----------------------------------------------------------------------- answers
 
     def _report(self, asked: Asked[Question], answer: Answer, packet: bytes, now_s: float) -> Report:
+        if answer.busy and asked.read in self._setup:
+            # The rest must not be sent without it; the link finds the connection silent, and connects again.
+            self._stop()
         if answer.busy:
             # Not a sign that the state is received: a controller that is always busy is silent.
             return Report([], 1, refusals=1, asked_s=asked.at_s)
@@ -281,23 +285,27 @@ class SnpxDriver(OnlyReads):
         self._axes_read = position.axes or ()
         if position.axes is not None and self._settings.j23 is not None:
             events.append(JointsReceived(self._axes.positions(position.axes)))
-            events += self._report_extra_axes(position.axes)
+            events += self._look_for_axes(position.axes)
         if now_s >= self._next_pose_s:
             self._next_pose_s = now_s + _POSE_EACH_S
             events.append(signals.of_pose(position.cartesian))
         return events
 
-    def _report_extra_axes(self, axes: Sequence[float]) -> list[ControllerEvent]:
-        """Report once the axes that no joint of the model has, and that are not at 0."""
-        unused = (each for each in range(len(axes)) if each not in self._axes.used)
-        extra = ", ".join(str(each + 1) for each in unused if abs(axes[each]) > _SOME_DEGREES)
-        if not extra or extra == self._extra_axes:
+    def _look_for_axes(self, axes: Sequence[float]) -> list[ControllerEvent]:
+        """Report once the axes that no joint of the model has, that are not at 0, and were not declared."""
+        extra = ", ".join(str(each) for each in self._other_than_joints(axes) if each not in self._declared)
+        if extra == self._undeclared:
             return []
-        self._extra_axes = extra
-        text = (
-            f"axis {extra} of group {self._settings.group} belongs to no joint of the model, and is not shown"
-        )
-        return [AlarmReceived(Severity.WARNING, text)]
+        self._undeclared = extra
+        return [AxesUndeclared(reason_codes.AXES_EXTRA(axes=extra) if extra else None)]
+
+    def _other_than_joints(self, axes: Sequence[float]) -> list[int]:
+        """Return the numbers of axes, from 1, that no joint of the model has, and that are not at 0."""
+        return [
+            number
+            for number, value in enumerate(axes, 1)
+            if number - 1 not in self._axes.used and abs(value) > _SOME_DEGREES
+        ]
 
     def _on_software(self, words: bytes) -> list[ControllerEvent]:
         """Report the version of the software once for each connection; without a text it is unknown."""

@@ -60,7 +60,7 @@ from protocol_gateway.drivers.fanuc.rmi import Answer, LineStream
 from protocol_gateway.drivers.fanuc.srtp import Answer as Packet
 from protocol_gateway.drivers.fanuc.srtp import Question
 from protocol_gateway.drivers.hexadecimal import hexadecimal
-from protocol_gateway.drivers.one_motion import Timers, encode_words, words_of
+from protocol_gateway.drivers.one_motion import FIRST_PERCENT, Timers, encode_words, words_of
 from protocol_gateway.drivers.polling import Asked
 from protocol_gateway.errors import GatewaySettingsError, NotReadyError
 from robomesh import reason_codes as codes
@@ -85,8 +85,6 @@ _REOPEN_S = 0.05
 _AGAIN_S = 0.05
 _ENDED_S = 0.3
 _STILL_S, _STILL_RAD = 0.5, 1e-3
-_SOME_DEGREES = 0.01
-_FIRST_PERCENT = 25.0
 _RMI_SENDS_HZ = 20.0
 _TOOL = Signal("tool.number")
 
@@ -154,6 +152,7 @@ class FanucMotionDriver(SnpxDriver):
             self.capabilities,
             commands=frozenset({MoveAbsolute, Speed, Stop, Reset}),
             stop_ends=StopEnds.OURS,
+            first_speed_percent=FIRST_PERCENT,
             dies_with_link=False,
             experimental=True,
             stop_means="FRC_Abort of RMI",
@@ -173,7 +172,7 @@ class FanucMotionDriver(SnpxDriver):
         self._motion: _Motion | None = None
         self._sent_s = float("-inf")
         self._initialize_open = self._abort_open = False
-        self._percent = _FIRST_PERCENT
+        self._percent = FIRST_PERCENT
         self._rests_after_stop = True
         self._forget_state()
 
@@ -194,9 +193,7 @@ class FanucMotionDriver(SnpxDriver):
 
     def controlled(self, taken: bool, now_s: float) -> Effects:
         """Connect to RMI while the robot is controlled."""
-        self._controlled = taken
-        if not taken:
-            self._percent = _FIRST_PERCENT
+        self._controlled, self._percent = taken, FIRST_PERCENT
         return self._due.with_timer(self._settle(now_s))
 
     def opened(self, channel: Channel, now_s: float) -> Effects:
@@ -244,6 +241,7 @@ class FanucMotionDriver(SnpxDriver):
         """Handle a lost connection."""
         if channel is SNPX:
             self._forget_state()
+            self._percent = FIRST_PERCENT
             effects = [*super().closed(channel, now_s)]
             if self._phase in _OPEN_MOTION:
                 effects += self._give_up(codes.FANUC_STATE_OLD(), now_s)
@@ -378,6 +376,8 @@ class FanucMotionDriver(SnpxDriver):
             return self._give_up(codes.FANUC_STATE_OLD(), now_s)
         if self._positions is None or _moved(self._positions, self._motion.start):
             return self._give_up(codes.FANUC_MOVED_BEFORE(), now_s)
+        if (extra := self._extra_axes()) is not None:
+            return self._give_up(extra, now_s)
         self._phase, self._sent_s = _Phase.MOVING, now_s
         return (Send(SESSION, self._motion.instruction),)
 
@@ -565,15 +565,17 @@ class FanucMotionDriver(SnpxDriver):
             return codes.FANUC_ARM_STOPPED(
                 activity="unknown" if status.activity is None else status.activity.value
             )
-        extra = [
-            str(number)
-            for number, value in enumerate(self._axes_read, 1)
-            if number - 1 not in self._axes.used and abs(value) > _SOME_DEGREES
-        ]
-        if extra:
-            # The instruction has a value for each axis.
-            return codes.FANUC_EXTRA_AXES(axes=", ".join(extra))
+        if (extra := self._extra_axes()) is not None:
+            return extra
         return None if self._line is _Line.OPEN else codes.FANUC_NOT_CONNECTED()
+
+    def _extra_axes(self) -> Reason | None:
+        """Return the refusal of a motion that would move other axes too; None: there are none.
+
+        The instruction has a value for each axis.
+        """
+        extra = ", ".join(map(str, self._other_than_joints(self._axes_read)))
+        return codes.FANUC_EXTRA_AXES(axes=extra) if extra else None
 
 
 def _refused(answer: Answer) -> Reason:

@@ -42,7 +42,7 @@ from protocol_gateway.drivers.driver import (
     Stop,
     StopEnds,
 )
-from protocol_gateway.drivers.one_motion import Timers, encode_words, words_of
+from protocol_gateway.drivers.one_motion import FIRST_PERCENT, Timers, encode_words, words_of
 from protocol_gateway.drivers.universal_robots.dashboard import RECOVERIES, Dashboard
 from protocol_gateway.drivers.universal_robots.driver import (
     JOINTS,
@@ -92,7 +92,6 @@ _MOST_BEATS_BEHIND = 13
 # A program may have ended before its last registers are seen.
 _ENDED_S = 0.05
 _STILL_S, _STILL_RAD = 0.5, 1e-3
-_FIRST_PERCENT = 25.0
 _LARGEST_NUMBER = 2**30
 _MAY_MOVE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
 _NO_MOTION = 0
@@ -120,6 +119,7 @@ class RtdeMotionDriver(RtdeDriver):
     capabilities = Capabilities(
         commands=frozenset({MoveAbsolute, Speed, Stop, Reset}),
         stop_ends=StopEnds.OURS,
+        first_speed_percent=FIRST_PERCENT,
         absolute=True,
         dies_with_link=True,
         reports_pose=True,
@@ -162,7 +162,7 @@ class RtdeMotionDriver(RtdeDriver):
         self._state: ControllerState | None = None
         self._state_s = self._excused_s = float("-inf")
         self._motion: _Motion | None = None
-        self._percent = _FIRST_PERCENT
+        self._percent = FIRST_PERCENT
         self._rests_after_stop = True
         self._still: tuple[tuple[float, ...], float] | None = None
         self._protective_s: float | None = None
@@ -175,6 +175,11 @@ class RtdeMotionDriver(RtdeDriver):
         unanswered = self._recoveries()
         self._forget()
         return self._due.with_timer((*unanswered, *super().started(now_s), _OPEN_DASHBOARD, _OPEN_INPUTS))
+
+    def controlled(self, taken: bool, now_s: float) -> Effects:
+        """Begin with a low speed."""
+        self._percent = FIRST_PERCENT
+        return ()
 
     def opened(self, channel: Channel, now_s: float) -> Effects:
         """Greet."""
@@ -218,7 +223,7 @@ class RtdeMotionDriver(RtdeDriver):
         effects: list[Effect] = []
         if channel is RTDE:
             # The next connection may reach another controller, where no speed was set.
-            self._percent, self._state, self._protective_s = _FIRST_PERCENT, None, None
+            self._percent, self._state, self._protective_s = FIRST_PERCENT, None, None
         if channel is INPUTS:
             self._inputs.disconnected()
         if channel is DASHBOARD:

@@ -45,6 +45,7 @@ class YaskawaSettings:
         pulses_per_degree: One a joint, negative where the joint turns the other way; of a linear joint, a
             millimetre. Empty: undeclared, joints are not shown.
         axes: Number of each joint's axis in the controller's order, from 1; empty: 1, 2, 3, ...
+        other_axes: Numbers of axes that are no joints of the model, and neither carry nor move the arm.
         zero: Position of each joint at 0 pulses [degree] or [mm]; empty: 0.
         coupling: Axes that turn with another joint, as in many wrists.
         group: Control group: R1 to R8, B1 to B8, S1 to S24.
@@ -56,6 +57,7 @@ class YaskawaSettings:
 
     pulses_per_degree: Sequence[float] = ()
     axes: Sequence[int] = ()
+    other_axes: Sequence[int] = ()
     zero: Sequence[float] = ()
     coupling: Sequence[Coupling] = ()
     group: str = "R1"

@@ -9,6 +9,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from protocol_gateway.drivers.driver import (
     Activity,
     AlarmReceived,
+    AxesUndeclared,
     Capabilities,
     Carries,
     Channel,
@@ -37,6 +38,7 @@ from protocol_gateway.drivers.yaskawa.data import HELD, Alarm, DataType, Positio
 from protocol_gateway.drivers.yaskawa.hses import Answer, Command, Read, Service, decode
 from protocol_gateway.errors import GatewaySettingsError
 from robomesh import reason_codes
+from robomesh.reasons import Reason
 from robots.joints import JointType
 
 HSES = Channel(name="hses", carries=Carries.READING, datagrams=True)
@@ -80,6 +82,8 @@ class HsesDriver(OnlyReads):
         # Robots only: a base or a station has no tool.
         self._pose = Read(Command.POSITION, 100 + instance) if settings.group[0] == "R" else None
         self._axis_names = Read(Command.AXES, instance)
+        self._base_axes = Read(Command.AXES, instance + 10)
+        self._declared_axes = {each - 1 for each in settings.other_axes}
         # Robots are numbered from 11 here, like their bases, and stations as elsewhere.
         self._system = Read(Command.SYSTEM, instance + 10 if settings.group[0] == "R" else instance)
         self._axes = Axes(settings, joint_types) if settings.pulses_per_degree else None
@@ -101,7 +105,6 @@ class HsesDriver(OnlyReads):
         self.requests_a_second = regular_hz + ALARMS / _ALARMS_EACH_S + 2.0
         # Kept over a lost link, so that it is not reported again.
         self._alarms: set[Alarm] = set()
-        self._extra_axes = ""
         self._begin()
 
     def _begin(self) -> None:
@@ -111,9 +114,14 @@ class HsesDriver(OnlyReads):
             regular.append(Regular(self._torques, 1.0 / _SIGNALS_HZ))
         others = (JOB, *self._io) if self._pose is None else (self._pose, JOB, *self._io)
         regular += [Regular(each, 1.0 / _SIGNALS_HZ) for each in others]
-        self._polling = Polling(regular, (STATUS, self._system, self._axis_names))
+        once = [STATUS, self._system, self._axis_names]
+        if self._group[0] == "R":
+            once.append(self._base_axes)
+        self._polling = Polling(regular, once)
         self._refused: set[Read] = set()
         self._names: Sequence[str] = ()
+        self._base_names: Sequence[str] = ()
+        self._undeclared: Reason | None = None
         self._round: set[Alarm] = set()
         self._next_round_s = self._next_tool_s = 0.0
         self._tool: int | None = None
@@ -202,8 +210,12 @@ class HsesDriver(OnlyReads):
                 return self._alarm(read.instance, payloads.alarm(data))
             case Command.SYSTEM:
                 return self._on_system(payloads.system(data))
+            case Command.AXES if read == self._base_axes:
+                self._base_names = payloads.axis_names(data)
+                return self._look_for_axes({})
             case Command.AXES:
-                return self._on_axis_names(payloads.axis_names(data))
+                self._names = payloads.axis_names(data)
+                return self._look_for_axes({})
             case Command.JOB:
                 return [signals.of_job(payloads.job(data))]
             case Command.TORQUE if self._axes is not None:
@@ -230,7 +242,7 @@ class HsesDriver(OnlyReads):
                 )
             return events
         moved = {each: str(each + 1) for each, at in enumerate(position.axes) if abs(at) > _SOME_PULSES}
-        return [*events, *self._report_extra_axes(moved)]
+        return [*events, *self._look_for_axes(moved)]
 
     def _tool_pose(self, position: Position) -> list[ControllerEvent]:
         if position.data_type not in (DataType.BASE, DataType.ROBOT):
@@ -239,20 +251,25 @@ class HsesDriver(OnlyReads):
             )
         return [signals.of_pose(position)]
 
-    def _on_axis_names(self, names: Sequence[str]) -> list[ControllerEvent]:
-        self._names = names
-        return self._report_extra_axes({each: name for each, name in enumerate(names) if name})
+    def _look_for_axes(self, moved: Mapping[int, str]) -> list[ControllerEvent]:
+        """Report once the axes that no joint of the model has, and that were not declared.
 
-    def _report_extra_axes(self, axes: Mapping[int, str]) -> list[ControllerEvent]:
-        """Report once the axes that no joint of the model has."""
+        Args:
+            moved: Axes away from 0, for a controller that does not name its axes.
+        """
         if self._axes is None:
             return []
-        extra = ", ".join(name for each, name in axes.items() if each not in self._axes.used)
-        if not extra or extra == self._extra_axes:
+        known = {*self._axes.used, *self._declared_axes}
+        named = {each: name for each, name in enumerate(self._names) if name} or moved
+        why = None
+        if base := ", ".join(filter(None, self._base_names)):
+            why = reason_codes.BASE_UNDECLARED(axes=base)
+        elif extra := ", ".join(name for each, name in named.items() if each not in known):
+            why = reason_codes.AXES_EXTRA(axes=extra)
+        if why == self._undeclared:
             return []
-        self._extra_axes = extra
-        text = f"axis {extra} of {self._group} belongs to no joint of the model, and is not shown"
-        return [AlarmReceived(Severity.WARNING, text)]
+        self._undeclared = why
+        return [AxesUndeclared(why)]
 
     def _status(self, status: Status, now_s: float) -> list[ControllerEvent]:
         if not status.second & Status2.ALARM:

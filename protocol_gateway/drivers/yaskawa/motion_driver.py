@@ -49,14 +49,14 @@ from protocol_gateway.drivers.driver import (
     Stop,
     StopEnds,
 )
-from protocol_gateway.drivers.one_motion import Timers, encode_words, words_of
+from protocol_gateway.drivers.one_motion import FIRST_PERCENT, Timers, encode_words, words_of
 from protocol_gateway.drivers.polling import Polling, Regular
 from protocol_gateway.drivers.yaskawa import commands
 from protocol_gateway.drivers.yaskawa import data as payloads
 from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings, instance_of
 from protocol_gateway.drivers.yaskawa.data import HELD, Position, Status, Status1, Status2
 from protocol_gateway.drivers.yaskawa.driver import HSES, STATUS, HsesDriver, mode_of
-from protocol_gateway.drivers.yaskawa.hses import Answer, Command, Read, decode
+from protocol_gateway.drivers.yaskawa.hses import Answer, Read, decode
 from protocol_gateway.errors import GatewaySettingsError, NotReadyError
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
@@ -80,12 +80,10 @@ _OTHERS_S = 1.0
 _BASE_EACH_S = 2.0
 _STILL = {JointType.ROTARY: 1e-3, JointType.PRISMATIC: 1e-4}
 _ARRIVED = {JointType.ROTARY: 2e-3, JointType.PRISMATIC: 2e-4}
-_FIRST_PERCENT = 25.0
 # Numbers of questions on the channel `stop` are below, those of HOLD are from here.
 _FIRST_HOLD = 128
 _NUMBERS = 256
 _NO_SUCH_GROUP, _NO_SUCH_GROUP_ADDED = 0x28, frozenset({0xA001, 0xB008})
-_BASE = 10
 
 
 @dataclass
@@ -136,13 +134,13 @@ class HsesMotionDriver(HsesDriver):
             text = f"yaskawa motion: a robot, R1 to R8, can be moved, not {options.group}"
             raise GatewaySettingsError(text)
         self._robot = instance_of(options.group)
-        self._base_axes = Read(Command.AXES, _BASE + self._robot)
         self._still_by = tuple(_STILL[each] for each in joint_types)
         self._arrived_by = tuple(_ARRIVED[each] for each in joint_types)
         reading = self.capabilities
         self.capabilities = Capabilities(
             commands=frozenset({MoveAbsolute, Speed, Stop, Reset}),
             stop_ends=StopEnds.OURS,
+            first_speed_percent=FIRST_PERCENT,
             absolute=True,
             dies_with_link=False,
             no_joints=reading.no_joints,
@@ -170,7 +168,7 @@ class HsesMotionDriver(HsesDriver):
         self._place_s = float("-inf")
         self._still_since: tuple[tuple[float, ...], float] | None = None
         self._motion: _Motion | None = None
-        self._percent = _FIRST_PERCENT
+        self._percent = FIRST_PERCENT
         self._has_base: bool | None = None
         # HOLD is wanted; it was set by this driver; something of the gateway's may go on when it ends.
         self._wants_hold = self._set_hold = False
@@ -186,6 +184,11 @@ class HsesMotionDriver(HsesDriver):
         """Open the sockets."""
         self._forget()
         return self._due.with_timer((*super().started(now_s), Open(STOP), Open(MOTION)))
+
+    def controlled(self, taken: bool, now_s: float) -> Effects:
+        """Begin with a low speed."""
+        self._percent = FIRST_PERCENT
+        return ()
 
     def opened(self, channel: Channel, now_s: float) -> Effects:
         """Begin to ask."""
@@ -214,7 +217,7 @@ class HsesMotionDriver(HsesDriver):
     def _lost(self, channel: Channel, now_s: float) -> Effects:
         if channel is HSES:
             # The next connection may reach another controller, where no speed was set.
-            self._percent, self._place, self._joint_positions = _FIRST_PERCENT, None, ()
+            self._percent, self._place, self._joint_positions = FIRST_PERCENT, None, ()
         if channel is STOP:
             self._stop_polling, self._state = Polling((), ()), None
             self._due.pop("blind", None)

@@ -868,6 +868,20 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ],
   ],
   [
+    "joints.axes_extra",
+    [
+      "axis {axes} of its controller belongs to no joint of the model: put it into the model, or name its number in other_axes of the site file if it neither carries nor moves the arm",
+      "控制器的轴 {axes} 不属于模型的任何关节：请将其加入模型；若该轴既不承载也不移动机械臂，请将其编号写入站点文件的 other_axes",
+    ],
+  ],
+  [
+    "joints.base_undeclared",
+    [
+      "its controller moves it on a base ({axes}), which the model does not have: where the arm stands is not known",
+      "控制器用基座轴（{axes}）移动该机械臂，而模型中没有该基座：机械臂所在位置未知",
+    ],
+  ],
+  [
     "joints.axes_undeclared",
     [
       "its joints are not shown, because the site file does not say how axis 3 is measured, or how positions may be assigned: declare j23 and assignments in [robot.fanuc] of the site file",
