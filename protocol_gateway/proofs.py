@@ -118,7 +118,7 @@ class Proofs:
         tried, used = f"{proof.driver}, {proof.means}", f"{self._protocol}, {capabilities.stop_means}"
         if tried != used:
             return codes.STOP_OTHER_MEANS(before=tried, now=used)
-        # Before the controller has told it, a stop is sent, and no motion (`software_unknown`).
+        # An unknown version permits stops, but no motions (`software_unknown`).
         if software not in ("", proof.software):
             return codes.STOP_OTHER_SOFTWARE(before=proof.software, now=software)
         return None

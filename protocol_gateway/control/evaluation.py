@@ -85,7 +85,7 @@ def refusal_of(
     if len(motions) > 1 and _C.RESUME in motions:
         # Some controllers resume the held motion first, others drop it, so the path would be unknown.
         return not_sent(codes.COMMAND_TWO_UNITS())
-    # A recovery comes from an operator only, who sees what becomes of it before the next command.
+    # A recovery comes from an operator only, who sees its outcome before the next command.
     by_program = command.step or command.source != MESH or len(command.requests) > 1
     if by_program and any(each.command == _C.RECOVER for each in command.requests):
         return not_sent(codes.RECOVER_PROGRAM())

@@ -14,7 +14,7 @@ TIMEOUT_S = 0.3
 """Time after which an answer is lost: a controller answers within some tens of milliseconds."""
 _SLOWEST = 16
 _CALM_S = 10.0
-# Of a question that is asked once, without an answer: not so often that it keeps others waiting.
+# Pause before a question without an answer is repeated, so that others are asked too.
 _AGAIN_S = 1.0
 
 

@@ -257,7 +257,7 @@ class ControllerLink:
     def _tell(self, effects: Effects) -> None:
         """Perform what the driver returns when something happened."""
         now = self._now()
-        # What ends a motion that is given up is no question, and is always sent.
+        # The end of a motion that the driver gives up is always sent.
         gives_up = any(isinstance(effect, FateUnknown) for effect in effects)
         for effect in effects:
             self._perform(effect, now, counted=not gives_up)

@@ -197,7 +197,7 @@ class SnpxDriver(OnlyReads):
 
     def _report(self, asked: Asked[Question], answer: Answer, packet: bytes, now_s: float) -> Report:
         if answer.busy and asked.read in self._setup:
-            # The rest must not be sent without it; the link finds the connection silent, and connects again.
+            # An incomplete begin is useless: the link finds the connection silent, and connects again.
             self._stop()
         if answer.busy:
             # Not a sign that the state is received: a controller that is always busy is silent.

@@ -78,7 +78,7 @@ START_S = 0.5
 _BEAT_S = 0.02
 _ASK_S = 0.5
 _ANSWER_WITHIN_S = 2.0
-# A controller answers a recovery after it was begun; nothing else is answered meanwhile.
+# A controller answers a recovery after its begin, and nothing else before.
 _RECOVERY_WITHIN_S = 10.0
 UNLOCK_AFTER_S = 5.0
 """Age of a protective stop from which on controllers unlock it."""
@@ -252,7 +252,7 @@ class RtdeMotionDriver(RtdeDriver):
         """Beat, ask, and look for what has not happened."""
         effects: list[Effect] = []
         ended = self._due.ended(now_s)
-        # A gateway that was late has not yet read what has arrived meanwhile.
+        # A late gateway has unread messages.
         late = now_s - min(ended.values(), default=now_s) > _LATE_S
         if "retry" in ended:
             effects += super().timer_ended(now_s)
