@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from protocol_gateway import set_up_file
 from protocol_gateway.audit.entry import audit_entry
 from protocol_gateway.audit.log import AuditLog, Entry
 from protocol_gateway.audit.persisted_state import ROTATE
@@ -58,6 +59,7 @@ _POLL_S = 0.1
 _SHOWN_WITHIN = 0.95
 _HEARTBEAT_S = 1.0
 _RETRY_S = 1.0
+_KEEP_SET_UP_S = 1.0
 
 
 class Robot:
@@ -125,7 +127,9 @@ class Robot:
         self._audit_topic = publisher("audit")
         self._program_topic = publisher("program")
         self._journal = Journal(publisher("events"), settings.name)
-        self._signals = Signals(publisher("signals"), self._journal, joints.names)
+        self._set_up_path = audit_path.with_suffix(".tool")
+        confirmed = set_up_file.read(self._set_up_path)
+        self._signals = Signals(publisher("signals"), self._journal, joints.names, confirmed)
         self._telemetry = Telemetry(
             joints,
             fast=publisher("joints"),
@@ -313,6 +317,7 @@ class Robot:
         )  # no link yet, but the failed send makes it connect without pauses
         link = asyncio.create_task(self._keep_running(self._link.run))
         sessions = asyncio.create_task(self._keep_running(self._watch_sessions))
+        set_up = asyncio.create_task(self._keep_running(self._keep_set_up))
         try:
             await self._keep_running(self._poll)
         finally:
@@ -322,7 +327,8 @@ class Robot:
             finally:
                 link.cancel()
                 sessions.cancel()
-                await asyncio.gather(link, sessions, return_exceptions=True)
+                set_up.cancel()
+                await asyncio.gather(link, sessions, set_up, return_exceptions=True)
 
     async def close(self) -> None:
         """Disconnect old client programs, write pending entries, and close the audit log."""
@@ -346,6 +352,19 @@ class Robot:
                 with contextlib.suppress(Exception):  # reporting itself may be what failed
                     self._journal.report(_S.ERROR, "gateway.failed", text)
                 await asyncio.sleep(_RETRY_S)
+
+    async def _keep_set_up(self) -> None:
+        """Write what was confirmed of tool, payload and frame, soon after it has changed."""
+        kept = dict(self._signals.confirmed)
+        while True:
+            await asyncio.sleep(_KEEP_SET_UP_S)
+            if (confirmed := dict(self._signals.confirmed)) == kept:
+                continue
+            kept = confirmed
+            try:
+                await asyncio.to_thread(set_up_file.write, self._set_up_path, confirmed)
+            except OSError as error:
+                log.warning("%s: cannot be written: %s", self._set_up_path, error)
 
     async def _poll(self) -> None:
         next_s = 0.0

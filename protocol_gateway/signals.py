@@ -14,6 +14,7 @@ import re
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 from protocol_gateway.drivers.driver import Signal, SignalsReceived, SignalValue
 from protocol_gateway.journal import Journal
@@ -98,14 +99,21 @@ class Signals:
 
     Args:
         joint_names: In the order of the driver's joint numbers.
+        confirmed: Tool, payload and frame that were confirmed last, by signal.
     """
 
-    def __init__(self, publisher: Publisher, journal: Journal, joint_names: Sequence[str]) -> None:
+    def __init__(
+        self,
+        publisher: Publisher,
+        journal: Journal,
+        joint_names: Sequence[str],
+        confirmed: Mapping[str, SignalValue] = MappingProxyType({}),
+    ) -> None:
         self._publisher, self._journal = publisher, journal
         self._joint_names = joint_names
         # Tool, payload and frame: as reported last, and as they were first or confirmed.
         self._setup: dict[str, SignalValue] = {}
-        self._confirmed: dict[str, SignalValue] = {}
+        self._confirmed = dict(confirmed)
         self.forget()
 
     def forget(self) -> None:
@@ -147,7 +155,7 @@ class Signals:
 
     def _set_up(self, entry: _Entry, value: SignalValue) -> str:
         """Keep a value of tool, payload or frame; return its change in words, empty if there is none."""
-        before = self._setup.get(entry.name)
+        before = self._setup.get(entry.name, self._confirmed.get(entry.name))
         if before is None and len(self._setup) >= MOST_SIGNALS:
             return ""
         self._setup[entry.name] = value
@@ -160,6 +168,11 @@ class Signals:
         return bool(self._setup)
 
     @property
+    def confirmed(self) -> dict[str, SignalValue]:
+        """Tool, payload and frame as they were first reported or confirmed, by signal."""
+        return self._confirmed
+
+    @property
     def unconfirmed(self) -> tuple[str, ...]:
         """Changes of tool, payload and frame since they were first reported or confirmed, in words."""
         found = (_change(name, self._confirmed[name], value) for name, value in self._setup.items())
@@ -167,7 +180,7 @@ class Signals:
 
     def confirm(self) -> None:
         """Take tool, payload and frame as they are now for right."""
-        self._confirmed = dict(self._setup)
+        self._confirmed = self._confirmed | self._setup
 
     def publish_due(self, now_s: float) -> None:
         """Publish what was reported since the last message, if it is time; call it repeatedly."""

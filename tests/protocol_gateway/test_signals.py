@@ -1,16 +1,21 @@
 """Signals: what is published of them, and when."""
 
+import json
 import math
 import re
 from pathlib import Path
 
 import pytest
 
+from protocol_gateway import set_up_file
 from protocol_gateway.drivers.driver import Signal, SignalsReceived
 from protocol_gateway.drivers.signal_names import SHARED, numbered, of_axes, of_joints
 from protocol_gateway.journal import Journal
 from protocol_gateway.link.timestamping import Received
 from protocol_gateway.signals import MOST_SIGNALS, Signals
+from tests.conftest import run
+from tests.protocol_gateway.gateway_site import gateway, until
+from tests.protocol_gateway.test_rtde_driver import UR, controller
 
 CURRENT = Signal("joint.current", "A", 0)
 LOAD = Signal("payload.mass", "kg")
@@ -190,6 +195,33 @@ def test_changes_of_the_tool_are_unconfirmed_until_they_are_undone_or_confirmed(
     assert robot.signals.unconfirmed == ()
     robot.reports((number, 1), after_s=0.1)
     assert robot.signals.unconfirmed == ("tool.number 3 → 1",)
+
+
+def test_a_change_of_the_tool_while_no_gateway_ran_is_one_too(mesh, tmp_path):
+    async def main():
+        path = tmp_path / "hall" / "arm.tool"
+        async with controller() as ports:
+            settings = {**UR, "ports": {"primary": ports[1]}}
+            async with gateway(mesh, tmp_path, ports[0], **settings):
+                await until(path.exists)
+            kept = json.loads(path.read_text())
+            assert kept["payload.mass"] == pytest.approx(1.2)
+            path.write_text(json.dumps(kept | {"payload.mass": 3.0}))
+            async with gateway(mesh, tmp_path, ports[0], **settings) as site:
+                event = await site.event("controller.payload_changed", 0)
+                assert event.values["changes"].startswith("payload.mass 3 → ")
+
+    run(main())
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"[]", b'{"tool.number": [1]}', b"[" * 50_000, b'{"a": NaN}'])
+def test_a_damaged_file_of_what_was_confirmed_is_none(tmp_path, content):
+    path = tmp_path / "arm.tool"
+    assert set_up_file.read(path) == {}
+    path.write_bytes(content)
+    assert set_up_file.read(path) == {}
+    set_up_file.write(path, {"tool.number": 2, "tool.name": "gripper", "payload.mass": 1.5})
+    assert set_up_file.read(path) == {"tool.number": 2, "tool.name": "gripper", "payload.mass": 1.5}
 
 
 def test_names_of_tools_without_end_are_bounded(robot):
