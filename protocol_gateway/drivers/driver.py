@@ -76,6 +76,14 @@ class StatusReceived:
         return self.activity, self.mode, self.homed, self.trace
 
 
+def homed_by_nature(activity: Activity | None) -> bool | None:
+    """Return whether an arm with absolute encoders is homed; None: unknown.
+
+    A controller that has lost the position, or its mastering, reports a fault.
+    """
+    return None if activity is Activity.FAULT else True
+
+
 @dataclass(frozen=True, slots=True)
 class Refused:
     """Refusal by the controller of the gateway's unit (or of the connection: number 1)."""

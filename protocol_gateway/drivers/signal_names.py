@@ -4,6 +4,7 @@ docs/signals.md explains them. A value for which no name fits gets one that begi
 "rtde.tool_mode".
 """
 
+import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
@@ -92,6 +93,15 @@ SHARED: Mapping[str, str] = MappingProxyType(
     }
 )
 """Pattern of each name, with its unit or kind."""
+_PATTERNS = [
+    (re.compile(re.escape(name).replace(r"\*", "[a-z0-9_]+")), "" if kind in (TEXT, BOOLEAN) else kind)
+    for name, kind in SHARED.items()
+]
+
+
+def unit_of(name: str) -> str:
+    """Return the unit that a name promises; empty: none, or the name is not a shared one."""
+    return next((unit for pattern, unit in _PATTERNS if pattern.fullmatch(name)), "")
 
 
 def of_placement(name: str) -> tuple[Signal, ...]:

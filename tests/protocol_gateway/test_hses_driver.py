@@ -239,7 +239,7 @@ def test_the_status_gives_activity_and_mode_and_what_it_does_not_say_is_unknown(
 ):
     assert (activity_of(Status(first, second)), mode_of(Status(first, second))) == (activity, mode)
     event, _ = Stepped().give(0x72, status(first, second))
-    assert event == StatusReceived(activity, mode)
+    assert event == StatusReceived(activity, mode, homed=None if activity is Activity.FAULT else True)
 
 
 def test_each_alarm_is_reported_once_when_it_appears_and_again_after_it_was_reset():
@@ -435,7 +435,7 @@ def test_a_controller_with_hses_is_shown_and_only_reads_are_sent(mesh, tmp_path)
         ):
             await until(lambda: site.controller.activity == STATE.MOVING)
             assert site.controller.mode == STATE.REMOTE
-            assert site.controller.homed == STATE.UNKNOWN
+            assert site.controller.homed == STATE.YES
             await site.units(50)
             first, last = (site.seen["joints"][at] for at in (0, -1))
             assert [joint.position for joint in first.joints] != [joint.position for joint in last.joints]

@@ -32,7 +32,7 @@ from tests.protocol_gateway.gateway_site import STATE, A, gateway, refusal, unti
 
 DEGREE, RADIAN, MILLIMETRE = (Unit(number_of(code), code) for code in ("DD", "C81", "MMT"))
 NOW_S, T_S = 100.0, 1.79e9
-OPC_UA = {"description": "puma560", "protocol": "opcua", "options": OpcUaSettings()}
+OPC_UA = {"description": "puma560", "protocol": "opcua", "options": OpcUaSettings(security="none")}
 
 
 def axes(*units, kind="position", profile=1):
@@ -254,11 +254,61 @@ def test_values_become_signals_with_the_names_of_all_vendors():
         ("cell.path", None): 1.5,
         ("opcua.joints", None): "Axis_1 has no good value",
         ("opcua.joints.spread", None): None,
+        ("opcua.without_unit", None): None,
     }
     told.values((5, 70.0, 1.0, False))
     assert told.signals == {("speed.override", None): None}
     told.values((6, 9.0))
     assert told.signals == {("robot.mode", None): "unknown 9"}
+
+
+def test_number_without_a_unit_is_not_shown_in_an_assumed_one():
+    """A signal's name promises its unit; OPC 40010-1 itself says that the override is in percent."""
+    items = [
+        *axes(DEGREE, DEGREE),
+        Item("motor", "Axis_2"),
+        Item("mass"),
+        Item("temperature", "", Unit(number_of("KGM"), "kg")),
+        Item("override"),
+        Item("declared", "tool.temperature"),
+        Item("declared", "joint.waist.current", Unit(0, "mystery")),
+        Item("declared", "tool.force.x"),
+        Item("declared", "cell.pressure", Unit(0, "bar")),
+        Item("declared", "counter.1"),
+    ]
+    declared = [
+        OpcUaSignal(name="tool.temperature", node="i=1"),
+        OpcUaSignal(name="joint.waist.current", node="i=2"),
+        OpcUaSignal(name="tool.force.x", node="i=3", unit="N"),
+        OpcUaSignal(name="cell.pressure", node="i=4"),
+        OpcUaSignal(name="counter.1", node="i=5"),
+    ]
+    told = Told(items, signals=declared)
+    told.values(*((number, 7.0) for number in range(2, 11)))
+    missing = "temperature of Axis_2, payload.mass, cabinet.temperature, tool.temperature, joint.waist.current"
+    assert told.signals == {
+        ("joint.temperature", 1): None,
+        ("payload.mass", None): None,
+        ("cabinet.temperature", None): None,
+        ("speed.override", None): 7.0,
+        ("tool.temperature", None): None,
+        ("joint.waist.current", None): None,
+        ("tool.force.x", None): 7.0,
+        ("cell.pressure", None): 7.0,
+        ("counter.1", None): 7.0,
+        ("opcua.joints", None): "Axis_1 has no good value",
+        ("opcua.joints.spread", None): None,
+        ("opcua.without_unit", None): missing,
+    }
+    (values,) = [each.values for each in told.events if isinstance(each, SignalsReceived)]
+    units = {signal.name: signal.unit for signal, _ in values}
+    assert (units["cell.pressure"], units["counter.1"], units["tool.force.x"]) == ("bar", "", "N")
+
+
+def test_nothing_is_assumed_about_encoders_or_security():
+    driver = OpcUaDriver((JointType.ROTARY,), {})
+    assert not driver.capabilities.absolute
+    assert OpcUaSettings().security == "sign_and_encrypt"
 
 
 def test_identity_is_reported_once_also_over_connections():

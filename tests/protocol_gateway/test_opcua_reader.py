@@ -35,7 +35,7 @@ CHANNEL = {"OpenSecureChannelRequest", "CloseSecureChannelRequest"}
 async def reading(port, **settings):
     """Read a server in this process; yield the decoded facts, and the task."""
     facts = []
-    settings = OpcUaSettings(**{"path": "/cell", **settings})
+    settings = OpcUaSettings(**{"path": "/cell", "security": "none", **settings})
     task = asyncio.create_task(
         process.read("127.0.0.1", port, settings, lambda line: facts.append(decode(line)))
     )
@@ -80,7 +80,7 @@ async def killed_gateway(server):
     """Kill -9 a process with a reading process; wait until that has ended too, and closed its session."""
     closed = server.counts["CloseSessionRequest"]
     gateway = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-c", GATEWAY, "127.0.0.1", str(server.port), to_text(OpcUaSettings(path="cell"))),
+        *(sys.executable, "-c", GATEWAY, "127.0.0.1", str(server.port), to_text(OpcUaSettings(path="cell", security="none"))),
         stdout=asyncio.subprocess.PIPE,
     )
     child = psutil.Process(int(await gateway.stdout.readline()))
@@ -107,7 +107,7 @@ async def joints_of_driver(server):
         for report in driver.received(OPCUA, line, asyncio.get_running_loop().time()):
             events.extend(report.events)
 
-    task = asyncio.create_task(process.read("127.0.0.1", server.port, OpcUaSettings(), write))
+    task = asyncio.create_task(process.read("127.0.0.1", server.port, OpcUaSettings(security="none"), write))
     await until(lambda: task.done() or any(isinstance(each, JointsReceived) for each in events))
     task.cancel()
     await asyncio.gather(task, return_exceptions=True)

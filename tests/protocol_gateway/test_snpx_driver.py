@@ -293,7 +293,7 @@ def test_operator_outputs_give_activity_and_mode_and_what_they_do_not_say_is_unk
     assert (activity_of(bits), mode_of(bits)) == (activity, mode)
     arm = Stepped()
     event, reported = arm.give_status(bits)
-    assert event == StatusReceived(activity, mode)
+    assert event == StatusReceived(activity, mode, homed=None if activity is Activity.FAULT else True)
     assert signals([reported])["robot.servo"] is bool(bits & READY)
 
 

@@ -28,6 +28,7 @@ from protocol_gateway.drivers.driver import (
     Severity,
     SoftwareReceived,
     StatusReceived,
+    homed_by_nature,
 )
 from protocol_gateway.drivers.fanuc import data, signals
 from protocol_gateway.drivers.fanuc.assignments import ALARMS, Block, SystemVariable, Variable
@@ -339,7 +340,9 @@ def _status(bits: int) -> list[ControllerEvent]:
     if not bits & (1 << OPERATOR_OUTPUTS.last) - 1:
         # Also a controller without these outputs has them all off.
         return [StatusReceived(), signals.unknown_operator()]
-    return [StatusReceived(activity_of(bits), mode_of(bits)), signals.of_operator(bits)]
+    activity = activity_of(bits)
+    status = StatusReceived(activity, mode_of(bits), homed_by_nature(activity))
+    return [status, signals.of_operator(bits)]
 
 
 def mode_of(bits: int) -> Mode | None:

@@ -420,9 +420,7 @@ class FanucMotionDriver(SnpxDriver):
                     self._still = positions, now_s
             case SignalsReceived(values):
                 self._tool = next((value for signal, value in values if signal == _TOOL), self._tool)
-            case StatusReceived(activity):
-                # Absolute encoders; a controller that has lost their position reports a fault.
-                event = replace(event, homed=None if activity in (None, Activity.FAULT) else True)
+            case StatusReceived():
                 self._status, self._status_s, self._asked_s = event, now_s, asked_s
                 still = self._still is not None and now_s - self._still[1] >= _STILL_S
                 ended = self._phase in (_Phase.NONE, _Phase.STOPPING)

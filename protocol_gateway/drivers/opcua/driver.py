@@ -84,7 +84,7 @@ class OpcUaDriver(OnlyReads):
         self._joint_types = joint_types
         check_declared(self._settings.joints, joint_types)
         mapping = repr([self._settings.device, *self._settings.joints])
-        self.capabilities = Capabilities(commands=frozenset(), absolute=True, joint_mapping=mapping)
+        self.capabilities = Capabilities(commands=frozenset(), joint_mapping=mapping)
         # Kept over a lost link, so that they are not reported again.
         self._server = self._identity = ""
         self._begin()
@@ -202,7 +202,8 @@ class _State:
         else:
             names = [each.name for each in axes]
             self._joiner = Joiner(axes, max(found.sampling_s, LEAST_SPREAD_S))
-        self._signals = signals.signals_of(found.items, names, settings.signals)
+        self._signals, without_unit = signals.signals_of(found.items, names, settings.signals)
+        self._without_unit = one_line(", ".join(without_unit)) or None
         self._problem = self.not_shown
         self._spread_s: float | None = None
         self._motion = _Motion()
@@ -246,6 +247,7 @@ class _State:
             *report,
             (signals.JOINTS, self._problem or "shown"),
             (signals.SPREAD, self._spread_s),
+            (signals.WITHOUT_UNIT, self._without_unit),
         ]
 
     def _changed(self, readings: Sequence[Reading], before: str) -> list[tuple[Signal, Value]]:

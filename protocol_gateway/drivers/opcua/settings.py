@@ -57,7 +57,7 @@ class OpcUaSettings:
         signals: Further variables.
     """
 
-    security: str = "none"
+    security: str = "sign_and_encrypt"
     server_certificate: str = ""
     certificate: str = ""
     user: str = ""

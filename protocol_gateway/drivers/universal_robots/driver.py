@@ -27,6 +27,7 @@ from protocol_gateway.drivers.driver import (
     Severity,
     SoftwareReceived,
     StatusReceived,
+    homed_by_nature,
 )
 from protocol_gateway.drivers.only_reads import OnlyReads
 from protocol_gateway.drivers.universal_robots.modes import (
@@ -235,8 +236,9 @@ def joints_of(state: ControllerState) -> JointsReceived:
 
 
 def status_of(state: ControllerState) -> StatusReceived:
-    """Return the status of a state. The encoders are absolute, so a homing motion is never needed."""
-    return StatusReceived(activity=activity_of(state), homed=True, controller_time_s=state.timestamp_s)
+    """Return the status of a state."""
+    activity = activity_of(state)
+    return StatusReceived(activity, homed=homed_by_nature(activity), controller_time_s=state.timestamp_s)
 
 
 def activity_of(state: ControllerState) -> Activity | None:

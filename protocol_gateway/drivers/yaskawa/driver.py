@@ -26,6 +26,7 @@ from protocol_gateway.drivers.driver import (
     Severity,
     SoftwareReceived,
     StatusReceived,
+    homed_by_nature,
 )
 from protocol_gateway.drivers.hexadecimal import hexadecimal
 from protocol_gateway.drivers.only_reads import OnlyReads
@@ -296,8 +297,9 @@ class HsesDriver(OnlyReads):
 
 
 def status_of(status: Status) -> StatusReceived:
-    """Return the status; the controller reports neither homing nor capture."""
-    return StatusReceived(activity=activity_of(status), mode=mode_of(status))
+    """Return the status; the controller does not report capture."""
+    activity = activity_of(status)
+    return StatusReceived(activity, mode_of(status), homed_by_nature(activity))
 
 
 def mode_of(status: Status) -> Mode | None:

@@ -17,7 +17,7 @@ All are sockets to the same port, so each has its own numbers and answers. UDP l
 """
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -445,22 +445,18 @@ class HsesMotionDriver(HsesDriver):
         ]
 
     def _proven(self, status: StatusReceived, now_s: float) -> StatusReceived:
-        """Return a status that says "moves" after a stop until every joint was still for STILL_S.
-
-        The encoders are absolute: a robot that has lost its position has an alarm.
-        """
-        status = StatusReceived(status.activity, status.mode, homed=True)
+        """Return a status that says "moves" after a stop until every joint was still for STILL_S."""
         runs = self._state is not None and self._state.first & Status1.RUNNING
         if status.activity is Activity.IDLE and (runs or self._motion is not None):
             # Of two statuses on two sockets, the later one may be the older one.
-            return StatusReceived(Activity.MOVING, status.mode, homed=True)
+            return replace(status, activity=Activity.MOVING)
         if self._rests_after_stop or status.activity in (None, Activity.MOVING):
             return status
         since = self._still_since
         if since is not None and now_s - since[1] >= STILL_S and now_s - self._place_s < _FRESH_S:
             self._rests_after_stop = True
             return status
-        return StatusReceived(Activity.MOVING, status.mode, homed=True)
+        return replace(status, activity=Activity.MOVING)
 
     def _on_system(self, system: payloads.System) -> list[ControllerEvent]:
         events = super()._on_system(system)
