@@ -98,6 +98,7 @@ def measure(rate_hz: int, seconds: float, *, signals: bool) -> dict[str, Any]:
         on_status=lambda: None,
         on_activity=lambda activity, dated_s: None,
         on_refused=lambda: None,
+        stop_expected=lambda now_s: False,
     )
     stamper = Timestamper()
     count = 0

@@ -25,7 +25,7 @@ from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.control import Control, Ports
 from protocol_gateway.control.jog import Jogs
 from protocol_gateway.control.program import Programs
-from protocol_gateway.control.robot_authority import RobotAuthority
+from protocol_gateway.control.robot_authority import HEED_TIMEOUT_S, RobotAuthority
 from protocol_gateway.core.codes import code_table
 from protocol_gateway.drivers.driver import Activity, Carries, Channel
 from protocol_gateway.drivers.registry import driver_maker
@@ -141,6 +141,7 @@ class Robot:
             on_status=self._on_controller_status,
             on_activity=self._on_activity,
             on_refused=self._on_refused,
+            stop_expected=self._stop_expected,
         )
         self._link = ControllerLink(
             LinkSettings(
@@ -448,6 +449,12 @@ class Robot:
 
     def _on_activity(self, activity: Activity | None, dated_s: float) -> None:
         self._control.handle(events.StatusReported(activity, dated_s))
+
+    def _stop_expected(self, now_s: float) -> bool:
+        """Return whether the controller may report a stop that the gateway has sent."""
+        authority = self._control.authority
+        just_reset = authority.reset_s is not None and now_s - authority.reset_s < HEED_TIMEOUT_S
+        return authority.stop is not None or just_reset
 
     def _on_refused(self) -> None:
         self._control.handle(events.UnitRefused())

@@ -44,22 +44,26 @@ _SEVERITIES = {Severity.INFO: _S.INFO, Severity.WARNING: _S.WARNING, Severity.ER
 _BACK_AFTER_S = 6.0
 
 
-class _LossNotice:
-    """Debounced notice that data are lost; they are back only after they were received for a while."""
+class _Notice:
+    """Debounced notice of a condition that may flap: its end is reported only after it was over for a while.
+
+    Attributes:
+        reported: The begin was reported, and not the end.
+    """
 
     def __init__(self) -> None:
-        self._reported_lost = False
-        self._back_s: float | None = None
+        self.reported = False
+        self._over_s: float | None = None
 
-    def update(self, now_s: float, *, lost: bool) -> bool | None:
-        """Return True to report the loss, False to report the return, None to report nothing."""
-        if lost:
-            self._back_s = None
-            news = None if self._reported_lost else True
+    def update(self, now_s: float, *, holds: bool) -> bool | None:
+        """Return True to report the begin, False to report the end, None to report nothing."""
+        if holds:
+            self._over_s = None
+            news = None if self.reported else True
         else:
-            self._back_s = now_s if self._back_s is None else self._back_s
-            news = False if self._reported_lost and now_s - self._back_s >= _BACK_AFTER_S else None
-        self._reported_lost = self._reported_lost if news is None else news
+            self._over_s = now_s if self._over_s is None else self._over_s
+            news = False if self.reported and now_s - self._over_s >= _BACK_AFTER_S else None
+        self.reported = self.reported if news is None else news
         return news
 
 
@@ -73,6 +77,9 @@ class Telemetry:
         controller_time_s: Time on the controller's own clock; None: it reports none.
         software: Version of the controller's software; empty: not reported since the link came up.
         undeclared_axes: Reason why its axes are more than the joints of the model; None: they are not.
+
+    Args:
+        stop_expected: Returns whether the gateway's own stop is the reason of a stopped arm at a time.
     """
 
     def __init__(
@@ -88,6 +95,7 @@ class Telemetry:
         on_status: Callable[[], None],
         on_activity: Callable[[Activity | None, float], None],
         on_refused: Callable[[], None],
+        stop_expected: Callable[[float], bool],
     ) -> None:
         self._message = JointStatesMessage(joints.names)
         self._fast = fast
@@ -98,6 +106,7 @@ class Telemetry:
         self._on_status = on_status
         self._on_activity = on_activity
         self._on_refusal = on_refused
+        self._stop_expected = stop_expected
         self._stale_after_s = stale_after_s
         self._next_slow_s = 0.0
         self.motion_detector = MotionDetector(joints.types)
@@ -112,7 +121,7 @@ class Telemetry:
         self._positions: tuple[tuple[float, ...], float] | None = None  # with their time
         self._fault = ""
         self._lost = (False, False)
-        self._joints_notice, self._status_notice = _LossNotice(), _LossNotice()
+        self._joints_notice, self._status_notice, self._stop_notice = _Notice(), _Notice(), _Notice()
         self.controller_time_s: float | None = None
         self.software = ""
         self.undeclared_axes: Reason | None = None
@@ -160,18 +169,23 @@ class Telemetry:
         positions, status = self._lost
         if positions and not before[0]:
             self.motion_detector.forget()
-        news = self._joints_notice.update(now_s, lost=positions)
+        news = self._joints_notice.update(now_s, holds=positions)
         if news is True:
             text = f"{self.positions_stale(now_s)}: the robot's position is unknown, motion is refused"
             self._journal.report(_S.WARNING, "joints.gone", text)
         elif news is False:
             self._journal.report(_S.INFO, "joints.back", "joint positions are received again")
-        news = self._status_notice.update(now_s, lost=status)
+        news = self._status_notice.update(now_s, holds=status)
         if news is True:
             text = f"the controller has sent no status for {STALE_S:g} s: its status is unknown now"
             self._journal.report(_S.WARNING, "status.gone", text)
         elif news is False:
             self._journal.report(_S.INFO, "status.back", "the controller sends its status again")
+        if self._stop_notice.reported and not status:
+            stopped = self._status.activity is Activity.STOPPED
+            if self._stop_notice.update(now_s, holds=stopped) is False:
+                text = "the controller's own stop is over"
+                self._journal.report(_S.INFO, "controller.stopped.over", text)
         if self._lost != before:
             self._on_status()
 
@@ -247,12 +261,12 @@ class Telemetry:
         if status.activity is not Activity.FAULT:
             self._fault = ""
         if changed:
-            self._report_changes(before, status)
+            self._report_changes(before, status, now_s)
             self._on_status()
         positions_s = float("-inf") if self._positions is None else self._positions[1]
         self._on_activity(status.activity, min(now_s, positions_s))
 
-    def _report_changes(self, before: StatusReceived, now: StatusReceived) -> None:
+    def _report_changes(self, before: StatusReceived, now: StatusReceived, now_s: float) -> None:
         if now.mode is Mode.LOCAL and before.mode is not Mode.LOCAL:
             text = "the controller is in local mode: only the operator at the controller can move the robot"
             self._journal.report(_S.WARNING, "controller.local", text)
@@ -261,6 +275,12 @@ class Telemetry:
         if now.activity is Activity.FAULT and before.activity is not Activity.FAULT:
             text = f"the controller has a fault: {self._fault or 'it does not say which'}"
             self._journal.report(_S.ERROR, "controller.fault", text)
+        if now.activity is not Activity.STOPPED or before.activity in (None, Activity.STOPPED):
+            return
+        # A controller also reports the stop that the gateway has sent.
+        if not self._stop_expected(now_s) and self._stop_notice.update(now_s, holds=True):
+            why = codes.CONTROLLER_STOPPED_ITSELF()
+            self._journal.report(_S.WARNING, "controller.stopped", why.text, why=why)
 
     def _on_joints(self, joints: JointsReceived, received: Received) -> None:
         self._positions = joints.positions, received.monotonic_s

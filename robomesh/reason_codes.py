@@ -1112,6 +1112,9 @@ ALARM_NOT_SAVED = Code("alarm.not_saved", "alarms cannot be saved; a restart wou
 GATEWAY_SILENT = Code(
     "gateway.silent", "the gateway of {robot} has reported nothing for more than {seconds:g} s"
 )
+CONTROLLER_STOPPED_ITSELF = Code(
+    "controller.stopped_itself", "the controller has stopped the arm by itself, or its drives are off"
+)
 FAULT_REPORTED = Code("controller.fault_reported", "the controller has a fault: {fault}")
 STOP_LATCHED_BY = Code("stop.latched_by", "stop {id} is latched by {by}: no reason given")
 STOP_LATCHED_WHY = Code("stop.latched_why", 'stop {id} is latched by {by}: reason "{reason}"')

@@ -60,6 +60,11 @@ RULES: Mapping[str, Rule] = MappingProxyType(
         ),
         "link.flooding": Rule(MEDIUM, "Lower the controller's rate; only the newest of it is published."),
         "controller.fault": Rule(HIGH, "Clear the fault at the controller, then reset."),
+        "controller.stopped": Rule(
+            MEDIUM,
+            "Find out at the robot what stopped it: an emergency stop, its safety functions, or a person.",
+            ended_by=("link.up", "link.down"),
+        ),
         "controller.local": Rule(LOW, "People at the controller move the robot: contact them."),
         "stop.latched": Rule(MEDIUM, "Find out why it was stopped; the operator who has control resets it."),
         "check.missing": Rule(HIGH, "Motions are not checked as they should be; see the gateway's log."),

@@ -126,6 +126,7 @@ class Gateway:
             on_status=lambda: None,
             on_activity=lambda activity, dated_s: None,
             on_refused=lambda: None,
+            stop_expected=lambda now_s: False,
         )
 
     def controller_sends(self, data: bytes, pieces: Sequence[bytes]) -> str:

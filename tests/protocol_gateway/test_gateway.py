@@ -95,6 +95,8 @@ def test_stop_needs_no_lease_and_latches_until_the_holder_resets_that_stop(mesh,
             await site.command(C.MOVE_ABSOLUTE, joint_positions=TARGET)
             await until(lambda: site.joints == pytest.approx(TARGET, abs=1e-6))
             assert not site.controller.HasField("stop")
+            # The controller has stopped for the gateway, not by itself.
+            assert not site.events("controller.stopped")
 
     run(main())
 

@@ -40,7 +40,7 @@ YASKAWA = {"description": "puma560", "protocol": "hses", "options": with_factors
 SIX = (JointType.ROTARY,) * 6
 NOW_S = 100.0
 RUNNING, TEACH, PLAY, REMOTE = 0x08, 0x20, 0x40, 0x80
-HELD, ALARM, SERVO = 0x02, 0x10, 0x40
+HELD, ALARM, ERROR, SERVO = 0x02, 0x10, 0x20, 0x40
 
 
 class Stepped:
@@ -240,6 +240,18 @@ def test_the_status_gives_activity_and_mode_and_what_it_does_not_say_is_unknown(
     assert (activity_of(Status(first, second)), mode_of(Status(first, second))) == (activity, mode)
     event, _ = Stepped().give(0x72, status(first, second))
     assert event == StatusReceived(activity, mode, homed=None if activity is Activity.FAULT else True)
+
+
+def test_error_of_which_only_the_display_says_more_is_reported_when_it_appears():
+    arm = Stepped()
+
+    def reported(second):
+        return [each.text for each in arm.give(0x72, status(PLAY, second)) if isinstance(each, AlarmReceived)]
+
+    said = ["the controller reports an error, which only its own display shows"]
+    assert [reported(each) for each in (SERVO, SERVO | ERROR, SERVO | ERROR, SERVO, ERROR)] == [
+        *([], said, [], [], said)
+    ]
 
 
 def test_each_alarm_is_reported_once_when_it_appears_and_again_after_it_was_reset():

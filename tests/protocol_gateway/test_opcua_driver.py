@@ -17,6 +17,7 @@ from protocol_gateway.drivers.driver import (
     MoveAbsolute,
     Open,
     Send,
+    Severity,
     SignalsReceived,
     SoftwareReceived,
     StatusReceived,
@@ -217,6 +218,29 @@ def test_status_follows_safety_drives_and_motion():
         assert told.status.mode is known
 
 
+def test_stop_of_the_safety_system_is_an_alarm_when_it_begins_also_over_connections():
+    items = [*axes(DEGREE, DEGREE), *(Item(kind) for kind in ("emergency_stop", "protective_stop"))]
+    told = Told(items)
+
+    def alarms():
+        return [(each.severity, each.number) for each in told.events if isinstance(each, AlarmReceived)]
+
+    told.values((2, False), (3, False))
+    assert alarms() == []
+    told.values((3, True))
+    assert alarms() == [(Severity.ERROR, "safety.protective_stop")]
+    told.values((3, True), (2, True))
+    assert alarms() == [(Severity.ERROR, "safety.emergency_stop")]
+    told.values((3, True, 0.0, False))  # unknown, so not known to be over
+    told.driver.opened(OPCUA, told.now_s)
+    told.tell(Found(tuple(items), "server X", 0.05))
+    told.values((2, True), (3, True))
+    assert alarms() == []
+    told.values((3, False))
+    told.values((3, True))
+    assert alarms() == [(Severity.ERROR, "safety.protective_stop")]
+
+
 def test_values_become_signals_with_the_names_of_all_vendors():
     items = [
         *axes(DEGREE, DEGREE),
@@ -285,7 +309,9 @@ def test_number_without_a_unit_is_not_shown_in_an_assumed_one():
     ]
     told = Told(items, signals=declared)
     told.values(*((number, 7.0) for number in range(2, 11)))
-    missing = "temperature of Axis_2, payload.mass, cabinet.temperature, tool.temperature, joint.waist.current"
+    missing = (
+        "temperature of Axis_2, payload.mass, cabinet.temperature, tool.temperature, joint.waist.current"
+    )
     assert told.signals == {
         ("joint.temperature", 1): None,
         ("payload.mass", None): None,

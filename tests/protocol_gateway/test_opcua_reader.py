@@ -80,7 +80,14 @@ async def killed_gateway(server):
     """Kill -9 a process with a reading process; wait until that has ended too, and closed its session."""
     closed = server.counts["CloseSessionRequest"]
     gateway = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-c", GATEWAY, "127.0.0.1", str(server.port), to_text(OpcUaSettings(path="cell", security="none"))),
+        *(
+            sys.executable,
+            "-c",
+            GATEWAY,
+            "127.0.0.1",
+            str(server.port),
+            to_text(OpcUaSettings(path="cell", security="none")),
+        ),
         stdout=asyncio.subprocess.PIPE,
     )
     child = psutil.Process(int(await gateway.stdout.readline()))

@@ -2,7 +2,7 @@
 
 from types import SimpleNamespace
 
-from protocol_gateway.drivers.driver import JointsReceived
+from protocol_gateway.drivers.driver import Activity, JointsReceived, Mode, StatusReceived
 from protocol_gateway.journal import Journal
 from protocol_gateway.link.link import Received
 from protocol_gateway.signals import Signals
@@ -17,6 +17,7 @@ class Desk:
     def __init__(self):
         self.now_s = 100.0
         self.codes = []
+        self.own_stop = False
         publisher = SimpleNamespace(put=lambda message, **_: None)
         self.telemetry = Telemetry(
             joints_of(load("pt600")),
@@ -29,6 +30,7 @@ class Desk:
             on_status=lambda: None,
             on_activity=lambda activity, dated_s: None,
             on_refused=lambda: None,
+            stop_expected=lambda now_s: self.own_stop,
         )
 
     def put(self, event):
@@ -60,3 +62,37 @@ def test_the_last_event_of_flapping_data_is_never_suppressed():
         desk.goes_on(6.2, positions=True)
         desk.goes_on(1.1, positions=False)
         assert desk.codes[-1] == "joints.gone"
+
+
+def test_controller_that_stops_by_itself_is_an_event_and_its_end_another():
+    desk = Desk()
+
+    def does(activity, seconds=0.3):
+        for _ in range(round(seconds * 10)):
+            desk.now_s += 0.1
+            desk.telemetry.on_event(StatusReceived(activity, Mode.REMOTE), Received(desk.now_s, 0))
+            desk.telemetry.check_timeouts(desk.now_s)
+        found, desk.codes = desk.codes, []
+        return [code for code in found if code.startswith("controller.")]
+
+    assert does(Activity.STOPPED) == []  # what was before is unknown
+    assert does(Activity.IDLE, 10.0) == []
+    assert does(Activity.STOPPED) == ["controller.stopped"]
+    # A state that flaps is one event.
+    for _ in range(20):
+        assert does(None, 1.0) == []
+        assert does(Activity.MOVING, 1.0) == []
+        assert does(Activity.STOPPED, 1.0) == []
+    assert does(Activity.MOVING, 10.0) == ["controller.stopped.over"]
+    assert does(None) == []
+    assert does(Activity.STOPPED) == []
+    assert does(Activity.IDLE) == []
+    desk.own_stop = True
+    assert does(Activity.STOPPED) == []
+    desk.own_stop = False
+    assert does(Activity.STOPPED) == []
+    assert does(Activity.IDLE, 10.0) == []
+    assert does(Activity.STOPPED) == ["controller.stopped"]
+    # Another controller may answer next.
+    desk.telemetry.forget()
+    assert does(Activity.IDLE, 10.0) == []

@@ -83,6 +83,8 @@ def test_a_protective_stop_is_unlocked_once_and_nothing_else_changes(mesh, tmp_p
             await until(lambda: not runs(server))
             await in_state(site, STATE.STOPPED)
             begin_s = time.monotonic()
+            event = await site.event("controller.stopped", 0)
+            assert (event.severity, event.reason.code) == (event.WARNING, "controller.stopped_itself")
             await until(lambda: not server.controller.programs.moving(time.monotonic()))
             assert await refused(recover(site, R.RESTART_SAFETY)) == "recover.not_allowed"
             assert await refused(recover(site, R.SERVO_ON)) == "recover.not_there"

@@ -4,7 +4,7 @@ The process subscribes to the server and prints each notification (`facts`). The
 nothing has changed, so the driver reports all values again. Without either, all values become stale.
 """
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from protocol_gateway.drivers.driver import (
@@ -52,6 +52,7 @@ _JOINTS_EACH_S = 0.2
 _LONGEST_LINE = 1 << 20
 # Of rad or m, beyond noise at rest; the arm counts as moving for this long after it.
 _MOVED, _MOVES_FOR_S = 1e-3, 0.5
+_STOPS = frozenset({"emergency_stop", "protective_stop"})
 _MODES = {
     1.0: Mode.LOCAL,  # manual, reduced speed
     2.0: Mode.LOCAL,  # manual, high speed
@@ -87,6 +88,7 @@ class OpcUaDriver(OnlyReads):
         self.capabilities = Capabilities(commands=frozenset(), joint_mapping=mapping)
         # Kept over a lost link, so that they are not reported again.
         self._server = self._identity = ""
+        self._stops: set[str] = set()
         self._begin()
 
     def _begin(self) -> None:
@@ -144,6 +146,12 @@ class OpcUaDriver(OnlyReads):
         if self._state is None:
             raise ValueError("values before the list of items")
         events = self._state.take(fact.readings, now_s)
+        for name, stopped in self._state.stops():
+            if stopped is True and name not in self._stops:
+                self._stops.add(name)
+                events.append(AlarmReceived(Severity.ERROR, f"{name} is on", name))
+            elif stopped is False:
+                self._stops.discard(name)
         identity = self._state.identity
         if identity and identity != self._identity:
             self._identity = identity
@@ -269,16 +277,21 @@ class _State:
         At rest it is idle only if no program is loaded: one that waits moves the arm without notice, and the
         server does not say whether it runs.
         """
-        stops = [*self._values("emergency_stop"), *self._values("protective_stop")]
         # By identity: 1.0 equals True, and a number is no answer here.
         off = any(each is False for each in self._values("in_control"))
-        if off or any(each is True for each in stops):
+        if off or any(stopped is True for _, stopped in self.stops()):
             return Activity.STOPPED
         if self._moves:
             return Activity.MOVING
         loaded = self._values("loaded")
         at_rest = self._moves is False and bool(loaded) and all(each is False for each in loaded)
         return Activity.IDLE if at_rest else None
+
+    def stops(self) -> Iterator[tuple[str, Value]]:
+        """Yield the name and value of each signal of a stop."""
+        for number, source in self._signals.items():
+            if self._items[number].kind in _STOPS:
+                yield source.signal.name, self._good(number)
 
     def _mode(self) -> Mode | None:
         modes = self._values("mode")

@@ -15,7 +15,7 @@ JOINTS = Signal("opcua.joints")
 SPREAD = Signal("opcua.joints.spread", "s")
 """Difference of the axes' times that were joined last."""
 WITHOUT_UNIT = Signal("opcua.without_unit")
-"""Text: names of the signals that are not shown, because their unit is unknown; not reported: there is none."""
+"""Text: names of the signals that are not shown, because their unit is unknown; None: there is none."""
 _LONGEST_UNIT = 16
 
 _MODES = ("other", "manual reduced speed", "manual high speed", "automatic", "automatic external")
@@ -94,7 +94,7 @@ _KINDS: Mapping[str, tuple[str, str, Callable[[Value], Value] | None]] = {
 def signals_of(
     items: Sequence[Item], axes: Sequence[str], declared: Sequence[OpcUaSignal]
 ) -> tuple[dict[int, Source], tuple[str, ...]]:
-    """Return the signal of each item that has one, by the item's number, and the names of those without a unit.
+    """Return the signal of each item that has one, by its number, and the names of those without a unit.
 
     A number whose unit is unknown has no value: a signal's name promises its unit.
 

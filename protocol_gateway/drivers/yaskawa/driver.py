@@ -106,6 +106,7 @@ class HsesDriver(OnlyReads):
         self.requests_a_second = regular_hz + ALARMS / _ALARMS_EACH_S + 2.0
         # Kept over a lost link, so that it is not reported again.
         self._alarms: set[Alarm] = set()
+        self._error = False
         self._begin()
 
     def _begin(self) -> None:
@@ -279,7 +280,12 @@ class HsesDriver(OnlyReads):
             self._next_round_s = now_s + _ALARMS_EACH_S
             self._round = set()
             self._polling.ask_once(Read(Command.ALARM, 1))
-        return [status_of(status), signals.of_status(status)]
+        error, self._error = self._error, bool(status.second & Status2.ERROR)
+        events: list[ControllerEvent] = [status_of(status), signals.of_status(status)]
+        if self._error and not error:
+            text = "the controller reports an error, which only its own display shows"
+            events.append(AlarmReceived(Severity.WARNING, text))
+        return events
 
     def _alarm(self, number: int, alarm: Alarm) -> list[ControllerEvent]:
         known = self._alarms | self._round

@@ -12,6 +12,7 @@ const CHINESE: Record<string, readonly [title: string, advice: string]> = {
   "link.channel_lost": ["控制器的一个接口未连接", "请检查控制器的服务、站点文件和防火墙中的此端口。"],
   "link.flooding": ["控制器数据过载", "降低控制器的发送频率；目前仅发布最新数据。"],
   "controller.fault": ["控制器故障", "在控制器上排除故障，然后复位。"],
+  "controller.stopped": ["机械臂已停止", "请到机器人旁查明原因：急停、安全功能或操作人员。"],
   "controller.local": ["控制器处于本地模式", "控制器旁有人在操作机器人，请询问他们。"],
   "stop.latched": ["已锁定停止", "查明停止原因；由控制者复位。"],
   "check.missing": ["运动检查不可用", "运动未按要求检查，请查看网关日志。"],

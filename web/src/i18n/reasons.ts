@@ -1761,6 +1761,10 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "{robot} 的网关已超过 {seconds} 秒没有数据",
     ],
   ],
+  [
+    "controller.stopped_itself",
+    ["the controller has stopped the arm by itself, or its drives are off", "控制器自行停止了机械臂，或其驱动已断电"],
+  ],
   ["controller.fault_reported", ["the controller has a fault: {fault}", "控制器报告故障：{fault}"]],
   ["stop.latched_by", ["stop {id} is latched by {by}: no reason given", "停止 {id} 由 {by} 锁定，未说明原因"]],
   ["stop.latched_why", ['stop {id} is latched by {by}: reason "{reason}"', "停止 {id} 由 {by} 锁定，原因：{reason}"]],
