@@ -490,6 +490,7 @@ class Robot:
             read_only=self._read_only,
             capabilities=self._capabilities,
             stop_arrives=self._link.carries(Carries.STOP),
+            stop_ends=self._link.stop_ends,
             accept_unknown=self._settings.accept_unknown,
             recover=self._settings.recover,
         )

@@ -21,7 +21,11 @@ _S = schema.ControllerState
 _LINKS = {LinkState.DOWN: _S.DOWN, LinkState.UP: _S.UP, LinkState.SILENT: _S.SILENT}
 _MODES = {None: _S.MODE_UNKNOWN, Mode.REMOTE: _S.REMOTE, Mode.LOCAL: _S.LOCAL}
 _CHECKS = {Policy.OFF: _S.OFF, Policy.WARN: _S.WARN, Policy.REQUIRE: _S.REQUIRE}
-_STOPS = {StopEnds.OURS: schema.Capabilities.OURS, StopEnds.ANY: schema.Capabilities.ANY}
+_STOPS = {
+    None: schema.Capabilities.NOT_NOW,
+    StopEnds.OURS: schema.Capabilities.OURS,
+    StopEnds.ANY: schema.Capabilities.ANY,
+}
 _KNOWN = {None: _S.UNKNOWN, True: _S.YES, False: _S.NO}
 _ACTIVITIES = {
     None: _S.ACTIVITY_UNKNOWN,
@@ -151,11 +155,10 @@ def controller_state(
 
 def _capabilities(controller: Controller) -> schema.Capabilities:
     capabilities = controller.capabilities
-    stops = _STOPS[capabilities.stop_ends] if controller.stop_arrives else schema.Capabilities.NOT_NOW
     if controller.read_only is not None:
         return schema.Capabilities(stops=schema.Capabilities.NONE, absolute=capabilities.absolute)
     return schema.Capabilities(
-        stops=stops,
+        stops=_STOPS[controller.stop_ends],
         commands=commands_of(controller),
         absolute=capabilities.absolute,
         dies_with_link=_KNOWN[capabilities.dies_with_link],

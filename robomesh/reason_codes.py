@@ -445,6 +445,9 @@ STOP_GATEWAY_KILLED = Code(
     "dead-man: the gateway was killed while {holder} had control, and the robot still moves",
 )
 STOP_LINK_LOST = Code("stop.link_lost", "the link was lost during a motion of {holder}: {detail}")
+STOP_WENT_LOCAL = Code(
+    "stop.went_local", "the controller changed to local control during a motion of {holder}"
+)
 STOP_FATE_UNKNOWN = Code("stop.fate_unknown", "the fate of a motion is unknown: {cause}")
 STOP_WOULD_NOT_ARRIVE = Code(
     "stop.would_not_arrive",

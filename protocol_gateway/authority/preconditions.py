@@ -36,6 +36,7 @@ from protocol_gateway.drivers.driver import (
     Resume,
     Speed,
     StatusReceived,
+    StopEnds,
     Trace,
 )
 from protocol_gateway.link.link import LinkState, LinkStatus
@@ -87,6 +88,7 @@ class Controller:
         read_only: Reason why nothing is sent to it; None: commands may be sent.
         capabilities: What its driver can do.
         stop_arrives: What carries its stop is connected.
+        stop_ends: Motion that a stop request ends now; None: it does not arrive, or would be refused.
         accept_unknown: States that it never reports and the site file does not require: "mode", "homed".
         recover: Recoveries that the site file allows.
     """
@@ -104,6 +106,7 @@ class Controller:
     read_only: Reason | None = None
     capabilities: Capabilities = _EVERYTHING
     stop_arrives: bool = True
+    stop_ends: StopEnds | None = StopEnds.ANY
     accept_unknown: frozenset[str] = frozenset()
     recover: frozenset[Recovery] = frozenset()
 

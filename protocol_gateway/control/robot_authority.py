@@ -40,7 +40,7 @@ from protocol_gateway.control import effects, entries, evaluation, events, repor
 from protocol_gateway.control.effects import Effects, Finding, Seen
 from protocol_gateway.control.evaluation import RunningProgram
 from protocol_gateway.control.events import LeaseResult, StopResult
-from protocol_gateway.drivers.driver import Activity, Stop
+from protocol_gateway.drivers.driver import Activity, Mode, Stop
 from protocol_gateway.errors import CommandError
 from protocol_gateway.link.link import LinkState
 from protocol_gateway.motion import has_arrived, motion_may_be_held
@@ -117,6 +117,7 @@ class RobotAuthority:
                 yield effects.Publish()
             case events.TimePassed():
                 yield from self._expire(seen)
+                yield from self._stop_in_local_control(seen)
             case events.SessionEnded():
                 yield from self._end_lease(lease_rules.end_session(self._authority, event.session), seen)
             case events.LeaseEnded():
@@ -478,6 +479,15 @@ class RobotAuthority:
         lease = self._authority.lease
         if lease is not None and lease.motion is not None:
             yield from self._stop_by_gateway(codes.STOP_LINK_LOST(holder=lease.holder, detail=why), seen)
+
+    def _stop_in_local_control(self, seen: Seen) -> Effects[None]:
+        """Stop a motion of the holder after the controller changed to local control.
+
+        Drivers that follow their motions have ended it by then. A person at the robot expects none of ours.
+        """
+        lease = self._authority.lease
+        if seen.controller.status.mode is Mode.LOCAL and lease is not None and lease.motion is not None:
+            yield from self._stop_by_gateway(codes.STOP_WENT_LOCAL(holder=lease.holder), seen)
 
     def _motion_observed(self, moving: bool, seen: Seen) -> Effects[None]:
         orphaned_by, self._orphan = self._orphan, ""

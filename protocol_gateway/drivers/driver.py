@@ -354,7 +354,8 @@ class Capabilities:
 
     Attributes:
         commands: Commands that `encode` takes; empty: the driver only reads.
-        stop_ends: Whose motion `Stop` ends; a test at the site proves that it works.
+        stop_ends: Whose motion `Stop` ends, unless `StopDepends` says it; a test at the site proves that it
+            works.
         jogs: `Reset` gives a held motion up without a latch, and a new target replaces a running motion: the
             arm goes on smoothly from where it is, without a stop between the targets.
         absolute: The arm has absolute encoders: it is homed by nature.
@@ -516,8 +517,23 @@ class FollowsControl(Protocol):
         ...
 
 
+@runtime_checkable
+class StopDepends(Protocol):
+    """Addition to `Driver` whose stop depends on the state of the controller, such as its mode."""
+
+    def stop_ends_now(self, now_s: float) -> StopEnds | None:
+        """Return whose motion `Stop` ends now; None: the controller refuses it, or that is not known.
+
+        It is asked only while a channel that carries STOP is connected.
+        """
+        ...
+
+
 class Driver(Protocol):
-    """Driver of a controller's protocol, without I/O. `FollowsControl` adds a method that it may have."""
+    """Driver of a controller's protocol, without I/O.
+
+    `FollowsControl` and `StopDepends` add methods that it may have.
+    """
 
     @property
     def ports(self) -> frozenset[str]:

@@ -39,6 +39,8 @@ from protocol_gateway.drivers.driver import (
     Send,
     SetTimer,
     StatusReceived,
+    StopDepends,
+    StopEnds,
     UnknownReceived,
 )
 from protocol_gateway.errors import LinkDownError, LinkError
@@ -245,6 +247,15 @@ class ControllerLink:
     def carries(self, what: Carries) -> bool:
         """Return whether a channel that carries it is connected."""
         return any(kept.connection and what in kept.channel.carries for kept in self._channels.values())
+
+    @property
+    def stop_ends(self) -> StopEnds | None:
+        """Motion that a stop request ends now; None: it cannot be sent, or the controller refuses it."""
+        if not self.carries(Carries.STOP):
+            return None
+        if isinstance(self._driver, StopDepends):
+            return self._driver.stop_ends_now(self._monotonic_s())
+        return self._driver.capabilities.stop_ends
 
     def defer_in_flood(self, kind: Hashable, call: Callable[[], None]) -> bool:
         """Defer a call in a flood, where only the newest of each kind is done; return whether deferred."""

@@ -62,22 +62,9 @@ def positions(server):
     return server.controller.positions(time.monotonic())
 
 
-def arm_moves(server):
-    program = server.controller.rmi
-    return program is not None and program.moving(time.monotonic())
-
-
 def runs(server):
     """Return whether RMI_MOVE is in the controller."""
     return server.controller.rmi is not None and server.controller.rmi.status is not ProgramStatus.ABORTED
-
-
-def moving(site):
-    return until(lambda: site.controller.activity == STATE.MOVING)
-
-
-def resting(site):
-    return until(lambda: site.controller.activity == STATE.IDLE)
 
 
 def tour(server):

@@ -2,7 +2,11 @@
 
 import asyncio
 import contextlib
+import os
+import pickle
+import sys
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import pytest
 
@@ -17,6 +21,8 @@ from tests.conftest import last_value
 C = schema.CommandRequest.Command
 A = schema.LeaseRequest.Action
 STATE = schema.ControllerState
+REPOSITORY = Path(__file__).resolve().parents[2]
+TOPICS = ("joints", "joints/slow", "controller", "lease", "events", "audit", "raw", "program")
 
 
 async def until(condition, timeout_s=30.0):
@@ -158,11 +164,10 @@ async def gateway(mesh, folder, *ports, up=True, each=(), **robot):
         site.others = [
             GatewaySite(monitor, folder / "hall" / f"{name}.jsonl", name) for name in names[1:] if each
         ]
-        topics = ("joints", "joints/slow", "controller", "lease", "events", "audit", "raw", "program")
         watching = [
             asyncio.create_task(watch(monitor, one, topic))
             for one in (site, *site.others)
-            for topic in topics
+            for topic in TOPICS
         ]
         try:
             await until(lambda: task.done() or site.seen.get("controller"))
@@ -180,6 +185,50 @@ async def gateway(mesh, folder, *ports, up=True, each=(), **robot):
             for each in watching:
                 each.cancel()
             await asyncio.gather(*watching, return_exceptions=True)
+
+
+_PROCESS = """
+import asyncio, pickle, sys
+from protocol_gateway.gateway import serve
+from robomesh.session import SessionSettings, open_session
+
+async def main(router, settings):
+    async with open_session(SessionSettings(connect=(router,))) as session:
+        await serve(session, settings)
+
+asyncio.run(main(sys.argv[1], pickle.loads(bytes.fromhex(sys.argv[2]))))
+"""
+
+
+@contextlib.asynccontextmanager
+async def gateway_process(mesh, folder, robots):
+    """Run a gateway in a process of its own; yield the process, and kill it."""
+    settings = pickle.dumps(Settings(site="hall", audit_folder=folder, robots=tuple(robots)))
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-c", _PROCESS, mesh.connect[0], settings.hex()),
+        cwd=REPOSITORY,
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
+    )
+    try:
+        yield process
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            process.kill()
+        await process.wait()
+
+
+@contextlib.asynccontextmanager
+async def watching(mesh, robot="arm"):
+    """Watch and command a robot whose gateway runs elsewhere."""
+    async with open_session(mesh) as session:
+        site = GatewaySite(session, None, robot)
+        tasks = [asyncio.create_task(watch(session, site, topic)) for topic in TOPICS]
+        try:
+            yield site
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
 
 
 def measured(site, name):
@@ -204,6 +253,27 @@ async def none_left_out(session, joints, robot):
     """Return whether a subscription received all states of the controller, without loss on a slow machine."""
     state = await last_value(session, f"robomesh/hall/{robot}/controller")
     return (joints.lost(f"robomesh/hall/{robot}/joints"), state.counters.units_skipped) == (0, 0)
+
+
+def moving(site):
+    return until(lambda: site.controller.activity == STATE.MOVING)
+
+
+def resting(site):
+    return until(lambda: site.controller.activity == STATE.IDLE)
+
+
+async def stopped_for(site, code):
+    """Wait until the gateway has latched a stop because a motion's fate is unknown, for a cause."""
+    await until(lambda: site.controller.HasField("stop"))
+    why = site.controller.stop.why
+    assert why.code == "stop.fate_unknown", why
+    assert code in codes_of(why), why
+
+
+def codes_of(reason):
+    """Return the codes of a reason and its causes."""
+    return {reason.code, *(code for each in reason.causes for code in codes_of(each))}
 
 
 async def refusal(awaitable):

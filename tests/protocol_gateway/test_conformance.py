@@ -2,24 +2,19 @@
 
 import asyncio
 import contextlib
-import os
-import pickle
-import sys
-from pathlib import Path
 
 import pytest
 
-from protocol_gateway.gateway import RobotSettings, Settings
+from protocol_gateway.gateway import RobotSettings
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
 from tests.conftest import free_port, run
 from tests.protocol_gateway.conformance import SUBJECTS
-from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
+from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, gateway_process, refusal, until
 from tests.protocol_gateway.wire import wire
 
 every_driver = pytest.mark.parametrize("subject", SUBJECTS, ids=str)
 quick_drivers = pytest.mark.parametrize("subject", [each for each in SUBJECTS if not each.slow], ids=str)
-HOUSE = Path(__file__).resolve().parents[2]
 QUICK = {"stale_after_s": 0.5, "reconnect_after_s": 1.5}
 FAULTS = [(subject, fault) for subject in SUBJECTS for fault in subject.faults]
 
@@ -180,19 +175,6 @@ def test_a_second_client_of_the_controller_changes_nothing(mesh, tmp_path, subje
     run(main())
 
 
-GATEWAY = """
-import asyncio, pickle, sys
-from protocol_gateway.gateway import serve
-from robomesh.session import SessionSettings, open_session
-
-async def main(router, settings):
-    async with open_session(SessionSettings(connect=(router,))) as session:
-        await serve(session, settings)
-
-asyncio.run(main(sys.argv[1], pickle.loads(bytes.fromhex(sys.argv[2]))))
-"""
-
-
 @pytest.mark.processes
 def test_a_killed_gateway_leaves_every_controller_as_it_was_and_reads_again(mesh, tmp_path):
     """The controllers notice nothing but a lost client, and one that comes back."""
@@ -209,7 +191,6 @@ def test_a_killed_gateway_leaves_every_controller_as_it_was_and_reads_again(mesh
     async def main():
         async with contextlib.AsyncExitStack() as stack, open_session(mesh) as monitor:
             robots = [robot(each, *await stack.enter_async_context(each.start())) for each in subjects]
-            settings = pickle.dumps(Settings(site="hall", audit_folder=tmp_path, robots=tuple(robots)))
 
             async def is_shown(name):
                 async for sample in monitor.subscribe(f"robomesh/hall/{name}/joints"):
@@ -217,16 +198,7 @@ def test_a_killed_gateway_leaves_every_controller_as_it_was_and_reads_again(mesh
                         return
 
             for _ in range(2):
-                process = await asyncio.create_subprocess_exec(
-                    sys.executable,
-                    *("-c", GATEWAY, mesh.connect[0], settings.hex()),
-                    cwd=HOUSE,
-                    env={**os.environ, "PYTHONPATH": str(HOUSE)},
-                )
-                try:
+                async with gateway_process(mesh, tmp_path, robots):
                     await asyncio.gather(*(is_shown(each.name) for each in subjects))
-                finally:
-                    process.kill()
-                    await process.wait()
 
     run(main())

@@ -201,7 +201,7 @@ def test_a_lost_stop_channel_is_no_lost_link_and_refuses_only_what_it_carries():
                 assert seen.states == [LinkState.SILENT, LinkState.UP]
                 with pytest.raises(LinkDownError):
                     arm_link.send(b"stop")
-                # It connects again by itself, at once after a failed stop.
+                # It connects again without a command, immediately after a failed stop.
                 reader, writer = await stops.next()
                 await until(lambda: driver.told.count(("opened", "stop")) == 2)
                 arm_link.send(b"stop")

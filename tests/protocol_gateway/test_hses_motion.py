@@ -3,9 +3,7 @@
 import asyncio
 import contextlib
 import math
-import signal
 import struct
-import sys
 import time
 from dataclasses import replace
 
@@ -18,7 +16,7 @@ from robomesh.errors import RefusedError
 from robots.joints import JointType
 from services.simulator.yaskawa.controller import Refusal
 from tests.conftest import run
-from tests.protocol_gateway.gateway_site import STATE, A, C, refusal, until
+from tests.protocol_gateway.gateway_site import STATE, A, C, moving, refusal, resting, stopped_for, until
 from tests.protocol_gateway.hses_site import (
     HOLD,
     HSES,
@@ -31,20 +29,10 @@ from tests.protocol_gateway.hses_site import (
     move,
     written,
 )
-from tests.protocol_gateway.test_ur_motion import watching
-from tests.protocol_gateway.wire import wire
 
 pytestmark = pytest.mark.slow
 
 HOLD_ON, HOLD_OFF = (HOLD, 1, 1), (HOLD, 1, 2)
-
-
-def moving(site):
-    return until(lambda: site.controller.activity == STATE.MOVING)
-
-
-def resting(site):
-    return until(lambda: site.controller.activity == STATE.IDLE)
 
 
 def positions(server):
@@ -53,18 +41,6 @@ def positions(server):
 
 def moves(server):
     return server.controller.moves(time.monotonic())
-
-
-def codes(reason):
-    return [reason.code, *(code for each in reason.causes for code in codes(each))]
-
-
-async def stopped_for(site, code):
-    """Wait until the gateway has latched a stop because a fate is unknown, for a reason."""
-    await until(lambda: site.controller.HasField("stop"))
-    found = codes(site.controller.stop.why)
-    assert found[0] == "stop.fate_unknown"
-    assert code in found, site.controller.stop
 
 
 async def until_reset(site, server):
@@ -187,27 +163,15 @@ def test_hold_is_set_again_while_the_stop_is_latched(mesh, tmp_path, monkeypatch
     run(main())
 
 
-def test_a_lost_answer_of_a_motion_does_not_send_it_again(mesh, tmp_path, monkeypatch):
+def test_a_refused_copy_of_a_motion_says_nothing_about_it(mesh, tmp_path, monkeypatch):
+    """UDP may double the motion, and the refusal of the copy may overtake the answer of the motion."""
+
     async def main():
         async with (
             controller(monkeypatch) as (port, server),
             movable(mesh, tmp_path, port) as (site, relay),
         ):
             await in_control(site)
-            relay.answers = lambda data: [] if data[24] == 0x82 else [data]
-            target = await move(site, 0.3)
-            await moving(site)
-            await resting(site)
-            assert positions(server) == pytest.approx(target, abs=2e-5)
-            # Doubled datagrams, as UDP may: the controller refuses the second, whose answer is not used.
-            relay.answers = lambda data: [data, data]
-            relay.commands = lambda data: [data, data]
-            target = await move(site, -0.3)
-            await moving(site)
-            await resting(site)
-            assert positions(server) == pytest.approx(target, abs=2e-5)
-            assert not site.controller.HasField("stop")
-            # The refusal of the copy overtakes the answer of the motion.
             kept = []
 
             def overtaken(data):
@@ -217,13 +181,14 @@ def test_a_lost_answer_of_a_motion_does_not_send_it_again(mesh, tmp_path, monkey
                 return kept[::-1] if len(kept) == 2 else []
 
             relay.answers = overtaken
+            relay.commands = lambda data: [data, data]
             target = await move(site, 0.3)
             await moving(site)
             await resting(site)
             assert [each[25] for each in kept] == [0, 0x1F]
             assert positions(server) == pytest.approx(target, abs=2e-5)
             assert not site.controller.HasField("stop")
-            assert len(motions(relay)) == 3
+            assert len(motions(relay)) == 1
 
     run(main())
 
@@ -251,28 +216,6 @@ def test_a_refused_motion_is_over_and_its_refusal_is_shown(mesh, tmp_path, monke
     run(main())
 
 
-def test_a_lost_motion_latches_a_stop_and_cannot_begin_later(mesh, tmp_path, monkeypatch):
-    async def main():
-        async with (
-            controller(monkeypatch) as (port, server),
-            movable(mesh, tmp_path, port) as (site, relay),
-        ):
-            await in_control(site)
-            late = []
-            relay.commands = lambda data: late.append(data) or [] if command(data) == MOVE else [data]
-            await move(site, 0.5)
-            await stopped_for(site, "hses.not_started")
-            await until(lambda: server.controller._held)
-            rest = positions(server)
-            server.datagram_received(late[0], ("127.0.0.1", 9))
-            assert server.controller.commands == 0
-            assert len(late) == 1
-            await until_reset(site, server)
-            assert positions(server) == pytest.approx(rest)
-
-    run(main())
-
-
 def test_a_late_answer_of_an_earlier_motion_says_nothing_about_a_later_one(mesh, tmp_path, monkeypatch):
     async def main():
         async with (
@@ -294,225 +237,29 @@ def test_a_late_answer_of_an_earlier_motion_says_nothing_about_a_later_one(mesh,
     run(main())
 
 
-def went_local(server):
-    server.controller.mode = Status1.PLAY
-
-
-def taught(server):
-    server.controller.mode = Status1.TEACH
-
-
-def held(server):
-    server.controller.press_hold(time.monotonic())
-
-
-def alarmed(server):
-    server.controller.raise_alarm(4315, 1, "COLLISION DETECT", time.monotonic())
-
-
-def without_servos(server):
-    server.controller.switch_servos(False, time.monotonic())
-
-
-def other_tool(server):
-    server.controller.tool = 5
-
-
-@pytest.mark.parametrize(
-    ("happens", "code"),
-    [
-        (went_local, "hses.went_local"),
-        (held, "hses.held"),
-        (alarmed, "hses.arm_stopped"),
-        (without_servos, "hses.arm_stopped"),
-        (other_tool, "hses.tool_changed"),
-    ],
-)
-def test_what_others_do_during_a_motion_latches_a_stop(mesh, tmp_path, monkeypatch, happens, code):
+def test_a_motion_is_refused_in_words(mesh, tmp_path, monkeypatch):
     async def main():
         async with (
             controller(monkeypatch) as (port, server),
             movable(mesh, tmp_path, port) as (site, relay),
         ):
             await in_control(site)
-            await move(site, 2.5)
-            await until(lambda: moves(server))
-            happens(server)
-            await stopped_for(site, code)
-            await until(lambda: HOLD_ON in written(relay))
-            assert len(motions(relay)) == 1
-
-    run(main())
-
-
-def test_a_stop_that_the_mode_forbids_is_shown_and_sent_again_in_remote(mesh, tmp_path, monkeypatch):
-    async def main():
-        async with (
-            controller(monkeypatch) as (port, server),
-            movable(mesh, tmp_path, port) as (site, relay),
-        ):
-            await in_control(site)
-            await move(site, 2.5)
-            await until(lambda: moves(server))
-            taught(server)
-            await stopped_for(site, "hses.went_local")
-            alarm = await site.event("controller.alarm", -1)
-            assert "refuses HOLD: the mode is wrong (status 0x1F, 0x2080)" in alarm.text
-            # HOLD is what it says it is: here the motion runs on.
-            assert moves(server)
-            server.controller.mode = Status1.PLAY | Status1.REMOTE
-            await until(lambda: server.controller._held)
-            await until(lambda: not moves(server))
-            assert (HOLD, 2, 2) not in written(relay)
-
-    run(main())
-
-
-@pytest.mark.parametrize(
-    ("prepare", "text"),
-    [
-        (went_local, "local"),
-        (without_servos, "stopped"),
-        (alarmed, "fault"),
-        (held, "hold"),
-    ],
-)
-def test_a_motion_is_refused_in_words(mesh, tmp_path, monkeypatch, prepare, text):
-    async def main():
-        async with (
-            controller(monkeypatch) as (port, server),
-            movable(mesh, tmp_path, port) as (site, relay),
-        ):
-            await in_control(site)
-            prepare(server)
-            await site.units(20)
-            assert text in (await refusal(move(site, 0.1))).lower()
+            arm, now = server.controller, time.monotonic
+            for text, begin, end in (
+                ("stopped", lambda: arm.switch_servos(False, now()), lambda: arm.switch_servos(True, now())),
+                ("hold", lambda: arm.press_hold(now()), lambda: setattr(arm, "held_at_pendant", False)),
+                ("fault", lambda: arm.raise_alarm(4315, 1, "COLLISION", now()), lambda: arm.reset(now())),
+                ("local", lambda: setattr(arm, "mode", Status1.PLAY), lambda: None),
+            ):
+                begin()
+                await site.units(20)
+                await site.lease(A.RENEW, ttl_s=5)
+                assert text in (await refusal(move(site, 0.1))).lower()
+                end()
+                await resting(site)
             assert not written(relay)
 
     run(main())
-
-
-def test_nothing_is_sent_while_another_job_runs(mesh, tmp_path, monkeypatch):
-    async def main():
-        async with (
-            controller(monkeypatch, demo=True) as (port, server),
-            movable(mesh, tmp_path, port) as (site, relay),
-        ):
-            await in_control(site)
-            await moving(site)
-            assert "a job runs" in await refusal(move(site, 0.1))
-            server.controller.press_hold(time.monotonic())
-            await until(lambda: site.controller.activity == STATE.HOLDING)
-            server.controller.held_at_pendant = False
-            await resting(site)
-            await site.lease(A.RENEW, ttl_s=5)
-            await move(site, 0.05)
-            await moving(site)
-            await resting(site)
-            server.controller.start(time.monotonic())
-            await until(lambda: site.events("motion.foreign"))
-            await until(lambda: site.seen["lease"][-1].holder == "")
-            assert len(motions(relay)) == 1
-
-    run(main())
-
-
-def test_a_dead_socket_of_the_stop_forbids_motion_and_ends_one(mesh, tmp_path, monkeypatch):
-    # On a controller all sockets are one port.
-    monkeypatch.setattr(HsesMotionDriver, "ports", frozenset({"stop"}))
-
-    async def main():
-        async with (
-            controller(monkeypatch) as (port, server),
-            wire(port, datagrams=True) as second,
-            movable(mesh, tmp_path, port, ports={"stop": second.port}) as (site, relay),
-        ):
-            await in_control(site)
-            await move(site, 2.5)
-            await until(lambda: moves(server))
-            second.swallows = True
-            await stopped_for(site, "hses.channel_lost")
-            # HOLD went by the other socket.
-            await until(lambda: not moves(server))
-            assert HOLD_ON in written(relay)
-            await until(lambda: site.controller.capabilities.stops == site.controller.capabilities.NOT_NOW)
-            assert site.controller.link == STATE.UP
-            await site.lease(A.RENEW, ttl_s=5)
-            sent = len(motions(relay))
-            await refusal(move(site, 0.1))
-            second.swallows = False
-            await until(lambda: site.controller.capabilities.stops != site.controller.capabilities.NOT_NOW)
-            assert len(motions(relay)) == sent == 1
-
-    run(main())
-
-
-def test_axes_of_others_forbid_motion_also_after_a_restart(mesh, tmp_path, monkeypatch):
-    async def main():
-        async with (
-            controller(monkeypatch) as (port, _),
-            controller(monkeypatch, faults=("joints",)) as (other, _),
-            movable(mesh, tmp_path, port, reconnect_after_s=1.5, stale_after_s=0.5) as (site, relay),
-        ):
-            await until(lambda: site.joints)
-            relay.swallows = True
-            await until(lambda: site.controller.link == STATE.DOWN)
-            await relay.lead_to(other)
-            await until(lambda: site.controller.link == STATE.UP)
-            await until(lambda: site.controller.joints_unproven)
-            assert "axis E of its controller" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
-            assert not site.controller.capabilities.commands
-            assert not motions(relay)
-
-    run(main())
-
-
-SITE = """
-site = "hall"
-[[robot]]
-name = "arm"
-model = "puma560"
-protocol = "hses"
-check = "off"
-yaskawa = { motion = true }
-"""
-
-
-@pytest.mark.processes
-def test_a_motion_runs_on_when_the_gateway_is_killed_and_the_next_one_holds_it(
-    mesh, router, tmp_path, monkeypatch
-):
-    """HSES has no dead man. What docs/controllers/yaskawa.md says of it is tried here."""
-    (tmp_path / "site.toml").write_text(SITE, encoding="utf-8")
-
-    async def started(port):
-        words = ("-m", "services.command_line.main", "gateway", "--site", str(tmp_path / "site.toml"))
-        address = ("--connect", router, "--controller", f"arm=udp://127.0.0.1:{port}")
-        return await asyncio.create_subprocess_exec(sys.executable, *words, *address, cwd=tmp_path)
-
-    async def main():
-        async with controller(monkeypatch) as (port, server):
-            process = await started(port)
-            try:
-                async with watching(mesh) as site:
-                    await until(lambda: site.seen.get("joints"), timeout_s=90.0)
-                    await in_control(site)
-                    await site.command(C.SPEED, speed_percent=2)
-                    await move(site, 2.0)
-                    await until(lambda: moves(server))
-                    process.send_signal(signal.SIGKILL)
-                    await process.wait()
-                    before = positions(server)[0]
-                    await until(lambda: positions(server)[0] > before + 0.05)
-                    process = await started(port)
-                    # Its audit log says that an operator had control.
-                    await until(lambda: server.controller._held, timeout_s=90.0)
-                    await until(lambda: not moves(server))
-            finally:
-                process.kill()
-                await process.wait()
-
-    run(main(), timeout_s=240.0)
 
 
 def test_the_site_file_must_say_how_many_pulses_and_which_robot():

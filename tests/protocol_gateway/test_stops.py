@@ -2,13 +2,15 @@
 
 import asyncio
 import threading
+from dataclasses import replace
 
 import pytest
 import zenoh
 
 from protocol_gateway.audit.log import Outcome, read_entries
 from protocol_gateway.audit.persisted_state import authority_after
-from protocol_gateway.control.events import FateUnknown, LinkRestored, MotionObserved
+from protocol_gateway.control.events import FateUnknown, LinkRestored, MotionObserved, TimePassed
+from protocol_gateway.drivers.driver import Mode
 from robomesh import reason_codes as codes
 from robomesh.errors import NoAnswerError
 from robomesh.schemas import robomesh_pb2 as schema
@@ -57,6 +59,26 @@ def test_a_motion_of_unknown_fate_latches_a_stop(tmp_path, clock):
             await bench.lease(A.ACQUIRE)
             with refused(codes.STOP_LATCHED, id="1"):
                 await bench.commands((C.HOME, {}))
+
+    run(main())
+
+
+def test_local_control_stops_the_holder_s_motion_once(tmp_path, clock):
+    async def main():
+        async with control_bench(tmp_path) as bench:
+            await bench.lease(A.ACQUIRE, ttl_s=60)
+            remote, bench.status = bench.status, replace(bench.status, mode=Mode.LOCAL)
+            bench.control.handle(TimePassed())
+            assert not bench.socket
+            bench.status = remote
+            await bench.commands((C.HOME, {}))
+            bench.control.handle(TimePassed())
+            assert STOP not in bench.socket
+            bench.status = replace(remote, mode=Mode.LOCAL)
+            for _ in range(3):
+                bench.control.handle(TimePassed())
+            assert bench.control.authority.stop.why.code == "stop.went_local"
+            assert bench.socket.count(STOP) == 1
 
     run(main())
 

@@ -27,6 +27,7 @@ from protocol_gateway.drivers.driver import (
     Speed,
     StatusReceived,
     Stop,
+    StopEnds,
 )
 from protocol_gateway.drivers.registry import driver_maker
 from protocol_gateway.drivers.universal_robots import rtde_messages as rtde
@@ -419,6 +420,18 @@ def test_a_stop_uses_each_connection_that_is_there():
     # Without any, the link says why it cannot be sent.
     assert [each.channel for each in flat(arm.command(Stop()), Send)] == [DASHBOARD]
     assert not flat(arm.command(Reset()), Send)
+
+
+def test_a_stop_ends_programs_of_others_in_remote_control_only():
+    arm = Arm()
+    assert arm.driver.stop_ends_now(arm.now_s) is StopEnds.ANY
+    # The program's own stop needs no mode; its inputs were not lost.
+    assert arm.driver.stop_ends_now(arm.now_s + 10.0) is StopEnds.OURS
+    arm.wait(0.6)
+    arm.answer(False)
+    assert arm.driver.stop_ends_now(arm.now_s) is StopEnds.OURS
+    arm.driver.closed(INPUTS, arm.now_s)
+    assert arm.driver.stop_ends_now(arm.now_s) is None
 
 
 def test_after_a_stop_the_arm_rests_only_when_every_joint_was_still():

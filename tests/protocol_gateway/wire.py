@@ -1,7 +1,8 @@
-"""A wire between a gateway and a simulated controller: cut, swallowing everything, or led to another one."""
+"""A wire between a gateway and a simulated controller: cut, swallowing, keeping back, delaying, doubling."""
 
 import asyncio
 import contextlib
+import itertools
 
 
 class Wire:
@@ -13,6 +14,7 @@ class Wire:
         swallows: Connections stay open, but nothing arrives at either side.
         commands, answers: Functions that return the datagrams to send in place of one of the gateway, or
             of the controller.
+        delays: Endless delays of the datagrams, one after the other [s], so that they overtake each other.
     """
 
     def __init__(self, target, *, datagrams=False):
@@ -21,6 +23,9 @@ class Wire:
         self.sent = []
         self.swallows = False
         self.commands = self.answers = lambda data: [data]
+        self.delays = itertools.repeat(0.0)
+        self._keeps = None
+        self._kept = []
         self._ends = set()  # what is closed when the wire is cut
         self._listening = None
 
@@ -55,14 +60,39 @@ class Wire:
         await asyncio.sleep(0)
         await self.open()
 
+    def keep_back(self, which=lambda data: True):
+        """Keep what the gateway sends until `release`: such datagrams, or all bytes from such ones on."""
+        self._keeps = which
+
+    def release(self):
+        """Send what was kept back, in its order."""
+        self._keeps, kept, self._kept = None, self._kept, []
+        for send, data in kept:
+            send(data)
+
+    def pass_on(self, data, send):
+        """Send bytes of the gateway to the controller, now or later."""
+        if self._keeps is not None and (self._keeps(data) or (self._kept and not self._datagrams)):
+            self._kept.append((send, data))
+        else:
+            self.later(send, data)
+
+    def later(self, send, data):
+        """Send after the next delay."""
+        delay_s = next(self.delays)
+        asyncio.get_running_loop().call_later(delay_s, send, data) if delay_s else send(data)
+
     async def _join(self, reader, writer):
         self._ends.add(writer.transport)
         with contextlib.suppress(OSError):
             there, back = await asyncio.open_connection("127.0.0.1", self.target)
             self._ends.add(back.transport)
-            await asyncio.gather(self._forward(reader, back, self.sent), self._forward(there, writer, []))
+            await asyncio.gather(
+                self._forward(reader, back, self.sent, lambda data: self.pass_on(data, back.write)),
+                self._forward(there, writer, [], writer.write),
+            )
 
-    async def _forward(self, reader, writer, seen):
+    async def _forward(self, reader, writer, seen, send):
         swallowed = False
         with contextlib.suppress(OSError):
             while data := await reader.read(65536):
@@ -70,7 +100,7 @@ class Wire:
                 # A stream with a gap is of no use: it carries nothing any more, also after the fault.
                 swallowed = swallowed or self.swallows
                 if not swallowed:
-                    writer.write(data)
+                    send(data)
         writer.transport.abort()
 
 
@@ -100,7 +130,7 @@ class _Gateway(asyncio.DatagramProtocol):
     def _send(self, back, data):
         if not self.wire.swallows and not back.cancelled() and back.exception() is None:
             for each in self.wire.commands(data):
-                back.result().sendto(each)
+                self.wire.pass_on(each, back.result().sendto)
 
 
 class _Controller(asyncio.DatagramProtocol):
@@ -110,7 +140,10 @@ class _Controller(asyncio.DatagramProtocol):
     def datagram_received(self, data, _):
         if not self.gateway.wire.swallows:
             for each in self.gateway.wire.answers(data):
-                self.gateway.transport.sendto(each, self.address)
+                self.gateway.wire.later(self._send, each)
+
+    def _send(self, data):
+        self.gateway.transport.sendto(data, self.address)
 
 
 @contextlib.asynccontextmanager

@@ -118,7 +118,6 @@ class RtdeMotionDriver(RtdeDriver):
 
     capabilities = Capabilities(
         commands=frozenset({MoveAbsolute, Speed, Stop, Reset}),
-        stop_ends=StopEnds.OURS,
         first_speed_percent=FIRST_PERCENT,
         absolute=True,
         dies_with_link=True,
@@ -321,6 +320,12 @@ class RtdeMotionDriver(RtdeDriver):
         if now_s - self._dashboard.answered_s > _MODE_VALID_S or self._dashboard.remote is None:
             return None
         return Mode.REMOTE if self._dashboard.remote else Mode.LOCAL
+
+    def stop_ends_now(self, now_s: float) -> StopEnds | None:
+        """Return whose motion a stop ends: the dashboard's any program, but in remote control only."""
+        if self._mode(now_s) is Mode.REMOTE:
+            return StopEnds.ANY
+        return StopEnds.OURS if self._inputs.ready else None
 
     # --------------------------------------------------------------------- inputs
 

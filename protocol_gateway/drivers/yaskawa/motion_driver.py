@@ -139,7 +139,6 @@ class HsesMotionDriver(HsesDriver):
         reading = self.capabilities
         self.capabilities = Capabilities(
             commands=frozenset({MoveAbsolute, Speed, Stop, Reset}),
-            stop_ends=StopEnds.OURS,
             first_speed_percent=FIRST_PERCENT,
             absolute=True,
             dies_with_link=False,
@@ -335,6 +334,12 @@ class HsesMotionDriver(HsesDriver):
         if HSES.name in self._opened:
             effects.append(Send(HSES, datagram, alternative=True))
         return effects
+
+    def stop_ends_now(self, now_s: float) -> StopEnds | None:
+        """Return whose motion HOLD ends: a job's, too; controllers refuse it unless they are in remote."""
+        if self._state is None or mode_of(self._state) is not Mode.REMOTE:
+            return None
+        return StopEnds.ANY
 
     def _keep_hold(self, now_s: float) -> list[Effect]:
         """Send HOLD again unless the controller is known to be on HOLD, or in local control."""

@@ -44,6 +44,7 @@ class SnpxController:
 
     Attributes:
         rmi: The program of RMI, which then moves the arm; None: there was none.
+        override: General override [%]; it slows the motions of RMI.
         pendant_enabled: The teach pendant is on, so RMI does not work.
     """
 
@@ -63,6 +64,7 @@ class SnpxController:
         self._servo_on = servo_on
         self._alarms: list[bytes] = []
         self.rmi: RmiProgram | None = None
+        self.override = 100
         self.pendant_enabled = False
         self.tool_number = 1
         self.group = group
@@ -85,8 +87,14 @@ class SnpxController:
             return SERVO_OFF
         if self.program_runs:
             return CANNOT_EXECUTE
-        self.rmi = RmiProgram(self._joints, self.positions(now_s))
+        self.rmi = RmiProgram(self._joints, self.positions(now_s), override=self.override / 100.0)
         return 0
+
+    def set_override(self, percent: int, now_s: float) -> None:
+        """Change the general override, as at the pendant."""
+        self.override = percent
+        if self.rmi is not None:
+            self.rmi.set_override(percent / 100.0, now_s)
 
     def target_of(self, axes: Sequence[float]) -> FloatArray | None:
         """Return joint positions of nine axes [degree] or [mm]; None: beyond the limits."""
@@ -195,7 +203,7 @@ class SnpxController:
     def numbers(self) -> Mapping[str, int]:
         """Return integer system variables."""
         return {
-            "$MCR.$GENOVERRIDE": 100,
+            "$MCR.$GENOVERRIDE": self.override,
             f"$MNUFRAMENUM[{self.group}]": 0,
             f"$MNUTOOLNUM[{self.group}]": self.tool_number,
             "$SNPX_PARAM.$VERSION": 2,

@@ -38,6 +38,7 @@ class RmiProgram:
 
     Args:
         start: Initial positions (n,) [rad] or [m].
+        override: Fraction of the instructions' speeds.
 
     Attributes:
         expected: Number that the next instruction must have.
@@ -45,10 +46,11 @@ class RmiProgram:
         reports_fault: The program was paused by a fault that the client has not been told.
     """
 
-    def __init__(self, joints: Joints, start: FloatArray) -> None:
+    def __init__(self, joints: Joints, start: FloatArray, *, override: float = 1.0) -> None:
         self._motion = Motion(joints, start.copy())
         self._open: deque[Instruction] = deque()
         self._begun = False
+        self._override = override
         self.status = ProgramStatus.RUNNING
         self.expected = 1
         self.holds = False
@@ -74,12 +76,21 @@ class RmiProgram:
         if self.status is not ProgramStatus.RUNNING or not self._open:
             return None
         if not self._begun:
-            self._motion.move(self._open[0].target, now_s, speed=self._open[0].speed)
+            self._begin(now_s)
             self._begun = True
         if self._motion.moving(now_s):
             return None
         self._begun = False
         return self._open.popleft().sequence
+
+    def _begin(self, now_s: float) -> None:
+        self._motion.move(self._open[0].target, now_s, speed=self._open[0].speed * self._override)
+
+    def set_override(self, fraction: float, now_s: float) -> None:
+        """Change the override, also of the motion that runs."""
+        self._override = fraction
+        if self._begun and self._motion.moving(now_s):
+            self._begin(now_s)
 
     def pause(self, now_s: float) -> bool:
         """Brake and wait; False: the program does not run."""

@@ -314,7 +314,7 @@ class Session(_Packets):
             "NumberUTool": 10,
             "NextSequenceID": 1 if program is None else program.expected,
             "NumberUFrame": 9,
-            "Override": 100,
+            "Override": controller.override,
         }
 
     def _instruction(self, name: str, packet: dict[str, Any], now_s: float) -> int:

@@ -669,6 +669,10 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     "stop.link_lost",
     ["the link was lost during a motion of {holder}: {detail}", "{holder} 的运动期间连接中断：{detail}"],
   ],
+  [
+    "stop.went_local",
+    ["the controller changed to local control during a motion of {holder}", "{holder} 的运动期间，控制器转为本地控制"],
+  ],
   ["stop.fate_unknown", ["the fate of a motion is unknown: {cause}", "运动的结果未知：{cause}"]],
   [
     "stop.would_not_arrive",
