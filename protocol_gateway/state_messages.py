@@ -156,13 +156,16 @@ def controller_state(
 def _capabilities(controller: Controller) -> schema.Capabilities:
     capabilities = controller.capabilities
     if controller.read_only is not None:
-        return schema.Capabilities(stops=schema.Capabilities.NONE, absolute=capabilities.absolute)
+        return schema.Capabilities(
+            stops=schema.Capabilities.NONE, absolute=capabilities.absolute, slow_hz=capabilities.slow_hz
+        )
     return schema.Capabilities(
         stops=_STOPS[controller.stop_ends],
         commands=commands_of(controller),
         absolute=capabilities.absolute,
         dies_with_link=_KNOWN[capabilities.dies_with_link],
         recoveries=recoveries_of(controller),
+        slow_hz=capabilities.slow_hz,
     )
 
 

@@ -17,14 +17,13 @@ from renderer.clearance_line import ClearanceLine, line_of, same_line
 from renderer.overlay import Overlay, Row
 from robomesh.activity import activity_words
 from robomesh.schemas.robomesh_pb2 import ControllerState, Description, KinematicState
-from robomesh.topics import topic
+from robomesh.topics import stale_after_s
 
 FloatArray = NDArray[np.float64]
 
 # Smaller movements are below a pixel (metres, or rotation matrix entries).
 _NOTICEABLE = 3e-5
 
-_STALE_AFTER_S = topic("frames").stale_after_s or 1.0
 _TOOL = "tool"
 # Duration of the trail, and its largest number of points.
 _TRAIL_S, _TRAIL_POINTS = 6.0, 240
@@ -63,12 +62,8 @@ class RobotState:
     @property
     def stale_after_s(self) -> float:
         """Age from which the robot's placements are stale and must not look live [s]."""
-        given = self.appearance is not None and self.appearance.description.HasField("stale_after_s")
-        return (
-            self.appearance.description.stale_after_s
-            if self.appearance is not None and given
-            else _STALE_AFTER_S
-        )
+        description = None if self.appearance is None else self.appearance.description
+        return stale_after_s("frames", description) or math.inf
 
     @property
     def cell(self) -> str:

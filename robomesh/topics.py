@@ -21,6 +21,7 @@ from robomesh.topic_schema import EVERYONE, PEOPLE, SERVICES, History, Priority,
 
 __all__ = [
     "EVERYONE",
+    "OF_ARM",
     "PEOPLE",
     "REQUESTS",
     "SCHEMAS",
@@ -33,6 +34,7 @@ __all__ = [
     "Topic",
     "check_operator",
     "request",
+    "stale_after_s",
     "topic",
 ]
 
@@ -569,6 +571,26 @@ def topic(name: str) -> Topic:
     if row is None:
         raise UnknownTopicError(codes.TOPIC_UNKNOWN(name=name, names=", ".join(TOPICS)))
     return TOPICS[row]
+
+
+OF_ARM = frozenset({"joints", "joints/slow", "frames", "kinematics"})
+"""Topics with the joints, and with what is computed from them: a robot may have another stale time."""
+
+
+def stale_after_s(name: str, description: schema.Description | None) -> float | None:
+    """Return the age from which a robot's message must not be shown as live [s]; None: it does not age.
+
+    Args:
+        description: The robot's, which has the time for its joints and what follows from them; None: not
+            known, so the topic's own applies.
+
+    Raises:
+        UnknownTopicError: If the topic is not in the table.
+    """
+    row = topic(name)
+    if name in OF_ARM and description is not None and description.HasField("stale_after_s"):
+        return description.stale_after_s
+    return row.stale_after_s
 
 
 def request(name: str) -> Request:

@@ -371,6 +371,8 @@ class Capabilities:
         experimental: Its commands were never tried on a real controller.
         stop_means: How its `Stop` is sent, which a proof of the stop names; empty: in one way only.
         recoveries: Actions of `Recover`. Each is off unless the site file allows it.
+        slow_hz: Positions a second, if they are too few to follow the arm: the robot is marked as slow. None:
+            they are not.
     """
 
     commands: frozenset[type[ControllerCommand]]
@@ -385,6 +387,7 @@ class Capabilities:
     experimental: bool = False
     stop_means: str = ""
     recoveries: frozenset[Recovery] = frozenset()
+    slow_hz: float | None = None
 
 
 # ------------------------------------------------------------------------ effects
@@ -415,12 +418,15 @@ class Channel:
         datagrams: UDP instead of TCP; `received` gets each datagram by itself.
         program: Module that reads the controller in a process of its own, because a library owns its sockets;
             empty: there is none. `received` gets what it prints. It has no input, so `Send` fails.
+        brief: The driver opens it again and again, each time for one file: its connections are not counted,
+            and their ends not reported.
     """
 
     name: str
     carries: Carries
     datagrams: bool = False
     program: str = ""
+    brief: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ OWN: Mapping[str, str] = {
     "rtde": "protocol_gateway.drivers.universal_robots.motion_driver:rtde_driver",
     "hses": "protocol_gateway.drivers.yaskawa.motion_driver:hses_driver",
     "snpx": "protocol_gateway.drivers.fanuc.motion_driver:fanuc_driver",
+    "fanuc-ftp": "protocol_gateway.drivers.fanuc.ftp_driver:fanuc_ftp_driver",
     "opcua": "protocol_gateway.drivers.opcua.driver:OpcUaDriver",
 }
 """Drivers of robomesh by the site file's `protocol`: module and class."""

@@ -343,7 +343,7 @@ class ControllerLink:
         if kept is not None:
             if why:
                 kept.reason = codes.LINK_REFUSED(where=kept.where, detail=why)
-                if Carries.READING not in kept.channel.carries:
+                if Carries.READING not in kept.channel.carries and not kept.channel.brief:
                     self._on_channel(kept.channel, kept.reason)
             self._tasks[kept].cancel()
 
@@ -372,7 +372,7 @@ class ControllerLink:
 
     def on_opened(self, kept: KeptChannel) -> None:
         """Begin a connection (called by the channel)."""
-        self._counts["connections"] += 1
+        self._counts["connections"] += not kept.channel.brief
         reads = Carries.READING in kept.channel.carries
         if reads:
             self._timestamper.connected()
@@ -385,7 +385,7 @@ class ControllerLink:
         self._tell(self._driver.opened(kept.channel, self._monotonic_s()))
         if reads:
             self._set_status(LinkState.SILENT, codes.LINK_NO_UNIT(where=kept.where))
-        else:
+        elif not kept.channel.brief:
             self._on_channel(kept.channel, None)
 
     def on_ended(self, kept: KeptChannel) -> bool:
@@ -398,7 +398,7 @@ class ControllerLink:
             self._set_status(LinkState.DOWN, kept.reason)
         if self._channels.get(kept.channel.name) is kept:
             self._tell(self._driver.closed(kept.channel, self._monotonic_s()))
-            if not reads:
+            if not reads and not kept.channel.brief:
                 self._on_channel(kept.channel, kept.reason)
         if not reads:
             return False

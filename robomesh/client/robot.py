@@ -34,7 +34,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 from robomesh.subscription import Sample as RawSample
 from robomesh.subscription import Subscription
-from robomesh.topics import topic
+from robomesh.topics import OF_ARM, stale_after_s, topic
 
 _EVENTS = 1000
 # A check or a solution with restarts takes seconds on a busy machine.
@@ -166,9 +166,16 @@ class AsyncRobot:
             else:
                 yield SignalState(**fields) if of_signals else Sample(**fields)
 
-        limit_s = subscription.topic.stale_after_s
+        limit_s = stale_after_s(name, None)
         reading = Reading(subscription, convert, limit_s=limit_s, on_stale=on_stale)
-        return AsyncStream(reading, self._learn_types if of_joints else None)
+
+        async def learn() -> None:
+            """Learn the types of the joints, and the robot's own time for its joints."""
+            with contextlib.suppress(NoAnswerError):
+                # Without it, only degrees are not known.
+                reading.set_limit(stale_after_s(name, await self.description()))
+
+        return AsyncStream(reading, learn if name in OF_ARM else None)
 
     def events(self, *, history: bool = True) -> AsyncStream[Event]:
         """Return the events of the robot's gateway and of other services about it.
@@ -381,12 +388,6 @@ class AsyncRobot:
             given = {"count": len(values), "joints": len(names), "names": ", ".join(names)}
             raise MessageError(codes.JOINT_COUNT(**given))
         return names, values
-
-    async def _learn_types(self) -> None:
-        try:
-            await self.description()
-        except NoAnswerError:
-            return  # only degrees need them
 
     def _key(self, name: str) -> str:
         return robot_key(self.site, self.name, name)

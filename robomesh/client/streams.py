@@ -88,6 +88,11 @@ class Reading(Generic[T]):
         self._current_s = time.monotonic()
         self._deadline_s = None if limit_s is None else self._current_s + max(limit_s, _FIRST_S)
 
+    def set_limit(self, limit_s: float | None) -> None:
+        """Set the age from which a message is stale [s], before the first one was taken; None: never."""
+        self._limit_s = limit_s
+        self._deadline_s = None if limit_s is None else time.monotonic() + max(limit_s, _FIRST_S)
+
     def next(self, *, awaited: bool) -> T | None:
         """Return the next value without waiting; None: there is none.
 

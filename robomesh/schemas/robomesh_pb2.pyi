@@ -139,7 +139,7 @@ class ControllerState(_message.Message):
     def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., link: _Optional[_Union[ControllerState.Link, str]] = ..., mode: _Optional[_Union[ControllerState.Mode, str]] = ..., activity: _Optional[_Union[ControllerState.Activity, str]] = ..., homed: _Optional[_Union[ControllerState.Known, str]] = ..., trace: _Optional[_Union[ControllerState.Known, str]] = ..., fault: _Optional[str] = ..., last_unit_age_s: _Optional[float] = ..., controller_time_s: _Optional[float] = ..., counters: _Optional[_Union[LinkCounters, _Mapping]] = ..., read_only: _Optional[bool] = ..., stop: _Optional[_Union[StopState, _Mapping]] = ..., link_text: _Optional[str] = ..., rate_hz: _Optional[float] = ..., health: _Optional[_Union[LinkHealth, _Mapping]] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., legacy_clients: _Optional[_Union[LegacyClients, _Mapping]] = ..., speed_percent: _Optional[float] = ..., check: _Optional[_Union[ControllerState.Check, str]] = ..., check_text: _Optional[str] = ..., check_starting: _Optional[bool] = ..., link_reasons: _Optional[_Iterable[_Union[Reason, _Mapping]]] = ..., check_reason: _Optional[_Union[Reason, _Mapping]] = ..., program: _Optional[_Union[ControllerState.Program, _Mapping]] = ..., jog: _Optional[_Union[JogState, _Mapping]] = ..., capabilities: _Optional[_Union[Capabilities, _Mapping]] = ..., software: _Optional[str] = ..., joints_unproven: _Optional[bool] = ..., joints_sha256: _Optional[str] = ...) -> None: ...
 
 class Capabilities(_message.Message):
-    __slots__ = ("stops", "commands", "absolute", "dies_with_link", "recoveries")
+    __slots__ = ("stops", "commands", "absolute", "dies_with_link", "recoveries", "slow_hz")
     class Stops(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STOPS_UNSPECIFIED: _ClassVar[Capabilities.Stops]
@@ -157,12 +157,14 @@ class Capabilities(_message.Message):
     ABSOLUTE_FIELD_NUMBER: _ClassVar[int]
     DIES_WITH_LINK_FIELD_NUMBER: _ClassVar[int]
     RECOVERIES_FIELD_NUMBER: _ClassVar[int]
+    SLOW_HZ_FIELD_NUMBER: _ClassVar[int]
     stops: Capabilities.Stops
     commands: _containers.RepeatedScalarFieldContainer[CommandRequest.Command]
     absolute: bool
     dies_with_link: ControllerState.Known
     recoveries: _containers.RepeatedScalarFieldContainer[Recover.Recovery]
-    def __init__(self, stops: _Optional[_Union[Capabilities.Stops, str]] = ..., commands: _Optional[_Iterable[_Union[CommandRequest.Command, str]]] = ..., absolute: _Optional[bool] = ..., dies_with_link: _Optional[_Union[ControllerState.Known, str]] = ..., recoveries: _Optional[_Iterable[_Union[Recover.Recovery, str]]] = ...) -> None: ...
+    slow_hz: float
+    def __init__(self, stops: _Optional[_Union[Capabilities.Stops, str]] = ..., commands: _Optional[_Iterable[_Union[CommandRequest.Command, str]]] = ..., absolute: _Optional[bool] = ..., dies_with_link: _Optional[_Union[ControllerState.Known, str]] = ..., recoveries: _Optional[_Iterable[_Union[Recover.Recovery, str]]] = ..., slow_hz: _Optional[float] = ...) -> None: ...
 
 class JogState(_message.Message):
     __slots__ = ("operator", "jog")

@@ -6,6 +6,7 @@ other port it sends nothing. An address that begins with opc.tcp is asked for it
 user and no session. A UDP port sends nothing before it is asked, so it is asked immediately.
 """
 
+import re
 import socket
 import time
 from collections.abc import Callable
@@ -26,6 +27,7 @@ _SNPX_PORTS = (60008, 18245)
 # Of Universal Robots; the last three send the same, and take nothing.
 _PRIMARY_PORTS = (30001, 30002, 30003, 30011, 30012, 30013)
 _RMI_PORT = 16001
+_FTP_PORT = 21
 _LISTEN_S = 2.0
 _ANSWER_S = 2.0
 _MOST_BYTES = 1 << 16
@@ -164,7 +166,7 @@ def _listen(connection: socket.socket, seconds: float, enough: Callable[[bytes],
 
 
 def _is_known(heard: bytes) -> bool:
-    return _units(heard)[0] > 1
+    return _units(heard)[0] > 1 or (heard.startswith(b"220 ") and heard.endswith(b"\n"))
 
 
 # ------------------------------------------------------------------- protocols
@@ -194,6 +196,8 @@ def _recognized(heard: bytes, port: int) -> Found:
             next="RMI takes one client, and is for motion; robomesh reads SNPX, and moves by RMI if the site "
             "file says so (docs/controllers/fanuc.md): probe tcp://HOST:60008",
         )
+    if port == _FTP_PORT and heard.startswith(b"220"):
+        return _greeting_of_ftp(heard)
     if port == _OPC_PORT and not heard:
         return Found(
             text=f"it accepts a connection, and sends nothing within {_LISTEN_S:g} s",
@@ -205,6 +209,21 @@ def _recognized(heard: bytes, port: int) -> Found:
     return Found(
         text=f"it accepts a connection, and sends nothing within {_LISTEN_S:g} s",
         next="a controller of the unit protocol sends its joints by itself",
+    )
+
+
+def _greeting_of_ftp(heard: bytes) -> Found:
+    """Return the meaning of an FTP server's greeting; nothing is sent, not even a user's name."""
+    greeting = heard.decode("latin-1").splitlines()[0][4:]
+    shown = one_line(greeting, _LONGEST_SHOWN)
+    fanuc = re.search(r"FANUC|R-30i|\bROBOT FTP\b|(Handling|Arc|Spot|Paint|Dispense|Pallet)Tool", greeting)
+    if fanuc is None:
+        return Found(text=f"an FTP server: {shown}", next="nothing says that it is a controller of FANUC")
+    return Found(
+        protocol="fanuc-ftp",
+        text=f"an FTP server, by its greeting of a controller of FANUC: {shown}",
+        next=f"if tcp://HOST:{_SNPX_PORTS[0]} does not answer (SNPX), in the site file: "
+        'protocol = "fanuc-ftp", and [robot.fanuc] with j23; it is slow',
     )
 
 

@@ -1,5 +1,6 @@
 """The site file's part on a robot of FANUC."""
 
+from pathlib import Path
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
@@ -10,11 +11,14 @@ from protocol_gateway.drivers.fanuc.assignments import (
     MOST_REGISTERS,
     MOST_TOOLS,
 )
-from protocol_gateway.drivers.fanuc.axes import FanucSettings, signal_bits
+from protocol_gateway.drivers.fanuc.axes import ANONYMOUS, FanucSettings, signal_bits
 from protocol_gateway.drivers.fanuc.data import AXES
 from protocol_gateway.errors import GatewaySettingsError
 from services.site_file.part import PART_CONFIG
 
+FTP_RATE = 1.0
+"""Positions a second by FTP, unless the site file says otherwise."""
+_RATE, _MOST_FTP_RATE = 20.0, 2.0
 _Axis: TypeAlias = Annotated[int, Field(ge=1, le=AXES, strict=True)]
 _Tool: TypeAlias = Annotated[int, Field(ge=1, le=MOST_TOOLS, strict=True)]
 _Register: TypeAlias = Annotated[int, Field(ge=1, le=MOST_REGISTER, strict=True)]
@@ -35,13 +39,17 @@ class Fanuc(BaseModel):
         reversed: Numbers of the joints, from 1, that turn the other way than the controller's axes.
         zero: Position of each joint where its axis is at 0 [deg], or [mm]; empty: 0.
         group: Motion group, 1 to 8.
-        rate: Positions a second.
+        rate: Positions a second; absent: 20, with the protocol `fanuc-ftp` 1, and there at most 2.
         tools: Numbers of the tools with a frame to read.
-        registers: Numbers of the registers R[] to read twice a second.
-        io: Inputs and outputs to read twice a second: `DI[1-16]`; DO, RI, RO, UI and UO likewise; at most 16.
+        registers: Numbers of the registers R[] to read twice a second, with `fanuc-ftp` every 5 s.
+        io: Inputs and outputs to read twice a second, with `fanuc-ftp` every 2 s: `DI[1-16]`; DO, RI, RO, UI
+            and UO likewise; at most 16.
         motion: The gateway moves the robot by RMI (option R912), experimental; otherwise it only reads, and
             sends nothing to RMI.
         speed: Speed of a motion at 100 %, in percent of the arm's greatest; the override slows it further.
+        user: User of the FTP server, with `fanuc-ftp`; absent: anonymous. FTP sends name and password
+            unencrypted.
+        password_file: File with that user's password, which only its owner may read.
     """
 
     model_config = PART_CONFIG
@@ -52,12 +60,14 @@ class Fanuc(BaseModel):
     reversed: tuple[_Axis, ...] = ()
     zero: tuple[float, ...] = ()
     group: Annotated[int, Field(ge=1, le=MOST_GROUPS, strict=True)] = 1
-    rate: Annotated[float, Field(ge=1, le=100)] = 20.0
+    rate: Annotated[float, Field(ge=0.2, le=100)] | None = None
     tools: Annotated[tuple[_Tool, ...], Field(max_length=MOST_TOOLS)] = (1,)
     registers: Annotated[tuple[_Register, ...], Field(max_length=MOST_REGISTERS)] = ()
     io: Annotated[tuple[str, ...], Field(max_length=16)] = ("DI[1-16]", "DO[1-16]", "RI[1-8]", "RO[1-8]")
     motion: StrictBool = False
     speed: Annotated[float, Field(ge=1, le=100)] = 20.0
+    user: Annotated[str, Field(max_length=100, pattern=r"^[!-~]*$")] = ""
+    password_file: Path | None = None
 
     @field_validator("io")
     @classmethod
@@ -81,6 +91,62 @@ class Fanuc(BaseModel):
 
     @property
     def settings(self) -> FanucSettings:
-        """The settings as the driver takes them."""
+        """The settings as the driver of SNPX takes them."""
+        return self._settings(_RATE)
+
+    @property
+    def ftp_settings(self) -> FanucSettings:
+        """The settings as the driver of FTP takes them."""
+        return self._settings(FTP_RATE)
+
+    def _settings(self, usual_hz: float) -> FanucSettings:
         values = self.model_dump()
-        return FanucSettings(rate_hz=values.pop("rate"), speed_percent=values.pop("speed"), **values)
+        rate_hz, password = values.pop("rate") or usual_hz, values.pop("password_file")
+        return FanucSettings(
+            rate_hz=rate_hz,
+            speed_percent=values.pop("speed"),
+            user=values.pop("user") or ANONYMOUS,
+            password_file="" if password is None else str(password),
+            **values,
+        )
+
+    def check_ftp(self, stale_after_s: float | None) -> None:
+        """Check the settings with the protocol `fanuc-ftp`.
+
+        Raises:
+            ValueError: If a key does not belong to it, or the stale time is too short for the rate.
+        """
+        for key in ("assignments", "motion", "speed"):
+            if key in self.model_fields_set:
+                raise ValueError(f"fanuc.{key} needs the protocol 'snpx', this robot's is 'fanuc-ftp'")
+        if self.password_file is not None and not self.user:
+            raise ValueError("fanuc.password_file needs user")
+        rate = self.rate or FTP_RATE
+        if rate > _MOST_FTP_RATE:
+            raise ValueError(
+                f"fanuc.rate {rate:g}: with the protocol 'fanuc-ftp' at most {_MOST_FTP_RATE:g}, because the "
+                "controller writes a file for each position"
+            )
+        if stale_after_s is not None and stale_after_s < 2.0 / rate:
+            raise ValueError(
+                f"stale_after_s {stale_after_s:g}: with {rate:g} positions a second {2.0 / rate:g} or more "
+                "is right; otherwise the joints are stale between two of them"
+            )
+
+    def check_snpx(self) -> None:
+        """Check the settings with the protocol `snpx`.
+
+        Raises:
+            ValueError: If a key does not belong to it.
+        """
+        for key in ("user", "password_file"):
+            if key in self.model_fields_set:
+                raise ValueError(f"fanuc.{key} needs the protocol 'fanuc-ftp', this robot's is 'snpx'")
+        if self.rate is not None and self.rate < 1.0:
+            raise ValueError(f"fanuc.rate {self.rate:g}: with the protocol 'snpx' 1 to 100 is right")
+
+    def in_folder(self, folder: Path) -> "Fanuc":
+        """Return the part with the path of its file relative to a folder."""
+        if self.password_file is None:
+            return self
+        return self.model_copy(update={"password_file": folder / self.password_file})

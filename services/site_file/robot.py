@@ -21,7 +21,7 @@ from robomesh.errors import KeyNameError
 from robots.description import Pose
 from robots.verification_record import VerificationRecord, read_record
 from services.errors import ListenError
-from services.site_file.fanuc import Fanuc
+from services.site_file.fanuc import FTP_RATE, Fanuc
 from services.site_file.fixtures import Clearance, Floor
 from services.site_file.legacy_clients import LegacyClients
 from services.site_file.listen_address import is_loopback, split_address
@@ -63,12 +63,13 @@ class Robot(BaseModel):
             `{ primary = 30011 }`.
         protocol: The controller's protocol: `unit` (docs/controllers.md), `rtde` for a controller of
             Universal Robots (docs/controllers/universal-robots.md), `hses` for one of Yaskawa
-            (docs/controllers/yaskawa.md), `snpx` for one of FANUC (docs/controllers/fanuc.md), `opcua` to
-            read an OPC UA server (docs/controllers/opcua.md), or that of an installed driver
-            (docs/controllers/own-driver.md).
+            (docs/controllers/yaskawa.md), `snpx` for one of FANUC (docs/controllers/fanuc.md),
+            `fanuc-ftp` to read one without SNPX once a second, `opcua` to read an OPC UA server
+            (docs/controllers/opcua.md), or that of an installed driver (docs/controllers/own-driver.md).
         universal_robots: Motion of a robot of Universal Robots; with the protocol `rtde`.
         yaskawa: Properties of the robot that a Yaskawa controller does not report; with the protocol `hses`.
-        fanuc: Properties of the robot that a FANUC controller does not report; with the protocol `snpx`.
+        fanuc: Properties of the robot that a FANUC controller does not report; with the protocols `snpx`
+            and `fanuc-ftp`.
         opcua: The OPC UA server, and what is read from it; with the protocol `opcua`.
         driver: Settings of an installed driver (docs/controllers/own-driver.md), which it gets unchanged.
         codes: Type codes of a controller that sends numbers, as in
@@ -95,7 +96,8 @@ class Robot(BaseModel):
             are for installed drivers: no driver of robomesh has them.
         stale_after_s: The stale time [s]: without a unit of the controller for this long, the robot's state
             is stale; without joint positions for this long, the gateway refuses motion. It reconnects after
-            twice this time, at least 4 s.
+            twice this time, at least 4 s. Absent: 1 s, with the protocol `fanuc-ftp` the time of three
+            positions.
         demo: The simulator moves the arm until the first command.
         legacy_clients: Address for programs that use the unit protocol; absent: they cannot connect.
     """
@@ -123,7 +125,7 @@ class Robot(BaseModel):
     verified: Path | None = None
     experimental: StrictBool = False
     recover: tuple[Recovery, ...] = ()
-    stale_after_s: Annotated[float, Field(gt=0.05, le=60)] = 1.0
+    stale_after_s: Annotated[float, Field(gt=0.05, le=60)] | None = None
     demo: StrictBool = False
     legacy_clients: LegacyClients | None = None
 
@@ -221,14 +223,19 @@ class Robot(BaseModel):
             )
         if self.simulated and self.protocol not in OWN:
             raise ValueError(f"controller: protocol {self.protocol!r} has no simulator: name its address")
-        for part, protocol in (
-            ("universal_robots", "rtde"),
-            ("yaskawa", "hses"),
-            ("fanuc", "snpx"),
-            ("opcua", "opcua"),
+        for part, of_part in (
+            ("universal_robots", ("rtde",)),
+            ("yaskawa", ("hses",)),
+            ("fanuc", ("snpx", "fanuc-ftp")),
+            ("opcua", ("opcua",)),
         ):
-            if getattr(self, part) is not None and self.protocol != protocol:
-                raise ValueError(f"{part} needs the protocol {protocol!r}, this robot's is {self.protocol!r}")
+            if getattr(self, part) is not None and self.protocol not in of_part:
+                needed = " or ".join(map(repr, of_part))
+                raise ValueError(f"{part} needs the protocol {needed}, this robot's is {self.protocol!r}")
+        if self.protocol == "fanuc-ftp":
+            (self.fanuc or Fanuc()).check_ftp(self.stale_after_s)
+        elif self.fanuc is not None:
+            self.fanuc.check_snpx()
         if self.protocol == "opcua" and not self.simulated:
             host, _ = split_address(self.address)
             (self.opcua or OpcUa()).check(loopback=is_loopback(host))
@@ -249,7 +256,7 @@ class Robot(BaseModel):
     @property
     def group(self) -> str:
         """Control group or device of its controller, where one has several robots; empty: it has one."""
-        if self.protocol == "snpx":
+        if self.protocol in ("snpx", "fanuc-ftp"):
             return f"G{(self.fanuc or Fanuc()).group}"
         if self.protocol == "opcua":
             return (self.opcua or OpcUa()).device
@@ -265,6 +272,8 @@ class Robot(BaseModel):
                 return (self.yaskawa or Yaskawa()).settings
             case "snpx":
                 return (self.fanuc or Fanuc()).settings
+            case "fanuc-ftp":
+                return (self.fanuc or Fanuc()).ftp_settings
             case "opcua":
                 return (self.opcua or OpcUa()).settings(simulated=self.simulated)
             case "rtde":
@@ -276,6 +285,15 @@ class Robot(BaseModel):
     def simulated(self) -> bool:
         """True if the controller is the simulator."""
         return self.controller == "simulated"
+
+    @property
+    def stale_time_s(self) -> float:
+        """The stale time [s]: as declared, or the protocol's."""
+        if self.stale_after_s is not None:
+            return self.stale_after_s
+        if self.protocol == "fanuc-ftp":
+            return 3.0 / ((self.fanuc or Fanuc()).rate or FTP_RATE)
+        return 1.0
 
     @property
     def proof_of_stop(self) -> StopProof | bool:

@@ -320,6 +320,8 @@ def _resolve_robot(robot: Robot, folder: Path) -> Robot:
         paths["verified"] = folder / robot.verified
     if robot.opcua is not None:
         paths["opcua"] = robot.opcua.in_folder(folder)
+    if robot.fanuc is not None:
+        paths["fanuc"] = robot.fanuc.in_folder(folder)
     return robot.model_copy(update=paths)
 
 

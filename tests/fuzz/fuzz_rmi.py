@@ -36,7 +36,7 @@ from protocol_gateway.drivers.fanuc.axes import FanucSettings
 from protocol_gateway.drivers.fanuc.motion_driver import RMI, SESSION, FanucMotionDriver
 from protocol_gateway.errors import NotReadyError
 from robots.joints import JointType
-from tests.fuzz.fuzzing import Finding, campaign, changed, cut
+from tests.fuzz.fuzzing import Finding, answers, campaign, changed
 
 NEW_BENCH_EACH = 400
 SETTINGS = FanucSettings(assignments="own", j23=1, motion=True)
@@ -105,20 +105,7 @@ def main() -> None:
 
 def fuzz(inputs: int, seed: int, counts: Counter[str]) -> tuple[int, Finding | None]:
     """Return how many messages were read, and the first that was handled wrongly."""
-    chance = random.Random(seed)
-    bench = Bench(counts)
-    for done in range(inputs):
-        if done % NEW_BENCH_EACH == 0:
-            bench = Bench(counts)
-        data = bench.next_bytes(chance)
-        try:
-            pieces = cut(data, chance) if chance.random() < 0.1 else [data]
-            problem = next(filter(None, map(bench.receive, pieces)), "")
-        except Exception as error:
-            problem = repr(error)
-        if problem:
-            return done, Finding(data, problem)
-    return inputs, None
+    return answers(inputs, seed, lambda: Bench(counts), renew_each=NEW_BENCH_EACH)
 
 
 class Bench:
@@ -131,6 +118,7 @@ class Bench:
         self.driver = FanucMotionDriver((JointType.ROTARY,) * 6, {}, options=SETTINGS)
         self.now_s = 0.0
         self.state = "connecting"
+        self.problem = ""
         self._given_up = False
         self._counts = counts
         self._rest = b""

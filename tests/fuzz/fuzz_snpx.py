@@ -35,7 +35,7 @@ from protocol_gateway.drivers.driver import (
 from protocol_gateway.drivers.fanuc.axes import FanucSettings
 from protocol_gateway.drivers.fanuc.driver import SNPX, SnpxDriver
 from robots.joints import JointType
-from tests.fuzz.fuzzing import Finding, campaign, changed, cut
+from tests.fuzz.fuzzing import Finding, answers, campaign, changed
 
 TIMEOUT_S = 1.0
 NEW_CONNECTION_EACH = 500
@@ -66,20 +66,7 @@ def main() -> None:
 
 def fuzz(inputs: int, seed: int, counts: Counter[str]) -> tuple[int, Finding | None]:
     """Return how many answers were read, and the first that was handled wrongly."""
-    chance = random.Random(seed)
-    bench = Bench(counts)
-    for done in range(inputs):
-        if done % NEW_CONNECTION_EACH == 0:
-            bench = Bench(counts)
-        data = bench.next_bytes(chance)
-        try:
-            pieces = cut(data, chance) if chance.random() < 0.1 else [data]
-            problem = next(filter(None, map(bench.receive, pieces)), "")
-        except Exception as error:
-            problem = repr(error)
-        if problem or bench.problem:
-            return done, Finding(data, problem or bench.problem)
-    return inputs, None
+    return answers(inputs, seed, lambda: Bench(counts), renew_each=NEW_CONNECTION_EACH)
 
 
 class Bench:

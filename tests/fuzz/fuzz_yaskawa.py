@@ -33,7 +33,7 @@ from protocol_gateway.drivers.driver import (
 from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
 from protocol_gateway.drivers.yaskawa.driver import HSES, HsesDriver
 from robots.joints import JointType
-from tests.fuzz.fuzzing import Finding, campaign, changed
+from tests.fuzz.fuzzing import Finding, answers, campaign, changed
 
 READS = {0x70: 1, 0x72: 1, 0x73: 1, 0x74: 1, 0x75: 1, 0x77: 1, 0x78: 0x0E, 0x89: 1}
 BUSY = (0xD8F1, 0xD8FA, 0xE444, 0xFFF6)
@@ -57,19 +57,13 @@ def main() -> None:
 
 def fuzz(inputs: int, seed: int, counts: Counter[str]) -> tuple[int, Finding | None]:
     """Return how many datagrams were read, and the first that was handled wrongly."""
-    chance = random.Random(seed)
     bench = Bench(counts)
-    for done in range(inputs):
-        if done % NEW_SOCKET_EACH == 0:
-            bench.open()
-        data = bench.next_datagram(chance)
-        try:
-            problem = bench.receive(data)
-        except Exception as error:
-            problem = repr(error)
-        if problem or bench.problem:
-            return done, Finding(data, problem or bench.problem)
-    return inputs, None
+
+    def renewed() -> Bench:
+        bench.open()
+        return bench
+
+    return answers(inputs, seed, renewed, renew_each=NEW_SOCKET_EACH, cuts=False)
 
 
 class Bench:
@@ -117,7 +111,7 @@ class Bench:
                     pass
         return events
 
-    def next_datagram(self, chance: random.Random) -> bytes:
+    def next_bytes(self, chance: random.Random) -> bytes:
         """Return an answer to the open question, or another datagram; a question is open then."""
         while not self._question:
             self.now_s = max(self.now_s, self._timer_s)
@@ -130,7 +124,7 @@ class Bench:
             self.now_s = self._asked_s + TIMEOUT_S + 0.001
             self._question = b""
             self.perform(self.driver.timer_ended(self.now_s))
-            return self.next_datagram(chance)
+            return self.next_bytes(chance)
         number, command = self._question[11], self._question[24]
         right = [_answer(number, READS[command], data) for data in DATA[command]]
         if command == 0x74:

@@ -7,7 +7,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple, NoReturn, Protocol
 
 WARM_UP = 20_000
 
@@ -74,6 +74,50 @@ def campaign(
     if mib - begun_mib > growth_mib:
         sys.exit(f"memory grew by {mib - begun_mib:.1f} MiB, {growth_mib:g} are allowed")
     print(verdict)
+
+
+class Bench(Protocol):
+    """A driver with a controller that is the fuzzer's.
+
+    Attributes:
+        problem: Wrong command of the driver; empty: none.
+    """
+
+    problem: str
+
+    def next_bytes(self, chance: random.Random) -> bytes:
+        """Return what the controller sends next."""
+        ...
+
+    def receive(self, data: bytes) -> str:
+        """Give bytes to the driver; return the problem with what it made of them, empty: none."""
+        ...
+
+
+def answers(
+    inputs: int, seed: int, renewed: Callable[[], Bench], *, renew_each: int, cuts: bool = True
+) -> tuple[int, Finding | None]:
+    """Return how many answers a driver has read, and the first that was handled wrongly.
+
+    Args:
+        renewed: Returns the bench for the next answers.
+        renew_each: Number of answers after which it is called again.
+        cuts: The bytes are a stream, and arrive in pieces.
+    """
+    chance = random.Random(seed)
+    bench = renewed()
+    for done in range(inputs):
+        if done and done % renew_each == 0:
+            bench = renewed()
+        data = bench.next_bytes(chance)
+        try:
+            pieces = cut(data, chance) if cuts and chance.random() < 0.1 else [data]
+            problem = next(filter(None, map(bench.receive, pieces)), "")
+        except Exception as error:
+            problem = repr(error)
+        if problem or bench.problem:
+            return done, Finding(data, problem or bench.problem)
+    return inputs, None
 
 
 def changed(message: bytes, others: Sequence[bytes], tokens: Sequence[bytes], chance: random.Random) -> bytes:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from protocol_gateway.drivers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
 from tests.protocol_gateway import (
+    ftp_site,
     test_hses_driver,
     test_opcua_driver,
     test_rtde_driver,
@@ -109,6 +110,19 @@ def reads_of_snpx(parts):
     return len(found)
 
 
+def reads_of_ftp(parts):
+    """Assert that a client logs in, enters the folder, and then only reads the declared files."""
+    lines = b"".join(parts).decode().split("\r\n")
+    assert lines.pop() == "" or not lines
+    for each in lines:
+        assert re.fullmatch(
+            r"USER anonymous|TYPE I|CWD md:|PASV|RETR (CURPOS|IOSTATE|SFTYSIG)\.DG"
+            r"|RETR ERRACT\.LS|RETR (NUMREG|SYSFRAME)\.VA",
+            each,
+        ), each
+    return len(lines)
+
+
 # Encodings of requests in OPC UA's namespace: endpoints, sessions, browse, read, subscriptions, publish. Not
 # among them: 673 (Write) and 712 (Call).
 READS_OF_OPC_UA = {428, 461, 467, 473, 527, 533, 631, 751, 787, 826}
@@ -191,6 +205,13 @@ SUBJECTS = (
         start=lambda **settings: one_port(test_snpx_driver.controller(**settings)),
         declared={"": reads_of_snpx},
         faults=("garbage", "split", "flood", "busy", "loss", "joints", "mute"),
+    ),
+    Subject(
+        name="fanuc-ftp",
+        settings=ftp_site.FANUC_FTP,
+        start=lambda **settings: one_port(ftp_site.controller(**settings)),
+        declared={"": reads_of_ftp},
+        faults=("garbage", "split", "busy", "loss", "joints", "mute"),
     ),
     Subject(
         name="opcua",

@@ -123,7 +123,9 @@ def test_a_controller_of_fanuc_with_two_groups_is_two_robots():
     ("robot", "problem"),
     [
         ({"controller": "udp://10.0.0.7:60008"}, "protocol 'snpx' needs tcp://10.0.0.7:60008"),
-        ({"protocol": "rtde", "fanuc": {}}, "fanuc needs the protocol 'snpx'"),
+        ({"protocol": "rtde", "fanuc": {}}, "fanuc needs the protocol 'snpx' or 'fanuc-ftp'"),
+        ({"fanuc": {"user": "li"}}, "fanuc.user needs the protocol 'fanuc-ftp'"),
+        ({"fanuc": {"rate": 0.5}}, "fanuc.rate 0.5: with the protocol 'snpx' 1 to 100 is right"),
         ({"fanuc": {"j23": 2}}, "Input should be -1, 0 or 1"),
         ({"fanuc": {"assignments": "yes"}}, "'own' or 'pendant'"),
         ({"fanuc": {"io": ["GI[1]"]}}, r"as in DI\[1-16\]"),
@@ -157,6 +159,65 @@ def test_a_simulated_robot_with_snpx_gets_a_simulator_with_the_same_axes():
         if fanuc:
             told = Fanuc.model_validate_json(words[words.index("--fanuc") + 1])
             assert with_defaults(told.settings, (JointType.ROTARY,) * 6) == settings
+
+
+FTP = {"protocol": "fanuc-ftp", "controller": "tcp://10.0.0.7:21"}
+
+
+@pytest.mark.parametrize(
+    ("fanuc", "robot", "rate", "stale_s"),
+    [
+        (None, {}, 1.0, 3.0),
+        ({"rate": 2}, {}, 2.0, 1.5),
+        ({"rate": 0.2}, {}, 0.2, 15.0),
+        ({"rate": 2}, {"stale_after_s": 1.0}, 2.0, 1.0),
+    ],
+)
+def test_a_position_a_second_by_ftp_is_not_stale_before_the_next(fanuc, robot, rate, stale_s):
+    (loader,) = fanuc_site(FTP | {"fanuc": fanuc} | robot).robot
+    assert (loader.options.rate_hz, loader.stale_time_s) == (rate, stale_s)
+    assert (loader.options.user, loader.options.password_file) == ("anonymous", "")
+    assert fanuc_site({"fanuc": fanuc and {}}).robot[0].stale_time_s == 1.0
+
+
+@pytest.mark.parametrize(
+    ("robot", "problem"),
+    [
+        ({"stale_after_s": 1.0}, "with 1 positions a second 2 or more is right"),
+        ({"fanuc": {"rate": 3}}, "with the protocol 'fanuc-ftp' at most 2"),
+        ({"fanuc": {"rate": 0.1}}, "greater than or equal to 0.2"),
+        ({"fanuc": {"motion": True, "assignments": "own", "j23": 1}}, "fanuc.assignments needs"),
+        ({"fanuc": {"speed": 5}}, "fanuc.speed needs the protocol 'snpx'"),
+        ({"fanuc": {"password_file": "x"}}, "fanuc.password_file needs user"),
+        ({"fanuc": {"user": "a b"}}, "String should match pattern"),
+        ({"controller": "udp://10.0.0.7:21"}, "protocol 'fanuc-ftp' needs tcp://10.0.0.7:21"),
+    ],
+)
+def test_what_a_site_file_declares_wrongly_of_a_robot_by_ftp_is_refused(robot, problem):
+    with pytest.raises(ValueError, match=problem):
+        fanuc_site(FTP | robot)
+
+
+def test_a_password_file_is_beside_the_site_file(tmp_path):
+    path = tmp_path / "site.toml"
+    path.write_text(
+        'site = "hall"\n[[robot]]\nname = "a"\nmodel = "puma560"\nprotocol = "fanuc-ftp"\n'
+        'controller = "tcp://10.0.0.7:21"\nfanuc = { user = "li", password_file = "secret" }\n'
+    )
+    (robot,) = load(path).robot
+    assert (robot.options.user, robot.options.password_file) == ("li", str(tmp_path / "secret"))
+
+
+def test_a_simulated_robot_by_ftp_gets_a_simulator_with_the_same_axes():
+    simulated = fanuc_site(FTP | {"controller": "simulated", "fanuc": {"j23": -1, "group": 2}})
+    found = {each.name: each.arguments for each in programs(simulated, None, "tcp/127.0.0.1:7447")}
+    words = found["simulate loader"]
+    assert words[words.index("--protocol") + 1] == "fanuc-ftp"
+    option = found["gateway"][found["gateway"].index("--controller") + 1]
+    settings = SERVICES["gateway"].settings(simulated, Options(controllers=[option])).robots[0].options
+    assert (settings.j23, settings.group, settings.rate_hz) == (-1, 2, 1.0)
+    told = Fanuc.model_validate_json(words[words.index("--fanuc") + 1])
+    assert (told.j23, told.group) == (-1, 2)
 
 
 OPC_UA = {"name": "handler", "model": "puma560", "protocol": "opcua", "controller": "tcp://10.0.0.7:4840"}
@@ -216,8 +277,10 @@ def test_two_devices_of_one_opc_ua_server_are_two_robots():
 def test_the_example_has_a_simulated_controller_of_each_protocol():
     example = load(Path(__file__).resolve().parents[2] / "examples" / "vendors.toml")
     assert {robot.protocol for robot in example.robot} == {*OWN}
-    ways = {"unit": "tcp", "rtde": "tcp", "hses": "udp", "snpx": "tcp", "opcua": "tcp"}
+    ways = {"unit": "tcp", "rtde": "tcp", "hses": "udp", "snpx": "tcp", "fanuc-ftp": "tcp", "opcua": "tcp"}
     named = enumerate(example.robot, start=1)
     addresses = [f"{robot.name}={ways[robot.protocol]}://127.0.0.1:{port}" for port, robot in named]
     settings = SERVICES["gateway"].settings(example, Options(controllers=addresses))
-    assert [robot.protocol for robot in settings.robots] == ["unit", "rtde", "hses", "snpx", "opcua"]
+    assert [robot.protocol for robot in settings.robots] == [*ways]
+    # One that gives a position a second is not stale between two of them.
+    assert [robot.stale_after_s for robot in settings.robots] == [1.0, 1.0, 1.0, 1.0, 3.0, 1.0]

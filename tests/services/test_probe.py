@@ -11,6 +11,7 @@ import pytest
 from services.command_line import probe
 from services.command_line.probe import ProbeError, examine
 from tests.conftest import free_port, run
+from tests.protocol_gateway.ftp_site import controller as fanuc_by_ftp
 from tests.protocol_gateway.gateway_site import simulator
 from tests.protocol_gateway.test_hses_driver import controller as yaskawa
 from tests.protocol_gateway.test_opcua_driver import controller as opcua
@@ -90,6 +91,35 @@ def test_a_controller_of_fanuc_is_recognized_by_its_first_answer(monkeypatch):
         assert "56 zero bytes" in found.sent
 
     run(main())
+
+
+def test_a_controller_that_is_read_by_ftp_is_recognized_by_its_greeting(monkeypatch):
+    async def main():
+        async with fanuc_by_ftp() as port:
+            monkeypatch.setattr(probe, "_FTP_PORT", port)
+            found = await examined(f"tcp://127.0.0.1:{port}")
+        assert (found.protocol, found.sent) == ("fanuc-ftp", "nothing")
+        assert "of a controller of FANUC: R-30iB FTP server ready." in found.text
+
+    run(main())
+
+
+@pytest.mark.parametrize(
+    ("greeting", "protocol"),
+    [
+        # Of real controllers, as their users publish them.
+        (b"220 R-30iB FTP server ready. [HandlingTool V8.20P/06]\r\n", "fanuc-ftp"),
+        (b"220 R-30iB FTP server ready. [ArcTool V8.20P/24]\r\n", "fanuc-ftp"),
+        (b"220 ROBOT FTP server ready.\r\n", "fanuc-ftp"),
+        (b"220 ProFTPD 1.3.5 Server ready.\r\n", ""),
+    ],
+)
+def test_an_ftp_server_is_heard_and_nothing_is_sent(monkeypatch, greeting, protocol):
+    with server(says=greeting) as (port, heard):
+        monkeypatch.setattr(probe, "_FTP_PORT", port)
+        found = examine(f"tcp://127.0.0.1:{port}")
+    assert (found.protocol, found.sent, heard) == (protocol, "nothing", b"")
+    assert "an FTP server" in found.text
 
 
 @pytest.mark.slow

@@ -23,6 +23,7 @@ from robots.joints import FloatArray, JointType
 _SIGNALS = re.compile(r"(DI|DO|RI|RO|UI|UO)\[([1-9]\d{0,3})(?:-([1-9]\d{0,3}))?\]")
 MOST_SIGNALS = 128
 LEAST_MOTION_RATE_HZ = 5.0
+ANONYMOUS = "anonymous"
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +85,8 @@ class FanucSettings:
         io: Inputs and outputs to read: "DI[1-16]".
         motion: The gateway moves the robot by RMI; otherwise it only reads.
         speed_percent: Speed of a motion at 100 percent, in percent of the arm's greatest.
+        user: User of the controller's FTP server.
+        password_file: File with that user's password, which only its owner may read; empty: no password.
     """
 
     assignments: Literal["own", "pendant"] | None = None
@@ -99,6 +102,8 @@ class FanucSettings:
     io: Sequence[str] = ("DI[1-16]", "DO[1-16]", "RI[1-8]", "RO[1-8]")
     motion: bool = False
     speed_percent: float = 20.0
+    user: str = ANONYMOUS
+    password_file: str = ""
 
     @property
     def motion_problem(self) -> str | None:

@@ -14,7 +14,8 @@ _CARTESIAN = Struct("<9f8h")
 ALARM = Struct("<11h80s80s18s")
 TASK = Struct("<16s2h16s")
 _NUMBER, _INTEGER = Struct("<f"), Struct("<i")
-_CODE = re.compile(r"[A-Z][A-Z0-9]{1,4}-\d{3,4}")
+# Names of three letters are padded: "JOG -010".
+_CODE = re.compile(r"([A-Z][A-Z0-9]{1,4}) ?-(\d{3,4})")
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +91,12 @@ class Alarm:
     def number(self) -> str:
         """Code as on the pendant, such as SRVO-001."""
         found = _CODE.match(self.message)
-        return found[0] if found else f"{self.facility}-{self.code:03d}"
+        return "-".join(found.groups()) if found else f"{self.facility}-{self.code:03d}"
+
+    @property
+    def full_message(self) -> str:
+        """Message that begins with its code."""
+        return self.message if _CODE.match(self.message) else f"{self.number} {self.message}".rstrip()
 
 
 def alarms(data: bytes) -> list[Alarm]:

@@ -381,8 +381,8 @@ def alarm_of(alarm: Alarm) -> AlarmReceived:
         severity = Severity.INFO
     else:
         severity = Severity.ERROR
-    message = alarm.message if alarm.message.startswith(alarm.number) else f"{alarm.number} {alarm.message}"
-    return AlarmReceived(severity, "; ".join(filter(None, (message.rstrip(), alarm.cause))), alarm.number)
+    text = "; ".join(filter(None, (alarm.full_message, alarm.cause)))
+    return AlarmReceived(severity, text, alarm.number)
 
 
 def _malformed(received: bytes, reason: str) -> MalformedReceived:

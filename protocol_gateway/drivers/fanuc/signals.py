@@ -8,7 +8,6 @@ from protocol_gateway.drivers.driver import Signal, SignalsReceived, SignalValue
 from protocol_gateway.drivers.fanuc import data
 from protocol_gateway.drivers.fanuc.assignments import (
     MasterTask,
-    NumericRegister,
     SystemVariable,
     Table,
     ToolFrame,
@@ -42,10 +41,10 @@ _OPERATOR = (
     (Signal("snpx.busy"), Operator.BUSY),
     (Signal("snpx.battery_alarm"), Operator.BATTERY_ALARM),
 )
-_POSE = (*of_axes("tool.pose", "m"), *of_axes("tool.pose", "rad", "rx ry rz"))
-_OFFSET = (*of_axes("tool.offset", "m"), *of_axes("tool.offset", "rad", "rx ry rz"))
+POSE = (*of_axes("tool.pose", "m"), *of_axes("tool.pose", "rad", "rx ry rz"))
+OFFSET = (*of_axes("tool.offset", "m"), *of_axes("tool.offset", "rad", "rx ry rz"))
 _CONFIGURATION = Signal("snpx.configuration")
-_TOOL, _FRAME = Signal("tool.number"), Signal("frame.number")
+TOOL, FRAME = Signal("tool.number"), Signal("frame.number")
 _OVERRIDE = Signal("speed.override", "%")
 _NAME, _LINE, _STATE = Signal("program.name"), Signal("program.line"), Signal("program.state")
 _CALLER = Signal("snpx.caller")
@@ -74,7 +73,7 @@ def unknown_operator() -> SignalsReceived:
 def of_pose(cartesian: Cartesian | None) -> SignalsReceived:
     """Return the signals of the Cartesian position; None: the controller cannot compute it."""
     configuration = None if cartesian is None else cartesian.configuration
-    return SignalsReceived([*_of_frame(_POSE, cartesian), (_CONFIGURATION, configuration)])
+    return SignalsReceived([*of_frame(POSE, cartesian), (_CONFIGURATION, configuration)])
 
 
 def of_state(table: Table, values: Mapping[Variable, bytes], refused: frozenset[Variable]) -> SignalsReceived:
@@ -90,14 +89,14 @@ def of_state(table: Table, values: Mapping[Variable, bytes], refused: frozenset[
     tool = integer(table.tool_number)
     found: list[tuple[Signal, SignalValue | None]] = [
         (_OVERRIDE, integer(SystemVariable.SPEED_OVERRIDE)),
-        (_FRAME, integer(table.frame_number)),
-        (_TOOL, tool),
+        (FRAME, integer(table.frame_number)),
+        (TOOL, tool),
         *_of_task(None if MasterTask() in refused else values[MasterTask()]),
         *_of_offset(tool, table.tools, values, refused),
     ]
     for each in table.registers:
         value = data.number(values[each]) if each not in refused else None
-        found.append((_register(each), value))
+        found.append((register(each.number), value))
     return SignalsReceived(found)
 
 
@@ -117,12 +116,13 @@ def _of_offset(
 ) -> list[tuple[Signal, SignalValue | None]]:
     """Return the active tool's frame; tool 0 is the flange itself."""
     if number == 0:
-        return [(each, 0.0) for each in _OFFSET]
+        return [(each, 0.0) for each in OFFSET]
     active = next((each for each in tools if each.number == number and each not in refused), None)
-    return _of_frame(_OFFSET, None if active is None else data.cartesian(values[active]))
+    return of_frame(OFFSET, None if active is None else data.cartesian(values[active]))
 
 
-def _of_frame(signals: Sequence[Signal], frame: Cartesian | None) -> list[tuple[Signal, SignalValue | None]]:
+def of_frame(signals: Sequence[Signal], frame: Cartesian | None) -> list[tuple[Signal, SignalValue | None]]:
+    """Return the values of a position and a rotation vector; None: not known."""
     if frame is None:
         return [(each, None) for each in signals]
     x, y, z, w, p, r = frame.values
@@ -130,8 +130,9 @@ def _of_frame(signals: Sequence[Signal], frame: Cartesian | None) -> list[tuple[
     return [*zip(signals, (x / 1000, y / 1000, z / 1000, *rotation.tolist()), strict=True)]
 
 
-def _register(register: NumericRegister) -> Signal:
-    return Signal(f"io.register.{register.number}")
+def register(number: int) -> Signal:
+    """Return the signal of a register."""
+    return Signal(f"io.register.{number}")
 
 
 def io_signals(bits: SignalBits) -> tuple[Signal, ...]:

@@ -18,7 +18,7 @@ from robomesh.presence import MONITOR
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 from robomesh.subscription import Sample, Subscription
-from robomesh.topics import topic
+from robomesh.topics import stale_after_s
 from services.command_line import discovery
 from services.command_line.live.monitor_text import (
     OLD,
@@ -190,6 +190,8 @@ class _Newest:
         state, lease = self._values.get("controller"), self._values.get("lease")
         if state is not None:
             head.append(f"   link {_word(_State.Link, state.link)}")
+            if state.capabilities.HasField("slow_hz"):
+                head.append(f"   slow, {state.capabilities.slow_hz:g} positions/s", style="yellow")
             head.append(
                 f"   {activity_words(state)}   mode {_word(_State.Mode, state.mode)}"
                 f"   homed {_word(_State.Known, state.homed)}",
@@ -262,7 +264,8 @@ class _Newest:
 
     def _stale(self, name: str) -> bool:
         age = self.age_s(name)
-        return age is None or age > (topic(name).stale_after_s or math.inf)
+        limit_s = stale_after_s(name, self._values.get("description"))
+        return age is None or (limit_s is not None and age > limit_s)
 
     def _foot(self) -> Any:
         from rich.text import Text

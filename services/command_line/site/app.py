@@ -134,6 +134,7 @@ class SimulatedProtocol(StrEnum):
     RTDE = "rtde"
     HSES = "hses"
     SNPX = "snpx"
+    FANUC_FTP = "fanuc-ftp"
     OPCUA = "opcua"
 
 
@@ -152,7 +153,7 @@ def simulate(
         typer.Option(
             metavar="HOST:PORT",
             show_default="127.0.0.1:5400; with rtde :30004, with hses :10040, with snpx :60008, "
-            "with opcua :4840",
+            "with fanuc-ftp :2121, with opcua :4840",
         ),
     ] = "",
     rate: Annotated[float, typer.Option(metavar="HZ", min=1, max=1000, help="With unit.")] = 100.0,
@@ -175,7 +176,7 @@ def simulate(
         typer.Option(
             help="unit: the old text protocol; rtde: RTDE, scripts and the dashboard of Universal Robots; "
             "hses: the High-Speed Ethernet Server of Yaskawa; snpx: SNPX of FANUC; "
-            "opcua: an OPC UA server, OPC 40010-1."
+            "fanuc-ftp: the files of FANUC's state by FTP; opcua: an OPC UA server, OPC 40010-1."
         ),
     ] = SimulatedProtocol.UNIT,
     primary: Annotated[
@@ -192,7 +193,8 @@ def simulate(
         str, typer.Option(metavar="JSON", help="The site file's table `yaskawa` as JSON; with hses.")
     ] = "",
     fanuc: Annotated[
-        str, typer.Option(metavar="JSON", help="The site file's table `fanuc` as JSON; with snpx.")
+        str,
+        typer.Option(metavar="JSON", help="The site file's table `fanuc` as JSON; with snpx and fanuc-ftp."),
     ] = "",
     rmi: Annotated[
         str,
@@ -210,7 +212,7 @@ def simulate(
     site: SiteFile = None,
     connect: Connect = DEFAULT_ROUTER,
 ) -> None:
-    """Run a simulated controller with the old text protocol, RTDE, HSES, SNPX or OPC UA."""
+    """Run a simulated controller with the old text protocol, RTDE, HSES, SNPX, FTP or OPC UA."""
     from services.command_line.site import launch
 
     mesh = launch.faults_mesh(for_, site, connect)
@@ -243,6 +245,17 @@ def simulate(
             robot=robot or "puma560",
             listen=listen or "127.0.0.1:60008",
             rmi=rmi,
+            fanuc=fanuc,
+            demo=demo,
+            faults=tuple(fault or ()),
+            insecure=insecure,
+            mesh=mesh,
+        )
+        return
+    if protocol is SimulatedProtocol.FANUC_FTP:
+        launch.launch_ftp_simulator(
+            robot=robot or "puma560",
+            listen=listen or "127.0.0.1:2121",
             fanuc=fanuc,
             demo=demo,
             faults=tuple(fault or ()),

@@ -268,6 +268,39 @@ def launch_snpx_simulator(
     service.run_until_signalled(serve_snpx(settings, ready=ready))
 
 
+def launch_ftp_simulator(
+    *,
+    robot: str,
+    listen: str,
+    fanuc: str,
+    demo: bool,
+    faults: tuple[str, ...],
+    insecure: bool,
+    mesh: "Mesh | None",
+) -> None:
+    """Run a simulated controller of FANUC's kind that is read by FTP."""
+    from services.simulator.fanuc.service import FtpSettings, serve_ftp
+    from services.site_file.fanuc import Fanuc
+    from services.site_file.listen_address import split_address
+
+    declared = _declared(Fanuc, "fanuc", fanuc)
+
+    def ready(port: int) -> None:
+        print(f"listening on {split_address(listen)[0]}:{port}", flush=True)
+
+    service.log_to_stderr()
+    settings = FtpSettings(
+        robot=robot,
+        listen=listen,
+        fanuc=None if declared is None else declared.settings,
+        demo=demo,
+        faults=faults,
+        insecure=insecure,
+        mesh=mesh,
+    )
+    service.run_until_signalled(serve_ftp(settings, ready=ready))
+
+
 def _declared(part: "type[_Part]", option: str, text: str) -> "_Part | None":
     """Return a table of the site file that an option gives as JSON; None: it is empty.
 

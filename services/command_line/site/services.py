@@ -78,8 +78,8 @@ def _gateway(site: "Site", options: Options) -> Any:
             experimental=robot.experimental,
             recover=frozenset(robot.recover),
             jog_speed=robot.jog_speed / 1000,
-            stale_after_s=robot.stale_after_s,
-            reconnect_after_s=max(4.0, 2.0 * robot.stale_after_s),
+            stale_after_s=robot.stale_time_s,
+            reconnect_after_s=max(4.0, 2.0 * robot.stale_time_s),
             legacy_clients=legacy_settings(robot),
             check=robot.check,
             cell=cells[robot.name],
@@ -133,7 +133,7 @@ def _kinematics(site: "Site", options: Options) -> Any:
             cell_description=cells[robot.name],
             cell=robot.cell,
             simulated=robot.simulated,
-            stale_after_s=robot.stale_after_s,
+            stale_after_s=robot.stale_time_s,
         )
         for robot in site.robot
     )

@@ -126,9 +126,9 @@ def _simulator(robot: Robot, site: str, attach: tuple[str, ...]) -> tuple[Progra
         controller = f"udp://127.0.0.1:{port}"
         declared = robot.yaskawa.model_dump_json(exclude_defaults=True) if robot.yaskawa else ""
         protocol = ("--protocol", "hses", *(("--yaskawa", declared) if declared else ()))
-    if robot.protocol == "snpx":
+    if robot.protocol in ("snpx", "fanuc-ftp"):
         declared = robot.fanuc.model_dump_json(exclude_defaults=True) if robot.fanuc else ""
-        protocol = ("--protocol", "snpx", *(("--fanuc", declared) if declared else ()))
+        protocol = ("--protocol", robot.protocol, *(("--fanuc", declared) if declared else ()))
         if robot.fanuc is not None and robot.fanuc.motion:
             rmi = _free_port()
             protocol = (*protocol, "--rmi", f"127.0.0.1:{rmi}")

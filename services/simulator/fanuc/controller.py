@@ -10,7 +10,7 @@ from datetime import datetime
 import numpy as np
 
 from protocol_gateway.drivers.fanuc.axes import Axes
-from protocol_gateway.drivers.fanuc.data import ALARM, AXES, POSITION, TASK, alarms
+from protocol_gateway.drivers.fanuc.data import ALARM, AXES, POSITION, TASK, Alarm, alarms
 from protocol_gateway.drivers.fanuc.signals import Operator
 from robots.description import RobotDescription
 from robots.joints import FloatArray, joints_of, violations
@@ -126,9 +126,19 @@ class SnpxController:
         return self._axes.values(self.positions(now_s))
 
     @property
+    def axis_count(self) -> int:
+        """Number of its axes without extended ones."""
+        return max(self._axes.used) + 1
+
+    @property
+    def newest_alarms(self) -> list[Alarm]:
+        """Active alarms, the newest first."""
+        return alarms(b"".join(self._alarms))
+
+    @property
     def newest_alarm(self) -> str:
         """Code of the newest alarm, such as SRVO-001."""
-        return alarms(self._alarms[0])[0].number if self._alarms else "No Error"
+        return self.newest_alarms[0].number if self._alarms else "No Error"
 
     def pause_rmi(self, now_s: float, *, fault: bool) -> None:
         """Pause RMI_MOVE, as an operator or a fault does."""

@@ -8,7 +8,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable, Coroutine, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 from protocol_gateway.drivers.fanuc.srtp import COMMANDS, LONGEST_TEXT, Area, Service
 from services.simulator import faults as effects
@@ -46,6 +46,14 @@ _GARBAGE = (
 )
 
 
+class Connected(Protocol):
+    """A connection of the controller, which faults may end."""
+
+    def abort(self) -> None:
+        """Close the connection immediately."""
+        ...
+
+
 class SnpxServer:
     """Server of one controller.
 
@@ -68,7 +76,7 @@ class SnpxServer:
         self.shared = shared
         self.table = AssignmentTable((*DELIVERED, *entered))
         self.controller = boot(False)
-        self.clients: set[Client] = set()
+        self.clients: set[Connected] = set()
         self.active: frozenset[str] = frozenset()
         self.questions = 0
         self._dropped_s = 0.0
@@ -77,7 +85,7 @@ class SnpxServer:
         """Return the protocol of a connection."""
         return Client(self)
 
-    def admit(self, client: "Client") -> bool:
+    def admit(self, client: "Connected") -> bool:
         """Register a connection, unless a fault forbids it, or there are too many."""
         now_s = time.monotonic()
         self._faults.first_client(now_s)

@@ -1,4 +1,4 @@
-"""Service of the simulated controller: listens for SNPX and RMI."""
+"""Service of the simulated controller: listens for SNPX and RMI, or for FTP."""
 
 import asyncio
 import contextlib
@@ -18,6 +18,7 @@ from services.errors import ListenError
 from services.simulator.demo import demo_tour
 from services.simulator.errors import SimulatorError
 from services.simulator.fanuc.controller import SnpxController
+from services.simulator.fanuc.ftp_server import FTP_FAULTS, FtpServer
 from services.simulator.fanuc.memory import Entry
 from services.simulator.fanuc.rmi_server import RmiServer
 from services.simulator.fanuc.server import SNPX_FAULTS, SnpxServer
@@ -89,14 +90,9 @@ async def serve_snpx(settings: SnpxSettings, *, ready: Callable[[FanucPorts], No
         SimulatorError: If a setting is invalid.
         DescriptionError: If the robot is unknown.
     """
-    remedy = "listen on 127.0.0.1, or take the risk with --insecure: these protocols have no TLS"
     addresses = [settings.listen, *([settings.rmi] if settings.rmi else ())]
     for address in addresses:
-        host, _ = split_address(address)
-        if warning := check_reach(
-            "the simulator", host, secured=False, insecure=settings.insecure, remedy=remedy
-        ):
-            logger.warning("%s", warning)
+        _warn_beyond_loopback(address, settings.insecure)
     faults = Faults(settings.faults, known=SNPX_FAULTS)
     server = _server(settings, faults)
     rmi = RmiServer(server)
@@ -123,13 +119,75 @@ async def serve_snpx(settings: SnpxSettings, *, ready: Callable[[FanucPorts], No
                 tasks.create_task(answer_requests(settings.mesh, faults))
 
 
+@dataclass(frozen=True, kw_only=True)
+class FtpSettings:
+    """Settings of a simulated controller of FANUC's kind that is read by FTP.
+
+    Attributes:
+        listen: `HOST:PORT`; a real controller has 21; port 0 takes a free one.
+        faults: Faults in the syntax of `services.simulator.faults`, of `FTP_FAULTS`.
+
+    The others are those of `SnpxSettings`.
+    """
+
+    robot: str = "puma560"
+    listen: str = "127.0.0.1:0"
+    fanuc: FanucSettings | None = None
+    demo: bool = False
+    faults: tuple[str, ...] = ()
+    insecure: bool = False
+    mesh: Mesh | None = None
+
+
+async def serve_ftp(settings: FtpSettings, *, ready: Callable[[int], None] | None = None) -> None:
+    """Simulate a controller that is read by FTP until cancelled.
+
+    Args:
+        ready: Called with the port once clients can connect.
+
+    Raises:
+        ListenError: If it cannot listen on the address.
+        SimulatorError: If a setting is invalid.
+        DescriptionError: If the robot is unknown.
+    """
+    _warn_beyond_loopback(settings.listen, settings.insecure)
+    faults = Faults(settings.faults, known=FTP_FAULTS)
+    controlled = _server(SnpxSettings(robot=settings.robot, fanuc=settings.fanuc, demo=settings.demo), faults)
+    server = FtpServer(controlled)
+    host, port = split_address(settings.listen)
+    try:
+        listening = await asyncio.start_server(server.serve, host, port)
+    except OSError as error:
+        raise _cannot_listen(settings.listen, error) from None
+    async with contextlib.AsyncExitStack() as listeners:
+        listeners.callback(controlled.close)
+        listeners.callback(listening.close)
+        if ready is not None:
+            ready(listening.sockets[0].getsockname()[1])
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(controlled.run())
+            if settings.mesh is not None:
+                tasks.create_task(answer_requests(settings.mesh, faults))
+
+
+def _warn_beyond_loopback(address: str, insecure: bool) -> None:
+    remedy = "listen on 127.0.0.1, or take the risk with --insecure: these protocols have no TLS"
+    host, _ = split_address(address)
+    if warning := check_reach("the simulator", host, secured=False, insecure=insecure, remedy=remedy):
+        logger.warning("%s", warning)
+
+
+def _cannot_listen(address: str, error: OSError) -> ListenError:
+    reason = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
+    return ListenError(f"the simulator cannot listen on {address}: {reason.lower()}")
+
+
 async def _listen(made: Callable[[], asyncio.Protocol], address: str) -> asyncio.Server:
     host, port = split_address(address)
     try:
         return await asyncio.get_running_loop().create_server(made, host, port)
     except OSError as error:
-        reason = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
-        raise ListenError(f"the simulator cannot listen on {address}: {reason.lower()}") from None
+        raise _cannot_listen(address, error) from None
 
 
 def _server(settings: SnpxSettings, faults: Faults) -> SnpxServer:

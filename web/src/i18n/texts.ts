@@ -135,6 +135,11 @@ const TEXTS = {
   program_done: ["{name}: done; {operator}", "{name}：已完成；{operator}"],
   program_ended: ["{name}: ended at {at}; {operator}: {text}", "{name}：中止于{at}；{operator}：{text}"],
   simulated: ["simulated", "仿真"],
+  slow: ["slow: {rate}/s", "慢速：{rate} 次/秒"],
+  slow_hint: [
+    "This controller gives only {rate} positions a second: the arm may have moved since.",
+    "此控制器每秒仅提供 {rate} 次位置：机械臂此后可能已移动。",
+  ],
   activity: ["activity", "动作"],
 
   fresh: ["live", "实时"],

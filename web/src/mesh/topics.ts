@@ -7,7 +7,7 @@ import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Signal } from "@preact/signals";
 import { signal } from "@preact/signals";
 import { useEffect, useMemo } from "preact/hooks";
-import type { AuditEntry, ControllerState, Event } from "../gen/robomesh_pb";
+import type { AuditEntry, ControllerState, Description, Event } from "../gen/robomesh_pb";
 import { AuditEntrySchema, AuditListSchema, EventListSchema, EventSchema } from "../gen/robomesh_pb";
 import { ageClock } from "./age-clock";
 import type { Sample } from "./connection";
@@ -188,13 +188,17 @@ export function jointsAge(
   return controller.sample.arrived >= joints.sample.arrived ? Math.max(own, reported) : own;
 }
 
-/** Return the age [s] at which a topic is stale; infinite if it does not expire. */
-export function staleAfter(topic: string): number {
+// Topics with the joints, and with what is computed from them: a robot may have another stale time.
+const OF_ARM: readonly string[] = ["joints", "joints/slow", "frames", "kinematics"];
+
+/** Return the age [s] at which a robot's topic is stale; infinite if it does not expire. */
+export function staleAfter(topic: string, description?: Description): number {
+  if (description?.staleAfterS !== undefined && OF_ARM.includes(topic)) return description.staleAfterS;
   const rows = hello.value?.stale ?? [];
   const row = rows.find((r) => r.topic === topic) ?? rows.find((r) => r.topic === topic.replace(/\/.*/, "/*"));
   return row?.afterS ?? Number.POSITIVE_INFINITY;
 }
 
-export function isStale(topic: string, age: number | null): boolean {
-  return age === null || age > staleAfter(topic);
+export function isStale(topic: string, age: number | null, description?: Description): boolean {
+  return age === null || age > staleAfter(topic, description);
 }

@@ -30,7 +30,7 @@ export function ToolPanel(props: {
   const { steps } = props;
   const state = props.kinematics?.message;
   const age = ageOf(props.kinematics);
-  const stale = isStale("kinematics", age);
+  const stale = isStale("kinematics", age, props.description);
   const pose = state?.toolToBase.length === 16 ? state.toolToBase : undefined;
   const at = pose ? [pose[3], pose[7], pose[11]] : [];
   const angles = pose ? rollPitchYaw(pose).map(toDegrees) : [];

@@ -30,7 +30,7 @@ export function Neighbours(props: { robotKey: string; cell: string; scene: Robot
 function Neighbour(props: { robotKey: string; description: Description; scene: RobotScene }) {
   const { robotKey, description, scene } = props;
   const age = useFramesAge(robotKey, "frames");
-  const stale = age !== undefined && isStale("frames", age);
+  const stale = age !== undefined && isStale("frames", age, description);
   const arm = useRef<Arm | null>(null);
   useEffect(() => {
     const made = scene.addNeighbour(robotKey.split("/").slice(1).join("/"), description);

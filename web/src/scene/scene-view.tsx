@@ -104,7 +104,7 @@ export function SceneView(props: {
   // Not drawn yet is not stale.
   const coming = framesAge === undefined;
   const staleJoints = props.stale && (props.age !== undefined || props.arm !== undefined);
-  const stale = staleJoints || absent || (!replayed && !coming && isStale(topic, framesAge));
+  const stale = staleJoints || absent || (!replayed && !coming && isStale(topic, framesAge, description));
   const age = staleJoints ? props.age : framesAge;
   const rate = useTopic(ReplayStateSchema, `${robotKey}/replay`)?.message.speed || 1;
 
@@ -181,7 +181,7 @@ export function SceneView(props: {
   useEffect(() => scene.current?.showGhost(shown && (forward?.(shown) ?? null)), [shown, forward, loaded]);
   useEffect(() => scene.current?.setRed(redLinks.value), [redLinks.value, identity, code]);
   useEffect(() => scene.current?.showPath(toolPath.value), [toolPath.value, identity, code]);
-  const near = useNearest(robotKey);
+  const near = useNearest(robotKey, description);
   useEffect(() => scene.current?.showGap(near?.nearest ?? null, near?.sourceTime), [near, identity, code]);
   const views = viewsOf(description);
   const chosen = views.find((each) => each.name === view) ?? freeView([]);
@@ -319,11 +319,14 @@ function lookFrom(view: View, [x = 0, y = 0, z = 0, ...target]: readonly number[
 }
 
 /** Return the two nearest points of the arm and its surroundings; null: not known. */
-function useNearest(robotKey: string): { nearest: Nearest; sourceTime: number } | null {
+function useNearest(
+  robotKey: string,
+  description: Description | undefined,
+): { nearest: Nearest; sourceTime: number } | null {
   const latest = useTopic(KinematicStateSchema, `${robotKey}/kinematics`);
   const clearance = latest?.message.clearance;
   const level = useClearanceLevel(robotKey, clearance);
-  const known = clearance && !isStale("kinematics", ageOf(latest));
+  const known = clearance && !isStale("kinematics", ageOf(latest), description);
   return useMemo(() => {
     if (!known) return null;
     const { firstPoint, secondPoint } = clearance;

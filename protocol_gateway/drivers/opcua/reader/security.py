@@ -1,10 +1,9 @@
 """Security of the connection: choice of a server's endpoint, and check of its pinned certificate."""
 
-import re
-import stat
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from asyncua import Client, ua
 from asyncua.crypto import security_policies as policies
@@ -15,6 +14,8 @@ from cryptography.hazmat.primitives import hashes, serialization
 from protocol_gateway.drivers.opcua.reader.problems import ReadingError, in_words
 from protocol_gateway.drivers.opcua.reader.session import TIMEOUT_S, OnlyReads
 from protocol_gateway.drivers.opcua.settings import OpcUaSettings
+from protocol_gateway.errors import GatewaySettingsError
+from protocol_gateway.secret_file import read_password, read_secret
 from robomesh.texts import one_line
 
 _POLICIES: dict[str, type[policies.SecurityPolicy]] = {
@@ -26,8 +27,8 @@ _POLICIES: dict[str, type[policies.SecurityPolicy]] = {
     )
 }
 """The best first; older ones use SHA-1."""
-_OTHERS = 0o077
 _NAME = "robomesh"
+_T = TypeVar("_T")
 
 
 def client_of(url: str) -> Client:
@@ -114,7 +115,7 @@ async def secured_client(url: str, settings: OpcUaSettings) -> Client:
         )
     if settings.user:
         client.set_user(settings.user)
-        client.set_password(_password(Path(settings.password_file)))
+        client.set_password(_of_file(read_password, settings.password_file, "password_file"))
     return client
 
 
@@ -157,7 +158,7 @@ def fingerprint(certificate: bytes) -> str:
 
 def _own(path: Path) -> tuple[x509.Certificate, bytes]:
     """Return our certificate, and its private key as DER."""
-    content = _secret(path, "certificate")
+    content = _of_file(read_secret, path, "certificate")
     try:
         key = serialization.load_pem_private_key(content, None)
         certificate = x509.load_pem_x509_certificate(content)
@@ -181,17 +182,9 @@ def _uri(certificate: x509.Certificate, path: str) -> str:
         ) from None
 
 
-def _password(path: Path) -> str:
-    return re.sub(r"\r?\n$", "", _secret(path, "password_file").decode(errors="replace"))
-
-
-def _secret(path: Path, key: str) -> bytes:
+def _of_file(read: Callable[[Path, str], _T], path: str | Path, key: str) -> _T:
     """Return the content of a file that only its owner may read."""
     try:
-        with path.open("rb") as file:
-            mode = stat.S_IMODE(path.stat().st_mode)
-            if mode & _OTHERS:
-                raise ReadingError(f"{path}: others may read it (mode {mode:o}): chmod 600 {path}")
-            return file.read()
-    except OSError as error:
-        raise ReadingError(f"{key} {path}: {(error.strerror or str(error)).lower()}") from None
+        return read(Path(path), key)
+    except GatewaySettingsError as error:
+        raise ReadingError(str(error)) from None

@@ -30,7 +30,7 @@ export function CellPage({ site, robot }: RobotName) {
   const events = useEvents(key);
   const [stage, setStage] = useState<Stage | null>(null);
   const age = jointsAge(joints, controller);
-  const stale = isStale("joints", age);
+  const stale = isStale("joints", age, description?.message);
   useShownState(key, joints, controller);
   useEffect(() => void (published.value = cell?.message ?? null), [cell]);
   useEffect(

@@ -12,11 +12,12 @@ import { alarmsOf } from "../../mesh/alarms";
 import { hello, watch } from "../../mesh/connection";
 import { robotSnapshot } from "../../mesh/robot-snapshots";
 import { problemOf, stateWord } from "../../mesh/robot-state";
-import { ageOf, isStale, now, staleAfter, useTopic } from "../../mesh/topics";
+import { ageOf, isStale, now, useTopic } from "../../mesh/topics";
 import { AliveServices } from "../../panels/alive-services";
 import { PriorityMark } from "../../ui/priority-mark";
 import { robotLink } from "../../ui/route";
 import { Silhouette } from "../../ui/silhouette";
+import { SlowTag } from "../../ui/slow-tag";
 import { State } from "../../ui/state";
 import { Tag } from "../../ui/tag";
 import { useVisible } from "./visibility";
@@ -80,7 +81,10 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
           {stale ? (
             <span class="age">{staleText(unitAge)}</span>
           ) : (
-            description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>
+            <>
+              <SlowTag state={controller?.message} />
+              {description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
+            </>
           )}
         </div>
         <div class="tile-line dim">
@@ -152,7 +156,7 @@ function Picture(props: { robotKey: string; description: Description | undefined
   }, [robotKey, kind]);
   const at = now.value; // triggers drawing
   const age = last.newAt === null ? null : Math.max(0, (at - last.newAt) / 1000);
-  const stale = props.stale || age === null || age > (description?.staleAfterS ?? staleAfter("joints/slow"));
+  const stale = props.stale || isStale("joints/slow", age, description);
   useEffect(() => picture?.setStale(stale), [picture, stale]);
   return (
     <div class={`tile-picture ${stale ? "stale" : ""}`} aria-hidden="true">

@@ -88,7 +88,7 @@ function ProgramOfRobot({ site, robot, sha256 }: RobotName & { sha256: string })
   const [stage, setStage] = useState<Stage | null>(null);
   useEffect(() => (stage ? addGizmo(stage) : undefined), [stage]);
   const age = jointsAge(joints, controller);
-  const stale = isStale("joints", age);
+  const stale = isStale("joints", age, description?.message);
   useShownState(key, joints, controller);
   const holder = lease && !isStale("lease", ageOf(lease)) ? lease.message.holder : null;
   const state = controller?.message;

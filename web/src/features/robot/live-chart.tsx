@@ -12,7 +12,7 @@ import { theme } from "../../ui/theme";
 import type { Columns } from "./plot-buckets";
 import { Buckets, columnsOf } from "./plot-buckets";
 import type { PlotFeed, Span } from "./plot-feed";
-import { holdOf, LIVE_S } from "./plot-feed";
+import { LIVE_S } from "./plot-feed";
 
 const DRAW_MS = 200;
 const CURVES = 7;
@@ -155,7 +155,7 @@ export function LiveChart(props: {
       shown = zoomed ?? { from: end - seconds, to: end };
       const drawn = curves.flatMap(({ name, unit }) => {
         const buckets = (frozen ? frozen.buckets.get(name) : feed.buckets(name, seconds)) ?? none;
-        return [{ buckets, holds: Math.max(holdOf(name), 2 * buckets.width), factor: unit.factor }];
+        return [{ buckets, holds: Math.max(feed.holdOf(name), 2 * buckets.width), factor: unit.factor }];
       });
       plot.setData(columnsOf(drawn, shown.from, shown.to, element.clientWidth, columns), true);
       setAny(curves.some(({ name }) => feed.has(name)));

@@ -2,6 +2,7 @@
 
 import { timestampFromMs } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
+import type { Description } from "../../gen/robomesh_pb";
 import { SeriesAnswerSchema, SeriesRequestSchema } from "../../gen/robomesh_pb";
 import { p } from "../../i18n/plots";
 import { ageClock } from "../../mesh/age-clock";
@@ -68,6 +69,9 @@ export class PlotFeed {
   private ended = false;
   /** The recorder's answers by span. */
   readonly past = signal<ReadonlyMap<number, Past>>(new Map());
+
+  /** The robot's, which has the stale time of its joints. */
+  description: Description | undefined;
 
   /** @param jointsTopic The topic that brings the joints, whole or thinned. */
   constructor(
@@ -176,7 +180,13 @@ export class PlotFeed {
   /** Return a value's newest number; null: none, or it is stale. */
   newest(name: string): number | null {
     const value = this.value(name);
-    return value && ageClock() / 1000 - value.newestAt <= holdOf(name) ? value.newest : null;
+    return value && ageClock() / 1000 - value.newestAt <= this.holdOf(name) ? value.newest : null;
+  }
+
+  /** Return how long a value is valid [s]: later, a plot has a gap. */
+  holdOf(name: string): number {
+    const after = staleAfter(topicOf(name, topicsOfValues()) ?? "", this.description);
+    return Number.isFinite(after) ? after : 3600;
   }
 
   /** Return whether a value has arrived, also if it is stale now. */
@@ -187,7 +197,7 @@ export class PlotFeed {
   /** Return whether the drawn curve of a value is level over the last `span` s, to the right edge. */
   isLevel(name: string, span: number, now: number): boolean {
     const value = this.value(name);
-    return value !== undefined && value.changedAt < now - span && value.newestAt > now - holdOf(name);
+    return value !== undefined && value.changedAt < now - span && value.newestAt > now - this.holdOf(name);
   }
 
   private value(name: string): Value | undefined {
@@ -212,7 +222,7 @@ export class PlotFeed {
       // By source time: delayed samples are drawn at the time of their measurement.
       const at = (sample.sourceTime + topic.ahead) / 1000;
       topic.liveFrom = Math.min(topic.liveFrom, at);
-      if (at - topic.last > holdOf(name)) this.onGap(topic, at - topic.last);
+      if (at - topic.last > this.holdOf(name)) this.onGap(topic, at - topic.last);
       topic.last = at;
       read(sample.payload, (own, number) => {
         const value = topic.values.get(own);
@@ -258,12 +268,6 @@ async function patiently<T>(request: () => Promise<T>): Promise<T> {
       if (!slow || --left === 0) throw error;
     }
   }
-}
-
-/** Return how long a value is valid [s]: later, a plot has a gap. */
-export function holdOf(name: string): number {
-  const after = staleAfter(topicOf(name, topicsOfValues()) ?? "");
-  return Number.isFinite(after) ? after : 3600;
 }
 
 /** Return the change that a plot shows: half a pixel of the smallest range. */

@@ -35,6 +35,7 @@ export function PlotsPanel(props: {
   const { robotKey, description, plots } = props;
   const topic = jointsTopic(robotKey);
   const feed = useMemo(() => new PlotFeed(robotKey, topic), [robotKey, topic]);
+  feed.description = description;
   useEffect(() => () => feed.end(), [feed]);
   const [pausedAt, setPausedAt] = useState<number | null>(null);
   const joints = (description?.joints ?? []).map(({ name }) => `joints/${name}/position`);

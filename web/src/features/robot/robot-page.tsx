@@ -34,6 +34,7 @@ import type { Stage } from "../../scene/robot-scene";
 import { SceneView } from "../../scene/scene-view";
 import { jointsTopic } from "../../scene/topic-selection";
 import { cellLink, programLink } from "../../ui/route";
+import { SlowTag } from "../../ui/slow-tag";
 import { State } from "../../ui/state";
 import { Tag } from "../../ui/tag";
 import { CameraPanel } from "./camera-panel";
@@ -58,7 +59,7 @@ export function RobotPage({ site, robot }: RobotName) {
   const program = useTopic(ProgramStateSchema, `${key}/program`);
   const events = useEvents(key);
   const age = jointsAge(joints, controller);
-  const stale = isStale("joints", age);
+  const stale = isStale("joints", age, description?.message);
   useShownState(key, joints, controller);
   const lost = useLostAt(stale, joints !== undefined);
   const holder = lease && !isStale("lease", ageOf(lease)) ? lease.message.holder : null;
@@ -208,6 +209,7 @@ function Headline(props: {
           <State state={state} told />
         </div>
         <span class="facts dim">{facts.join(" · ")}</span>
+        <SlowTag state={message} />
         {description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
         {runs && <ProgramLine latest={program} />}
       </div>
