@@ -13,7 +13,8 @@ from services.simulator.fanuc.service import SnpxSettings, serve_snpx
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, until
 
 FANUC = {"description": "puma560", "protocol": "snpx", "up": False}
-MOVES = FanucSettings(assignments="own", j23=1, motion=True, speed_percent=100.0)
+# More positions a second than by default, so that tests are short.
+MOVES = FanucSettings(assignments="own", j23=1, motion=True, speed_percent=100.0, rate_hz=60.0)
 
 
 @contextlib.asynccontextmanager

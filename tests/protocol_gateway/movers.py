@@ -30,8 +30,6 @@ from tests.protocol_gateway.wire import wire
 
 NONE, NOT_NOW, OURS, ANY = (getattr(schema.Capabilities, each) for each in ("NONE", "NOT_NOW", "OURS", "ANY"))
 
-RATE_HZ = 60.0  # of what is asked for, so that tests are short
-
 
 class Mover:
     """A robot that a gateway moves, between both a wire for each port.
@@ -418,7 +416,7 @@ async def without_servos(arm):
 
 class HsesMover(Mover):
     name = "hses"
-    robot: ClassVar[dict] = {**hses_site.HSES, "options": replace(hses_site.MOTION, rate_hz=RATE_HZ)}
+    robot: ClassVar[dict] = hses_site.HSES
     ports = ("stop",)
     datagrams = True
     local_stops = NOT_NOW
@@ -542,7 +540,7 @@ async def refused(arm):
 
 class RmiMover(Mover):
     name = "rmi"
-    robot: ClassVar[dict] = {**fanuc_site.FANUC, "options": replace(fanuc_site.MOVES, rate_hz=RATE_HZ)}
+    robot: ClassVar[dict] = {**fanuc_site.FANUC, "options": fanuc_site.MOVES}
     ports = ("rmi", "rmi_session")
     stops = local_stops = OURS
     dies_with_link = False

@@ -241,7 +241,7 @@ def test_a_tool_changed_by_others_leaves_motions_unchecked_and_ends_one(mesh, tm
 def test_an_override_of_others_slows_the_motion_only(mesh, tmp_path, monkeypatch, mover):
     async def main():
         async with mover.started(mesh, tmp_path, monkeypatch) as arm:
-            target = await arm.begin(0.3)
+            target = await arm.begin(0.15)
             await arm.slow_down()
             async with kept_control(arm.site):
                 await until(lambda: near(arm.positions(), target))
