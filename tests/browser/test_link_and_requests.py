@@ -23,7 +23,13 @@ pytestmark = pytest.mark.browser
 PT600 = "#/hall/pt600"
 
 
-def test_how_the_link_does_is_told_in_figures(open_page):
+CAN = (
+    "reads · moves joints · jogs · holds · sets the speed · homes · stops any motion · "
+    "without the gateway: unknown"
+)
+
+
+def test_how_the_link_does_is_told_in_figures_and_what_its_driver_can_do_in_words(open_page):
     page = open_page(ARM, drawn=False)
     button(page, "Link").click()
     facts = region(page, "Link")
@@ -31,6 +37,7 @@ def test_how_the_link_does_is_told_in_figures(open_page):
     for name in ("Units received", "Malformed", "Lost"):
         expect(facts).to_contain_text(name)
     expect(facts).not_to_contain_text("Old clients")  # none may attach here
+    expect(facts).to_contain_text(CAN)
     assert serious(page) == []
 
 

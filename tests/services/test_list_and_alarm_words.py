@@ -52,6 +52,27 @@ def test_a_returned_site_is_not_gone():
     assert not gone_sites([schema.AlarmList(site="a", alarms=[gone(state=Alarm.RETURNED)])])
 
 
+def test_a_robots_row_has_what_its_driver_can_do(mesh):
+    state = schema.ControllerState(link=schema.ControllerState.UP)
+    can = state.capabilities
+    can.stops, can.absolute = schema.Capabilities.OURS, True
+    can.dies_with_link = schema.ControllerState.NO
+    can.recoveries.extend([schema.Recover.POWER_ON, schema.Recover.BRAKE_RELEASE])
+
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            gateway.declare_publisher("hall", "arm", "controller").put(state)
+            while (await listing._row(monitor, "hall", "arm"))["link"] != "up":
+                await asyncio.sleep(0.02)
+            return [await listing._row(monitor, "hall", name) for name in ("arm", "other")]
+
+    arm, other = run(main())
+    keys = ("stops", "commands", "absolute", "dies_with_link", "recoveries")
+    assert [arm[key] for key in keys] == ["ours", [], True, False, ["power_on", "brake_release"]]
+    assert [other[key] for key in keys] == [None, [], None, None, []]
+    assert "a motion goes on without the gateway" in listing_text._state(arm)
+
+
 def test_the_error_for_an_unknown_robot_names_gone_sites(mesh):
     async def main():
         async with open_session(mesh) as watch, open_session(mesh) as monitor:

@@ -22,6 +22,8 @@ from services.command_line.live.monitor_text import replay_record
 
 _State = schema.ControllerState
 _Stops, _Command = schema.Capabilities.Stops, schema.CommandRequest.Command
+_Recovery = schema.Recover.Recovery
+_KNOWN = {_State.YES: True, _State.NO: False}
 _Alarm = schema.Alarm
 # Requests per process, of which the quickest counts; requests in parallel; timeout.
 _CLOCKS, _CLOCKS_AT_ONCE, _CLOCK_S = 3, 8, 0.7
@@ -181,13 +183,23 @@ async def _row(session: Session, site: str, robot: str) -> dict[str, Any]:
         "read_only": state.read_only,
         "joints_unproven": state.joints_unproven,
         "software": state.software,
-        "stops": _Stops.Name(state.capabilities.stops).lower() if state.HasField("capabilities") else None,
-        "commands": [_Command.Name(each) for each in state.capabilities.commands],
-        "slow_hz": state.capabilities.slow_hz if state.capabilities.HasField("slow_hz") else None,
+        **_capabilities(state.capabilities if state.HasField("capabilities") else None),
         "rate_hz": state.rate_hz if state.HasField("rate_hz") else None,
         "age_s": state.last_unit_age_s if state.HasField("last_unit_age_s") else None,
         "holder": lease.holder if isinstance(lease, schema.Lease) else "",
         "replay": None,
+    }
+
+
+def _capabilities(found: schema.Capabilities | None) -> dict[str, Any]:
+    """Return what the driver can do with its controller; None: not reported."""
+    return {
+        "stops": None if found is None else _Stops.Name(found.stops).lower(),
+        "commands": [] if found is None else [_Command.Name(each) for each in found.commands],
+        "absolute": None if found is None else found.absolute,
+        "dies_with_link": None if found is None else _KNOWN.get(found.dies_with_link),
+        "slow_hz": found.slow_hz if found is not None and found.HasField("slow_hz") else None,
+        "recoveries": [] if found is None else [_Recovery.Name(each).lower() for each in found.recoveries],
     }
 
 
@@ -203,9 +215,7 @@ def _row_without_gateway(site: str, robot: str, link: str) -> dict[str, Any]:
         "read_only": False,
         "joints_unproven": False,
         "software": "",
-        "stops": None,
-        "commands": [],
-        "slow_hz": None,
+        **_capabilities(None),
         "rate_hz": None,
         "age_s": None,
         "holder": "",

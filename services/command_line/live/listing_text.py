@@ -168,4 +168,6 @@ def _state(row: dict[str, Any]) -> str:
         words.append("a stop cannot be sent now")
     elif row["stops"] == "ours":
         words.append("a stop ends our motions only")
+    if row["dies_with_link"] is False:
+        words.append("a motion goes on without the gateway")
     return ", ".join(words)

@@ -1,16 +1,55 @@
 // Facts about the link to the controller, attached legacy clients, and the end of the audit log.
 
 import type { ControllerState } from "../../gen/robomesh_pb";
+import { ControllerState_Known as Known, Capabilities_Stops as Stops } from "../../gen/robomesh_pb";
 import { count, fixed } from "../../i18n/format";
 import type { TextName } from "../../i18n/texts";
 import { t } from "../../i18n/texts";
+import { Command } from "../../mesh/command";
 import type { Latest } from "../../mesh/topics";
 import { ageOf, isStale } from "../../mesh/topics";
+import { recoveryNames } from "../../panels/control/recover";
 import { Unit } from "../../ui/unit";
 
 const HASH_SHOWN = 4; // bytes of the log's last hash: enough to compare by eye
 
 type Fact = [name: TextName, value: string, unit?: string];
+
+const STOPS: Partial<Record<Stops, TextName>> = {
+  [Stops.ANY]: "can_stop_any",
+  [Stops.OURS]: "can_stop_ours",
+  [Stops.NOT_NOW]: "can_stop_not_now",
+};
+const WITHOUT_GATEWAY: Partial<Record<Known, TextName>> = {
+  [Known.YES]: "dies_with_link",
+  [Known.NO]: "lives_without_link",
+};
+const COMMANDS: [Command, TextName][] = [
+  [Command.MOVE_ABSOLUTE, "can_move"],
+  [Command.JOG, "can_jog"],
+  [Command.HOLD, "can_hold"],
+  [Command.SPEED, "can_speed"],
+  [Command.HOME, "can_home"],
+];
+
+/** Return what the driver can do with its controller, in words; empty: an older gateway does not report it. */
+function capabilitiesText(state: ControllerState): string {
+  const { capabilities } = state;
+  if (!capabilities) return "";
+  const { commands, stops, absolute, diesWithLink } = capabilities;
+  const moves = commands.includes(Command.MOVE_ABSOLUTE);
+  const words: TextName[] = [moves ? "can_read" : "can_only_read"];
+  words.push(...COMMANDS.filter(([command]) => commands.includes(command)).map(([, name]) => name));
+  const stop = STOPS[stops];
+  if (stop) words.push(stop);
+  if (absolute) words.push("can_absolute");
+  if (moves) {
+    words.push(WITHOUT_GATEWAY[diesWithLink] ?? "without_gateway_unknown");
+  }
+  const recoveries = recoveryNames(state);
+  const recovers = recoveries.length ? [t("can_recover", { names: recoveries.join(" / ") })] : [];
+  return [...words.map((name) => t(name)), ...recovers].join(" · ");
+}
 
 /** Known facts only: legacy controllers report few. */
 export function LinkFacts({ controller }: { controller: Latest<ControllerState> | undefined }) {
@@ -45,8 +84,15 @@ export function LinkFacts({ controller }: { controller: Latest<ControllerState> 
     facts.push(["audit_entries", count(auditHead.number)], ["audit_head", `${hash}…`]);
   }
   const stale = isStale("controller", ageOf(controller));
+  const capabilities = capabilitiesText(state);
   return (
     <dl class={`facts-list ${stale ? "stale" : ""}`} tabIndex={0} aria-label={t("link")}>
+      {capabilities && (
+        <div class="whole">
+          <dt>{t("can")}</dt>
+          <dd>{capabilities}</dd>
+        </div>
+      )}
       {facts.map(([name, value, unit]) => (
         <div key={name}>
           <dt>{t(name)}</dt>

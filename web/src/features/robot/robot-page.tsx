@@ -194,9 +194,8 @@ function Headline(props: {
     facts.push(t(message.homed === Known.YES ? "homed" : message.homed === Known.NO ? "not_homed" : "homed_unknown"));
     const check = CHECKS[message.check];
     if (check) facts.push(t(check));
-    const dies = message.capabilities?.diesWithLink;
-    if (dies === Known.YES || dies === Known.NO)
-      facts.push(t(dies === Known.YES ? "dies_with_link" : "lives_without_link"));
+    // The others are in the Link panel: this line is cut short.
+    if (message.capabilities?.diesWithLink === Known.NO) facts.push(t("lives_without_link"));
     if (message.readOnly) facts.push(t("read_only"));
     if (message.legacyClients?.attached) facts.push(t("legacy_some", { count: message.legacyClients.attached }));
   }

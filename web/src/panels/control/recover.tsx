@@ -27,6 +27,12 @@ const named = (recovery: Recovery): recovery is Named => recovery in NAMES;
 /** Return the recoveries that the robot's site file allows. */
 const allowed = (state: ControllerState | undefined): Named[] => (state?.capabilities?.recoveries ?? []).filter(named);
 
+/** Return the names of what can be sent to bring the controller back. */
+export const recoveryNames = (state: ControllerState): string[] =>
+  allowed(state)
+    .filter((recovery) => recovery !== Recovery.CONFIRM_TOOL)
+    .map((recovery) => t(NAMES[recovery]));
+
 /** The button, if the site file allows a recovery. */
 export function RecoverButton(props: { state: ControllerState | undefined; mine: boolean; open: () => void }) {
   const { state, mine } = props;
