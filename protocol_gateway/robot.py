@@ -432,7 +432,9 @@ class Robot:
     def _on_controller_status(self) -> None:
         before, self._read_only = (
             self._read_only,
-            self._proofs.read_only(self._telemetry.software) or self._telemetry.undeclared_axes,
+            self._proofs.read_only(self._telemetry.software)
+            or self._telemetry.undeclared_axes
+            or self._telemetry.motion_impossible,
         )
         if self._read_only != before:
             self._report_read_only()

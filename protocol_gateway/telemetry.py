@@ -13,6 +13,7 @@ from protocol_gateway.drivers.driver import (
     JointsReceived,
     MalformedReceived,
     Mode,
+    MotionImpossible,
     RecoverAnswered,
     Refused,
     Severity,
@@ -77,6 +78,7 @@ class Telemetry:
         controller_time_s: Time on the controller's own clock; None: it reports none.
         software: Version of the controller's software; empty: not reported since the link came up.
         undeclared_axes: Reason why its axes are more than the joints of the model; None: they are not.
+        motion_impossible: Reason why its driver cannot move the arm; None: it can, or it only reads.
 
     Args:
         stop_expected: Returns whether the gateway's own stop is the reason of a stopped arm at a time.
@@ -125,6 +127,7 @@ class Telemetry:
         self.controller_time_s: float | None = None
         self.software = ""
         self.undeclared_axes: Reason | None = None
+        self.motion_impossible: Reason | None = None
         self.motion_detector.forget()
         self._signals.forget()
 
@@ -222,6 +225,9 @@ class Telemetry:
                 self._on_software(one_line(version, LONGEST_TEXT))
             case AxesUndeclared(why):
                 self.undeclared_axes = why
+                self._on_status()
+            case MotionImpossible(why):
+                self.motion_impossible = why
                 self._on_status()
             case Refused(number, text):
                 self._on_refused(number, text)

@@ -250,6 +250,19 @@ class AxesUndeclared:
     why: Reason | None
 
 
+@dataclass(frozen=True, slots=True)
+class MotionImpossible:
+    """The driver cannot move the arm with this controller, for example because of its software's version.
+
+    Meanwhile the robot is read-only.
+
+    Attributes:
+        why: The reason; None: it can.
+    """
+
+    why: Reason | None
+
+
 ControllerEvent: TypeAlias = (
     JointsReceived
     | StatusReceived
@@ -260,6 +273,7 @@ ControllerEvent: TypeAlias = (
     | SignalsReceived
     | SoftwareReceived
     | AxesUndeclared
+    | MotionImpossible
     | RecoverAnswered
 )
 

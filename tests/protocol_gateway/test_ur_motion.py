@@ -132,9 +132,15 @@ def test_other_software_is_refused(mesh, tmp_path, monkeypatch, version):
             movable(mesh, tmp_path, ports, accept_unknown=frozenset({"mode"})) as site,
         ):
             await until(lambda: site.joints)
-            await until(lambda: site.controller.capabilities.stops != site.controller.capabilities.NOT_NOW)
-            await site.lease(A.ACQUIRE, ttl_s=5)
-            assert "PolyScope 5.6" in await refusal(move(site, 0.1))
+            await until(lambda: site.controller.read_only)
+            can = site.controller.capabilities
+            assert (can.stops, [*can.commands], [*can.recoveries]) == (can.NONE, [], [])
+            assert "PolyScope 5.6" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
+            # The dashboard is given back, and a connection for inputs is not opened.
+            await until(lambda: not server._dashboards)
+            await site.units(50)
+            assert (len(server.rtde_clients), len(server._dashboards)) == (1, 0)
+            assert not server.controller.registers.inputs
             assert not runs(server)
 
     run(main())

@@ -14,6 +14,7 @@ from protocol_gateway.drivers.driver import (
     Home,
     JointsReceived,
     Mode,
+    MotionImpossible,
     MoveAbsolute,
     MoveRelative,
     Open,
@@ -665,3 +666,31 @@ def test_nothing_is_recovered_by_itself():
         arm.wait(1.0)
         assert set(bytes(arm.sent["dashboard"]).splitlines()) <= {b"is in remote control", b"stop"}
         assert not arm.sent["scripts"]
+
+
+def test_seats_are_taken_only_from_a_controller_whose_version_allows_motion():
+    arm = Arm()
+
+    def reconnected(version):
+        """Return the channels that are opened and closed for a version, and the reason against motion."""
+        arm.effects = []
+        arm.sent["rtde"].clear()
+        arm._do(arm.driver.closed(RTDE, arm.now_s))
+        arm._do(arm.driver.opened(RTDE, arm.now_s))
+        arm.greet(version)
+        (report,) = [
+            each.events[0]
+            for each in flat(arm.effects, Report)
+            if each.events and isinstance(each.events[0], MotionImpossible)
+        ]
+        changes = [each.channel.name for kind in (Open, Close) for each in flat(arm.effects, kind)]
+        return changes, report.why and report.why.code
+
+    assert reconnected((5, 9, 0, 0)) == ([], None)
+    impossible = "universal_robots.software"
+    changes, why = reconnected((10, 7, 0, 0))
+    assert (sorted(changes), why) == (["dashboard", "inputs", "scripts"], impossible)
+    assert reconnected((3, 15, 0, 0)) == ([], impossible)
+    with pytest.raises(NotReadyError, match=r"PolyScope 5\.6"):
+        arm.command(Recover(Recovery.POWER_ON))
+    assert reconnected((5, 9, 0, 0)) == (["dashboard", "inputs"], None)

@@ -30,6 +30,7 @@ from protocol_gateway.drivers.driver import (
     Effects,
     FateUnknown,
     Mode,
+    MotionImpossible,
     MoveAbsolute,
     Open,
     Recovery,
@@ -60,6 +61,7 @@ from protocol_gateway.drivers.universal_robots.modes import (
     name_of,
 )
 from protocol_gateway.drivers.universal_robots.motion_script import Progress, Registers, motion_script
+from protocol_gateway.drivers.universal_robots.rtde_messages import ControllerVersion
 from protocol_gateway.drivers.universal_robots.rtde_reader import RtdeReader
 from protocol_gateway.drivers.universal_robots.settings import UniversalRobotsSettings
 from protocol_gateway.drivers.universal_robots.state import ControllerState
@@ -155,6 +157,8 @@ class RtdeMotionDriver(RtdeDriver):
         self._inputs = InputsWriter(self._registers.inputs)
         self._dashboard = Dashboard()
         self._opened: set[str] = set()
+        # Whether the controller's software allows motion; None: its version is not known yet.
+        self._possible: bool | None = None
         self._scripts_wanted = False
         self._reopen: list[Open] = []
         self._due = Timers("retry")
@@ -169,11 +173,11 @@ class RtdeMotionDriver(RtdeDriver):
     # ----------------------------------------------------------------- channels
 
     def started(self, now_s: float) -> Effects:
-        """Connect to all interfaces, but to that of scripts only in remote control."""
+        """Connect for reading, and to the dashboard, which can stop; the version decides on the others."""
         self._dashboard.opened()
         unanswered = self._recoveries()
         self._forget()
-        return self._due.with_timer((*unanswered, *super().started(now_s), _OPEN_DASHBOARD, _OPEN_INPUTS))
+        return self._due.with_timer((*unanswered, *super().started(now_s), _OPEN_DASHBOARD))
 
     def controlled(self, taken: bool, now_s: float) -> Effects:
         """Begin with a low speed."""
@@ -202,6 +206,26 @@ class RtdeMotionDriver(RtdeDriver):
         if channel is SCRIPTS:
             return ()
         return self._due.with_timer(super().received(channel, data, now_s))
+
+    def _states(self, data: bytes, now_s: float) -> Effects:
+        before, effects = self._reader.controller, super()._states(data, now_s)
+        version = self._reader.controller
+        return effects if version is None or version is before else (*effects, *self._on_version(version))
+
+    def _on_version(self, version: ControllerVersion) -> Effects:
+        """Take the interfaces for motion only from a controller with which motion is possible."""
+        before, self._possible = self._possible, _moves_with(version)
+        effects: list[Effect] = [Report([MotionImpossible(self._software_obstacle())], 0)]
+        if self._possible:
+            effects += [_OPEN_DASHBOARD] if before is False else []
+            return effects if before else [*effects, _OPEN_INPUTS]
+        self._reopen = []
+        for channel in (DASHBOARD, INPUTS):
+            if channel.name in self._opened:
+                self._opened.discard(channel.name)
+                effects += self._lost(channel)
+        channels = {None: (DASHBOARD,), True: (DASHBOARD, INPUTS), False: ()}[before]
+        return [*effects, *map(Close, channels)]
 
     def skipped(self, channel: Channel, now_s: float) -> Effects:
         """Connect again: the stream cannot be read from its middle."""
@@ -488,6 +512,8 @@ class RtdeMotionDriver(RtdeDriver):
     def _recovery_obstacle(self, recovery: Recovery, now_s: float) -> Reason | None:
         """Return why a recovery cannot be sent now; None: it can."""
         state = self._state
+        if (obstacle := self._software_obstacle()) is not None:
+            return obstacle
         if state is None or now_s - self._state_s > _STATE_VALID_S:
             return codes.UR_STATE_OLD()
         if self._motion is not None:
@@ -515,11 +541,16 @@ class RtdeMotionDriver(RtdeDriver):
             return codes.UR_STOP_YOUNG(seen=seen_s, seconds=UNLOCK_AFTER_S)
         return None
 
+    def _software_obstacle(self) -> Reason | None:
+        """Return why no motion is possible with the controller's software; None: it is, or it is unknown."""
+        version = self._reader.controller
+        return None if version is None or _moves_with(version) else codes.UR_SOFTWARE(version=version)
+
     def _obstacle(self, now_s: float) -> Reason | None:
         """Return why no motion can be sent now; None: it can."""
         state, version = self._state, self._reader.controller
-        if version is not None and not (version.major == 5 and version.minor >= 6):
-            return codes.UR_SOFTWARE(version=version)
+        if (obstacle := self._software_obstacle()) is not None:
+            return obstacle
         if state is None or version is None or now_s - self._state_s > _STATE_VALID_S:
             return codes.UR_STATE_OLD()
         if lacks := [name for name in self._registers.outputs if name not in state.registers]:
@@ -542,6 +573,10 @@ class RtdeMotionDriver(RtdeDriver):
             return codes.UR_CHANNEL_MISSING(name=INPUTS.name)
         missing = [each.name for each in (SCRIPTS, DASHBOARD) if each.name not in self._opened]
         return codes.UR_CHANNEL_MISSING(name=missing[0]) if missing else None
+
+
+def _moves_with(version: ControllerVersion) -> bool:
+    return version.major == 5 and version.minor >= 6
 
 
 def _fits(recovery: Recovery, state: ControllerState) -> bool:

@@ -148,6 +148,9 @@ export function whyNoMotion(state: ControllerState | undefined): string {
   if (!state) return "";
   if (state.readOnly) {
     const causes = state.linkReasons.flatMap((reason) => reason.causes);
+    // A controller's own obstacle; the others are about proofs.
+    const own = causes.find(({ code }) => /^(joints|universal_robots)\./.test(code));
+    if (own) return t("no_motion_reason", { text: reasonText(own, own.text) });
     return causes.some(({ code }) => code === READS_ONLY) ? t("reads_only_text") : t("read_only_text");
   }
   if (state.stop) return t("reset_needs");
