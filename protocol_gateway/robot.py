@@ -40,6 +40,7 @@ from protocol_gateway.settings import RobotSettings
 from protocol_gateway.signals import Signals
 from protocol_gateway.state_messages import controller_state, lease_state, timestamp
 from protocol_gateway.telemetry import Telemetry
+from protocol_gateway.watchdog import SLOW_STALE_S, STALE_S
 from robomesh import reason_codes as codes
 from robomesh.keys import presence_key
 from robomesh.publisher import LIST_LENGTH, Publisher
@@ -138,6 +139,7 @@ class Robot:
             signals=self._signals,
             journal=self._journal,
             stale_after_s=settings.stale_after_s,
+            status_stale_s=STALE_S if driver.capabilities.slow_hz is None else SLOW_STALE_S,
             on_status=self._on_controller_status,
             on_activity=self._on_activity,
             on_refused=self._on_refused,

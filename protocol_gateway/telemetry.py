@@ -94,6 +94,7 @@ class Telemetry:
         signals: Signals,
         journal: Journal,
         stale_after_s: float,
+        status_stale_s: float = STALE_S,
         on_status: Callable[[], None],
         on_activity: Callable[[Activity | None, float], None],
         on_refused: Callable[[], None],
@@ -109,7 +110,7 @@ class Telemetry:
         self._on_activity = on_activity
         self._on_refusal = on_refused
         self._stop_expected = stop_expected
-        self._stale_after_s = stale_after_s
+        self._stale_after_s, self._status_stale_s = stale_after_s, status_stale_s
         self._next_slow_s = 0.0
         self.motion_detector = MotionDetector(joints.types)
         self._reported_software = ""
@@ -118,7 +119,7 @@ class Telemetry:
     def forget(self) -> None:
         """Drop all values after the link was lost: another controller may answer next."""
         self._status = StatusReceived()
-        self._status_watchdog = Watchdog()
+        self._status_watchdog = Watchdog(self._status_stale_s)
         self._activity_since_s = 0.0
         self._positions: tuple[tuple[float, ...], float] | None = None  # with their time
         self._fault = ""
@@ -180,7 +181,9 @@ class Telemetry:
             self._journal.report(_S.INFO, "joints.back", "joint positions are received again")
         news = self._status_notice.update(now_s, holds=status)
         if news is True:
-            text = f"the controller has sent no status for {STALE_S:g} s: its status is unknown now"
+            text = (
+                f"the controller has sent no status for {self._status_stale_s:g} s: its status is unknown now"
+            )
             self._journal.report(_S.WARNING, "status.gone", text)
         elif news is False:
             self._journal.report(_S.INFO, "status.back", "the controller sends its status again")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from protocol_gateway.watchdog import Watchdog
+from protocol_gateway.watchdog import SLOW_STALE_S, Watchdog
 
 
 def seen(*reports):
@@ -34,3 +34,11 @@ def test_it_expires_after_three_seconds_and_recovers_immediately():
     assert watchdog.expired(6.0)
     watchdog.reset("idle", 6.1)
     assert not watchdog.expired(6.2)
+
+
+def test_status_that_is_read_slowly_has_longer():
+    watchdog = Watchdog(SLOW_STALE_S)
+    for time_s in (0, 2, 5, 9, 13):
+        watchdog.reset("idle", time_s)
+    assert not watchdog.expired(18.9)
+    assert watchdog.expired(19.0)

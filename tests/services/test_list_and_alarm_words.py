@@ -129,3 +129,8 @@ def test_an_alarms_name_is_not_wrapped_and_its_text_uses_the_full_width(monkeypa
     assert lines[0].endswith("gateway · service.silent")
     assert [line.strip() for line in lines[-2:]] == ["3 times, by li", "Look at it."]
     assert len(lines) == 6
+
+
+def test_a_slow_robot_is_marked_in_the_list():
+    row = listing._row_without_gateway("hall", "arm", "up") | {"state": "idle", "slow_hz": 0.5}
+    assert listing_text._state(row) == "idle, slow, joints at 0.5 Hz"

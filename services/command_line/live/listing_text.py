@@ -159,7 +159,7 @@ def _state(row: dict[str, Any]) -> str:
     if row["stop_id"] is not None:
         words.append(f"stop {row['stop_id']} latched")
     if row["slow_hz"] is not None:
-        words.append(f"slow, {row['slow_hz']:g} positions/s")
+        words.append(f"slow, joints at {row['slow_hz']:g} Hz")
     if row["joints_unproven"]:
         words.append("joints unproven")
     if row["read_only"]:

@@ -191,7 +191,7 @@ class _Newest:
         if state is not None:
             head.append(f"   link {_word(_State.Link, state.link)}")
             if state.capabilities.HasField("slow_hz"):
-                head.append(f"   slow, {state.capabilities.slow_hz:g} positions/s", style="yellow")
+                head.append(f"   slow, joints at {state.capabilities.slow_hz:g} Hz", style="yellow")
             head.append(
                 f"   {activity_words(state)}   mode {_word(_State.Mode, state.mode)}"
                 f"   homed {_word(_State.Known, state.homed)}",

@@ -81,10 +81,10 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
           {stale ? (
             <span class="age">{staleText(unitAge)}</span>
           ) : (
-            <>
+            <span class="tile-tags">
               <SlowTag state={controller?.message} />
               {description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
-            </>
+            </span>
           )}
         </div>
         <div class="tile-line dim">
