@@ -25,7 +25,7 @@ FIRST_PERCENT = 25.0
 def encode_words(
     commands: Sequence[ControllerCommand], joints: int, recoveries: Collection[Recovery] = ()
 ) -> bytes:
-    """Encode commands for `words_of`; at most one motion, as the last one.
+    """Encode commands for `words_of`; at most one motion, as the last one; a stop or a recovery alone.
 
     Args:
         joints: Number of the robot's joints.
@@ -37,6 +37,9 @@ def encode_words(
     words: list[tuple[str, object]] = []
     for place, command in enumerate(commands):
         match command:
+            case Stop() | Recover() if len(commands) > 1:
+                # What follows may be refused, and nothing would be sent.
+                raise CommandError(f"{type(command).__name__} is sent alone, without other commands")
             case MoveAbsolute(positions):
                 if len(positions) != joints:
                     raise CommandError(codes.COMMAND_VALUES(count=len(positions), joints=joints))

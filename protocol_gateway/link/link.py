@@ -265,9 +265,9 @@ class ControllerLink:
 
     # --------------------------------------------------------- effects of the driver
 
-    def _tell(self, effects: Effects) -> None:
-        """Perform what the driver returns when something happened."""
-        now = self._now()
+    def _tell(self, effects: Effects, now: Received | None = None) -> None:
+        """Perform what the driver returns when something happened, now unless a time is given."""
+        now = now or self._now()
         # The end of a motion that the driver gives up is always sent.
         gives_up = any(isinstance(effect, FateUnknown) for effect in effects)
         for effect in effects:
@@ -434,8 +434,7 @@ class ControllerLink:
         self._counts["bytes_received"] += len(data)
         if self._is_deluge(kept, len(data), now.monotonic_s):
             return
-        for effect in self._driver.received(kept.channel, data, now.monotonic_s):
-            self._perform(effect, now)
+        self._tell(self._driver.received(kept.channel, data, now.monotonic_s), now)
 
     def _report(self, report: Report, now: Received) -> None:
         events, units = report.events, report.units

@@ -97,22 +97,31 @@ def _primary(data: bytes, pieces: Sequence[bytes], counts: Counter[str]) -> str:
 def strict_states(data: bytes) -> list[tuple[float, tuple[float, ...], int]]:
     """Return the states of a stream after the handshake, up to an impossible length or an end of the data."""
     states = []
-    at = 0
-    while len(data) - at >= 3:
-        size = data[at] * 256 + data[at + 1]
-        if size < 3 or size > LONGEST or at + size > len(data):
-            break
-        body = data[at + 3 : at + size]
+    for kind, body in strict_packages(data)[0]:
         # A pause that was not requested ends the use of the connection.
-        if data[at + 2] == ord("P") and body in (b"\0", b"\1"):
+        if kind == ord("P") and body in (b"\0", b"\1"):
             break
-        if data[at + 2] == ord("U") and len(body) == 1 + 8 * 7 + 4 + 8 and body[0] == 1:
+        if kind == ord("U") and len(body) == 1 + 8 * 7 + 4 + 8 and body[0] == 1:
             numbers = [struct.unpack(">d", body[1 + 8 * i : 9 + 8 * i])[0] for i in range(7)]
             mode = int.from_bytes(body[57:61], "big", signed=True)
             if all(number - number == 0 for number in numbers):
                 states.append((numbers[0], tuple(numbers[1:]), mode))
-        at += size
     return states
+
+
+def strict_packages(data: bytes) -> tuple[list[tuple[int, bytes]], bytes | None]:
+    """Return letter and body of RTDE's packages, and the rest; None: a length is impossible."""
+    packages = []
+    at = 0
+    while len(data) - at >= 3:
+        size = data[at] * 256 + data[at + 1]
+        if size < 3 or size > LONGEST:
+            return packages, None
+        if at + size > len(data):
+            break
+        packages.append((data[at + 2], data[at + 3 : at + size]))
+        at += size
+    return packages, data[at:]
 
 
 def strict_alarms(data: bytes) -> list[tuple[int, int, int]]:
@@ -138,7 +147,7 @@ def strict_alarms(data: bytes) -> list[tuple[int, int, int]]:
 # -------------------------------------------------------------------------------- inputs
 
 
-def _rtde_package(letter: bytes, payload: bytes = b"") -> bytes:
+def rtde_package(letter: bytes, payload: bytes = b"") -> bytes:
     return struct.pack(">H", 3 + len(payload)) + letter + payload
 
 
@@ -150,25 +159,25 @@ def _message(kind: int, payload: bytes) -> bytes:
     return _primary_package(20, struct.pack(">QbB", 25_643_784_000, -2, kind) + payload)
 
 
-DATA = _rtde_package(b"U", b"\1" + struct.pack(">7did", 12.5, 0.1, -1.5, 1.2, -0.4, 1.57, 3.0, 7, 1.2))
-VERSION = _rtde_package(b"v", struct.pack(">4I", 5, 21, 0, 0))
+DATA = rtde_package(b"U", b"\1" + struct.pack(">7did", 12.5, 0.1, -1.5, 1.2, -0.4, 1.57, 3.0, 7, 1.2))
+VERSION = rtde_package(b"v", struct.pack(">4I", 5, 21, 0, 0))
 HANDSHAKE = b"".join(
     (
-        _rtde_package(b"V", b"\1"),
+        rtde_package(b"V", b"\1"),
         VERSION,
-        _rtde_package(b"O", b"\1" + ",".join(FIELDS.values()).encode()),
-        _rtde_package(b"S", b"\1"),
+        rtde_package(b"O", b"\1" + ",".join(FIELDS.values()).encode()),
+        rtde_package(b"S", b"\1"),
     )
 )
 RTDE = (
     *(DATA,) * 6,
-    _rtde_package(b"V", b"\1"),
+    rtde_package(b"V", b"\1"),
     VERSION,
-    _rtde_package(b"O", b"\1" + ",".join(OUTPUTS.values()).encode()),
-    _rtde_package(b"I", b"\1UINT32,IN_USE,NOT_FOUND"),
-    _rtde_package(b"S", b"\1"),
-    _rtde_package(b"P", b"\1"),
-    _rtde_package(b"M", b"\x05hello\x04RTDE\x02"),
+    rtde_package(b"O", b"\1" + ",".join(OUTPUTS.values()).encode()),
+    rtde_package(b"I", b"\1UINT32,IN_USE,NOT_FOUND"),
+    rtde_package(b"S", b"\1"),
+    rtde_package(b"P", b"\1"),
+    rtde_package(b"M", b"\x05hello\x04RTDE\x02"),
 )
 PRIMARY = (
     *(_message(6, struct.pack(">iiiII", 153, 3, 3, 0, 7) + b"too hot"),) * 4,

@@ -126,11 +126,13 @@ class Bench:
             self.perform(self.driver.timer_ended(self.now_s))
             return self.next_bytes(chance)
         number, command = self._question[11], self._question[24]
-        right = [_answer(number, READS[command], data) for data in DATA[command]]
+        right = [answer_datagram(number, READS[command], data) for data in DATA[command]]
         if command == 0x74:
-            return _answer(number, 1, b"", status=0x28)
+            return answer_datagram(number, 1, b"", status=0x28)
         if kind < 0.1:
-            return _answer(number, READS[command], b"", status=0x1F, added=chance.choice((*BUSY, 0xB008)))
+            return answer_datagram(
+                number, READS[command], b"", status=0x1F, added=chance.choice((*BUSY, 0xB008))
+            )
         return changed(chance.choice(right), right, TOKENS, chance)
 
     def receive(self, data: bytes) -> str:
@@ -212,7 +214,7 @@ def strict_place(data: bytes) -> list[float] | None:
 # -------------------------------------------------------------------------------- inputs
 
 
-def _answer(number: int, service: int, data: bytes, *, status: int = 0, added: int = 0) -> bytes:
+def answer_datagram(number: int, service: int, data: bytes, *, status: int = 0, added: int = 0) -> bytes:
     head = struct.pack("<4sHHBBBBI8s", b"YERC", 32, len(data), 3, 1, 1, number, 1 << 31, b"99999999")
     return head + struct.pack("<BBBxHH", service + 0x80, status, bool(added), added, 0) + data
 

@@ -7,7 +7,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple, NoReturn, Protocol
+from typing import Any, NamedTuple, NoReturn, Protocol
 
 WARM_UP = 20_000
 
@@ -17,6 +17,10 @@ class Finding(NamedTuple):
 
     data: bytes
     problem: str
+
+
+class Wrong(Exception):
+    """A driver did what a strict reading forbids."""
 
 
 def options(doc: str, *, inputs: int, seconds: float) -> argparse.ArgumentParser:
@@ -118,6 +122,35 @@ def answers(
         if problem or bench.problem:
             return done, Finding(data, problem or bench.problem)
     return inputs, None
+
+
+def step(
+    bench: Callable[[random.Random], Any], inputs: int, seed: int, *, new_each: int
+) -> tuple[int, Finding | None]:
+    """Give inputs to benches; return how many were read, and the first that was handled wrongly.
+
+    Args:
+        bench: Creates a bench: `next_input` returns channel and bytes, `receive` raises `Wrong`.
+        new_each: Inputs after which a new bench begins.
+    """
+    chance = random.Random(seed)
+    for done in range(inputs):
+        if done % new_each == 0:
+            steps = bench(chance)
+        data = b""
+        try:
+            channel, data = steps.next_input()
+            steps.receive(channel, data)
+        except Wrong as problem:
+            return done, Finding(data, str(problem))
+        except Exception as error:
+            return done, Finding(data, repr(error))
+    return inputs, None
+
+
+def near(here: Sequence[float], there: Sequence[float], within: float) -> bool:
+    """Return whether all numbers are near the others."""
+    return all(abs(a - b) <= within for a, b in zip(here, there, strict=True))
 
 
 def changed(message: bytes, others: Sequence[bytes], tokens: Sequence[bytes], chance: random.Random) -> bytes:

@@ -260,6 +260,22 @@ def test_a_driver_refuses_a_command_and_reports_an_unknown_fate():
     run(main())
 
 
+def test_what_ends_a_motion_is_sent_however_many_questions_were_sent():
+    async def main():
+        async with controller() as reads:
+            effects = (Send(READ, b"end"), FateUnknown(codes.UR_PAUSED()))
+            driver = Driver(started=(Open(READ),), received=effects)
+            driver.requests_a_second = 0.0
+            async with link(driver, reads.port) as (_, seen):
+                reader, writer = await reads.next()
+                writer.write(b"state")
+                assert await reader.readexactly(3) == b"end"
+                assert len(seen.fates) == 1
+                await end(writer)
+
+    run(main())
+
+
 def test_a_driver_moves_a_channel_to_another_port():
     async def main():
         async with controller() as first, controller() as second:

@@ -16,6 +16,7 @@ from protocol_gateway.drivers.driver import (
     Mode,
     MoveAbsolute,
     Open,
+    Reset,
     Send,
     Speed,
     StatusReceived,
@@ -143,6 +144,22 @@ def test_a_stop_of_a_motion_that_has_not_begun_is_proven_by_rest_after_it():
     assert activity(driver, 1.9, (*HERE[:5], 0.7)) is Activity.MOVING
     assert activity(driver, 2.3, (*HERE[:5], 0.7)) is Activity.MOVING
     assert activity(driver, 2.5, (*HERE[:5], 0.7)) is Activity.IDLE
+
+
+@pytest.mark.parametrize("resets", [(), (Reset(),), (Reset(), MoveAbsolute(HERE))])
+def test_a_stop_that_was_not_delivered_is_sent_later_unless_a_reset_was_accepted(resets):
+    driver = ready()
+    driver.closed(SESSION, 1.0)
+    driver.command(driver.encode(Stop()), 1.1)
+    if len(resets) == 2:
+        with pytest.raises(NotReadyError):
+            driver.command(driver.encode(*resets), 1.2)
+    elif resets:
+        driver.command(driver.encode(*resets), 1.2)
+    driver.timer_ended(10.0)
+    driver.opened(RMI, 10.1)
+    driver.received(RMI, CONNECTED, 10.2)
+    assert sent(driver.opened(SESSION, 10.3)) == ([] if len(resets) == 1 else [rmi.abort()])
 
 
 @pytest.mark.parametrize(

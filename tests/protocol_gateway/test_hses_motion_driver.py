@@ -4,10 +4,21 @@ import struct
 
 import pytest
 
-from protocol_gateway.drivers.driver import Send, Stop
+from protocol_gateway.drivers.driver import (
+    Activity,
+    MoveAbsolute,
+    Report,
+    Reset,
+    Send,
+    SetTimer,
+    StatusReceived,
+    Stop,
+)
 from protocol_gateway.drivers.yaskawa.motion_driver import HSES, STOP, HsesMotionDriver
+from protocol_gateway.drivers.yaskawa.motion_driver import MOTION as MOTIONS
+from protocol_gateway.errors import CommandError, NotReadyError
 from robots.joints import JointType
-from tests.protocol_gateway.hses_site import HOLD, MOTION, command
+from tests.protocol_gateway.hses_site import HOLD, MOTION, MOVE, command
 
 
 def answer(question, data):
@@ -62,3 +73,119 @@ def test_hold_is_repeated_to_the_controller_whose_stop_it_was_only(later, again)
         stepped.driver.closed(channel, stepped.now_s)
     stepped.connect(later)
     assert (stepped.holds() > 0) is again
+
+
+class Answered(Stepped):
+    """A driver whose questions a controller answers; the test changes what it answers."""
+
+    def __init__(self, **given):
+        super().__init__()
+        self.first, self.second, self.pulses, self.tool = 0x84, 0x40, [0] * 8, 0
+        self.names = b"".join(bytes((each, 0, 0, 0)) for each in b"SLURBT\0\0")
+        for name, value in given.items():
+            setattr(self, name, value)
+        self.timer_s, self.events, self.written = None, [], []
+        for channel in (HSES, STOP, MOTIONS):
+            self.do(self.driver.opened(channel, self.now_s))
+        self.run(2.0)
+
+    def do(self, effects):
+        for effect in effects:
+            if isinstance(effect, SetTimer):
+                self.timer_s = effect.at_s
+            if isinstance(effect, Report):
+                self.events += effect.events
+            if isinstance(effect, Send) and effect.data[29] not in (1, 0x0E):
+                self.written.append((effect.channel, command(effect.data)))
+            elif isinstance(effect, Send):
+                data = answer(effect.data, self.data(effect.data))
+                self.do(self.driver.received(effect.channel, data, self.now_s))
+
+    def data(self, question):
+        """Return what answers a question; empty: nothing of use."""
+        match command(question), question[26]:
+            case 0x72, 1:
+                return struct.pack("<2I", self.first, self.second)
+            case 0x75, 1 if self.pulses is not None:
+                return struct.pack("<5I8i", 0, 0, self.tool, 0, 0, *self.pulses)
+            case 0x74, 1:
+                return self.names
+            case 0x74, 11:
+                return bytes(32)
+            case 0x89, 11:
+                return software("A")
+        return b""
+
+    def run(self, seconds):
+        """Let time pass."""
+        end_s = self.now_s + seconds
+        while self.timer_s is not None and self.timer_s <= end_s:
+            self.now_s, self.timer_s = max(self.now_s, self.timer_s) + 1e-6, None
+            self.do(self.driver.timer_ended(self.now_s))
+        self.now_s = end_s
+
+    def command(self, *commands):
+        self.do(self.driver.command(self.driver.encode(*commands), self.now_s))
+
+    def activities(self, seconds):
+        self.events = []
+        self.run(seconds)
+        return {each.activity for each in self.events if isinstance(each, StatusReceived)}
+
+
+NEAR = MoveAbsolute((0.1, 0.0, 0.0, 0.0, 0.0, 0.0))
+
+
+def test_a_motion_that_is_refused_leaves_hold_as_it_was():
+    stepped = Answered()
+    stepped.command(Stop())
+    stepped.second |= 8
+    stepped.run(0.5)
+    with pytest.raises(NotReadyError):
+        stepped.command(Reset(), NEAR)
+    # HOLD is lost, so it is sent again.
+    stepped.second &= ~8
+    stepped.written.clear()
+    stepped.run(1.0)
+    assert (STOP, HOLD) in stepped.written
+    # Nothing is on HOLD now, and the driver wants none any longer: both can be done.
+    stepped.command(Reset(), NEAR)
+    assert stepped.written[-1] == (MOTIONS, MOVE)
+
+
+def test_a_stop_is_sent_alone():
+    with pytest.raises(CommandError, match="alone"):
+        Answered().driver.encode(Stop(), NEAR)
+
+
+@pytest.mark.parametrize("lost", [None, 0.06, 0.11, 0.16, 0.21])
+def test_rest_after_a_stop_is_shown_only_by_positions_since_then(lost):
+    stepped = Answered()
+    assert stepped.activities(1.0) == {Activity.IDLE}
+    stepped.command(NEAR)
+    stepped.command(Stop())
+    stepped.second |= 8
+    if lost is not None:
+        # One position, and none for half a second: the arm may move.
+        stepped.pulses = [5000] + [0] * 7
+        stepped.run(lost)
+        stepped.pulses = None
+        assert stepped.activities(2.0) == {Activity.MOVING}
+        stepped.pulses = [9000] + [0] * 7
+    assert stepped.activities(0.45) == {Activity.MOVING}
+    stepped.run(0.5)
+    assert stepped.activities(0.5) == {Activity.HOLDING}
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ({"names": b"".join(bytes((each, 0, 0, 0)) for each in b"SLURBT\x01\0")}, r"axis \?"),
+        ({"tool": 2**31}, "tool 2147483648"),
+    ],
+)
+def test_a_motion_is_refused_if_it_could_move_more_than_is_known(given, text):
+    stepped = Answered(**given)
+    with pytest.raises(NotReadyError, match=text):
+        stepped.command(NEAR)
+    assert not stepped.written

@@ -457,6 +457,47 @@ def test_after_a_stop_the_arm_rests_only_when_every_joint_was_still():
     assert activity(actual_q=(0.09, 0, 0, 0, 0, 0)) is Activity.IDLE
 
 
+def test_rest_after_a_stop_is_shown_only_by_states_since_then():
+    arm = Arm()
+    arm.wait(1.0)
+    arm.command(MoveAbsolute(TARGET))
+    arm.command(Stop())
+    arm.now_s += 0.01
+    statuses = [event for report in flat(arm.state(), Report) for event in report.events]
+    assert flat(statuses, StatusReceived)[0].activity is Activity.MOVING
+    arm.wait(0.5)
+    arm.now_s += 0.01
+    statuses = [event for report in flat(arm.state(), Report) for event in report.events]
+    assert flat(statuses, StatusReceived)[0].activity is Activity.IDLE
+
+
+def test_a_question_precedes_the_stop_that_follows_from_the_same_timer():
+    """Its answer would be taken for that of the stop."""
+    arm = Arm()
+    arm.command(MoveAbsolute(TARGET))
+    effects = arm.wait(0.52)
+    (fate,) = flat(effects, FateUnknown)
+    question = Send(DASHBOARD, b"is in remote control\n")
+    assert effects.index(question) < effects.index(fate)
+
+
+@pytest.mark.parametrize("line", [b"\xa0true\n", b"true\x85\n", b"\x1ctrue\n"])
+def test_an_answer_next_to_other_bytes_is_none(line):
+    arm = Arm()
+    arm.wait(0.52)
+    arm.receive(DASHBOARD, line)
+    arm.state()
+    with pytest.raises(NotReadyError) as error:
+        arm.command(MoveAbsolute(TARGET))
+    assert error.value.reason.code == "controller.mode_unknown"
+
+
+@pytest.mark.parametrize("first", [Stop(), Recover(Recovery.CLOSE_SAFETY_POPUP)])
+def test_a_stop_and_a_recovery_are_sent_alone(first):
+    with pytest.raises(CommandError, match="alone"):
+        Arm().driver.encode(first, MoveAbsolute(TARGET))
+
+
 def test_a_refused_stop_is_an_alarm_only_while_a_program_runs():
     arm = Arm()
     arm.command(Stop())
@@ -625,6 +666,13 @@ def test_a_refused_recovery_is_reported_with_the_controller_s_words():
     (answer,) = answers(effects)
     assert (answer.accepted, answer.answer[:13]) == (False, "Cannot unlock")
     assert arm.command(Recover(UNLOCK))
+
+
+def test_an_answer_with_other_bytes_is_none_to_a_recovery():
+    arm = in_state(**FITTING[UNLOCK])
+    arm.command(Recover(UNLOCK))
+    (answer,) = answers(arm.receive(DASHBOARD, b"Protective\x00stop releasing\n"))
+    assert (answer.accepted, answer.answer) == (False, "Protective stop releasing")
 
 
 def test_a_recovery_without_an_answer_is_unknown_and_not_sent_again():

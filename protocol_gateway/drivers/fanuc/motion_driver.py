@@ -507,7 +507,7 @@ class FanucMotionDriver(SnpxDriver):
             NotReadyError: If a motion cannot be sent now.
         """
         effects: list[Effect] = []
-        percent = self._percent
+        percent, resets = self._percent, False
         for word, value in words_of(encoded):
             match word:
                 case "stop":
@@ -516,10 +516,13 @@ class FanucMotionDriver(SnpxDriver):
                     percent = value
                 case "move":
                     effects += self._move(value, percent, now_s)
-                case "reset" if self._line is not _Line.OPEN:
-                    # It clears the gateway's latch only, and cancels a stop that was not delivered.
-                    self._stop_owed = False
+                case "reset":
+                    resets = self._line is not _Line.OPEN
         self._percent = percent
+        if resets:
+            # It clears the gateway's latch only, and cancels a stop that was not delivered: after the motion
+            # beside it, which may be refused.
+            self._stop_owed = False
         return self._due.with_timer((*effects, *self._settle(now_s)))
 
     def _stop_arm(self, now_s: float) -> Effects:

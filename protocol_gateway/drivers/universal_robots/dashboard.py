@@ -90,22 +90,24 @@ class Dashboard:
         """Take the next bytes, split anywhere."""
         *lines, self._line = (self._line + data).split(b"\n")
         for line in lines:
-            self._take(one_line(line.decode("latin-1").strip(), 200), now_s)
+            # Compared as bytes: `one_line` replaces control characters by blanks.
+            self._take(line.strip(b" \t\r"), now_s)
         if len(self._line) > _LONGEST_LINE:
             self.lost = True
 
-    def _take(self, line: str, now_s: float) -> None:
+    def _take(self, line: bytes, now_s: float) -> None:
+        text = one_line(line.decode("latin-1"), 200)
         match self._expected.popleft() if self._expected else None:
             case _Expected.MODE:
                 self.asked_s = None
-                self.remote = {"true": True, "false": False}.get(line.lower())
+                self.remote = {b"true": True, b"false": False}.get(line.lower())
                 self.answered_s = now_s
                 self.was_local = self.was_local or self.remote is False
-            case _Expected.STOP if line != "Stopped":
-                self.refusals.append(line)
+            case _Expected.STOP if line != b"Stopped":
+                self.refusals.append(text)
             case _Expected.RECOVERY if self.recovery is not None:
-                expected = RECOVERIES[self.recovery][1].lower()
-                self._answer(line.lower().startswith(expected), line)
+                expected = RECOVERIES[self.recovery][1].lower().encode("ascii")
+                self._answer(line.lower().startswith(expected), text)
             case None:
                 # Which answer belongs to which command is not known any longer.
                 self.lost = True

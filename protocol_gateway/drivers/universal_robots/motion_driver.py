@@ -247,6 +247,7 @@ class RtdeMotionDriver(RtdeDriver):
         if channel is RTDE:
             # The next connection may reach another controller, where no speed was set.
             self._percent, self._state, self._protective_s = FIRST_PERCENT, None, None
+            self._still = None
         if channel is INPUTS:
             self._inputs.disconnected()
         if channel is DASHBOARD:
@@ -282,6 +283,9 @@ class RtdeMotionDriver(RtdeDriver):
         if "reopen" in ended:
             effects += self._reopen
             self._reopen = []
+        # First, because FateUnknown sends a stop immediately, and answers have the order of the commands.
+        if "ask" in ended and DASHBOARD.name in self._opened:
+            effects += self._next_question(now_s)
         if "start" in ended and self._motion is not None and not self._motion.started:
             if late and now_s < self._motion.sent_s + 2.0 * START_S:
                 self._due["start"] = now_s + _LATE_S
@@ -289,8 +293,6 @@ class RtdeMotionDriver(RtdeDriver):
                 effects += self._give_up(codes.UR_NOT_STARTED(seconds=START_S))
         if "beat" in ended and self._motion is not None:
             effects += self._next_beat(now_s, late=late)
-        if "ask" in ended and DASHBOARD.name in self._opened:
-            effects += self._next_question(now_s)
         return self._due.with_timer(effects)
 
     # ------------------------------------------------------------------ dashboard
@@ -438,12 +440,19 @@ class RtdeMotionDriver(RtdeDriver):
 
     def _give_up(self, why: Reason) -> Effects:
         """End the permission and the beats of the motion, and have a stop latched."""
-        self._motion = None
-        self._rests_after_stop = False
+        self._may_move_yet()
         effects: list[Effect] = []
         if self._inputs.ready:
             effects.append(self._written(_NO_MOTION))
         return (*effects, FateUnknown(why))
+
+    def _may_move_yet(self) -> None:
+        """Note that the arm may still move after the end of a motion, until it was seen at rest."""
+        if self._motion is not None:
+            # The arm may have moved since the newest state.
+            self._still = None
+        self._motion = None
+        self._rests_after_stop = False
 
     # ------------------------------------------------------------------- commands
 
@@ -479,8 +488,7 @@ class RtdeMotionDriver(RtdeDriver):
 
     def _stop(self) -> Effects:
         """End permission and beats, and the program itself, by the connections that are there."""
-        self._motion = None
-        self._rests_after_stop = False
+        self._may_move_yet()
         effects: list[Effect] = []
         if self._inputs.ready:
             effects.append(self._written(_NO_MOTION, alternative=True))

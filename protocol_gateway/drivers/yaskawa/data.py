@@ -71,12 +71,15 @@ def torques(data: bytes) -> tuple[int, ...]:
 def axis_names(data: bytes) -> tuple[str, ...]:
     """Decode the names of a control group's axes: S, L, U, R, B, T, E, W; empty: there is no such axis.
 
+    A name that cannot be read is "?": the axis exists, and a motion could move it.
+
     Raises:
         ValueError: If no controller sends data of this length.
     """
     if len(data) % _NAME_BYTES or not _FEWEST_AXES <= len(data) // _NAME_BYTES <= _MOST_AXES:
         raise ValueError(f"names of axes with {len(data)} bytes; 24, 28 and 32 are right")
-    return tuple(text(data[at : at + _NAME_BYTES]) for at in range(0, len(data), _NAME_BYTES))
+    names = [data[at : at + _NAME_BYTES] for at in range(0, len(data), _NAME_BYTES)]
+    return tuple((text(each) or "?") if each.strip(b"\0 ") else "" for each in names)
 
 
 class Status1(IntFlag):

@@ -84,6 +84,7 @@ _ARRIVED = {JointType.ROTARY: 2e-3, JointType.PRISMATIC: 2e-4}
 _FIRST_HOLD = 128
 _NUMBERS = 256
 _NO_SUCH_GROUP, _NO_SUCH_GROUP_ADDED = 0x28, frozenset({0xA001, 0xB008})
+_LAST_TOOL = 63
 
 
 @dataclass
@@ -217,6 +218,7 @@ class HsesMotionDriver(HsesDriver):
         if channel is HSES:
             # The next connection may reach another controller, where no speed was set.
             self._percent, self._place, self._joint_positions = FIRST_PERCENT, None, ()
+            self._still_since = None
         if channel is STOP:
             self._stop_polling, self._state = Polling((), ()), None
             self._due.pop("blind", None)
@@ -432,6 +434,8 @@ class HsesMotionDriver(HsesDriver):
 
     def _give_up(self, why: Reason, now_s: float) -> Effects:
         """Set HOLD, and have a stop latched."""
+        # The arm may have moved since the newest position.
+        self._still_since = None
         self._stop_now()
         return (*self._hold(now_s, on=True), FateUnknown(why))
 
@@ -458,7 +462,8 @@ class HsesMotionDriver(HsesDriver):
         if self._rests_after_stop or status.activity in (None, Activity.MOVING):
             return status
         since = self._still_since
-        if since is not None and now_s - since[1] >= STILL_S and now_s - self._place_s < _FRESH_S:
+        # Up to the newest position, because later motion is unknown.
+        if since is not None and self._place_s - since[1] >= STILL_S and now_s - self._place_s < _FRESH_S:
             self._rests_after_stop = True
             return status
         return replace(status, activity=Activity.MOVING)
@@ -501,7 +506,15 @@ class HsesMotionDriver(HsesDriver):
         """
         effects: list[Effect] = []
         percent = self._percent
-        for word, value in words_of(encoded):
+        words = words_of(encoded)
+        # Raise every refusal before the state changes: all commands are sent, or none.
+        names = {word for word, _ in words}
+        if "reset" in names and (obstacle := self._reset_obstacle(now_s)) is not None:
+            raise NotReadyError(obstacle)
+        if "move" in names and (obstacle := self._obstacle(now_s, resets="reset" in names)) is not None:
+            raise NotReadyError(obstacle)
+        targets = [self._pulses(value) for word, value in words if word == "move"]
+        for word, value in words:
             match word:
                 case "stop":
                     effects += self._stop(now_s)
@@ -510,13 +523,14 @@ class HsesMotionDriver(HsesDriver):
                 case "speed":
                     percent = value
                 case "move":
-                    effects += self._move(value, percent, now_s)
+                    effects += self._move(value, targets[0], percent, now_s)
         self._percent = percent
         return self._due.with_timer(effects)
 
     def _stop(self, now_s: float) -> Effects:
         if self._motion is not None or not self._at_rest(now_s):
             self._unfinished = True
+            self._still_since = None
         self._stop_now()
         return self._hold(now_s, on=True)
 
@@ -528,36 +542,44 @@ class HsesMotionDriver(HsesDriver):
         held = self._state.second & HELD and not ours
         return not self._state.first & Status1.RUNNING and not held
 
-    def _reset(self, now_s: float) -> Effects:
-        """End HOLD if this driver has set it, and nothing of the gateway's can go on then.
-
-        Raises:
-            NotReadyError: If something may go on, or the state is not known.
-        """
+    def _reset_obstacle(self, now_s: float) -> Reason | None:
+        """Return why HOLD cannot end now: the state is not known, or something may go on; None: it can."""
         if not self._wants_hold and not self._set_hold:
-            return ()
+            return None
         state = self._state
         if state is None or not self._fresh(now_s) or self._state_s < self._hold_sent_s:
-            raise NotReadyError(codes.HSES_STATE_OLD())
+            return codes.HSES_STATE_OLD()
         held = state.second & Status2.HELD_BY_COMMAND
         if held and self._unfinished and state.second & Status2.SERVO_ON:
-            raise NotReadyError(codes.HSES_HELD_MOTION())
+            return codes.HSES_HELD_MOTION()
+        return None
+
+    def _reset(self, now_s: float) -> Effects:
+        """End HOLD if this driver has set it."""
+        if not self._wants_hold and not self._set_hold:
+            return ()
         self._wants_hold = False
         self._due.pop("hold", None)
-        if not held:
+        if self._state is None or not self._state.second & Status2.HELD_BY_COMMAND:
             self._set_hold = False
             return ()
         self._refused_hold = ""
         return self._hold(now_s, on=False)
 
-    def _move(self, target: Sequence[float], percent: float, now_s: float) -> Effects:
-        if (obstacle := self._obstacle(now_s)) is not None:
-            raise NotReadyError(obstacle)
+    def _pulses(self, target: Sequence[float]) -> Sequence[int]:
+        """Return the pulses of a target.
+
+        Raises:
+            NotReadyError: If a motion cannot hold them.
+        """
         assert self._axes is not None
-        assert self._place is not None
         pulses = self._axes.pulses(np.array(target, dtype=float))
         if any(abs(each) > commands.LONGEST_NUMBER for each in pulses):
             raise NotReadyError(codes.HSES_AXES(detail="the target has more pulses than a motion can hold"))
+        return pulses
+
+    def _move(self, target: Sequence[float], pulses: Sequence[int], percent: float, now_s: float) -> Effects:
+        assert self._place is not None
         self._number = (self._number + 1) % _NUMBERS
         tool = self._place.tool
         self._motion = _Motion(self._number, now_s, self._joint_positions, tuple(target), tool)
@@ -565,8 +587,12 @@ class HsesMotionDriver(HsesDriver):
         datagram = commands.motion(self._number, robot=self._robot, percent=percent, pulses=pulses, tool=tool)
         return (Send(MOTION, datagram),)
 
-    def _obstacle(self, now_s: float) -> Reason | None:
-        """Return why no motion can be sent now; None: it can."""
+    def _obstacle(self, now_s: float, *, resets: bool) -> Reason | None:
+        """Return why no motion can be sent now; None: it can.
+
+        Args:
+            resets: A reset precedes it, so the driver itself does not want HOLD any longer.
+        """
         missing = [each.name for each in (HSES, STOP, MOTION) if each.name not in self._opened]
         if missing:
             return codes.HSES_CHANNEL_MISSING(name=missing[0])
@@ -575,9 +601,12 @@ class HsesMotionDriver(HsesDriver):
             return codes.HSES_STATE_OLD()
         if (extra := self._other_axes(place)) is not None:
             return extra
+        if place.tool > _LAST_TOOL:
+            detail = f"the controller reports tool {place.tool}; 0 to {_LAST_TOOL} are right"
+            return codes.HSES_AXES(detail=detail)
         if self._motion is not None:
             return codes.HSES_MOVES()
-        if state.second & HELD or self._wants_hold:
+        if state.second & HELD or (self._wants_hold and not resets):
             return codes.CONTROLLER_HOLDING()
         if mode_of(state) is not Mode.REMOTE:
             return codes.CONTROLLER_LOCAL()
