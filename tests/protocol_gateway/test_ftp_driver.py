@@ -28,6 +28,7 @@ from protocol_gateway.drivers.driver import (
 from protocol_gateway.drivers.fanuc.axes import FanucSettings
 from protocol_gateway.drivers.fanuc.ftp_driver import FILE, FTP, TIMEOUT_S, FtpDriver, fanuc_ftp_driver
 from protocol_gateway.errors import CommandError, GatewaySettingsError
+from protocol_gateway.link.link import UnaskedSends
 from robomesh import reason_codes as codes
 from robomesh.session import open_session
 from robots.description import load
@@ -69,6 +70,7 @@ class Stepped:
     def __init__(self, *, password="", **settings):
         self.settings = FanucSettings(**{"j23": 0, "rate_hz": 1.0, "io": ("DI[1-2]",), **settings})
         self.driver = FtpDriver(SIX, {}, options=self.settings, password=password)
+        self._unasked = UnaskedSends(self.driver.requests_a_second)
         self.now_s = NOW_S
         self.sent, self.events, self.reports, self.ports, self.closed = [], [], [], [], []
         self.timer_s = None
@@ -89,6 +91,8 @@ class Stepped:
                 case Send(channel, data):
                     assert channel is FTP
                     assert data.endswith(b"\r\n")
+                    # The link sends no more than is declared, and drops the rest.
+                    assert self._unasked.allowed(self.now_s)
                     self.sent.append(data.decode().rstrip())
                 case SetTimer(at_s):
                     self.timer_s = at_s

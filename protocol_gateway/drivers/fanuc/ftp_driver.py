@@ -141,8 +141,9 @@ class FtpDriver(OnlyReads):
             del self._periods[File.REGISTERS]
         if not options.tools:
             del self._periods[File.FRAMES]
-        # Two commands for each file, and those of a new connection.
-        self.requests_a_second = 2.0 * sum(1.0 / each for each in self._periods.values()) + 6.0
+        # Two commands for each file. A new connection begins with a log-in and all files together.
+        regular_hz = 2.0 * sum(1.0 / each for each in self._periods.values())
+        self.requests_a_second = regular_hz + 2.0 * len(self._periods) + 4.0
         # Kept over a lost connection: alarms are not reported again.
         self._alarms: frozenset[ListedAlarm] = frozenset()
         self._waits = False
