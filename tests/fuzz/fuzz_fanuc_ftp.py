@@ -13,6 +13,7 @@ import random
 import re
 import sys
 from collections import Counter
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -138,8 +139,8 @@ class Bench:
             if self._awaited:
                 # The connection for the file is made, or fails.
                 self._awaited, self._connected = False, chance.random() < 0.99
-                told = self.driver.opened if self._connected else self.driver.closed
-                self._report(self._perform(told(FILE, self.now_s)))
+                done = self.driver.opened if self._connected else self.driver.closed
+                self.problem = self.problem or self._tell(partial(done, FILE, self.now_s))
             elif self._is_quiet() and self._timer_s is not None:
                 self.now_s = max(self.now_s, self._timer_s)
                 self._timer_s = None
@@ -199,21 +200,20 @@ class Bench:
             if data or not self._given:
                 self._content += data
                 self._given = True
-                return self._report(self._perform(self.driver.received(FILE, data, self.now_s)))
+                return self._tell(partial(self.driver.received, FILE, data, self.now_s))
             if self._connected:
                 self._ended, self._connected = True, False
-                return self._report(self._perform(self.driver.closed(FILE, self.now_s)))
+                return self._tell(partial(self.driver.closed, FILE, self.now_s))
             return ""
         self._replies += data
         self._greets = False
-        file, content, ended, confirmed = self._file, self._content, self._ended, self._answered() == 2
-        events = self._perform(self.driver.received(FTP, data, self.now_s))
-        return self._compare(events, file if ended and confirmed else "", content)
+        return self._tell(partial(self.driver.received, FTP, data, self.now_s))
 
-    def _report(self, events: list[ControllerEvent]) -> str:
-        """Return the problem with the events at the end of a file."""
+    def _tell(self, call: Callable[[], Effects]) -> str:
+        """Return the problem with the driver's reports of a call; they may begin the next file."""
         whole = self._ended and self._answered() == 2
-        return self._compare(events, self._file if whole else "", self._content)
+        file, content = self._file if whole else "", self._content
+        return self._compare(self._perform(call()), file, content)
 
     # ------------------------------------------------------ a strict reading, written apart
 
