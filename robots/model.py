@@ -1,5 +1,6 @@
 """The kinematic model: forward kinematics and the tool's Jacobian. Wraps Pinocchio."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -103,7 +104,7 @@ def link_placements(model: RobotModel, joint_positions: ArrayLike) -> FloatArray
     Source: Chen, Zhang, Xue 2001, section 3.2.
     """
     _forward(model, joint_positions)
-    return np.stack([_placement(model, frame) for frame in model._link_ids])
+    return _placements(model, model._link_ids)
 
 
 def frame_placements(model: RobotModel, joint_positions: ArrayLike) -> dict[str, FloatArray]:
@@ -113,10 +114,23 @@ def frame_placements(model: RobotModel, joint_positions: ArrayLike) -> dict[str,
         JointCountError: If there is not one value per joint.
     """
     _forward(model, joint_positions)
-    return {
-        name: _placement(model, frame)
-        for name, frame in zip(model.frame_names, model._frame_ids, strict=True)
-    }
+    return dict(zip(model.frame_names, _placements(model, model._frame_ids), strict=True))
+
+
+def all_placements(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
+    """Return the placements of every link, and then of the tool and every named frame, in the base frame.
+
+    Args:
+        joint_positions: (n,) joint positions [rad] or [m].
+
+    Returns:
+        (number of links and frames, 4, 4), in the order of `link_names` and `frame_names`.
+
+    Raises:
+        JointCountError: If there is not one value per joint.
+    """
+    _forward(model, joint_positions)
+    return _placements(model, (*model._link_ids, *model._frame_ids))
 
 
 def tool_placement(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
@@ -126,7 +140,8 @@ def tool_placement(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
         JointCountError: If there is not one value per joint.
     """
     _forward(model, joint_positions)
-    return _placement(model, model._frame_ids[0])
+    placement: FloatArray = _placements(model, model._frame_ids[:1])[0]
+    return placement
 
 
 def tool_jacobian(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
@@ -177,5 +192,7 @@ def _forward(model: RobotModel, joint_positions: ArrayLike) -> None:
     pin.framesForwardKinematics(model._pinocchio, model._workspace, positions)
 
 
-def _placement(model: RobotModel, frame: int) -> FloatArray:
-    return np.array(model._workspace.oMf[frame].homogeneous, dtype=np.float64)
+def _placements(model: RobotModel, frames: Sequence[int]) -> FloatArray:
+    # Pinocchio's property takes longer than the frames.
+    placed = model._workspace.oMf
+    return np.array([placed[frame].homogeneous for frame in frames], dtype=np.float64)

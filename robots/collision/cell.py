@@ -3,8 +3,8 @@
 `build_cell` reads the files that a `robots.cells.CellDescription` names.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from robots.cells import FLOOR, CellDescription, CellRobot, Fixture, Floor
 from robots.collision.geometry import Body, exact_bodies, hull_bodies, piece_bodies
 from robots.collision.link_pairs import PairPlan, plan_pairs
-from robots.collision.obstacles import Balls, Obstacles, balls_of, join_obstacles
+from robots.collision.obstacles import Balls, Bounds, Obstacles, balls_of, bounds_of, join_obstacles
 from robots.collision.self_collision import SelfPairs, self_pairs
 from robots.description import load
 from robots.errors import MeshError
@@ -35,6 +35,7 @@ class Arm:
         links: (b,) number of each body's link in the model.
         moving: (b,) whether a joint moves the body.
         balls: Balls that cover the bodies.
+        bounds: The bodies' bounding boxes.
         own: The pairs of bodies for the self-collision check.
         plan: The decisions on these pairs.
     """
@@ -52,6 +53,7 @@ class Arm:
     links: NDArray[np.int64]
     moving: NDArray[np.bool_]
     balls: Balls
+    bounds: Bounds
     own: SelfPairs
     plan: PairPlan
 
@@ -71,6 +73,47 @@ class Cell:
     fixtures: Obstacles
     floor: Floor | None
     ignored: frozenset[tuple[str, str]]
+    surroundings: dict[tuple[str, ...], "Surroundings"] = field(default_factory=dict, repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What is around an arm, wherever the other arms are.
+
+    Attributes:
+        arms: The other arms that are counted.
+        obstacles: The fixtures and these arms, with placements of the fixtures only.
+        checked: (a, b) which pairs of the arm's bodies and the obstacles are checked.
+    """
+
+    arms: tuple[Arm, ...]
+    obstacles: Obstacles
+    checked: NDArray[np.bool_]
+
+
+def surroundings_of(cell: Cell, robot: str, others: Iterable[str]) -> Surroundings:
+    """Return what is around an arm; two bodies that do not move are not checked against each other.
+
+    Args:
+        others: The robots that are counted; the arm itself never is.
+    """
+    key = (robot, *others)
+    found = cell.surroundings.get(key)
+    if found is None:
+        found = cell.surroundings[key] = _surroundings(cell, cell.arms[robot], key[1:])
+    return found
+
+
+def _surroundings(cell: Cell, arm: Arm, others: Sequence[str]) -> Surroundings:
+    arms = tuple(cell.arms[name] for name in others if name != arm.name)
+    nowhere = [
+        Obstacles(each.names, each.bodies, np.empty((0, 4, 4)), each.moving, each.bounds) for each in arms
+    ]
+    around = join_obstacles([cell.fixtures, *nowhere])
+    checked: NDArray[np.bool_] = arm.moving[:, None] | around.moving
+    if cell.ignored:
+        checked &= [[(one, other) not in cell.ignored for other in around.names] for one in arm.names]
+    return Surroundings(arms, around, checked)
 
 
 def build_cell(description: CellDescription, *, exact: bool = False, wait: bool = True) -> Cell:
@@ -130,6 +173,7 @@ def _arm(robot: CellRobot, *, exact: bool, wait: bool) -> Arm:
         links=links,
         moving=np.array([tree.links[number].joint != BASE for number in links], dtype=np.bool_),
         balls=balls_of([body for _, body in bodies]),
+        bounds=bounds_of([body for _, body in bodies]),
         own=self_pairs(tree, bodies, pairs),
         plan=plan,
     )
@@ -145,7 +189,8 @@ def _fixture_obstacles(fixture: Fixture, links: set[str]) -> Obstacles:
     if not bodies:
         raise MeshError(source, "has no surface, so it cannot be checked for collisions")
     placements = np.tile(np.asarray(fixture.fixture_to_site, dtype=np.float64), (len(bodies), 1, 1))
-    return Obstacles((fixture.name,) * len(bodies), bodies, placements, np.zeros(len(bodies), dtype=np.bool_))
+    moving = np.zeros(len(bodies), dtype=np.bool_)
+    return Obstacles((fixture.name,) * len(bodies), bodies, placements, moving, bounds_of(bodies))
 
 
 def pending(cell: Cell) -> tuple[str, ...]:

@@ -181,7 +181,7 @@ class _OutsidePairs:
         self._known = np.empty(0)
         if self._pairs:
             boxes = join_boxes([sweep.box for sweep in sweeps])
-            least = least_distances(arm.balls, first[None], boxes)[0]
+            least = least_distances(arm.balls, first, boxes)
             self._known = least[tuple(np.array(self._pairs).T)]
 
     def measured(self, gauge: Gauge, at: Placed, travel: FloatArray) -> tuple[float, list[_Near]]:

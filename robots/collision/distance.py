@@ -1,18 +1,17 @@
 """Distances of an arm to itself and to the obstacles around it, in one position."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import coal
 import numpy as np
-from numpy.typing import NDArray
 
 from robots.cells import FLOOR
-from robots.collision.cell import Arm, Cell
+from robots.collision.cell import Arm, Cell, surroundings_of
 from robots.collision.floor import heights_above
 from robots.collision.geometry import TOUCH_M, Body, transform
-from robots.collision.obstacles import Obstacles, boxes_of, join_obstacles, least_distances
+from robots.collision.obstacles import Obstacles, least_distances, placed_boxes
 from robots.collision.self_collision import nearest_pair, touching_pairs
 from robots.joints import FloatArray
 from robots.model import link_placements
@@ -93,16 +92,13 @@ def arm_obstacles(arm: Arm, positions: FloatArray) -> Obstacles:
     Raises:
         JointCountError: If there is not one value per joint.
     """
-    placements = arm.base_to_site @ link_placements(arm.model, positions)
-    return Obstacles(arm.names, arm.bodies, placements[arm.links], arm.moving)
+    return Obstacles(arm.names, arm.bodies, _placements(arm, positions), arm.moving, arm.bounds)
 
 
-def checked(cell: Cell, at: Obstacles, around: Obstacles) -> NDArray[np.bool_]:
-    """Return which pairs of bodies are checked: (a, b)."""
-    moves: NDArray[np.bool_] = at.moving[:, None] | around.moving
-    if cell.ignored:
-        moves &= [[(one, other) not in cell.ignored for other in around.names] for one in at.names]
-    return moves
+def _placements(arm: Arm, positions: FloatArray) -> FloatArray:
+    """Return the placements of an arm's bodies: (b, 4, 4), body to site [m]."""
+    placements: FloatArray = (arm.base_to_site @ link_placements(arm.model, positions))[arm.links]
+    return placements
 
 
 def own_contacts(cell: Cell, robot: str, positions: FloatArray) -> tuple[Nearest, ...]:
@@ -215,15 +211,14 @@ def _distance_bounds(
 ) -> tuple[Obstacles, Obstacles, FloatArray]:
     """Return an arm, its obstacles and lower bounds of their distances (a, b): infinite if unchecked."""
     at = arm_obstacles(cell.arms[robot], positions)
-    around = join_obstacles(
-        [
-            cell.fixtures,
-            *(arm_obstacles(cell.arms[name], there) for name, there in others.items() if name != robot),
-        ]
+    surroundings = surroundings_of(cell, robot, others)
+    placements = [_placements(arm, others[arm.name]) for arm in surroundings.arms]
+    around = replace(
+        surroundings.obstacles, placements=np.concatenate([cell.fixtures.placements, *placements])
     )
     if not len(at) or not len(around):
         return at, around, np.full((len(at), len(around)), np.inf)
-    boxes = boxes_of(around.bodies, around.placements)
-    least = least_distances(cell.arms[robot].balls, at.placements[None], boxes)[0]
-    least[~checked(cell, at, around)] = np.inf
+    boxes = placed_boxes(around.bounds, around.placements)
+    least = least_distances(cell.arms[robot].balls, at.placements, boxes)
+    least[~surroundings.checked] = np.inf
     return at, around, least

@@ -11,6 +11,26 @@ from robots.joints import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
+class Bounds:
+    """Bounding boxes of bodies, along the axes of their frames [m].
+
+    Attributes:
+        centers, halves: (b, 3).
+    """
+
+    centers: FloatArray
+    halves: FloatArray
+
+
+def bounds_of(bodies: Sequence[Body]) -> Bounds:
+    """Return the bounding box of each body."""
+    return Bounds(
+        np.array([body.center for body in bodies]).reshape(-1, 3),
+        np.array([body.half for body in bodies]).reshape(-1, 3),
+    )
+
+
+@dataclass(frozen=True, eq=False)
 class Obstacles:
     """Bodies with their placements.
 
@@ -24,6 +44,7 @@ class Obstacles:
     bodies: tuple[Body, ...]
     placements: FloatArray
     moving: NDArray[np.bool_]
+    bounds: Bounds
 
     def __len__(self) -> int:
         return len(self.names)
@@ -31,11 +52,13 @@ class Obstacles:
 
 def join_obstacles(parts: Sequence[Obstacles]) -> Obstacles:
     """Concatenate obstacles."""
+    bodies = tuple(body for part in parts for body in part.bodies)
     return Obstacles(
         tuple(name for part in parts for name in part.names),
-        tuple(body for part in parts for body in part.bodies),
+        bodies,
         np.concatenate([np.empty((0, 4, 4)), *(part.placements for part in parts)]),
         np.concatenate([np.empty(0, dtype=np.bool_), *(part.moving for part in parts)]),
+        bounds_of(bodies),
     )
 
 
@@ -54,18 +77,15 @@ class Boxes:
     halves: FloatArray
 
 
-def boxes_of(bodies: Sequence[Body], placements: FloatArray) -> Boxes:
+def placed_boxes(bounds: Bounds, placements: FloatArray) -> Boxes:
     """Return the bounding box of each placed body.
 
     Args:
         placements: (b, 4, 4) body to site [m].
     """
-    centers = np.array([body.center for body in bodies]).reshape(-1, 3)
-    return Boxes(
-        np.einsum("bij,bj->bi", placements[:, :3, :3], centers) + placements[:, :3, 3],
-        placements[:, :3, :3],
-        np.array([body.half for body in bodies]).reshape(-1, 3),
-    )
+    axes = placements[:, :3, :3]
+    centers = (axes @ bounds.centers[:, :, None])[:, :, 0] + placements[:, :3, 3]
+    return Boxes(centers, axes, bounds.halves)
 
 
 def box_about(boxes: Boxes) -> Boxes:
@@ -107,24 +127,23 @@ def least_distances(balls: Balls, placements: FloatArray, boxes: Boxes) -> Float
     """Return a lower bound of the distance of each body to the content of each box [m].
 
     Args:
-        placements: (m, a, 4, 4) of the bodies that the balls cover, at m samples, to the site.
+        placements: (a, 4, 4) of the bodies that the balls cover, to the site.
 
     Returns:
-        (m, a, b), 0 where a body and a content may touch.
+        (a, b), 0 where a body and a content may touch.
     """
-    of_balls = placements[:, balls.owners]
-    centers = np.einsum("mkij,kj->mki", of_balls[..., :3, :3], balls.centers) + of_balls[..., :3, 3]
-    # One axis of the boxes at a time needs less memory than all three together.
-    squares = np.zeros((*centers.shape[:2], len(boxes.centers)))
-    for axis in range(3):
-        along = boxes.axes[:, :, axis]
-        beyond = centers @ along.T - np.einsum("bi,bi->b", boxes.centers, along)
-        np.abs(beyond, out=beyond)
-        beyond -= boxes.halves[:, axis]
-        np.maximum(beyond, 0.0, out=beyond)
-        squares += beyond * beyond
-    gaps = np.sqrt(squares, out=squares) - balls.radii[:, None]
-    least: FloatArray = np.maximum(np.minimum.reduceat(gaps, balls.starts, axis=1), 0.0)
+    of_balls = placements[balls.owners]
+    centers = (of_balls[:, :3, :3] @ balls.centers[:, :, None])[:, :, 0] + of_balls[:, :3, 3]
+    # Few operations, because the arrays are small: all axes of all boxes in one multiplication.
+    axes = boxes.axes.transpose(1, 2, 0)
+    beyond = (centers @ axes.reshape(3, -1)).reshape(-1, 3, len(boxes.centers))
+    beyond -= (boxes.centers.T[:, None] * axes).sum(axis=0)
+    np.abs(beyond, out=beyond)
+    beyond -= boxes.halves.T
+    np.maximum(beyond, 0.0, out=beyond)
+    beyond *= beyond
+    gaps = np.sqrt(beyond.sum(axis=1)) - balls.radii[:, None]
+    least: FloatArray = np.maximum(np.minimum.reduceat(gaps, balls.starts, axis=0), 0.0)
     return least
 
 

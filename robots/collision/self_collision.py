@@ -109,7 +109,8 @@ def nearest_pair(
     pin.computeDistances(inner, data, own.hulls, own.hulls_workspace, everywhere)
     results = list(own.hulls_workspace.distanceResults)
     distances = np.array([result.min_distance for result in results])
-    pin.updateGeometryPlacements(inner, data, own.geometry, own.workspace)
+    if own.meshes:
+        pin.updateGeometryPlacements(inner, data, own.geometry, own.workspace)
     # A mesh is never nearer than its hull, so measure as meshes only the pairs with the nearest hulls.
     left = set(own.meshes)
     while (number := int(distances.argmin())) in left:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from robots.collision.cell import Arm, Cell
 from robots.collision.distance import Gauge
 from robots.collision.geometry import Body, transform
-from robots.collision.obstacles import Boxes, boxes_of
+from robots.collision.obstacles import Boxes, bounds_of, placed_boxes
 from robots.collision.path import (
     SAMPLE_M,
     boxes_of_pieces,
@@ -130,7 +130,7 @@ def sweeps_of(
 
 
 def _at_rest(name: str, body: Body, placement: FloatArray) -> Sweep:
-    return Sweep(name, body, placement[None], np.zeros(1), boxes_of([body], placement[None]))
+    return Sweep(name, body, placement[None], np.zeros(1), placed_boxes(bounds_of([body]), placement[None]))
 
 
 def _swept(arm: Arm, lines: FloatArray, passed: SweptRegion, within_m: float) -> list[Sweep]:

@@ -27,8 +27,8 @@ from services.kinematics.conditions import (
 from services.kinematics.floor import floor_event
 from services.kinematics.shown_cell import ShownCell
 from services.kinematics.states import (
+    FramesMessage,
     add_proximity,
-    frames_message,
     kinematic_state,
     positions_by_name,
     velocities_by_name,
@@ -81,6 +81,7 @@ async def follow(session: Session, arm: FollowedArm, cell_state: CellState, show
     events = session.declare_publisher(arm.site, arm.name, "events/kinematics")
     frames_limit, kinematics_limit = _RateLimit(frames.topic.rate_hz), _RateLimit(kinematics.topic.rate_hz)
     fixtures_limit = _RateLimit(_FIXTURES_HZ)
+    frames_message = FramesMessage(arm.model, prefix=arm.path, base_to_site=arm.base_to_site)
     alarms = Alarms()
     before: tuple[int, FloatArray] | None = None
     mismatch_log = _MismatchLog(arm)
@@ -104,14 +105,9 @@ async def follow(session: Session, arm: FollowedArm, cell_state: CellState, show
         if sample.live:
             cell_state.update(arm.name, positions)
         if frames_due:
-            transforms = frames_message(
-                arm.model,
-                positions,
-                prefix=arm.path,
-                base_to_site=arm.base_to_site,
-                timestamp=message.timestamp,
-                fixtures=now.placements if fixtures_limit.due(time_ns) or placed is not now.fixtures else {},
-            )
+            with_fixtures = fixtures_limit.due(time_ns) or placed is not now.fixtures
+            fixtures = now.placements if with_fixtures else {}
+            transforms = frames_message.filled(positions, message.timestamp, fixtures)
             placed = now.fixtures
             if not sample.live:
                 # A last value: answer late joiners with it. Published, it would look live.

@@ -1,90 +1,113 @@
 """Conversion of joint states to `frames` and `kinematics` messages: pure functions."""
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.joints import FloatArray, Joints, constraint_values
-from robots.model import RobotModel, frame_placements, link_placements, manipulability, tool_jacobian
+from robots.model import (
+    RobotModel,
+    all_placements,
+    manipulability,
+    tool_jacobian,
+    tool_placement,
+)
 from robots.singularity import singularity_margin
 from services.kinematics.cell_state import Proximity
 
 
 def positions_by_name(joints: Joints, states: JointStates) -> FloatArray | None:
     """Return (n,) joint positions [rad] or [m] in the robot's order; None if one is missing or not finite."""
-    by_name = {joint.name: joint.position for joint in states.joints}
-    positions = np.array([by_name.get(name, np.nan) for name in joints.names])
-    return positions if np.isfinite(positions).all() else None
+    return _in_order(joints, {joint.name: joint.position for joint in states.joints})
 
 
 def velocities_by_name(joints: Joints, states: JointStates) -> FloatArray | None:
     """Return (n,) joint velocities [rad/s] or [m/s]; None if the controller does not report all of them."""
-    by_name = {joint.name: joint.velocity for joint in states.joints if joint.HasField("velocity")}
-    velocities = np.array([by_name.get(name, np.nan) for name in joints.names])
-    return velocities if np.isfinite(velocities).all() else None
+    reported = {joint.name: joint.velocity for joint in states.joints if joint.HasField("velocity")}
+    return _in_order(joints, reported)
 
 
-def frames_message(
-    model: RobotModel,
-    positions: FloatArray,
-    *,
-    prefix: str,
-    base_to_site: FloatArray,
-    timestamp: Timestamp,
-    fixtures: Mapping[str, FloatArray] | None = None,
-) -> FrameTransforms:
-    """Return the placements of every link, the tool and every named frame in the site's frame.
+def _in_order(joints: Joints, values: Mapping[str, float]) -> FloatArray | None:
+    ordered = [values.get(name, math.nan) for name in joints.names]
+    return np.array(ordered) if all(map(math.isfinite, ordered)) else None
+
+
+class FramesMessage:
+    """The placements of an arm's links, tool and named frames as a message, which is filled again and again.
 
     Args:
-        positions: (n,) joint positions [rad] or [m].
         prefix: `<site>/<robot>`; the site's frame has the name of the site.
         base_to_site: (4, 4) placement of the base in the site's frame.
-        fixtures: (4, 4) placements in the site's frame to include, by name.
     """
-    frames = dict(zip(model.link_names, link_placements(model, positions), strict=True))
-    # A URDF's link named "tool" shares the tool's frame.
-    frames |= frame_placements(model, positions)
-    placements = base_to_site @ np.array([*frames.values()])
-    site = prefix.partition("/")[0]
-    ids = [f"{prefix}/{name}" for name in frames]
-    if fixtures:
-        placements = np.concatenate([placements, [*fixtures.values()]])
-        ids += [f"{site}/{name}" for name in fixtures]
-    rotations = quaternions(placements[:, :3, :3])
-    message = FrameTransforms()
-    for frame_id, placement, (x, y, z, w) in zip(ids, placements, rotations.tolist(), strict=True):
-        transform = message.transforms.add(parent_frame_id=site, child_frame_id=frame_id)
-        transform.timestamp.CopyFrom(timestamp)
-        transform.translation.x, transform.translation.y, transform.translation.z = placement[:3, 3].tolist()
-        transform.rotation.x, transform.rotation.y = x, y
-        transform.rotation.z, transform.rotation.w = z, w
-    return message
+
+    def __init__(self, model: RobotModel, *, prefix: str, base_to_site: FloatArray) -> None:
+        self._model, self._base_to_site = model, base_to_site
+        self._site = prefix.partition("/")[0]
+        # A URDF's link named "tool" shares the tool's frame, which comes later.
+        numbers = {name: number for number, name in enumerate((*model.link_names, *model.frame_names))}
+        self._numbers = [*numbers.values()]
+        self._message = FrameTransforms()
+        self._rows = [self._added(self._message, f"{prefix}/{name}") for name in numbers]
+
+    def _added(self, message: FrameTransforms, frame_id: str) -> FrameTransform:
+        return message.transforms.add(parent_frame_id=self._site, child_frame_id=frame_id)
+
+    def filled(
+        self,
+        positions: FloatArray,
+        timestamp: Timestamp,
+        fixtures: Mapping[str, FloatArray] | None = None,
+    ) -> FrameTransforms:
+        """Return the placements in the site's frame; the next call changes a message without fixtures.
+
+        Args:
+            positions: (n,) joint positions [rad] or [m].
+            fixtures: (4, 4) placements in the site's frame to include, by name.
+        """
+        placements = self._base_to_site @ all_placements(self._model, positions)[self._numbers]
+        for row, placement in zip(self._rows, placements.tolist(), strict=True):
+            _fill(row, placement, timestamp)
+        if not fixtures:
+            return self._message
+        message = FrameTransforms()
+        message.CopyFrom(self._message)
+        for name, fixture in fixtures.items():
+            _fill(self._added(message, f"{self._site}/{name}"), fixture.tolist(), timestamp)
+        return message
 
 
-def quaternions(rotations: FloatArray) -> FloatArray:
-    """Convert rotation matrices (m, 3, 3) to unit quaternions x, y, z, w (m, 4), w not negative.
+def _fill(row: FrameTransform, placement: Sequence[Sequence[float]], timestamp: Timestamp) -> None:
+    to, turn, at = row.translation, row.rotation, row.timestamp
+    to.x, to.y, to.z = (line[3] for line in placement[:3])
+    turn.x, turn.y, turn.z, turn.w = quaternion(placement)
+    at.seconds, at.nanos = timestamp.seconds, timestamp.nanos
 
-    Source: Bar-Itzhack 2000: the eigenvector of the largest eigenvalue; also exact at half turns.
+
+def quaternion(rotation: Sequence[Sequence[float]]) -> tuple[float, float, float, float]:
+    """Convert a rotation matrix, or the upper left of a placement, to a unit quaternion x, y, z, w; w >= 0.
+
+    Source: Shepperd 1978: from the largest of the four, so that half turns are exact, too.
     """
-    r = rotations
-    k = np.empty((len(r), 4, 4))
-    k[:, 0, 0] = r[:, 0, 0] - r[:, 1, 1] - r[:, 2, 2]
-    k[:, 1, 1] = r[:, 1, 1] - r[:, 0, 0] - r[:, 2, 2]
-    k[:, 2, 2] = r[:, 2, 2] - r[:, 0, 0] - r[:, 1, 1]
-    k[:, 3, 3] = r[:, 0, 0] + r[:, 1, 1] + r[:, 2, 2]
-    k[:, 1, 0] = k[:, 0, 1] = r[:, 1, 0] + r[:, 0, 1]
-    k[:, 2, 0] = k[:, 0, 2] = r[:, 2, 0] + r[:, 0, 2]
-    k[:, 2, 1] = k[:, 1, 2] = r[:, 2, 1] + r[:, 1, 2]
-    k[:, 3, 0] = k[:, 0, 3] = r[:, 2, 1] - r[:, 1, 2]
-    k[:, 3, 1] = k[:, 1, 3] = r[:, 0, 2] - r[:, 2, 0]
-    k[:, 3, 2] = k[:, 2, 3] = r[:, 1, 0] - r[:, 0, 1]
-    _, vectors = np.linalg.eigh(k)
-    q: FloatArray = vectors[:, :, 3]
-    return np.where(q[:, 3:] < 0, -q, q)
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = (line[:3] for line in rotation[:3])
+    # Four times each of the quaternion's products with its largest element.
+    largest = max(xx, yy, zz, xx + yy + zz)
+    if largest == xx:
+        found = 1.0 + xx - yy - zz, yx + xy, xz + zx, zy - yz
+    elif largest == yy:
+        found = yx + xy, 1.0 - xx + yy - zz, zy + yz, xz - zx
+    elif largest == zz:
+        found = xz + zx, zy + yz, 1.0 - xx - yy + zz, yx - xy
+    else:
+        found = zy - yz, xz - zx, yx - xy, 1.0 + xx + yy + zz
+    length = math.copysign(math.hypot(*found), found[3])
+    x, y, z, w = (each / length for each in found)
+    return x, y, z, w
 
 
 def kinematic_state(
@@ -107,7 +130,7 @@ def kinematic_state(
         manipulability=manipulability(model, positions),
         singularity_margin=singularity_margin(model, positions, reach=reach),
     )
-    message.tool_to_base.extend(frame_placements(model, positions)["tool"].ravel().tolist())
+    message.tool_to_base.extend(tool_placement(model, positions).ravel().tolist())
     if velocities is not None:
         twist = (tool_jacobian(model, positions) @ velocities).tolist()
         message.linear_velocity.CopyFrom(_vector(twist[:3]))
@@ -139,8 +162,8 @@ def add_proximity(message: schema.KinematicState, proximity: Proximity, *, site:
 
 def forward_answer(model: RobotModel, positions: FloatArray) -> schema.ForwardAnswer:
     """Return tool, links and named frames in the base frame for joint positions (n,) [rad] or [m]."""
-    placed = dict(zip(model.link_names, link_placements(model, positions), strict=True))
-    placed |= frame_placements(model, positions)
+    names = (*model.link_names, *model.frame_names)
+    placed = dict(zip(names, all_placements(model, positions), strict=True))
     answer = schema.ForwardAnswer(tool_to_base=placed["tool"].ravel().tolist())
     for name, placement in placed.items():
         answer.links.add(name=name, placement_to_base=placement.ravel().tolist())

@@ -18,7 +18,7 @@ from robots.description import library_names, load
 from robots.model import build_model, tool_placement
 from robots.poses import rpy_rotation
 from services import kinematics
-from services.kinematics.states import frames_message, kinematic_state, quaternions
+from services.kinematics.states import FramesMessage, kinematic_state, quaternion
 from tests.cells import single_arm
 from tests.conftest import last_value, run
 from tests.refusals import refused
@@ -63,16 +63,15 @@ def rotation_of(quaternion):
 @given(angles, angles, angles)
 def test_a_quaternion_is_the_rotation_of_its_matrix(roll, pitch, yaw):
     rotation = rpy_rotation(roll, pitch, yaw)
-    (quaternion,) = quaternions(rotation[None])
-    assert quaternion[3] >= 0
-    assert rotation_of(quaternion) == pytest.approx(rotation, abs=1e-12)
+    turn = quaternion(rotation.tolist())
+    assert turn[3] >= 0
+    assert rotation_of(turn) == pytest.approx(rotation, abs=1e-12)
 
 
 @pytest.mark.parametrize("axis", [*np.eye(3).tolist(), [0.6, 0.8, 0.0], [0.6, 0.0, -0.8]])
 def test_half_turns_are_exact(axis):
     rotation = 2 * np.outer(axis, axis) - np.eye(3)
-    (quaternion,) = quaternions(rotation[None])
-    assert rotation_of(quaternion) == pytest.approx(rotation, abs=1e-12)
+    assert rotation_of(quaternion(rotation.tolist())) == pytest.approx(rotation, abs=1e-12)
 
 
 @pytest.mark.parametrize("name", library_names())
@@ -81,15 +80,14 @@ def test_frames_equal_the_dh_product_in_the_sites_frame(name):
     model = build_model(description)
     base_to_site = np.eye(4)
     base_to_site[:3, :3], base_to_site[:3, 3] = rpy_rotation(0.1, -0.2, 2.0), (1.0, -2.0, 0.5)
+    frames_message = FramesMessage(model, prefix="hall/arm", base_to_site=base_to_site)
     random = np.random.default_rng(7)
     for positions in random.uniform(model.joints.lower, model.joints.upper, (100, len(model.joints))):
-        message = frames_message(
-            model, positions, prefix="hall/arm", base_to_site=base_to_site, timestamp=Timestamp()
-        )
+        message = frames_message.filled(positions, Timestamp(seconds=7))
         frames = {frame.child_frame_id: frame for frame in message.transforms}
         for link, placement in zip(model.link_names, dh_product(description, positions), strict=True):
             frame = frames[f"hall/arm/{link}"]
-            assert frame.parent_frame_id == "hall"
+            assert (frame.parent_frame_id, frame.timestamp.seconds) == ("hall", 7)
             expected = base_to_site @ placement
             translation, q = frame.translation, frame.rotation
             assert (translation.x, translation.y, translation.z) == pytest.approx(expected[:3, 3], abs=1e-9)
