@@ -18,7 +18,7 @@ from robots.urdf.write import to_urdf
 from services.kinematics.answers import Workers, answer_robot_requests
 from services.kinematics.cell_state import CellState
 from services.kinematics.descriptions import add_surroundings, describe
-from services.kinematics.publisher import FollowedArm, follow, follow_proof
+from services.kinematics.publisher import ArmPublisher, ArmPublishers, FollowedArm
 from services.kinematics.settings import RobotSettings, Settings
 from services.kinematics.shown_cell import ShownCell, first_content, follow_gateway
 
@@ -43,11 +43,14 @@ async def serve(session: Session, settings: Settings) -> None:
     shown: dict[str, ShownCell] = {}
     quotas = settings.quotas
     checks = Quota("checks", at_once=quotas.checks, a_minute=quotas.checks_a_minute)
+    arms = ArmPublishers(settings.site, [robot.name for robot in settings.robots])
     try:
         async with asyncio.TaskGroup() as group:
             for cell in cells:
                 robots = [robot for robot in settings.robots if robot.cell_description is cell]
-                group.create_task(_serve_cell(session, settings, cell, robots, workers, checks, shown))
+                group.create_task(_serve_cell(session, settings, cell, robots, workers, checks, shown, arms))
+            for topic in ("joints", "controller"):
+                group.create_task(arms.follow(session, topic))
             if settings.cell_content is not None:
                 group.create_task(follow_gateway(session, settings.site, shown))
     finally:
@@ -63,6 +66,7 @@ async def _serve_cell(
     workers: Workers,
     checks: Quota,
     shown: dict[str, ShownCell],
+    arms: ArmPublishers,
 ) -> None:
     cell_state = CellState(
         {robot.name: robot.stale_after_s for robot in robots},
@@ -75,7 +79,7 @@ async def _serve_cell(
         group.create_task(shown_cell.build())
         for robot in robots:
             group.create_task(
-                _serve_robot(session, settings.site, robot, cell_state, shown_cell, workers, checks)
+                _serve_robot(session, settings.site, robot, cell_state, shown_cell, workers, checks, arms)
             )
             shown[robot.name] = shown_cell
 
@@ -88,6 +92,7 @@ async def _serve_robot(
     shown: ShownCell,
     workers: Workers,
     checks: Quota,
+    arms: ArmPublishers,
 ) -> None:
     (robot,) = (each for each in settings.cell_description.robots if each.name == settings.name)
     description = load(robot.model, confined=robot.confined)
@@ -128,6 +133,4 @@ async def _serve_robot(
         reach=reach_of(description),
         base_to_site=robot.base_to_site,
     )
-    async with asyncio.TaskGroup() as group:
-        group.create_task(follow_proof(session, arm, cell_state))
-        group.create_task(follow(session, arm, cell_state, shown))
+    arms.add(robot.name, ArmPublisher(session, arm, cell_state, shown))

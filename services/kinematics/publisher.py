@@ -1,7 +1,8 @@
 """Publishers of `frames`, `kinematics` and `events/kinematics`, driven by incoming joint states only."""
 
+import contextlib
 import logging
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -9,9 +10,10 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from robomesh.errors import MessageError
-from robomesh.keys import robot_key
+from robomesh.keys import ROOT, robot_key
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
+from robomesh.subscription import Sample
 from robots.collision import Cell, distances
 from robots.joints import FloatArray
 from robots.model import RobotModel
@@ -40,6 +42,8 @@ log = logging.getLogger(__name__)
 _LONGEST_DIFFERENCE_S = 0.5
 # Rate at which `frames` repeats the fixtures, which do not move.
 _FIXTURES_HZ = 1.0
+# Samples of each arm that may wait while others are processed.
+_NEWEST_EACH = 8
 
 _LEVELS = {
     schema.Event.INFO: logging.INFO,
@@ -69,82 +73,125 @@ class FollowedArm:
         return f"{self.site}/{self.name}"
 
 
-async def follow(session: Session, arm: FollowedArm, cell_state: CellState, shown: ShownCell) -> None:
-    """Publish an arm's frames, kinematic state and events, until cancelled.
+class ArmPublisher:
+    """Publisher of an arm's frames, kinematic state and events.
 
     Args:
         cell_state: State of its cell; receives each state that is processed.
         shown: Content of its cell; until its hulls are built no clearance is published.
     """
-    frames = session.declare_publisher(arm.site, arm.name, "frames")
-    kinematics = session.declare_publisher(arm.site, arm.name, "kinematics")
-    events = session.declare_publisher(arm.site, arm.name, "events/kinematics")
-    frames_limit, kinematics_limit = _RateLimit(frames.topic.rate_hz), _RateLimit(kinematics.topic.rate_hz)
-    fixtures_limit = _RateLimit(_FIXTURES_HZ)
-    frames_message = FramesMessage(arm.model, prefix=arm.path, base_to_site=arm.base_to_site)
-    alarms = Alarms()
-    before: tuple[int, FloatArray] | None = None
-    mismatch_log = _MismatchLog(arm)
-    floor_reported: Cell | None = None
-    placed: object = None
-    async for sample in session.subscribe(robot_key(arm.site, arm.name, "joints")):
-        time_ns, dated_by = sample.header.source_time_ns, sample.header.publisher
-        frames_due, kinematics_due = frames_limit.due(time_ns), kinematics_limit.due(time_ns)
-        now = shown.now
+
+    def __init__(self, session: Session, arm: FollowedArm, cell_state: CellState, shown: ShownCell) -> None:
+        self._arm, self._cell_state, self._shown = arm, cell_state, shown
+        self._frames = session.declare_publisher(arm.site, arm.name, "frames")
+        self._kinematics = session.declare_publisher(arm.site, arm.name, "kinematics")
+        self._events = session.declare_publisher(arm.site, arm.name, "events/kinematics")
+        self._frames_limit = _RateLimit(self._frames.topic.rate_hz)
+        self._kinematics_limit = _RateLimit(self._kinematics.topic.rate_hz)
+        self._fixtures_limit = _RateLimit(_FIXTURES_HZ)
+        self._message = FramesMessage(arm.model, prefix=arm.path, base_to_site=arm.base_to_site)
+        self._alarms = Alarms()
+        self._before: tuple[int, FloatArray] | None = None
+        self._mismatch_log = _MismatchLog(arm)
+        self._floor_reported: Cell | None = None
+        self._placed: object = None
+
+    def take(self, sample: Sample) -> None:
+        """Take a sample of the arm's `joints`, and publish what is due, or one of its `controller`."""
+        with contextlib.suppress(MessageError):
+            if sample.parsed.topic == "controller":
+                message = sample.message()
+                assert isinstance(message, schema.ControllerState)
+                # Unproven joints may not be those of the model.
+                self._cell_state.update_proof(self._arm.name, unproven=message.joints_unproven)
+            else:
+                self._take_joints(sample)
+
+    def _take_joints(self, sample: Sample) -> None:
+        time_ns = sample.header.source_time_ns
+        frames_due, kinematics_due = self._frames_limit.due(time_ns), self._kinematics_limit.due(time_ns)
         if not (frames_due or kinematics_due):
-            continue
-        try:
-            message = sample.message()
-        except MessageError:
-            continue
+            return
+        message = sample.message()
         assert isinstance(message, JointStates)
-        positions = positions_by_name(arm.model.joints, message)
-        mismatch_log.update(None if positions is not None else message)
+        positions = positions_by_name(self._arm.model.joints, message)
+        self._mismatch_log.update(None if positions is not None else message)
         if positions is None:
-            continue
+            return
         if sample.live:
-            cell_state.update(arm.name, positions)
+            self._cell_state.update(self._arm.name, positions)
         if frames_due:
-            with_fixtures = fixtures_limit.due(time_ns) or placed is not now.fixtures
-            fixtures = now.placements if with_fixtures else {}
-            transforms = frames_message.filled(positions, message.timestamp, fixtures)
-            placed = now.fixtures
-            if not sample.live:
-                # A last value: answer late joiners with it. Published, it would look live.
-                frames.remember(transforms, source_time_ns=time_ns)
-                continue
-            frames.put(transforms, source_time_ns=time_ns, dated_by=dated_by)
-        if not (sample.live and kinematics_due):
-            continue
+            self._publish_frames(sample, positions, message.timestamp)
+        if sample.live and kinematics_due:
+            self._publish_state(sample, positions, message)
+
+    def _publish_frames(self, sample: Sample, positions: FloatArray, timestamp: Timestamp) -> None:
+        now, time_ns = self._shown.now, sample.header.source_time_ns
+        with_fixtures = self._fixtures_limit.due(time_ns) or self._placed is not now.fixtures
+        transforms = self._message.filled(positions, timestamp, now.placements if with_fixtures else {})
+        self._placed = now.fixtures
+        if sample.live:
+            self._frames.put(transforms, source_time_ns=time_ns, dated_by=sample.header.publisher)
+        else:
+            # A last value: answer late joiners with it. Published, it would look live.
+            self._frames.remember(transforms, source_time_ns=time_ns)
+
+    def _publish_state(self, sample: Sample, positions: FloatArray, message: JointStates) -> None:
+        arm, built = self._arm, self._shown.now.built
+        time_ns, dated_by = sample.header.source_time_ns, sample.header.publisher
         velocities = velocities_by_name(arm.model.joints, message)
         if velocities is None:
-            velocities = _difference(before, time_ns, positions)
-        before = time_ns, positions
-        state, proximity = _state(arm, cell_state, now.built, positions, velocities, message.timestamp)
-        kinematics.put(state, source_time_ns=time_ns, dated_by=dated_by)
+            velocities = _difference(self._before, time_ns, positions)
+        self._before = time_ns, positions
+        state, proximity = _state(arm, self._cell_state, built, positions, velocities, message.timestamp)
+        self._kinematics.put(state, source_time_ns=time_ns, dated_by=dated_by)
         # Unproven joints may be elsewhere: alarms about them would be invented.
-        conditions = () if state.joints_unproven else _conditions(arm, now.built, positions, state, proximity)
-        found = alarms.judge(conditions, sample.received)
-        if now.built is not None and floor_reported is not now.built:
-            floor_reported = now.built
+        conditions = () if state.joints_unproven else _conditions(arm, built, positions, state, proximity)
+        found = self._alarms.judge(conditions, sample.received)
+        if built is not None and self._floor_reported is not built:
+            self._floor_reported = built
             poses = {"at home": arm.model.joints.home, "where it is now": positions}
-            if (below_floor := floor_event(now.built, arm.name, poses)) is not None:
+            if (below_floor := floor_event(built, arm.name, poses)) is not None:
                 found.append(below_floor)
         for event in found:
             event.timestamp.CopyFrom(message.timestamp)
-            events.put(event, source_time_ns=time_ns, dated_by=dated_by)
+            self._events.put(event, source_time_ns=time_ns, dated_by=dated_by)
             log.log(_LEVELS[event.severity], "%s: %s", arm.path, event.text)
 
 
-async def follow_proof(session: Session, arm: FollowedArm, cell_state: CellState) -> None:
-    """Keep in a cell's state whether an arm's joints are unproven, until cancelled."""
-    async for sample in session.subscribe(robot_key(arm.site, arm.name, "controller")):
-        try:
-            message = sample.message()
-        except MessageError:
-            continue
-        assert isinstance(message, schema.ControllerState)
-        cell_state.update_proof(arm.name, unproven=message.joints_unproven)
+class ArmPublishers:
+    """The publishers of a site's arms, which start one after the other.
+
+    One subscription for all arms wakes the event loop less often; of a backlog the newest states are taken.
+
+    Args:
+        arms: Names of the arms.
+    """
+
+    def __init__(self, site: str, arms: Collection[str]) -> None:
+        self._site, self._names = site, frozenset(arms)
+        self._publishers: dict[str, ArmPublisher] = {}
+        # Of arms that have not started: the newest sample of each key.
+        self._early: dict[str, Sample] = {}
+
+    def add(self, name: str, publisher: ArmPublisher) -> None:
+        """Start an arm with what has arrived."""
+        self._publishers[name] = publisher
+        for key in (robot_key(self._site, name, "controller"), robot_key(self._site, name, "joints")):
+            if (sample := self._early.pop(key, None)) is not None:
+                publisher.take(sample)
+
+    async def follow(self, session: Session, topic: str) -> None:
+        """Deliver `joints` or `controller` of all arms until cancelled."""
+        newest = _NEWEST_EACH * max(1, len(self._names))
+        subscription = session.subscribe(f"{ROOT}/{self._site}/*/{topic}", newest=newest)
+        while samples := await subscription.next_batch():
+            for key, sample in {sample.key: sample for sample in samples}.items():
+                robot = sample.parsed.robot
+                if (publisher := self._publishers.get(robot)) is not None:
+                    publisher.take(sample)
+                elif robot in self._names:
+                    self._early[key] = sample
 
 
 def _state(
