@@ -285,7 +285,7 @@ def cpu_of(process_id: int) -> float:
 
 
 def stops(name: str, number: int) -> list[dict[str, Any]]:
-    """Return the delays of stops, without load and beside processes that compute."""
+    """Return the delays of stops, without load and during computations of other processes."""
     rows = []
     with (
         running(name, 1) as (endpoint, _, arrivals),
@@ -336,7 +336,7 @@ def _stop_request() -> bytes:
 
 
 def answer_bare(endpoint: str) -> None:
-    """Answer questions at once, without doing anything."""
+    """Answer questions immediately."""
     with zenoh.open(client_config((endpoint,))) as session:
         answering = session.declare_queryable("bare", lambda query: query.reply("bare", b""))
         time.sleep(3600)

@@ -314,7 +314,7 @@ def cpu_s(pid: int) -> float:
 
 
 def swinging(port: int, written: Any, units: int) -> None:
-    """Run a controller whose arm swings, with the counter in its last joint."""
+    """Run a controller with a swinging arm; its last joint is the counter."""
     names = joints_of(load("pt600"))
     with socket.create_server(("127.0.0.1", port)) as server:
         client, _ = server.accept()

@@ -91,7 +91,7 @@ class CellFile(Protocol):
 
     @property
     def name(self) -> str:
-        """Name of the file; empty: there is none."""
+        """Name of the file, or an empty text."""
 
     def cell(self, robot: str) -> str:
         """Return the name of a robot's cell."""

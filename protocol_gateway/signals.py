@@ -154,7 +154,7 @@ class Signals:
             self._journal.report(_S.INFO, code, text, changes=", ".join(some))
 
     def _set_up(self, entry: _Entry, value: SignalValue) -> str:
-        """Keep a value of tool, payload or frame; return its change in words, empty if there is none."""
+        """Keep a value of tool, payload or frame; return its change in words, or an empty text."""
         before = self._setup.get(entry.name, self._confirmed.get(entry.name))
         if before is None and len(self._setup) >= MOST_SIGNALS:
             return ""
@@ -275,7 +275,7 @@ class Signals:
 
 
 def _change(name: str, before: SignalValue, now: SignalValue, unit: str = "") -> str:
-    """Return a change in words; empty if there is none."""
+    """Return a change in words, or an empty text."""
     if isinstance(before, float) and isinstance(now, float):
         same = abs(now - before) <= _LEAST_CHANGE
     else:

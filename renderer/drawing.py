@@ -128,7 +128,7 @@ class Drawing:
         return _corners(known) if known else None
 
     def inside(self, scene: Scene, camera: Camera) -> str:
-        """Return the name of the body that contains a perspective camera's eye; empty if there is none."""
+        """Return the name of the body that contains a perspective camera's eye, or an empty text."""
         if camera.orthographic:
             return ""
         for part, uploaded in self._known(scene.parts + scene.others + scene.fixtures):

@@ -194,7 +194,7 @@ class Datagrams(_Socket, asyncio.DatagramProtocol):
             raise LinkCloggedError(codes.LINK_CLOGGED())
 
     def pause(self, seconds: float) -> None:
-        """Do nothing: the kernel drops datagrams that nobody reads in time."""
+        """Do nothing: the kernel drops unread datagrams."""
 
     async def end(self) -> None:
         """Close the socket."""

@@ -238,7 +238,7 @@ class ControllerLink:
         self._response_timer.command_sent(now.monotonic_s)
 
     def controlled(self, taken: bool) -> None:
-        """Tell the driver whether an operator controls the robot, if it wants to know and has started."""
+        """Tell a started driver whether an operator controls the robot, if it follows control."""
         self._is_controlled = taken
         running = self._failed is not None and not self._failed.done()
         if running and isinstance(self._driver, FollowsControl):

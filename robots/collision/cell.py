@@ -78,7 +78,7 @@ class Cell:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What is around an arm, wherever the other arms are.
+    """Fixtures and other arms around an arm, independent of their positions.
 
     Attributes:
         arms: The other arms that are counted.
@@ -92,7 +92,7 @@ class Surroundings:
 
 
 def surroundings_of(cell: Cell, robot: str, others: Iterable[str]) -> Surroundings:
-    """Return what is around an arm; two bodies that do not move are not checked against each other.
+    """Return the surroundings of an arm; two bodies that do not move are not checked against each other.
 
     Args:
         others: The robots that are counted; the arm itself never is.

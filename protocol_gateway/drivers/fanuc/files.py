@@ -52,7 +52,7 @@ def lines_of(data: bytes) -> str:
 
 
 def software(file: str) -> str:
-    """Return the version of the software, which the head of most files has; empty: there is none."""
+    """Return the version of the software, from the head of most files, or an empty text."""
     found = _SOFTWARE.search(file)
     return " ".join(found[1].split()) if found else ""
 
