@@ -12,6 +12,7 @@ task and solves for the whole pose, which is reachable too. TRAC-IK's figures ar
 import argparse
 import json
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -28,7 +29,7 @@ from robots.collision import allowed_positions, build_cell, outside_nearest, own
 from robots.description import known_names, load
 from robots.inverse import InverseSolver, Task, build_solver, solve
 from robots.joints import FloatArray, violations
-from robots.model import RobotModel, build_model, tool_jacobian, tool_placement
+from robots.model import RobotModel, all_positions, build_model, tool_jacobian, tool_placement
 from robots.poses import inverse
 from robots.programs.check import check_program
 from services.site_file.fixtures import Fixture as FixtureSettings
@@ -61,7 +62,11 @@ def measure(count: int, peers_python: str) -> dict[str, Any]:
     peers = ask_peers(arms, peers_python) if peers_python else {}
     toolbox, others = peers.get("roboticstoolbox", {}), peers.get("mujoco", {})
     result: dict[str, Any] = {"targets": count, "forward": [], "inverse": [], "trac_ik_read": TRAC_IK}
-    result["peers"] = {name: next(iter(arms_of.values())).get("version") for name, arms_of in peers.items()}
+    result["peers"], result["missing"] = {}, {}
+    for name, arms_of in peers.items():
+        answer = next(iter(arms_of.values()))
+        kind = "peers" if "version" in answer else "missing"
+        result[kind][name] = answer.get("version", answer.get("missing"))
     for name, arm in arms.items():
         there = toolbox.get(name, {})
         row = {"arm": name, **arm.forward(), "roboticstoolbox": there.get("per_second")}
@@ -115,11 +120,7 @@ class Arm:
             tool_placement(model, positions)
             tool_jacobian(model, positions)
 
-        everything = (
-            [model._followers[0] @ x + model._followers[1] for x in everywhere]
-            if model._followers
-            else everywhere
-        )
+        everything = [all_positions(model, x) for x in everywhere]
 
         def bare(positions: FloatArray) -> None:
             pinocchio.computeJointJacobians(inner, data, positions)
@@ -213,9 +214,16 @@ def ask_peers(arms: dict[str, Arm], python: str) -> dict[str, Any]:
         path = Path(folder) / "arms.json"
         path.write_text(json.dumps(asked))
         program = Path(__file__).with_name("kinematics_peers.py")
-        done = subprocess.run([python, str(program), str(path)], capture_output=True, text=True, check=False)
+        try:
+            done = subprocess.run(
+                [python, str(program), str(path)], capture_output=True, text=True, check=False
+            )
+        except OSError as error:
+            print(f"no peers: {python}: {error.strerror}", file=sys.stderr)
+            return {}
     if done.returncode:
-        raise SystemExit(f"{python}: {done.stderr.strip().splitlines()[-1:]}")
+        print(f"no peers: {python}: {done.stderr.strip().rpartition(chr(10))[2]}", file=sys.stderr)
+        return {}
     answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return answer
 
@@ -303,6 +311,8 @@ def tell(result: dict[str, Any]) -> None:
         print("no peers: run 'pip install roboticstoolbox-python mujoco ikpy' in a separate environment")
         print("and name its Python with --peers-python")
     print("peers:", ", ".join(f"{name} {version}" for name, version in result["peers"].items()) or "none")
+    for name, why in result["missing"].items():
+        print(f"{name} not measured: {why}")
     print(
         "\nFK + Jacobian, calls/s      ours  Pinocchio alone  roboticstoolbox    mujoco   "
         "FK off NumPy's, roboticstoolbox's [m]"

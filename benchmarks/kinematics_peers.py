@@ -28,8 +28,8 @@ def main() -> None:
         for peer, measure in (("roboticstoolbox", toolbox), ("mujoco", mujoco_), ("ikpy", ikpy_)):
             try:
                 answer[peer][name] = measure(arm)
-            except ImportError as error:
-                answer[peer][name] = {"missing": str(error)}
+            except Exception as error:  # not only ImportError: a peer may fail on another's old package
+                answer[peer][name] = {"missing": f"{type(error).__name__}: {error}"}
     print(json.dumps(answer))
 
 

@@ -203,7 +203,11 @@ def writers(peers_python: str) -> dict[str, Any]:
         if peers_python:
             program = Path(__file__).with_name("recorder_peers.py")
             command = [peers_python, str(program), str(WRITTEN), str(SIZE), folder]
-            found |= json.loads(subprocess.run(command, check=True, capture_output=True, timeout=300).stdout)
+            try:
+                done = subprocess.run(command, check=True, capture_output=True, timeout=300)
+                found |= json.loads(done.stdout)
+            except (OSError, subprocess.SubprocessError) as error:
+                print(f"no peers: {error}", file=sys.stderr)
     return found
 
 

@@ -21,8 +21,8 @@ def main() -> None:
             version = write(folder / f"{name}.mcap", messages, bytes(range(256)) * (size // 256 + 1), size)
             rate = messages / (time.perf_counter() - begun)
             answer[name] = {"version": version, "messages_per_s": round(rate)}
-        except ImportError as error:
-            answer[name] = {"missing": str(error)}
+        except Exception as error:  # not only ImportError: a peer may fail on another's old package
+            answer[name] = {"missing": f"{type(error).__name__}: {error}"}
     print(json.dumps(answer))
 
 

@@ -1,10 +1,12 @@
 """Pictures a second, compared with VTK, pyrender and mujoco: same meshes, cameras and sizes.
 
     ./dev run python benchmarks/renderer.py [--peers-python PYTHON] [--rounds 3] [--turns 12]
-        [--device N] [--json]
+        [--device N] [--only 720p/4x/100k/1,...] [--json]
 
 In software OpenGL, or on the EGL device with the number N. PYTHON is a separate environment with vtk,
-pyrender and mujoco. Each program is a separate process, which draws and reads back to NumPy; they take turns,
+pyrender and mujoco; a peer that it cannot import or run is reported and left out. pyrender pins PyOpenGL
+3.1.0, with which MuJoCo fails: install 'pyopengl>=3.1.7' after both. --only selects rows by size, samples,
+triangles and views. Each program is a separate process, which draws and reads back to NumPy; they take turns,
 row by row, so that other load affects all of them. Ours draws more than the task for the peers: the floor and
 its grid, the arm's soft shadow, edges, dimmed hollows; its rows "full" add the lamp's shadow on the arm.
 Medians of all turns; the spread is from p10 to p90. On a machine with other load, pictures for a second of
@@ -12,8 +14,10 @@ one core's time are a better measure than pictures a second.
 """
 
 import argparse
+import contextlib
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -55,13 +59,22 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--turns", type=int, default=12)
     parser.add_argument("--device", type=int, default=None, help="number of the EGL device; none: software")
+    parser.add_argument("--only", default="", help=f"rows, of {', '.join(map(name_of, rows()))}")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--serve", default="", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.serve:
         serve_ours(Path(arguments.serve), arguments.device)
         return
-    result = measure(arguments.peers_python, arguments.rounds, arguments.turns, arguments.device)
+    chosen = [name for name in arguments.only.split(",") if name]
+    if unknown := [name for name in chosen if name not in map(name_of, rows())]:
+        parser.error(
+            f"--only {', '.join(unknown)}: no such row; choose from {', '.join(map(name_of, rows()))}"
+        )
+    if arguments.peers_python and not shutil.which(arguments.peers_python):
+        parser.error(f"--peers-python {arguments.peers_python}: no such program")
+    wanted = [row for row in rows() if not chosen or name_of(row) in chosen]
+    result = measure(arguments.peers_python, arguments.rounds, arguments.turns, arguments.device, wanted)
     print(json.dumps(result)) if arguments.json else tell(result)
 
 
@@ -77,8 +90,15 @@ def rows() -> list[dict[str, Any]]:
     return some + more
 
 
-def measure(peers_python: str, rounds: int, turns: int, device: int | None) -> dict[str, Any]:
-    """Return the milliseconds of each row and program."""
+def name_of(row: dict[str, Any]) -> str:
+    """Return a row's name, as in 720p/4x/100k/1."""
+    return f"{row['size'][1]}p/{row['samples']}x/{row['count']}/{row['views']}"
+
+
+def measure(
+    peers_python: str, rounds: int, turns: int, device: int | None, wanted: list[dict[str, Any]]
+) -> dict[str, Any]:
+    """Return the milliseconds of each row and program, and why a program is missing."""
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder) / "scene.npz"
         triangles = write_scene(scene)
@@ -95,22 +115,26 @@ def measure(peers_python: str, rounds: int, turns: int, device: int | None) -> d
             here_now = {name: server for name, server in servers.items() if "ready" in versions[name]}
             answers: dict[tuple[int, str], list[dict[str, Any]]] = {}
             for _ in range(rounds):
-                for number, row in enumerate(rows()):
-                    for name, server in here_now.items():
+                for number, row in enumerate(wanted):
+                    for name, server in [*here_now.items()]:
                         shading = "full" if name.endswith("full") else "fast"
                         answer = server.ask({**row, "turns": turns, "shading": shading})
+                        if "missing" in answer:
+                            versions[name] = answer
+                            del here_now[name]
                         answers.setdefault((number, name), []).append(answer)
-                    print(f"row {number + 1} of {len(rows())}", file=sys.stderr, flush=True)
+                    print(f"row {number + 1} of {len(wanted)}", file=sys.stderr, flush=True)
         finally:
             for server in servers.values():
                 server.close()
     return {
         "robot": ROBOT,
         "triangles": triangles,
-        "programs": {name: next(iter(version.values())) for name, version in versions.items()},
+        "programs": {name: version["ready"] for name, version in versions.items() if "ready" in version},
+        "missing": {name: version["missing"] for name, version in versions.items() if "missing" in version},
         "rows": [
             {**row, **{name: summary(answers[number, name], row["views"]) for name in here_now}}
-            for number, row in enumerate(rows())
+            for number, row in enumerate(wanted)
         ],
     }
 
@@ -225,7 +249,7 @@ def serve_ours(path: Path, device: int | None) -> None:
 
 
 class Server:
-    """A process that answers each line with a line."""
+    """A process that answers each line with a line; its answer has "missing" if it cannot."""
 
     def __init__(self, command: list[str], device: int | None) -> None:
         chosen = SOFTWARE if device is None else {variable: str(device) for variable in DEVICE_VARIABLES}
@@ -236,8 +260,9 @@ class Server:
 
     def ask(self, row: dict[str, Any]) -> dict[str, Any]:
         assert self._process.stdin is not None
-        self._process.stdin.write(json.dumps(row) + "\n")
-        self._process.stdin.flush()
+        with contextlib.suppress(BrokenPipeError):  # it has ended: `answer` reports it
+            self._process.stdin.write(json.dumps(row) + "\n")
+            self._process.stdin.flush()
         return self.answer()
 
     def answer(self) -> dict[str, Any]:
@@ -246,16 +271,19 @@ class Server:
             if line.startswith("{"):
                 answer: dict[str, Any] = json.loads(line)
                 return answer
-        raise RuntimeError(f"{self._process.args} ended with {self._process.wait()}")
+        return {"missing": f"ended with status {self._process.wait()}"}
 
     def close(self) -> None:
         self._process.kill()
-        self._process.communicate()
+        with contextlib.suppress(BrokenPipeError):
+            self._process.communicate()
 
 
 def tell(result: dict[str, Any]) -> None:
     names = [name for name in result["rows"][0] if name not in ("size", "samples", "count", "views")]
     print(f"{result['robot']}, {result['triangles']} triangles; {result['programs']}")
+    for name, why in result["missing"].items():
+        print(f"{name} not measured: {why}")
     print("drawn with", {name: result["rows"][0][name]["device"] for name in names})
     print("pictures a core's second; by the clock (ms of a turn, p10 to p90; MiB)")
     for row in result["rows"]:

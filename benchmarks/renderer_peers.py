@@ -5,7 +5,8 @@
 It imports no module of the project. Each line of standard input asks for one row in JSON. The answer is a
 line with the milliseconds of each turn (every view drawn and read back to NumPy), by the clock and of
 processor time of all threads; the share of the last picture that is not background; OpenGL's name of the
-device; and the process's memory.
+device; and the process's memory. If a peer cannot be imported or cannot draw a row, the line has the reason
+instead.
 Smooth normals, one light from the camera, no shadows, no reflections: the least that each can do.
 """
 
@@ -35,8 +36,10 @@ def main() -> None:
     try:
         make = {"vtk": vtk_, "pyrender": pyrender_, "mujoco": mujoco_}[peer]
         version = make(scene, None)
-    except Exception as error:  # pyrender's window library fails with AttributeError without X.
-        print(json.dumps({"missing": str(error)}), flush=True)
+    # Not only ImportError: pyrender's window library without X, and MuJoCo with pyrender's old PyOpenGL, fail
+    # with AttributeError.
+    except Exception as error:
+        print(json.dumps({"missing": reason(error)}), flush=True)
         return
     print(json.dumps({"ready": version}), flush=True)
     serve(lambda row: make(scene, row), scene)
@@ -45,29 +48,41 @@ def main() -> None:
 def serve(make: Callable[[dict[str, Any]], Stage], scene: dict[str, Any]) -> None:
     """Answer rows until standard input ends."""
     for line in sys.stdin:
-        row = json.loads(line)
-        render, close, device = make(row)
-        times, spent, picture = [], [], None
-        for turn in range(row["turns"] + WARM_UP):
-            placements = scene["placements"][turn % len(scene["placements"])]
-            start, begun = time.perf_counter(), time.process_time()
-            for view in range(row["views"]):
-                picture = render(placements, view)
-            times.append((time.perf_counter() - start) * 1e3)
-            spent.append((time.process_time() - begun) * 1e3)
-        assert picture is not None
-        corner = picture[2, 2].astype(int)
-        drawn = np.abs(picture.astype(int) - corner).max(axis=2) > 12
-        answer = {
-            "ms": times[WARM_UP:],
-            "cpu_ms": spent[WARM_UP:],
-            "drawn": float(drawn.mean()),
-            "device": device,
-            "shape": picture.shape,
-            "rss_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
-        }
-        close()
+        try:
+            answer = drawn(make, scene, json.loads(line))
+        except Exception as error:
+            answer = {"missing": reason(error)}
         print(json.dumps(answer), flush=True)
+
+
+def drawn(make: Callable[[dict[str, Any]], Stage], scene: dict[str, Any], row: dict[str, Any]) -> Any:
+    """Draw a row's turns and return their times."""
+    render, close, device = make(row)
+    times, spent, picture = [], [], None
+    for turn in range(row["turns"] + WARM_UP):
+        placements = scene["placements"][turn % len(scene["placements"])]
+        start, begun = time.perf_counter(), time.process_time()
+        for view in range(row["views"]):
+            picture = render(placements, view)
+        times.append((time.perf_counter() - start) * 1e3)
+        spent.append((time.process_time() - begun) * 1e3)
+    assert picture is not None
+    corner = picture[2, 2].astype(int)
+    foreground = np.abs(picture.astype(int) - corner).max(axis=2) > 12
+    answer = {
+        "ms": times[WARM_UP:],
+        "cpu_ms": spent[WARM_UP:],
+        "drawn": float(foreground.mean()),
+        "device": device,
+        "shape": picture.shape,
+        "rss_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
+    close()
+    return answer
+
+
+def reason(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"
 
 
 def links(scene: dict[str, Any], count: str) -> list[dict[str, Any]]:
