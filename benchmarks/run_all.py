@@ -338,7 +338,9 @@ def main() -> None:
     minutes = arguments.minutes or (math.inf if arguments.growth else 20.0)
     expected = sum(run.seconds for _, run in plan) / 60
     say(f"about {expected:.0f} minutes on two idle cores, {len(plan)} programs")
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # Both, because a shell lets background programs ignore Ctrl-C, and the programs started here would too.
+    for each in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(each, signal.default_int_handler)
     result = {
         "growth": arguments.growth,
         "rows": rows,
@@ -424,7 +426,8 @@ def outcome_of(run: Run, limit_s: float, arguments: Any) -> dict[str, Any]:
     result: dict[str, Any] = {"took_s": time.monotonic() - begun, "load": os.getloadavg()[0]}
     if not failed:
         try:
-            result["result"] = json.loads(output[-1])
+            # Without NaN, which is not JSON.
+            result["result"] = json.loads(output[-1], parse_constant=lambda _: None)
         except (IndexError, ValueError):
             failed = "printed no JSON"
     if notes := [line for line in said if any(word in line for word in NOTES)]:
@@ -483,7 +486,7 @@ def line_of(line: Line, result: dict[str, Any]) -> dict[str, Any]:
         found = {run["program"]: run["result"] for run in runs if run["round"] == number and "result" in run}
         try:
             own, others = line.read(found)
-        except (KeyError, StopIteration, ValueError):
+        except (KeyError, StopIteration, TypeError, ValueError):
             continue
         own_values = listed(own)
         ours += own_values
@@ -506,8 +509,9 @@ def line_of(line: Line, result: dict[str, Any]) -> dict[str, Any]:
 
 
 def listed(value: float | list[float]) -> list[float]:
+    """Return the values that there are: a program without a sample gives null."""
     values = value if isinstance(value, list) else [value]
-    return [each for each in values if math.isfinite(each)]
+    return [each for each in values if each is not None and math.isfinite(each)]
 
 
 def spread(values: Sequence[float]) -> dict[str, float] | None:
@@ -539,7 +543,7 @@ def growth_table(result: dict[str, Any]) -> list[dict[str, Any]]:
                             costs.setdefault(name, {})[count] = cost
                         else:
                             failed.append(f"{count}, {name}: no cost (0, or nothing delivered)")
-                except (KeyError, ValueError, ZeroDivisionError):
+                except (KeyError, TypeError, ValueError, ZeroDivisionError):
                     failed.append(f"{count}: no cost in its result")
         lines += [
             {
