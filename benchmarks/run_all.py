@@ -118,8 +118,10 @@ ROWS: dict[str, tuple[Run, ...]] = {
 
 
 def kinematics(results: Results) -> Values:
-    service, bare = results["live_kinematics"], results["kinematics"]
+    service = results["live_kinematics"]
     robots, ours = service["robots"], 100 * service["cpu_share"]
+    if not (bare := results.get("kinematics")):
+        return ours, {}
     rates = next(each for each in bare["forward"] if each["arm"] == "pt600")
     frames = 100 * 60 * robots / rates["pinocchio"]
     clearances = 100 * 20 * robots / bare["collision"]["outside_within_warning"]
