@@ -102,7 +102,8 @@ class Proofs:
         """
         capabilities, proof = self._capabilities, self._stop
         if not capabilities.commands:
-            return codes.READS_ONLY()
+            off = codes.MOTION_OFF(protocol=self._protocol)
+            return off if capabilities.can_be_moved else codes.READS_ONLY()
         if Stop not in capabilities.commands:
             return codes.NO_STOP_CODE()
         if self._simulated and proof is True:

@@ -333,6 +333,11 @@ STOP_LATCHED = Code(
 ROBOT_READ_ONLY = Code("robot.read_only", "this robot is read-only: {cause}")
 READ_ONLY = Code("robot.is_read_only", "read-only: {cause}")
 READS_ONLY = Code("robot.reads_only", "the driver of its controller only reads", "move it from its own panel")
+MOTION_OFF = Code(
+    "robot.motion_off",
+    "its site file does not let the gateway move it",
+    "move it from its own panel; motion with {protocol} is an experiment (see docs/controllers.md)",
+)
 NO_STOP_CODE = Code(
     "robot.no_stop_code",
     "the codes in the site file have no stop for its controller",

@@ -24,7 +24,7 @@ def stop_latched(stop: StopRequested, result: StopResult) -> Report:
 def stop_not_sent(stop: StopRequested, result: StopResult) -> Report:
     """Report a stop of a read-only robot."""
     text = f"{result.reason} ({stop.by}: {stop.reason})"
-    return Report(_S.ERROR, "stop.not_sent", text, why=result.reason, values={"by": stop.by})
+    return Report(_S.WARNING, "stop.not_sent", text, why=result.reason, values={"by": stop.by})
 
 
 def stop_sent(result: StopResult) -> Report:

@@ -382,6 +382,7 @@ class Capabilities:
             the joints of a real arm are unproven until `robomesh robot verify` has compared them.
         joint_mapping: The site file's declarations by which it converts joints, in any form: with others,
             the joints are unproven again.
+        can_be_moved: Another key of the site file would let the driver move the arm.
         experimental: Its commands were never tried on a real controller.
         stop_means: How its `Stop` is sent, which a proof of the stop names; empty: in one way only.
         recoveries: Actions of `Recover`. Each is off unless the site file allows it.
@@ -398,6 +399,7 @@ class Capabilities:
     no_joints: Reason | None = None
     reports_pose: bool = False
     joint_mapping: str = ""
+    can_be_moved: bool = False
     experimental: bool = False
     stop_means: str = ""
     recoveries: frozenset[Recovery] = frozenset()

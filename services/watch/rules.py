@@ -92,7 +92,7 @@ RULES: Mapping[str, Rule] = MappingProxyType(
         "controller.software": _NONE,
         "stop.remembered": _NONE,  # the controller state reports it
         "stop.sent": _NONE,
-        "stop.not_sent": Rule(CRITICAL, "The stop did not reach the controller: use its emergency stop."),
+        "stop.not_sent": Rule(LOW, "This robot is only watched: stop it at its own panel."),
         "stop.disobeyed": Rule(CRITICAL, "The robot still moves: use its emergency stop."),
         "motion.foreign": Rule(HIGH, _WHO),
         "lease.ended": Rule(LOW, "Control was not given back; see who had it.", (), 5 * _MINUTE_S),

@@ -163,11 +163,12 @@ def test_a_program_of_others_between_motions_ends_control_and_the_stop_ends_it_i
     async def main():
         async with mover.started(mesh, tmp_path, monkeypatch) as arm:
             target = await arm.begin(0.05)
-            await until(lambda: near(arm.positions(), target))
-            await until(lambda: not arm.site.seen["lease"][-1].motion)
-            said = stops(arm)
-            await arm.start_foreign()
-            await until(lambda: arm.site.events("motion.foreign"))
+            async with kept_control(arm.site):
+                await until(lambda: near(arm.positions(), target))
+                await until(lambda: not arm.site.seen["lease"][-1].motion)
+                said = stops(arm)
+                await arm.start_foreign()
+                await until(lambda: arm.site.events("motion.foreign"))
             await until(lambda: arm.site.seen["lease"][-1].holder == "")
             # The gateway has stopped what may have been the holder's motion.
             await until(lambda: arm.site.controller.stop.sent)

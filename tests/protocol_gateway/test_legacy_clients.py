@@ -27,10 +27,12 @@ async def test_old_programs_read_the_same_states_as_the_mesh(mesh, tmp_path):
             tuple(round(joint.position * 57.29577951308232, 6) for joint in message.joints)
             for message in site.seen["joints"]
         ]
-        first = published.index(one.positions[0])
-        count = min(len(published) - first, len(one.positions))
-        assert count > 50
-        assert one.positions[:count] == published[first : first + count]
+        # On a busy machine either reader may leave some out.
+        both = {*published} & {*one.positions}
+        assert len(both) > 50
+        assert [each for each in one.positions if each in both] == [
+            each for each in published if each in both
+        ]
         assert set(one.bytes[:2000].split(b"@")[1:-1]) & set(two.bytes.split(b"@"))
         await until(lambda: site.controller.legacy_clients.attached == 2)
 

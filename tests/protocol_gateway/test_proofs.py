@@ -102,6 +102,7 @@ def test_the_hash_is_of_what_places_the_tool_and_of_nothing_else():
         (MOVES, {"stop": True, "simulated": True, "experimental": False}, "", None),
         (MOVES, {"stop": False, "simulated": True}, "", codes.STOP_NOT_PROVEN),
         (READS, {"stop": TRIAL}, "5.12.4", codes.READS_ONLY),
+        (replace(READS, can_be_moved=True), {"stop": TRIAL}, "5.12.4", codes.MOTION_OFF),
         (Capabilities(commands=frozenset({Hold})), {"stop": True}, "", codes.NO_STOP_CODE),
         (Capabilities(commands=COMMANDS), {"stop": True, "experimental": False}, "", None),
         (Capabilities(commands=COMMANDS), {"stop": TRIAL, "protocol": "unit"}, "", codes.STOP_OTHER_MEANS),

@@ -106,6 +106,7 @@ class SnpxDriver(OnlyReads):
             absolute=True,
             no_joints=None if known else reason_codes.AXES_UNDECLARED(),
             reports_pose=known,
+            can_be_moved=True,
             joint_mapping=self._axes.mapping,
         )
         regular_hz = settings.rate_hz + _STATUS_HZ + _SIGNALS_HZ * (1 + len(self._io)) + _ALARMS_HZ

@@ -97,7 +97,7 @@ class RtdeDriver(OnlyReads):
     """
 
     ports = frozenset({PRIMARY.name, "scripts", "dashboard"})
-    capabilities = Capabilities(commands=frozenset(), absolute=True, reports_pose=True)
+    capabilities = Capabilities(commands=frozenset(), absolute=True, reports_pose=True, can_be_moved=True)
     # A greeting takes at most seven requests.
     requests_a_second = 10.0
 

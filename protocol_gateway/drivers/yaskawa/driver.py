@@ -99,6 +99,7 @@ class HsesDriver(OnlyReads):
             absolute=True,
             no_joints=reason_codes.JOINTS_UNDECLARED() if self._axes is None else None,
             reports_pose=self._pose is not None,
+            can_be_moved=settings.group[0] == "R",
             joint_mapping="" if self._axes is None else self._axes.mapping,
         )
         regular_hz = settings.rate_hz + _STATUS_HZ + _SIGNALS_HZ * (3 + len(self._io))

@@ -166,13 +166,7 @@ function StopPlace({ robots }: { robots: readonly string[] }) {
 
 function RobotStop({ robot, robotKey }: { robot: string; robotKey: string }) {
   const text = stopRequestText(useTopic(ControllerStateSchema, `${robotKey}/controller`));
-  return (
-    <StopButton
-      robots={[robotKey]}
-      text={text}
-      hint={t(text === "stop_ours" ? "stop_ours_hint" : "stop_hint", { robot })}
-    />
-  );
+  return <StopButton robots={[robotKey]} text={text} hint={t(`${text}_hint`, { robot })} />;
 }
 
 /** It can always be pressed, also where its request does not arrive now: then it says so. */

@@ -23,7 +23,7 @@ const CHINESE: Record<string, readonly [title: string, advice: string]> = {
   "controller.alarm": ["控制器报告警报", "请查看控制器自身的显示。"],
   "signals.too_many": ["控制器信号过多", "请减少控制器驱动上报的信号。"],
   "controller.refused": ["控制器拒绝了命令", "查看所请求的内容及拒绝原因。"],
-  "stop.not_sent": ["停止未送达控制器", "停止未送达控制器：请使用其急停。"],
+  "stop.not_sent": ["停止未送达控制器", "此机器人只能监视：请在其面板上停止。"],
   "stop.disobeyed": ["已要求停止但仍在运动", "机器人仍在运动：请使用其急停。"],
   "motion.foreign": ["有人从别处移动机器人", "查明谁在移动机器人；查明前请远离。"],
   "lease.ended": ["控制权未归还", "控制权未被归还，请查看原控制者。"],

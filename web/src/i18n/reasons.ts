@@ -557,6 +557,13 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ["robot.read_only", ["this robot is read-only: {cause}", "此机器人只读：{cause}"]],
   ["robot.is_read_only", ["read-only: {cause}", "只读：{cause}"]],
   [
+    "robot.motion_off",
+    [
+      "its site file does not let the gateway move it: move it from its own panel; motion with {protocol} is an experiment (see docs/controllers.md)",
+      "站点文件不允许网关移动它：请在其自身的示教器上移动；通过 {protocol} 运动属于试验功能（见 docs/controllers.md）",
+    ],
+  ],
+  [
     "robot.reads_only",
     [
       "the driver of its controller only reads: move it from its own panel",

@@ -78,6 +78,10 @@ const TEXTS = {
     "Stop latched for {robot}, but it did not reach the controller: {text}",
     "{robot} 已锁定停止，但未送达控制器：{text}",
   ],
+  stop_never: [
+    "Cannot be stopped from here, use the robot's panel: {robot}.",
+    "无法从此处停止，请使用机器人面板：{robot}。",
+  ],
   stop_failed: ["Stop request to {robot} failed: {text}", "{robot} 的停止请求失败：{text}"],
   stop_unreachable: ["Stop cannot be sent: use the emergency stop", "停止无法发送：请使用急停"],
   stop_none: ["No stop from here: use the robot's panel", "无法从此处停止：请使用机器人面板"],
@@ -86,6 +90,14 @@ const TEXTS = {
   stop_ours_hint: [
     "Asks {robot} to stop a motion that was commanded here. Other motions go on. Not an emergency stop.",
     "请求 {robot} 停止由此处命令的运动。其他运动继续。这不是急停。",
+  ],
+  stop_none_hint: [
+    "No request stops {robot}: it is only watched from here. Stop it at its own panel.",
+    "任何请求都不能停止 {robot}：此处只能监视。请在其面板上停止。",
+  ],
+  stop_not_now_hint: [
+    "A request does not reach the controller of {robot} now. It is latched, and sent when the connection is back.",
+    "请求目前无法送达 {robot} 的控制器。请求将被锁定，连接恢复后发送。",
   ],
   stop_again: ["Send again", "重新发送"],
   no_connection: ["No connection: nothing can be sent.", "无连接：无法发送。"],

@@ -52,6 +52,8 @@ export const DISOBEYED = "stop.disobeyed";
 const END_S = 0.01; // a recording's end, by its player's rounding
 const POSITIONS_STALE = "positions.stale";
 const UNPROVEN = new Set([
+  "joints.axes_extra",
+  "joints.base_undeclared",
   "joints.not_verified",
   "joints.of_other_robot",
   "joints.disagree",

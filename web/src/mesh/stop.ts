@@ -17,6 +17,8 @@ export const stopNotice = signal<Notice | null>(null);
 /** Robots of a press that had no answer, and when it was made [ms since the Unix epoch]. */
 export const unsentStop = signal<{ robotKeys: readonly string[]; at: number } | null>(null);
 
+type Outcome = { kind: "done" | "never" | "refused"; robot: string; text: string };
+
 /** Request a stop of each robot separately, so that a robot without an answer delays no other. */
 export async function stop(robotKeys: readonly string[], pressedAt = Date.now()): Promise<void> {
   const name = (key: string) => key.split("/").slice(1).join("/");
@@ -26,30 +28,40 @@ export async function stop(robotKeys: readonly string[], pressedAt = Date.now())
   const requestedAt = performance.now();
   const unsent: string[] = [];
   const outcomes = await Promise.all(
-    robotKeys.map(async (key): Promise<Notice> => {
+    robotKeys.map(async (key): Promise<Outcome> => {
       const robot = name(key);
       try {
         const page = pageReport(key);
         const request = { reason: "the page", by, ...(page && { page }) };
         const answer = await ask(`${key}/stop`, StopRequestSchema, request, StopAnswerSchema);
-        return answer.sent
-          ? { kind: "done", text: t("stop_done", { robot, id: String(answer.stopId) }) }
-          : { kind: "refused", text: t("stop_latched", { robot, text: reasonText(answer.reason, answer.text) }) };
+        if (answer.sent) return { kind: "done", robot, text: t("stop_done", { robot, id: String(answer.stopId) }) };
+        const text = reasonText(answer.reason, answer.text);
+        // Without a number nothing is latched: the robot is only watched.
+        return answer.stopId
+          ? { kind: "refused", robot, text: t("stop_latched", { robot, text }) }
+          : { kind: "never", robot, text };
       } catch (error) {
         if (error instanceof AskError && error.noAnswer) {
           unsent.push(key);
           // The next request must not use the same dead connection.
           reopenIfSilent(requestedAt);
         }
-        return { kind: "refused", text: t("stop_failed", { robot, text: reasonOf(error) }) };
+        return { kind: "refused", robot, text: t("stop_failed", { robot, text: reasonOf(error) }) };
       }
     }),
   );
-  const failed = outcomes.filter((outcome) => outcome.kind === "refused");
-  const text = (failed.length ? failed : outcomes).map((outcome) => outcome.text).join(" ");
-  const notice: Notice = failed.length
-    ? { kind: "refused", text: `${timeOfDay(pressedAt)} ${text}` }
-    : { kind: "done", text };
+  const of = (kind: Outcome["kind"]) => outcomes.filter((outcome) => outcome.kind === kind);
+  const never = of("never").map((outcome) => outcome.robot);
+  const lines = [
+    ...of("refused").map((outcome) => outcome.text),
+    ...(never.length ? [t("stop_never", { robot: never.join(", ") })] : []),
+    ...of("done").map((outcome) => outcome.text),
+  ];
+  const text = lines.join("\n");
+  const notice: Notice =
+    of("done").length === outcomes.length
+      ? { kind: "done", text }
+      : { kind: "refused", text: `${timeOfDay(pressedAt)} ${text}` };
   stopNotice.value = notice;
   if (unsent.length) unsentStop.value = { robotKeys: unsent, at: pressedAt };
   if (notice.kind === "done") setTimeout(() => stopNotice.value === notice && (stopNotice.value = null), NOTICE_MS);
