@@ -94,7 +94,7 @@ def test_without_motion_in_the_site_file_rmi_is_never_connected(mesh, tmp_path, 
         ):
             await until(lambda: site.joints)
             assert not (await site.stop(by="wang")).sent
-            assert "reads" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
+            assert "does not let the gateway move it" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
             await site.units(20)
             assert not server.received
             assert server.session is None

@@ -161,6 +161,6 @@ def test_without_motion_in_the_site_file_no_other_connection_is_opened(mesh, tmp
             assert gate.data == greeting
             assert not server._dashboards
             assert len(server._monitors) == 1
-            assert "reads" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
+            assert "does not let the gateway move it" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
 
     run(main())
