@@ -121,16 +121,16 @@ def test_taking_over_needs_a_reason_which_the_loser_is_told(open_arm):
 
 def test_a_question_stays_while_it_is_not_known_who_is_in_control(open_arm):
     alice, bob = open_arm(), open_arm()
-    answers = answers_of(bob)
+    answers_come = answers_of(bob)
     bob.reload()
     take(alice, "alice")
     bob.get_by_label("Your name").fill("bob")
     button(bob, "Take over…").click()
     bob.get_by_label("Reason").fill("smoke at the gripper")
-    answers["come"] = False
+    answers_come(False)
     expect(who_controls(bob)).to_have_text("Who is in control is not known")
     expect(bob.get_by_label("Reason")).to_have_value("smoke at the gripper")
-    answers["come"] = True
+    answers_come(True)
     expect(who_controls(bob)).not_to_have_text("Who is in control is not known")
     expect(bob.get_by_label("Reason")).to_be_focused()
     bob.keyboard.press("Escape")

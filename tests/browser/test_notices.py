@@ -131,7 +131,7 @@ def test_a_window_that_is_closed_has_not_given_control_back(open_page):
 
 def test_a_browser_that_is_seen_to_be_slow_keeps_control_and_is_told_when_it_is_too_slow(open_page):
     page, other = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
-    answers = answers_of(page)
+    answers_come = answers_of(page)
     page.reload()
     expect(who_controls(page)).to_have_text("Nobody is in control")
     take(page, "alice")
@@ -140,10 +140,10 @@ def test_a_browser_that_is_seen_to_be_slow_keeps_control_and_is_told_when_it_is_
     expect(who_controls(other)).to_have_text("alice is in control")
     expect(who_controls(page)).to_have_text("You are in control")
     # A renewal is asked for, and its answer comes too late.
-    answers["come"] = False
+    answers_come(False)
     page.wait_for_timeout(1000)
     stand_still(page, 6.5)
-    answers["come"] = True
+    answers_come(True)
     expect(control_notice(page)).to_contain_text(
         "Control ended: this browser was too slow to renew it in time."
     )
