@@ -68,7 +68,9 @@ def descend(
         limited: Stay within limits.
         place_first: Give the position priority over the orientation.
     """
-    model, data, frame, placement = chain._model, chain._data, chain._frame, chain._placement
+    model, data, frame = chain._model, chain._data, chain._frame
+    # The Jacobian's computation places the tool as well: iMf holds the links' placements relative to it.
+    placement = data.iMf[0]
     factors, offsets = chain._factors, chain._offsets
     wide = len(x) > rows
     identity = np.eye(rows if wide else len(x))
@@ -77,7 +79,6 @@ def descend(
     for _ in range(_STEPS):
         q = x if factors is None else factors @ x + offsets
         jacobian = pin.computeFrameJacobian(model, data, q, frame, _LOCAL)
-        pin.framesForwardKinematics(model, data, q)
         away = placement.actInv(target)
         error = pin.log6(away).vector if rows == 6 else _axis_error(away)[:rows]
         if place_first:
@@ -99,17 +100,17 @@ def descend(
             jacobian = jacobian * np.where(np.arange(rows) < 3, 1.0, _ORIENTATION)[:, None]
         if stopped:
             # Exclude joints that a limit stops: otherwise the steps of the other joints are too short.
-            pull = np.dot(error, jacobian)
+            pull = error.dot(jacobian)
             jacobian = jacobian * ~(((x >= chain.upper) & (pull > 0)) | ((x <= chain.lower) & (pull < 0)))
         damping = (_DAMPING * squared + 1e-14) * identity
         turned = jacobian.T
         if wide:
-            factor.compute(np.dot(jacobian, turned) + damping)
-            step = x + np.dot(turned, factor.solve(error))
+            factor.compute(jacobian.dot(turned) + damping)
+            step = x + turned.dot(factor.solve(error))
         else:
-            factor.compute(np.dot(turned, jacobian) + damping)
+            factor.compute(turned.dot(jacobian) + damping)
             # The solver too returns a different shape for one joint.
-            step = x + factor.solve(np.dot(turned, error)).reshape(-1)
+            step = x + factor.solve(turned.dot(error)).reshape(-1)
         x = clipped(chain, step) if limited else step
         stopped = limited and x.tolist() != step.tolist()  # a quarter of the time of comparing the arrays
     return Found(x, *placement_misses(chain, x, target, rows))
