@@ -7,11 +7,14 @@ from playwright.sync_api import expect
 
 from tests.browser.crowd import crowd
 from tests.browser.robot_page import (
+    button,
     drawings,
     joint_value,
     region,
+    serious,
     tile,
     tiles,
+    visit,
 )
 
 pytestmark = pytest.mark.browser
@@ -64,6 +67,21 @@ def test_what_needs_a_look_is_found_among_many_and_stands_first_when_asked(open_
     page.get_by_role("button", name="Clear the filter").click()
     expect(tiles(page)).to_have_count(COUNT + 2)
     many.mark("faulty", [])
+
+
+def test_a_robot_that_is_only_watched_is_marked_and_offers_no_command(open_page, many):
+    page = open_page("#/yard/r001", drawn=False)
+    expect(button(page, "Take control")).to_be_visible()
+    expect(button(page, "waist +1°")).to_be_visible()
+    many.mark("read_only", ["yard/r001"])
+    expect(region(page, "Control")).to_contain_text("reads this kind of controller")
+    for name in ("Take control", "Home", "waist +1°"):
+        expect(button(page, name)).to_have_count(0)
+    assert serious(page) == []
+    visit(page, "#/")
+    expect(tile(page, "yard/r001")).to_contain_text("read-only")
+    expect(tile(page, "yard/r002")).not_to_contain_text("read-only")
+    many.mark("read_only", [])
 
 
 def test_a_robot_of_another_site_is_shown_from_its_slow_states_until_all_is_asked_for(open_page, many):

@@ -61,6 +61,7 @@ const UNPROVEN = new Set([
   "joints.other_software",
 ]);
 const READS_ONLY = "robot.reads_only";
+const ONLY_WATCHED = new Set([READS_ONLY, "robot.motion_off"]);
 
 /** Return how long before a controller's report an event was [ms], by the gateway's clock. */
 export function msBefore(state: ControllerState, stamp: Timestamp | undefined): number {
@@ -145,13 +146,19 @@ export function whyUnproven(state: ControllerState | undefined): string {
   return t("sentence", { text: text.charAt(0).toUpperCase() + text.slice(1) });
 }
 
+/** Return whether the robot is only watched, as long as its driver and its site file are the same. */
+export function isOnlyWatched(state: ControllerState | undefined): boolean {
+  if (!state?.readOnly) return false;
+  return state.linkReasons.some(({ causes }) => causes.some(({ code }) => ONLY_WATCHED.has(code)));
+}
+
 /** Explain why nothing moves the robot now, not even RESUME, and what to do; empty: it can move, as far as is known. */
 export function whyNoMotion(state: ControllerState | undefined): string {
   if (!state) return "";
   if (state.readOnly) {
     const causes = state.linkReasons.flatMap((reason) => reason.causes);
     // A controller's own obstacle; the others are about proofs.
-    const own = causes.find(({ code }) => /^(joints|universal_robots)\./.test(code));
+    const own = causes.find(({ code }) => /^(joints|universal_robots)\.|^robot\.motion_off$/.test(code));
     if (own) return t("no_motion_reason", { text: reasonText(own, own.text) });
     return causes.some(({ code }) => code === READS_ONLY) ? t("reads_only_text") : t("read_only_text");
   }

@@ -15,9 +15,9 @@ import { problemOf, stateWord } from "../../mesh/robot-state";
 import { ageOf, isStale, now, useTopic } from "../../mesh/topics";
 import { AliveServices } from "../../panels/alive-services";
 import { PriorityMark } from "../../ui/priority-mark";
+import { RobotTags } from "../../ui/robot-tags";
 import { robotLink } from "../../ui/route";
 import { Silhouette } from "../../ui/silhouette";
-import { SlowTag } from "../../ui/slow-tag";
 import { State } from "../../ui/state";
 import { Tag } from "../../ui/tag";
 import { useVisible } from "./visibility";
@@ -82,7 +82,7 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
             <span class="age">{staleText(unitAge)}</span>
           ) : (
             <span class="tile-tags">
-              <SlowTag state={controller?.message} />
+              <RobotTags state={controller?.message} />
               {description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
             </span>
           )}

@@ -14,7 +14,7 @@ import { controlNotice, holds } from "../../mesh/control";
 import { useJointSteps } from "../../mesh/joint-steps";
 import type { Motion } from "../../mesh/notice-expiry";
 import { useNoticeExpiry } from "../../mesh/notice-expiry";
-import { whyNoNewMotion, whyNoTarget, whyUnproven } from "../../mesh/robot-state";
+import { isOnlyWatched, whyNoNewMotion, whyNoTarget, whyUnproven } from "../../mesh/robot-state";
 import { whyFrozen } from "../../mesh/sight";
 import { checkTarget, targetParts, targetProblem } from "../../mesh/target-check";
 import { now } from "../../mesh/topics";
@@ -108,6 +108,7 @@ export function JointsPanel(props: {
     );
     if (!accepted) setTargets([]);
   };
+  const watching = isMonitor.value || isOnlyWatched(props.controller);
   const [size, setSize] = useState<(typeof STEPS)[number]>("1");
   const unmoved = !MOVES.has(props.controller?.activity ?? Activity.ACTIVITY_UNKNOWN);
   const steps = useJointSteps({
@@ -134,7 +135,7 @@ export function JointsPanel(props: {
         ? t("joint_hint")
         : mine || !reachable.value
           ? why
-          : isMonitor.value || props.controller?.readOnly
+          : watching || props.controller?.readOnly
             ? whyUnproven(props.controller)
             : t("joint_hint_take");
   return (
@@ -150,7 +151,7 @@ export function JointsPanel(props: {
             </strong>
           )}
           {props.age === undefined ? <span class="dim">{t("no_data")}</span> : <Age stale={stale} age={props.age} />}
-          {isMonitor.value || (
+          {watching || (
             <>
               <span class="step-label dim">{t("step")}</span>
               <Choice label={t("step")} values={STEPS} chosen={size} text={(each) => each} choose={setSize} />
@@ -168,7 +169,7 @@ export function JointsPanel(props: {
           const beyond = position !== undefined && (position < joint.lower || position > joint.upper);
           const refused = steps.refused?.index === index ? Math.sign(steps.refused.offset) : 0;
           const stepBy = (sign: 1 | -1) =>
-            isMonitor.value ? (
+            watching ? (
               <span />
             ) : (
               <StepButton

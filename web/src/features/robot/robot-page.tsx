@@ -33,8 +33,8 @@ import { NoRobot, useRobotSearch } from "../../panels/robot-not-found";
 import type { Stage } from "../../scene/robot-scene";
 import { SceneView } from "../../scene/scene-view";
 import { jointsTopic } from "../../scene/topic-selection";
+import { RobotTags } from "../../ui/robot-tags";
 import { cellLink, programLink } from "../../ui/route";
-import { SlowTag } from "../../ui/slow-tag";
 import { State } from "../../ui/state";
 import { Tag } from "../../ui/tag";
 import { CameraPanel } from "./camera-panel";
@@ -196,7 +196,6 @@ function Headline(props: {
     if (check) facts.push(t(check));
     // The others are in the Link panel: this line is cut short.
     if (message.capabilities?.diesWithLink === Known.NO) facts.push(t("lives_without_link"));
-    if (message.readOnly) facts.push(t("read_only"));
     if (message.legacyClients?.attached) facts.push(t("legacy_some", { count: message.legacyClients.attached }));
   }
   const runs = isShown(program, events) && program.message.outcome !== Outcome.ENDED;
@@ -208,7 +207,7 @@ function Headline(props: {
           <State state={state} told />
         </div>
         <span class="facts dim">{facts.join(" · ")}</span>
-        <SlowTag state={message} />
+        <RobotTags state={message} />
         {description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
         {runs && <ProgramLine latest={program} />}
       </div>

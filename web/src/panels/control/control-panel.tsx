@@ -11,7 +11,7 @@ import { reachable } from "../../mesh/connection";
 import { controlNotice, holds } from "../../mesh/control";
 import type { Motion } from "../../mesh/notice-expiry";
 import { useNoticeExpiry } from "../../mesh/notice-expiry";
-import { stoppedByItself, whyNoCommand, whyNoMotion, whyNoNewMotion } from "../../mesh/robot-state";
+import { isOnlyWatched, stoppedByItself, whyNoCommand, whyNoMotion, whyNoNewMotion } from "../../mesh/robot-state";
 import { whyFrozen } from "../../mesh/sight";
 import type { Latest } from "../../mesh/topics";
 import { now } from "../../mesh/topics";
@@ -51,6 +51,13 @@ export function ControlPanel(props: {
       props.description?.joints.map((joint) => joint.home),
     );
   useNoticeExpiry(controlNotice.value, (notice) => (controlNotice.value = notice), props.motion);
+  if (isOnlyWatched(state)) {
+    return (
+      <Panel name="control" title={t("control")}>
+        <p class="no-control">{why}</p>
+      </Panel>
+    );
+  }
   const holding = state?.activity === Activity.HOLDING;
   const tracing = state?.trace === Known.YES;
   return (
