@@ -49,17 +49,12 @@ RADIAN = 0.017453292519943295
 
 
 def main() -> None:
-    counts: Counter[str] = Counter()
     campaign(
         __doc__,
-        partial(fuzz, counts=counts),
-        inputs=1_000_000,
-        seconds=3600.0,
+        fuzz,
         name="fanuc-ftp",
-        growth_mib=16,
         verdict="no exception, no joints, pose and alarm but what a strict reading of a whole file gives; "
         "only the declared commands were sent, one at a time",
-        told=lambda: ", ".join(f"{count:,} {name}" for name, count in counts.most_common()),
     )
 
 

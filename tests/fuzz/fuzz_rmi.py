@@ -13,7 +13,6 @@ import random
 import re
 import sys
 from collections import Counter
-from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -89,17 +88,12 @@ TOKENS = (
 
 
 def main() -> None:
-    counts: Counter[str] = Counter()
     campaign(
         __doc__,
-        partial(fuzz, counts=counts),
-        inputs=1_000_000,
-        seconds=3600.0,
+        fuzz,
         name="rmi",
-        growth_mib=16,
         verdict="no exception, no motion and no end of a motion but what a strict reading gives; nothing but "
         "the driver's five messages was sent",
-        told=lambda: ", ".join(f"{count:,} {name}" for name, count in counts.most_common()),
     )
 
 

@@ -15,7 +15,6 @@ import re
 import struct
 import sys
 from collections import Counter, deque
-from functools import partial
 from pathlib import Path
 
 if __name__ == "__main__":
@@ -50,17 +49,12 @@ ASSIGNMENT = re.compile(
 
 
 def main() -> None:
-    counts: Counter[str] = Counter()
     campaign(
         __doc__,
-        partial(fuzz, counts=counts),
-        inputs=1_000_000,
-        seconds=3600.0,
+        fuzz,
         name="snpx",
-        growth_mib=16,
         verdict="no exception, no joints and no alarm but what a strict reading gives; only questions and "
         "the driver's own assignments were sent",
-        told=lambda: ", ".join(f"{count:,} {name}" for name, count in counts.most_common()),
     )
 
 

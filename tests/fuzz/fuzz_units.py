@@ -74,7 +74,7 @@ def main() -> None:
     logging.disable()
     campaign(
         __doc__,
-        fuzz,
+        lambda inputs, seed, counts: fuzz(inputs, seed),
         inputs=10_000_000,
         seconds=7200.0,
         name="units",

@@ -102,17 +102,13 @@ LATE_S = 0.25
 
 
 def main() -> None:
-    counts: Counter[str] = Counter()
     campaign(
         __doc__,
-        partial(fuzz, counts=counts),
-        inputs=1_000_000,
+        fuzz,
         seconds=7200.0,
         name="ur-motion",
-        growth_mib=16,
         verdict="no exception, no joints, no program, no permission, no recovery and no end of a motion but "
         "what a strict reading gives; nothing else was sent",
-        told=lambda: ", ".join(f"{count:,} {name}" for name, count in counts.most_common()),
     )
 
 

@@ -12,7 +12,6 @@ import random
 import struct
 import sys
 from collections import Counter, deque
-from functools import partial
 from pathlib import Path
 
 if __name__ == "__main__":
@@ -42,16 +41,11 @@ NEW_SOCKET_EACH = 2000
 
 
 def main() -> None:
-    counts: Counter[str] = Counter()
     campaign(
         __doc__,
-        partial(fuzz, counts=counts),
-        inputs=1_000_000,
-        seconds=3600.0,
+        fuzz,
         name="yaskawa",
-        growth_mib=16,
         verdict="no exception, no joints and no alarm but what a strict reading gives; only reads were sent",
-        told=lambda: ", ".join(f"{count:,} {name}" for name, count in counts.most_common()),
     )
 
 

@@ -82,17 +82,13 @@ REPEATED_S, REFUSED_S = 0.4, 1.2
 
 
 def main() -> None:
-    counts: Counter[str] = Counter()
     campaign(
         __doc__,
-        partial(fuzz, counts=counts),
-        inputs=1_000_000,
+        fuzz,
         seconds=7200.0,
         name="yaskawa-motion",
-        growth_mib=16,
         verdict="no exception, no joints, no motion, no end of a motion and no end of HOLD but what a strict "
         "reading gives; nothing but reads, motions and HOLD was sent",
-        told=lambda: ", ".join(f"{count:,} {name}" for name, count in counts.most_common()),
     )
 
 

@@ -5,6 +5,7 @@ import random
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn, Protocol
@@ -43,35 +44,35 @@ def keep(folder: Path, name: str, finding: Finding) -> NoReturn:
 
 def campaign(
     doc: str,
-    fuzz: Callable[[int, int], tuple[int, Finding | None]],
+    fuzz: Callable[[int, int, Counter[str]], tuple[int, Finding | None]],
     *,
-    inputs: int,
-    seconds: float,
     name: str,
-    growth_mib: float,
     verdict: str,
-    told: Callable[[], str] = str,
+    inputs: int = 1_000_000,
+    seconds: float = 3600.0,
+    growth_mib: float = 16,
 ) -> None:
     """Fuzz in blocks until the options' end; exit with status 1 at a finding, or if the memory grows.
 
     Args:
-        fuzz: Reads so many inputs with a seed; returns how many it read, and the first wrong one.
+        fuzz: Reads so many inputs with a seed, and counts what it did by name; returns how many it read, and
+            the first wrong one.
         name: Of the files of findings: NAME-seed1-23.bin.
-        growth_mib: Growth of the process after a warm-up that is allowed.
         verdict: Last line of a run without findings.
-        told: Returns a line with further counts; empty: none.
+        growth_mib: Growth of the process after a warm-up that is allowed.
     """
+    counts: Counter[str] = Counter()
     arguments = options(doc, inputs=inputs, seconds=seconds).parse_args()
     begun_s = time.monotonic()
-    done, finding = fuzz(WARM_UP, arguments.seed)
+    done, finding = fuzz(WARM_UP, arguments.seed, counts)
     begun_mib = rss_mib()
     while finding is None and done < arguments.inputs and time.monotonic() < begun_s + arguments.seconds:
-        more, finding = fuzz(min(50_000, arguments.inputs - done), arguments.seed * 1_000_003 + done)
+        more, finding = fuzz(min(50_000, arguments.inputs - done), arguments.seed * 1_000_003 + done, counts)
         done += more
     took_s, mib = time.monotonic() - begun_s, rss_mib()
     print(f"{done:,} inputs in {took_s:.0f} s, {time.process_time():.0f} s of CPU")
-    if line := told():
-        print(line)
+    if counts:
+        print(", ".join(f"{count:,} {what}" for what, count in counts.most_common()))
     print(f"memory {begun_mib:.1f} MiB after {WARM_UP:,} inputs, {mib:.1f} MiB at the end")
     if finding is not None:
         keep(arguments.keep, f"{name}-seed{arguments.seed}-{done}.bin", finding)
