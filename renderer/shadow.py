@@ -1,5 +1,6 @@
 """The soft shadow on the floor: sharp below low bodies, wide and faint below high ones."""
 
+import math
 from collections.abc import Sequence
 
 import cv2
@@ -27,6 +28,8 @@ _LAYERS = (
     (0.45, 0.050, 0.46),
     (_ANY_HEIGHT, 0.080, 0.42),
 )
+# From here on a shadow's edge is darker by less than a level, over the scene's radius.
+_WIDEST = 3.0 * max(width for _, width, _ in _LAYERS)
 
 
 class FloorShadow:
@@ -87,16 +90,16 @@ class FloorShadow:
                 uploaded.shadow.render()
         n = _TEXELS
         heights = np.frombuffer(self._heights.read(components=1, dtype="f4"), dtype=np.float32).reshape(n, n)
-        dark = soft_shadow(heights / radius, texel=2.0 * extent / n / radius)
-        levels = (np.clip(dark, 0.0, 1.0) * 255.0).astype(np.uint8)
+        texel = 2.0 * extent / n / radius
+        # Only the part with shadow is computed and drawn: most of the floor has none.
+        along, across = _around(heights < NOTHING, math.ceil(_WIDEST / texel))
+        dark = soft_shadow(heights[along, across] / radius, texel=texel) * _FADE[along, across]
+        levels = np.zeros((n, n), dtype=np.uint8)
+        levels[along, across] = np.clip(dark, 0.0, 1.0) * 255.0
         self._shadow.write(levels.tobytes())
-        # Only the part with shadow is drawn: most of the floor has none.
-        places = np.argwhere(levels > 0)
-        low, high = (
-            (places.min(axis=0), places.max(axis=0) + 1) if len(places) else (np.zeros(2), np.zeros(2))
-        )
-        rows_and_columns = np.clip(np.array([low - 1, high + 1]), 0, n) / n * 2.0 - 1.0
-        self._drawn = tuple(rows_and_columns[:, ::-1].ravel().tolist())
+        along, across = _around(levels > 0, 1)
+        corners = np.array([across.start, along.start, across.stop, along.stop])
+        self._drawn = tuple((corners / n * 2.0 - 1.0).tolist())
 
     def lay(
         self, site_to_clip: NDArray[np.float64], *, center: NDArray[np.float64], radius: float, floor: float
@@ -113,9 +116,30 @@ class FloorShadow:
             v=(0.0, 1.0, 0.0),
             extent=_EXTENT * radius,
             drawn=self._drawn,
-            strength=1.0,
         )
         self._plane.render(moderngl.TRIANGLE_STRIP, vertices=4)
+
+
+def _around(filled: NDArray[np.bool_], edge: int) -> tuple[slice, slice]:
+    """Return the rows and columns of the filled texels and of `edge` texels around them."""
+
+    def span(other_axis: int) -> slice:
+        places = np.flatnonzero(filled.any(axis=other_axis))
+        if not len(places):
+            return slice(0, 0)
+        return slice(max(int(places[0]) - edge, 0), min(int(places[-1]) + 1 + edge, _TEXELS))
+
+    return span(1), span(0)
+
+
+def _fade() -> FloatArray:
+    """Return the share of the shadow by texel: it fades out towards the map's edge, without corners."""
+    middles = (np.arange(_TEXELS) + 0.5) / _TEXELS * 2.0 - 1.0
+    beyond = np.clip((np.hypot(*np.meshgrid(middles, middles)) - 0.8) / 0.2, 0.0, 1.0)
+    return (1.0 - beyond * beyond * (3.0 - 2.0 * beyond)).astype(np.float32)
+
+
+_FADE = _fade()
 
 
 def soft_shadow(heights: FloatArray, *, texel: float) -> FloatArray:

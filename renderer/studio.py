@@ -31,7 +31,7 @@ class Drawn:
     """A drawn picture.
 
     Attributes:
-        picture: (height, width, 3), a copy.
+        picture: (height, width, 3).
         camera: The camera that drew it.
         inside: Name of the body that contains the camera; empty if there is none.
     """
@@ -104,8 +104,7 @@ class Studio:
                 drawing.add(part.mesh, self._meshes[part.mesh])
         if close_up_of is not None:
             camera = self._close_up(drawing, close_up_of, scene, camera)
-        # A copy, because the next picture overwrites the surface while this one is being encoded.
-        picture = drawing.draw(scene, camera).copy()
+        picture = drawing.draw(scene, camera)
         return Drawn(picture=picture, camera=camera, inside=drawing.inside(scene, camera))
 
     def tidy(self, *, meshes: Collection[str], streams: Collection[str]) -> None:

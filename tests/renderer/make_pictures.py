@@ -111,7 +111,7 @@ def _drawn(meshes, scene, camera, size, shading, *, near=False):
     if near:
         camera = fitted(camera, size[0] / size[1], drawing.corners(scene), margin=1.3)
     try:
-        return drawing.draw(scene, camera).copy()
+        return drawing.draw(scene, camera)
     finally:
         drawing.close()
 
