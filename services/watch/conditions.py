@@ -14,8 +14,8 @@ from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import ControllerState
 from robomesh.schemas.robomesh_pb2 import Reason as ReasonMessage
 
-# A site's services start one after the other.
-_LINK_AFTER_S = 1.0
+# A site's simulated controllers start beside their gateways, each in some seconds on a slow machine.
+_LINK_AFTER_S = 3.0
 _CHECK_AFTER_S = 20.0
 _SILENT_AFTER_S = 6.0
 # Longer than the gateway takes to drop a frozen controller and reconnect.
