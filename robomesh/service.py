@@ -97,7 +97,8 @@ def _exit_now() -> None:
     for handler in logging.getLogger().handlers:
         if isinstance(handler, _Stderr):
             handler.flush_lines()
-    sys.stdout.flush()
+    if sys.stdout is not None:
+        sys.stdout.flush()
     os._exit(0)
 
 

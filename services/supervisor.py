@@ -3,11 +3,17 @@
 It holds no robot state and is on no data path. If it is killed, its processes end too; a killed process is
 restarted without an effect on the others. Groups of programs can be added and removed at run time. A critical
 service has a warm standby process.
+
+The first process of a program may be a fork of the supervisor (`fork`), which has imported most of what a
+service imports. Each later one is a Python of its own: then the supervisor has threads and a Zenoh session,
+of which a fork would have broken copies.
 """
 
 import asyncio
+import atexit
 import contextlib
 import ctypes
+import gc
 import os
 import random
 import signal
@@ -15,6 +21,11 @@ import sys
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple, NoReturn, Protocol
+
+from setproctitle import setproctitle, setthreadtitle
 
 from services.errors import ServiceError
 
@@ -37,6 +48,8 @@ _POLL_S = 0.4
 # A standby is started when its program has run this long, so that it does not slow down the site's start.
 _STANDBY_AFTER_S = 5.0
 _STANDBY = "ROBOMESH_SPARE"
+# Forked processes that the site can do without begin when it is ready, or after this time.
+_OTHERS_AFTER_S = 3.0
 
 # Returns the groups of programs that should run in addition, now. A new key starts its group's programs; a
 # removed key stops them.
@@ -63,14 +76,84 @@ class Program:
     last: bool = False
 
 
+class _Process(Protocol):
+    """The part of asyncio's processes that the supervisor uses."""
+
+    @property
+    def returncode(self) -> int | None: ...
+    @property
+    def stdin(self) -> asyncio.StreamWriter | None: ...
+    @property
+    def stdout(self) -> asyncio.StreamReader | None: ...
+    def send_signal(self, signal: int) -> None: ...
+    async def wait(self) -> int: ...
+
+
 @dataclass(frozen=True)
 class _Running:
     program: Program
-    process: asyncio.subprocess.Process
+    process: _Process
+
+
+class _Child(NamedTuple):
+    """A forked process, and the ends to read of its output's pipe and of one that only its end closes."""
+
+    pid: int
+    output: int
+    life: int
+
+
+@dataclass(frozen=True)
+class Forked:
+    """Processes that were forked before the event loop.
+
+    Attributes:
+        children: By the program's name.
+        others: Descriptor; closing it lets the processes begin that are not required.
+    """
+
+    children: dict[str, _Child]
+    others: int
 
 
 class CouldNotStartError(ServiceError):
     """A required service cannot run with its configuration; its log has the reason."""
+
+
+def fork(programs: Sequence[Program], main: Callable[[], None]) -> Forked:
+    """Fork a process for each program; those that cannot be forked are missing.
+
+    Call it before the first thread, Zenoh session and event loop of this process.
+
+    Args:
+        main: The command line, which runs with the program's arguments in `sys.argv`.
+    """
+    # A pipe must not become standard input or output, if one is closed.
+    while (file := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(file)
+    # Otherwise the garbage collections of each process would copy the pages that they share.
+    gc.freeze()
+    supervisor, children = os.getpid(), dict[str, _Child]()
+    held, others = os.pipe()
+    for program in programs:
+        files: list[int] = []
+        try:
+            files += os.pipe()
+            files += os.pipe()
+            pid = os.fork()
+        except OSError:  # too few processes or descriptors: `supervise` tries again
+            for file in files:
+                os.close(file)
+            continue
+        output, written, life, own_life = files
+        if not pid:
+            _be(program, main, supervisor, written, held, own_life)
+        for file in files[1::2]:
+            os.close(file)
+        children[program.name] = _Child(pid, output, life)
+    os.close(held)
+    return Forked(children, others)
 
 
 async def supervise(
@@ -79,10 +162,12 @@ async def supervise(
     ready: Callable[[], Awaitable[None]],
     write: Callable[[str], None],
     extra: ExtraPrograms = dict,
+    forked: Forked | None = None,
 ) -> None:
     """Run the programs, in order, until cancelled; then stop them. A second cancellation kills them.
 
     Args:
+        forked: The first processes of the programs (`fork`).
         ready: Runs concurrently; may wait until the site is up and report it.
         write: Writes a line of log.
         extra: Polled for the programs to run in addition.
@@ -92,15 +177,20 @@ async def supervise(
     """
     width = max(len(program.name) for program in programs)
     running: dict[str, _Running] = {}
+    first = {} if forked is None else await _adopt(forked)
+    running |= {each.name: _Running(each, first[each.name]) for each in programs if each.name in first}
 
     def keep(program: Program) -> Coroutine[None, None, None]:
-        return _keep_running(program, running, _prefixed(write, f"{program.name:<{width}} | "))
+        prefixed = _prefixed(write, f"{program.name:<{width}} | ")
+        return _keep_running(program, running, prefixed, first.pop(program.name, None))
 
     try:
         async with asyncio.TaskGroup() as group:
             for program in programs:
                 group.create_task(keep(program))
-            group.create_task(_once(ready))
+            waiting = group.create_task(_once(ready))
+            if forked is not None:
+                group.create_task(_begin_others(forked, waiting))
             group.create_task(_run_extra(extra, running, keep, write))
     except ExceptionGroup as errors:
         # Not `except*`: before Python 3.11.4 an exception raised in it is wrapped in a group again.
@@ -159,14 +249,21 @@ async def _once(ready: Callable[[], Awaitable[None]]) -> None:
     await ready()
 
 
-async def _keep_running(program: Program, running: dict[str, _Running], write: Callable[[str], None]) -> None:
+async def _begin_others(forked: Forked, ready: asyncio.Task[None]) -> None:
+    await asyncio.wait([ready], timeout=_OTHERS_AFTER_S)
+    os.close(forked.others)
+
+
+async def _keep_running(
+    program: Program, running: dict[str, _Running], write: Callable[[str], None], first: _Process | None
+) -> None:
     wait_s = _SHORTEST_WAIT_S
     was_healthy = False
     while True:
         started = time.monotonic()
         status: int | None = None
         try:
-            process = await _next(program, running)
+            process, first = first or await _next(program, running), None
         except OSError as error:  # out of memory or processes: must not end the other programs
             outcome = f"could not be started: {error.strerror}"
         else:
@@ -202,7 +299,7 @@ async def _lines(stream: asyncio.StreamReader) -> AsyncIterator[str]:
         yield rest.decode(errors="replace").rstrip()
 
 
-async def _next(program: Program, running: dict[str, _Running]) -> asyncio.subprocess.Process:
+async def _next(program: Program, running: dict[str, _Running]) -> _Process:
     """Activate the standby process, or start a new one; return it."""
     waiting = running.pop(_standby_name(program), None)
     if waiting is None or waiting.process.returncode is not None:
@@ -241,31 +338,120 @@ def _standby_name(program: Program) -> str:
 
 async def _start(program: Program, *, standby: bool = False) -> asyncio.subprocess.Process:
     supervisor = os.getpid()
-
-    def die_with_the_supervisor() -> None:
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
-        if os.getppid() != supervisor:
-            os._exit(0)
-
     return await asyncio.create_subprocess_exec(
-        sys.executable,
-        "-P",  # a file of the current folder must not hide a module
-        "-m",
-        "services.command_line.main",
-        *program.arguments,
+        *_words(program),
         stdin=asyncio.subprocess.PIPE if standby else asyncio.subprocess.DEVNULL,
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.STDOUT,
         # A terminal's Ctrl-C must reach only the supervisor, which stops the others in order.
         start_new_session=True,
-        preexec_fn=die_with_the_supervisor,
-        env={**_environment(), "PYTHONUNBUFFERED": "1", **({_STANDBY: "1"} if standby else {})},
+        preexec_fn=lambda: _die_with(supervisor),
+        env={**_environment(), **({_STANDBY: "1"} if standby else {})},
     )
+
+
+def _words(program: Program) -> tuple[str, ...]:
+    # -P: a file of the current folder must not hide a module.
+    return (sys.executable, "-P", "-m", "services.command_line.main", *program.arguments)
 
 
 def _environment() -> dict[str, str]:
     """Return this environment without the operator's certificate: services have their own certificates."""
-    return {name: value for name, value in os.environ.items() if name != "ROBOMESH_KEYS"}
+    rest = {name: value for name, value in os.environ.items() if name != "ROBOMESH_KEYS"}
+    return {**rest, "PYTHONUNBUFFERED": "1"}
+
+
+def _die_with(supervisor: int) -> None:
+    """Have the kernel end this process when the supervisor ends; in the new process."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != supervisor:
+        os._exit(0)
+
+
+def _be(
+    program: Program,
+    main: Callable[[], None],
+    supervisor: int,
+    output: int,
+    held: int,
+    life: int,
+) -> NoReturn:
+    """In a forked process, be what `_start` starts for the program.
+
+    Args:
+        output: Descriptor of its standard output and error.
+        held: Descriptor whose end of file lets a program begin that is not required.
+        life: Descriptor that stays open.
+    """
+    status: object = 1
+    try:
+        _die_with(supervisor)
+        setproctitle(" ".join(_words(program)))
+        setthreadtitle(program.name)
+        os.setsid()
+        nothing = os.open(os.devnull, os.O_RDONLY)
+        for number, file in enumerate((nothing, output, output)):
+            os.dup2(file, number)
+        # The supervisor's, those of other processes, and those that the supervisor has inherited.
+        for file in {int(each.name) for each in Path("/proc/self/fd").iterdir()} - {0, 1, 2, held, life}:
+            with contextlib.suppress(OSError):  # that of the folder
+                os.close(file)
+        if not program.required:
+            os.read(held, 1)
+        os.close(held)
+        sys.stdin, sys.stdout, sys.stderr = (
+            os.fdopen(number, mode, buffering=1, errors="backslashreplace", closefd=False)
+            for number, mode in enumerate("rww")
+        )
+        os.environ.pop("ROBOMESH_KEYS", None)
+        os.environ.update(_environment())
+        sys.argv = ["robomesh", *program.arguments]
+        atexit._clear()
+        main()
+    except SystemExit as end:
+        status = end.code
+    finally:
+        # The supervisor's code must not go on in this process.
+        atexit._run_exitfuncs()
+        os._exit(status if isinstance(status, int) else 1)
+
+
+async def _adopt(forked: Forked) -> dict[str, _Process]:
+    """Read the output of forked processes, and wait for their ends, in this event loop."""
+    loop, adopted = asyncio.get_running_loop(), dict[str, _Process]()
+    for name, child in forked.children.items():
+        adopted[name] = process = _ForkedProcess(child)
+        protocol = partial(asyncio.StreamReaderProtocol, process.stdout)
+        await loop.connect_read_pipe(protocol, os.fdopen(child.output, "rb", buffering=0))
+        loop.add_reader(child.life, process.end)
+    return adopted
+
+
+class _ForkedProcess:
+    """A forked process, as asyncio's processes are."""
+
+    stdin: asyncio.StreamWriter | None = None
+
+    def __init__(self, child: _Child) -> None:
+        self._child, self._ended = child, asyncio.Event()
+        self.stdout = asyncio.StreamReader()
+        self.returncode: int | None = None
+
+    def send_signal(self, signal: int) -> None:
+        os.kill(self._child.pid, signal)
+
+    async def wait(self) -> int:
+        await self._ended.wait()
+        assert self.returncode is not None
+        return self.returncode
+
+    def end(self) -> None:
+        """Take its exit status; called when its end of the pipe `life` is closed."""
+        asyncio.get_running_loop().remove_reader(self._child.life)
+        os.close(self._child.life)
+        _, status = os.waitpid(self._child.pid, 0)
+        self.returncode = os.waitstatus_to_exitcode(status)
+        self._ended.set()
 
 
 async def _end(processes: Sequence[_Running], write: Callable[[str], None]) -> None:

@@ -1,11 +1,13 @@
 """Parts of the supervisor; test_whole_site tests a whole site."""
 
 import asyncio
+import contextlib
 import errno
 import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import psutil
 import pytest
@@ -13,6 +15,26 @@ import pytest
 from services import supervisor
 from services.supervisor import CouldNotStartError, Program, _lines, supervise
 from tests.conftest import free_port, run
+from tests.site import alive, wait_until
+
+FORKING = """
+import asyncio, sys
+from services import supervisor
+from services.command_line import main
+from services.supervisor import Program, fork, supervise
+supervisor._OTHERS_AFTER_S = 1000.0
+programs = [
+    Program(name=words[0], arguments=tuple(words[1:]), required=words[0] != "optional")
+    for words in map(str.split, sys.argv[1:])
+]
+async def ready():
+    if not any(each.name == "endless" for each in programs):
+        return
+    await asyncio.Event().wait()
+write = lambda line: print(line, flush=True)
+forked = fork(programs, main.main)
+asyncio.run(supervise(programs, ready=ready, write=write, forked=forked))
+"""
 
 
 def test_lines_of_any_length_and_any_bytes_are_read():
@@ -182,3 +204,109 @@ def test_a_temporary_lack_of_processes_ends_no_program(monkeypatch):
     run(main())
     assert len(lines("late", "could not be started: Resource temporarily unavailable; restarting in")) == 2
     assert not lines("rest", "ended")
+
+
+@contextlib.contextmanager
+def forking(*programs, **how):
+    """Yield a supervisor that has forked programs, each given as its name and its arguments."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", FORKING, *programs],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        **how,
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def until_line(process, words):
+    """Read its log up to a line with these words."""
+    for line in process.stdout:
+        if words in line:
+            return line
+    raise AssertionError(f"no line with {words!r}")
+
+
+def children_of(process):
+    """Return the process id of each child by its name in `ps`."""
+    return {each.name(): each.pid for each in psutil.Process(process.pid).children()}
+
+
+def pipes_of(pid):
+    """Return the pipes that a process has open."""
+    links = [str(each.readlink()) for each in Path(f"/proc/{pid}/fd").iterdir()]
+    return {link for link in links if link.startswith("pipe:")}
+
+
+@pytest.mark.slow
+def test_a_killed_fork_is_replaced_by_a_new_python_and_the_others_do_not_notice():
+    simulate = "simulate --listen 127.0.0.1:0"
+    with forking(f"one {simulate}", f"optional {simulate}") as process:
+        for _ in range(2):
+            until_line(process, "listening on")
+        before = children_of(process)
+        assert before.keys() == {"one", "optional"}
+        shown = " ".join(psutil.Process(before["one"]).cmdline())
+        # A small environment leaves little room for it.
+        assert shown.strip().partition("services.command_line.main ")[2].startswith("simulate")
+        assert os.getsid(before["one"]) == before["one"], "Ctrl-C in a terminal reaches it"
+        assert not pipes_of(before["one"]) & pipes_of(before["optional"])
+        os.kill(before["one"], signal.SIGKILL)
+        until_line(process, "one      | ended (killed by SIGKILL); restarting in 0.1 s")
+        until_line(process, "one      | listening on")
+        after = children_of(process)
+        assert "one" not in after
+        assert after["optional"] == before["optional"]
+        process.kill()
+        wait_until(lambda: not any(map(alive, (*before.values(), *after.values()))), what="orphans")
+
+
+@pytest.mark.slow
+def test_an_optional_fork_waits_for_the_site_and_no_fork_outlives_its_supervisor():
+    with forking("endless simulate --listen 127.0.0.1:0", "optional robot show nobody") as process:
+        until_line(process, "endless  | listening on")
+        forks = children_of(process)
+        assert forks.keys() == {"endless", "optional"}, "it has run and ended before the site is ready"
+        process.kill()
+        wait_until(lambda: not any(map(alive, forks.values())), what="orphans")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("closed", [0, 1, 2])
+def test_a_fork_that_cannot_start_is_reported_as_any_other(closed):
+    with forking("optional robot show nobody", preexec_fn=lambda: closed == 1 or os.close(closed)) as process:
+        until_line(process, "optional | robomesh: nobody: no such robot")
+        until_line(process, "optional | could not start; everything else runs without it")
+
+
+@pytest.mark.slow
+def test_what_the_supervisor_imports_leaves_a_process_that_can_be_forked():
+    # Before a fork OpenBLAS ends its threads; whatever else has threads or files would break in the fork.
+    program = (
+        "import os, threading\n"
+        "from services.command_line import main\n"
+        "from services.command_line.site import app, up\n"
+        "pid = os.fork()\n"
+        "if not pid: os._exit(0)\n"
+        "os.waitpid(pid, 0)\n"
+        "print(len(os.listdir('/proc/self/task')), len(os.listdir('/proc/self/fd')))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["1", "4"], "threads; 0, 1, 2 and the folder"
+
+
+def test_a_program_that_cannot_be_forked_is_left_to_the_supervisor(monkeypatch):
+    def fork():
+        raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+
+    monkeypatch.setattr(os, "fork", fork)
+    monkeypatch.setattr("gc.freeze", lambda: None)
+    open_files = psutil.Process().num_fds()
+    forked = supervisor.fork([Program(name="one", arguments=("simulate",))], lambda: None)
+    os.close(forked.others)
+    assert not forked.children
+    assert psutil.Process().num_fds() == open_files

@@ -14,6 +14,7 @@ from pathlib import Path
 from robomesh import service
 from robomesh.keys import robot_key
 from robomesh.session import SessionSettings, open_session
+from services.command_line import main
 from services.command_line.site.metrics_ports import extra_with_metrics, first_address, with_metrics
 from services.command_line.site.services import SERVICES
 from services.errors import SiteFileError
@@ -25,7 +26,7 @@ from services.site_file.listen_address import reachable, split_address
 from services.site_file.robot import Robot
 from services.site_file.site import Site
 from services.site_file.started_robots import may_start, read_started
-from services.supervisor import ENDS_WITHIN_S, Program, supervise
+from services.supervisor import ENDS_WITHIN_S, Program, fork, supervise
 from services.used_ports import check_free, is_used_by_child
 
 log = logging.getLogger(__name__)
@@ -39,13 +40,16 @@ def run(path: Path | None, metrics: str = "") -> None:
     Args:
         metrics: HOST:PORT of the first service's Prometheus endpoint; empty: the site file decides.
     """
-    _log_plain_lines()
-    # The services log that they wait for their router.
-    logging.getLogger("robomesh").setLevel(logging.ERROR)
     site = site_file.load(path)
     endpoint = reachable(site.listened[0])
     metered = first_address(site, metrics)
     _check_ports_free(site)
+    every = with_metrics(programs(site, path, endpoint), metered)
+    # Before the thread that writes the log, and before these levels, which are not for the services.
+    forked = fork(every, main.main)
+    _log_plain_lines()
+    # The services log that they wait for their router.
+    logging.getLogger("robomesh").setLevel(logging.ERROR)
 
     async def ready() -> None:
         await _until_page_shows_robots(site, endpoint)
@@ -53,10 +57,11 @@ def run(path: Path | None, metrics: str = "") -> None:
 
     service.run_until_signalled(
         supervise(
-            with_metrics(programs(site, path, endpoint), metered),
+            every,
             ready=ready,
             write=_write,
             extra=extra_with_metrics(_Started(site, path, endpoint).wanted, metered),
+            forked=forked,
         ),
         ends_within_s=ENDS_WITHIN_S,
     )
