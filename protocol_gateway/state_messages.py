@@ -50,6 +50,7 @@ class JointStatesMessage:
     def __init__(self, names: Sequence[str]) -> None:
         self._message = JointStates(joints=[JointState(name=name) for name in names])
         self._rows = list(self._message.joints)
+        self._has_velocities = False
 
     def fill(self, joints: JointsReceived, wall_ns: int) -> JointStates:
         """Return the message with a unit's positions and velocities, stamped with its receive time."""
@@ -57,12 +58,13 @@ class JointStatesMessage:
         date.seconds, date.nanos = divmod(wall_ns, 1_000_000_000)
         for row, position in zip(self._rows, joints.positions, strict=True):
             row.position = position
-        if joints.velocities is None:
-            for row in self._rows:
-                row.ClearField("velocity")
-        else:
+        if joints.velocities is not None:
             for row, velocity in zip(self._rows, joints.velocities, strict=True):
                 row.velocity = velocity
+        elif self._has_velocities:
+            for row in self._rows:
+                row.ClearField("velocity")
+        self._has_velocities = joints.velocities is not None
         return self._message
 
 

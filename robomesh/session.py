@@ -98,15 +98,24 @@ class Session:
         self._keep(publisher)
         return publisher
 
-    def subscribe(self, key_expr: str, *, newest: int = 1, history: bool = True) -> Subscription:
+    def subscribe(
+        self, key_expr: str, *, newest: int = 1, history: bool = True, pause_s: float = 0.0
+    ) -> Subscription:
         """Subscribe to a topic of one robot, or of many with a wildcard.
 
         Args:
             newest: Number of samples kept for a slow consumer, over all keys; older ones are dropped.
             history: Begin with the last value, and query it again when a service comes back.
+            pause_s: Pause after the samples that have arrived [s]: those of the pause arrive together after
+                it, so many keys wake the process less often. A sample after a longer gap is not delayed.
         """
         subscription = Subscription(
-            self.zenoh_session, key_expr, newest=newest, history=history, ignored=self.ignored
+            self.zenoh_session,
+            key_expr,
+            newest=newest,
+            history=history,
+            ignored=self.ignored,
+            pause_s=pause_s,
         )
         self._keep(subscription)
         if history and self._refresher is None:

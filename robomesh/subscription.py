@@ -93,7 +93,14 @@ class Subscription:
     """
 
     def __init__(
-        self, session: zenoh.Session, key_expr: str, *, newest: int, history: bool, ignored: Ignored
+        self,
+        session: zenoh.Session,
+        key_expr: str,
+        *,
+        newest: int,
+        history: bool,
+        ignored: Ignored,
+        pause_s: float = 0.0,
     ) -> None:
         self.key_expr = key_expr
         self._ignored = ignored
@@ -111,6 +118,7 @@ class Subscription:
         self._lock = threading.Lock()
         self._malformed = 0
         self._received = 0
+        self._pause_s = pause_s
         self._history = history
         self._closed = False
         self._query_timer: asyncio.TimerHandle | None = None
@@ -303,8 +311,14 @@ class Subscription:
 
     def _read(self) -> None:
         try:
-            for sample in self._subscriber:
-                self._receive(sample)
+            ring = self._subscriber.handler
+            while True:
+                sample = ring.recv()
+                while sample is not None:
+                    self._receive(sample)
+                    sample = ring.try_recv()
+                if self._pause_s:
+                    time.sleep(self._pause_s)
         except zenoh.ZError:
             if not self._closed:  # `close` before the first read raises too
                 raise

@@ -1,6 +1,7 @@
 """Distance of an arm from a singular position, in which its tool cannot move or turn in some direction."""
 
-from collections.abc import Sequence
+import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,15 +48,28 @@ def singularity_margin(model: RobotModel, joint_positions: ArrayLike, *, reach: 
     return float(singularity_margins(jacobian, model.joints.types, reach=reach))
 
 
-def singularity_margins(jacobians: FloatArray, types: Sequence[JointType], *, reach: float) -> FloatArray:
+def singularity_margins(jacobians: FloatArray, types: tuple[JointType, ...], *, reach: float) -> FloatArray:
     """Return the `singularity_margin` of each Jacobian: (...,) for (..., 6, n).
 
     Args:
         types: The joints' types.
     """
-    # Dimensionless: divide metres, of the tool and of prismatic joints, by the reach.
+    scaled = jacobians * _without_units(types, reach)
+    margins: FloatArray = np.linalg.svd(scaled, compute_uv=False)[..., -1]
+    return margins
+
+
+def dexterity(jacobian: FloatArray, types: tuple[JointType, ...], *, reach: float) -> tuple[float, float]:
+    """Return `manipulability` and `singularity_margin` of a Jacobian (6, n), by one decomposition."""
+    both = np.array([jacobian, jacobian * _without_units(types, reach)])
+    plain, scaled = np.linalg.svd(both, compute_uv=False).tolist()
+    return math.prod(plain), scaled[-1]
+
+
+@lru_cache
+def _without_units(types: tuple[JointType, ...], reach: float) -> FloatArray:
+    """Return factors (6, n) that divide a Jacobian's metres, of tool and prismatic joints, by the reach."""
     length = reach or 1.0
     rows = np.array([1 / length] * 3 + [1.0] * 3)[:, None]
     columns = np.array([length if kind is JointType.PRISMATIC else 1.0 for kind in types])
-    margins: FloatArray = np.linalg.svd(jacobians * rows * columns, compute_uv=False)[..., -1]
-    return margins
+    return rows * columns

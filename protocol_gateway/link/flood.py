@@ -92,13 +92,13 @@ class EventDispatcher:
         """Dispatch the events of one read; `burst`: they may have been delayed on the way."""
         if burst:
             self._restart_timer()
-        elif not self.flood.active:
+        elif self._deferred and not self.flood.active:
             self._flush()
         for event, date in zip(events, dates, strict=True):
             if self.flood.active or (burst and _is_undated_state(event)):
                 older = self.defer(_kind(event), partial(self._on_event, event, date))
             else:
-                older = self._deferred.pop(_kind(event), None) is not None
+                older = bool(self._deferred) and self._deferred.pop(_kind(event), None) is not None
                 self._on_event(event, date)
             self.skipped += older and isinstance(event, JointsReceived)
 

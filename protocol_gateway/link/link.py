@@ -20,6 +20,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
+from operator import attrgetter
 
 from protocol_gateway.drivers.driver import (
     Carries,
@@ -269,7 +270,7 @@ class ControllerLink:
         """Perform what the driver returns when something happened, now unless a time is given."""
         now = now or self._now()
         # The end of a motion that the driver gives up is always sent.
-        gives_up = any(isinstance(effect, FateUnknown) for effect in effects)
+        gives_up = FateUnknown in map(type, effects)
         for effect in effects:
             self._perform(effect, now, counted=not gives_up)
 
@@ -457,7 +458,7 @@ class ControllerLink:
         dates = self._timestamper.timestamps(events, now)
         if units > report.refusals and not other_joints:
             self._refusal, self._unusable = "", None
-            self._unit_received(max(dates, key=lambda date: date.monotonic_s, default=now), now)
+            self._unit_received(max(dates, key=attrgetter("monotonic_s"), default=now), now)
         elif not units and self._unusable is not None and self._status.state is LinkState.SILENT:
             self._fall_silent()
             return  # reported once, not for each unit

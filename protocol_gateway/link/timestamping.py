@@ -104,8 +104,10 @@ class Timestamper:
         if now.monotonic_s - self._arrived_s > _GAP_S:
             self._gap_end_s = now.monotonic_s
         self._arrived_s = now.monotonic_s
-        times_ns, moment_of = _moments(events)
         now_ns = round(now.monotonic_s * 1e9)
+        if len(events) == 1 and self._is_of_now(events[0], now, now_ns):
+            return [now]
+        times_ns, moment_of = _moments(events)
         stamps = self._stamps(times_ns, now_ns)
         dates = [
             now
@@ -114,6 +116,19 @@ class Timestamper:
             for stamp_ns, clock in stamps
         ]
         return [dates[moment] for moment in moment_of]
+
+    def _is_of_now(self, event: ControllerEvent, now: Received, now_ns: int) -> bool:
+        """Note the only event of a read, and return whether its stamp is simply its receipt.
+
+        This is a shortcut for controllers without TIME: the general way gives the same stamp.
+        """
+        timed = self._line.time_ns is not None or getattr(event, "controller_time_s", None) is not None
+        ordered = self._newest_ns is None or self._newest_ns < now_ns
+        if timed or not ordered or not self._behind or self._clock != now.clock:
+            return False
+        self._rate.period_ns(1, now_ns)
+        self._newest_ns = now_ns
+        return True
 
     def _begin_clock(self) -> None:
         self._clock += 1

@@ -106,11 +106,13 @@ def nearest_pair(
         return None
     everywhere = all_positions(model, positions)
     inner, data = model._pinocchio, model._workspace
-    pin.computeDistances(inner, data, own.hulls, own.hulls_workspace, everywhere)
+    nearest = pin.computeDistances(inner, data, own.hulls, own.hulls_workspace, everywhere)
+    if nearest not in own.meshes:
+        result = own.hulls_workspace.distanceResults[nearest]
+        return nearest, result.min_distance, _points(result)
     results = list(own.hulls_workspace.distanceResults)
     distances = np.array([result.min_distance for result in results])
-    if own.meshes:
-        pin.updateGeometryPlacements(inner, data, own.geometry, own.workspace)
+    pin.updateGeometryPlacements(inner, data, own.geometry, own.workspace)
     # A mesh is never nearer than its hull, so measure as meshes only the pairs with the nearest hulls.
     left = set(own.meshes)
     while (number := int(distances.argmin())) in left:

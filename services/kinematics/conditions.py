@@ -33,22 +33,20 @@ def limit_conditions(joints: Joints, positions: FloatArray) -> Iterator[Conditio
     Args:
         positions: (n,) [rad] or [m].
     """
-    names = [*joints.names, *(" + ".join(constraint.names) for constraint in joints.constraints)]
-    types = [*joints.types, *(constraint.type for constraint in joints.constraints)]
-    values = np.concatenate([positions, constraint_values(joints, positions)])
-    lower = np.concatenate([joints.lower, [constraint.lower for constraint in joints.constraints]])
-    upper = np.concatenate([joints.upper, [constraint.upper for constraint in joints.constraints]])
-    shares = np.minimum(values - lower, upper - values) / np.maximum(upper - lower, 1e-9)
-    for number in np.flatnonzero(shares <= _LIMIT_OVER).tolist():
-        name, kind, value = names[number], types[number], float(values[number])
-        low = value - lower[number] < upper[number] - value
-        end, limit = ("lower", lower[number]) if low else ("upper", upper[number])
+    ranges = [*zip(joints.names, joints.types, joints.lower.tolist(), joints.upper.tolist(), strict=True)]
+    ranges += [(" + ".join(each.names), each.type, each.lower, each.upper) for each in joints.constraints]
+    values = [*positions.tolist(), *constraint_values(joints, positions).tolist()]
+    for (name, kind, lower, upper), value in zip(ranges, values, strict=True):
+        end, limit = ("lower", lower) if value - lower < upper - value else ("upper", upper)
+        left = value - lower if end == "lower" else upper - value
+        if not (share := left / max(upper - lower, 1e-9)) <= _LIMIT_OVER:
+            continue
         yield Condition(
             key=f"limit {name}",
-            active=bool(shares[number] < _LIMIT),
+            active=share < _LIMIT,
             code="kinematics.limit",
             severity=_S.WARNING,
-            text=f"{name} is near the end of its range: {_text(value, kind)} of {_text(float(limit), kind)}",
+            text=f"{name} is near the end of its range: {_text(value, kind)} of {_text(limit, kind)}",
             over=f"{name} is away from the end of its range again",
             values=(("joint", name), ("limit", end), ("left", f"{abs(limit - value):.6g}")),
         )

@@ -1,12 +1,13 @@
 """Conversion of joint states to `frames` and `kinematics` messages: pure functions."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
-from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
+from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from robomesh.schemas import robomesh_pb2 as schema
@@ -14,11 +15,10 @@ from robots.joints import FloatArray, Joints, constraint_values
 from robots.model import (
     RobotModel,
     all_placements,
-    manipulability,
     tool_jacobian,
     tool_placement,
 )
-from robots.singularity import singularity_margin
+from robots.singularity import dexterity
 from services.kinematics.cell_state import Proximity
 
 
@@ -55,8 +55,9 @@ class FramesMessage:
         self._message = FrameTransforms()
         self._rows = [self._added(self._message, f"{prefix}/{name}") for name in numbers]
 
-    def _added(self, message: FrameTransforms, frame_id: str) -> FrameTransform:
-        return message.transforms.add(parent_frame_id=self._site, child_frame_id=frame_id)
+    def _added(self, message: FrameTransforms, frame_id: str) -> "_Row":
+        row = message.transforms.add(parent_frame_id=self._site, child_frame_id=frame_id)
+        return row.translation, row.rotation, row.timestamp
 
     def filled(
         self,
@@ -82,9 +83,13 @@ class FramesMessage:
         return message
 
 
-def _fill(row: FrameTransform, placement: Sequence[Sequence[float]], timestamp: Timestamp) -> None:
-    to, turn, at = row.translation, row.rotation, row.timestamp
-    to.x, to.y, to.z = (line[3] for line in placement[:3])
+# The parts of a FrameTransform that change: to look them up takes as long as to fill them.
+_Row = tuple[Vector3, Quaternion, Timestamp]
+
+
+def _fill(row: _Row, placement: Sequence[Sequence[float]], timestamp: Timestamp) -> None:
+    to, turn, at = row
+    to.x, to.y, to.z = placement[0][3], placement[1][3], placement[2][3]
     turn.x, turn.y, turn.z, turn.w = quaternion(placement)
     at.seconds, at.nanos = timestamp.seconds, timestamp.nanos
 
@@ -94,7 +99,7 @@ def quaternion(rotation: Sequence[Sequence[float]]) -> tuple[float, float, float
 
     Source: Shepperd 1978: from the largest of the four, so that half turns are exact, too.
     """
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = (line[:3] for line in rotation[:3])
+    (xx, xy, xz, *_), (yx, yy, yz, *_), (zx, zy, zz, *_), *_ = rotation
     # Four times each of the quaternion's products with its largest element.
     largest = max(xx, yy, zz, xx + yy + zz)
     if largest == xx:
@@ -105,9 +110,9 @@ def quaternion(rotation: Sequence[Sequence[float]]) -> tuple[float, float, float
         found = xz + zx, zy + yz, 1.0 - xx - yy + zz, yx - xy
     else:
         found = zy - yz, xz - zx, yx - xy, 1.0 + xx + yy + zz
-    length = math.copysign(math.hypot(*found), found[3])
-    x, y, z, w = (each / length for each in found)
-    return x, y, z, w
+    x, y, z, w = found
+    length = math.copysign(math.hypot(x, y, z, w), w)
+    return x / length, y / length, z / length, w / length
 
 
 def kinematic_state(
@@ -125,17 +130,16 @@ def kinematic_state(
         velocities: (n,) [rad/s] or [m/s]; None if unknown, then there is no twist.
         reach: Result of `robots.singularity.reach_of` [m].
     """
+    joints, jacobian = model.joints, tool_jacobian(model, positions)
+    manipulable, margin = dexterity(jacobian, joints.types, reach=reach)
     message = schema.KinematicState(
-        timestamp=timestamp,
-        manipulability=manipulability(model, positions),
-        singularity_margin=singularity_margin(model, positions, reach=reach),
+        timestamp=timestamp, manipulability=manipulable, singularity_margin=margin
     )
     message.tool_to_base.extend(tool_placement(model, positions).ravel().tolist())
     if velocities is not None:
-        twist = (tool_jacobian(model, positions) @ velocities).tolist()
-        message.linear_velocity.CopyFrom(_vector(twist[:3]))
-        message.angular_velocity.CopyFrom(_vector(twist[3:]))
-    joints = model.joints
+        twist = (jacobian @ velocities).tolist()
+        _set(message.linear_velocity, twist[:3])
+        _set(message.angular_velocity, twist[3:])
     for name, position, lower, upper in zip(
         joints.names, positions.tolist(), joints.lower.tolist(), joints.upper.tolist(), strict=True
     ):
@@ -155,8 +159,8 @@ def add_proximity(message: schema.KinematicState, proximity: Proximity, *, site:
         if nearest is not None:
             field.distance = nearest.distance_m
             field.first, field.second = (f"{site}/{name}" for name in nearest.pair)
-            field.first_point.CopyFrom(_vector(nearest.points[0].tolist()))
-            field.second_point.CopyFrom(_vector(nearest.points[1].tolist()))
+            _set(field.first_point, nearest.points[0].tolist())
+            _set(field.second_point, nearest.points[1].tolist())
     message.not_counted.extend(proximity.not_counted)
 
 
@@ -170,6 +174,6 @@ def forward_answer(model: RobotModel, positions: FloatArray) -> schema.ForwardAn
     return answer
 
 
-def _vector(values: Iterable[float]) -> schema.Vector3:
-    x, y, z = values
-    return schema.Vector3(x=x, y=y, z=z)
+def _set(vector: schema.Vector3, values: Sequence[float]) -> None:
+    vector.SetInParent()  # also if all values are 0
+    vector.x, vector.y, vector.z = values

@@ -197,3 +197,28 @@ def test_stamps_increase_follow_time_and_precede_their_receipt(seed):
                     assert abs(span_ns - time_ns) <= max(0.1 * time_ns, MS), (time_ns, span_ns)
             last[received.clock] = received.wall_ns, time_s
         now_s = max(now_s, read_s)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_shortcut_without_time_gives_the_general_stamps(seed, monkeypatch):
+    chance = random.Random(seed)
+    reads, now_s, time_s = [], 100.0, 0.0
+    for _ in range(300):
+        now_s += chance.choice([0.0, 1e-9, 1e-3, 0.01, 0.01, 0.3])
+        time_s += 0.01
+        units = chance.choice([1, 1, 1, 2, 5])
+        reads.append(
+            (chance.random(), [joints(time_s if chance.random() < 0.02 else None)] * units, at(now_s))
+        )
+
+    def stamped(timestamper):
+        for event, events, now in reads:
+            if event < 0.02:
+                timestamper.connected()
+            elif event < 0.03:
+                timestamper.wall_clock_was_set()
+            yield timestamper.timestamps(events, now)
+
+    shortened = [*stamped(Timestamper())]
+    monkeypatch.setattr(Timestamper, "_is_of_now", lambda self, event, now, now_ns: False)
+    assert shortened == [*stamped(Timestamper())]

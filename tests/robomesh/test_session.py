@@ -5,7 +5,10 @@ import signal
 import struct
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import zenoh
@@ -234,6 +237,38 @@ def test_slow_consumer_keeps_the_newest_and_delays_no_other(mesh):
             assert slow.lost("robomesh/site/arm/joints") == 0
 
     run(main())
+
+
+def test_samples_within_a_pause_arrive_after_it_in_order(mesh, monkeypatch):
+    pauses, go_on = [], threading.Event()
+
+    def pause(seconds):
+        pauses.append(seconds)
+        go_on.wait(60.0)
+
+    monkeypatch.setattr(subscription_module, "time", SimpleNamespace(sleep=pause, monotonic=time.monotonic))
+
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            states = monitor.subscribe("robomesh/site/arm/joints", newest=10, history=False, pause_s=0.5)
+            publisher = gateway.declare_publisher("site", "arm", "joints")
+            await until(lambda: publisher.watched)
+            publisher.put(joints(0.0))
+            assert [sample.message() for sample in await states.next_batch()] == [joints(0.0)]
+            await until(lambda: pauses == [0.5])
+            for number in range(1, 5):
+                publisher.put(joints(float(number)))
+            await answered(gateway, publisher.key)
+            assert states.take() is None
+            go_on.set()
+            later = [await anext(states) for _ in range(4)]
+            assert [sample.message() for sample in later] == [joints(float(each)) for each in range(1, 5)]
+            assert states.missed(publisher.key) == 0
+
+    try:
+        run(main())
+    finally:
+        go_on.set()
 
 
 def test_gap_in_the_numbers_is_counted_as_lost(mesh):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from robots.description import load
-from robots.model import build_model
-from robots.singularity import reach_of, singularity_margin
+from robots.model import build_model, manipulability, tool_jacobian
+from robots.singularity import dexterity, reach_of, singularity_margin
 
 
 def margin(name, degrees):
@@ -29,6 +29,16 @@ def test_the_reach_is_the_arms_length_from_its_first_joint_to_its_tool():
 def test_margin_is_zero_only_in_singular_positions(name, stretched, bent):
     assert margin(name, bent) > 0.02
     assert margin(name, stretched) < 1e-9
+
+
+@pytest.mark.parametrize("name", ["pt600", "puma560"])
+def test_both_measures_of_one_decomposition_are_those_of_their_own(name):
+    description = load(name)
+    model, reach = build_model(description), reach_of(description)
+    for positions in np.random.default_rng(1).uniform(-1.0, 1.0, (20, len(model.joints))):
+        manipulable, margin = dexterity(tool_jacobian(model, positions), model.joints.types, reach=reach)
+        assert manipulable == pytest.approx(manipulability(model, positions), abs=1e-12)
+        assert margin == pytest.approx(singularity_margin(model, positions, reach=reach), abs=1e-12)
 
 
 def test_margin_does_not_depend_on_the_arms_size(tmp_path):
