@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio
+from google.protobuf.timestamp_pb2 import Timestamp
 
 from robots.cells import CellDescription, CellRobot, Fixture
 from robots.collision import allowed_positions, build_cell, outside_nearest, own_contacts, own_nearest
@@ -32,6 +33,9 @@ from robots.joints import FloatArray, violations
 from robots.model import RobotModel, all_positions, build_model, tool_jacobian, tool_placement
 from robots.poses import inverse
 from robots.programs.check import check_program
+from robots.singularity import reach_of
+from services.kinematics.cell_state import CellState
+from services.kinematics.states import FramesMessage, add_proximity, kinematic_state
 from services.site_file.fixtures import Fixture as FixtureSettings
 from services.site_file.fixtures import fixture_shape
 
@@ -85,6 +89,7 @@ def measure(count: int, peers_python: str) -> dict[str, Any]:
                 judged = arm.judged(found["solutions"], found["seconds"])
                 result["inverse"].append({"arm": name, "who": peer, **judged})
     result["collision"] = collisions("ur5" if "ur5" in names else "puma560")
+    result["messages"] = messages()
     result["program"] = program()
     return result
 
@@ -275,6 +280,38 @@ def collisions(name: str) -> dict[str, Any]:
     }
 
 
+def messages() -> dict[str, float]:
+    """Return the times of what the kinematics service publishes for a Pt600 beside another one [us]."""
+    apart = np.eye(4)
+    apart[1, 3] = 0.9
+    arms = CellRobot("arm", "pt600", np.eye(4)), CellRobot("other", "pt600", apart)
+    cell, description, now = build_cell(CellDescription(arms, around())), load("pt600"), Timestamp(seconds=1)
+    model, reach = build_model(description), reach_of(description)
+    state = CellState({"arm": np.inf, "other": np.inf}, time.monotonic)
+    state.update("other", model.joints.home)
+    frames = FramesMessage(model, prefix="bench/arm", base_to_site=np.eye(4))
+    inner, data, tool = model._pinocchio, model._workspace, model._frame_ids[0]
+
+    def bare(positions: FloatArray) -> None:
+        pinocchio.framesForwardKinematics(inner, data, positions)
+        pinocchio.computeFrameJacobian(inner, data, positions, tool, pinocchio.ReferenceFrame.LOCAL)
+
+    def published(positions: FloatArray) -> None:
+        found = kinematic_state(model, positions, positions, reach=reach, timestamp=now)
+        add_proximity(found, state.proximity(cell, "arm", positions), site="bench")
+        found.SerializeToString()
+
+    random = np.random.default_rng(4)
+    positions = [model.joints.home + random.uniform(-0.3, 0.3, len(model.joints)) for _ in range(200)]
+    calls = {
+        "frames": lambda x: frames.filled(x, now).SerializeToString(),
+        "state with clearance": published,
+        "clearance alone": lambda x: state.proximity(cell, "arm", x),
+        "all frames and a Jacobian in Pinocchio": bare,
+    }
+    return {name: 1e6 / rate(call, positions) for name, call in calls.items()}
+
+
 def program() -> dict[str, Any]:
     """Return the check time of a minute of moves near three fixtures, the best of three."""
     cell = build_cell(CellDescription((CellRobot("arm", "pt600", np.eye(4)),), around()))
@@ -342,6 +379,8 @@ def tell(result: dict[str, Any]) -> None:
         f"  nearest of its own links: {found['own_nearest']:,.0f}; nearest of three fixtures within 50 mm: "
         f"{found['outside_within_warning']:,.0f}"
     )
+    times = ", ".join(f"{name} {us:.1f} us" for name, us in result["messages"].items())
+    print(f"\nmessages of the kinematics service, Pt600 in a cell of two: {times}")
     found = result["program"]
     print(
         f"a program of {found['duration_s']:.1f} s near three fixtures: checked in "

@@ -55,8 +55,8 @@ def singularity_margins(jacobians: FloatArray, types: tuple[JointType, ...], *, 
         types: The joints' types.
     """
     scaled = jacobians * _without_units(types, reach)
-    margins: FloatArray = np.linalg.svd(scaled, compute_uv=False)[..., -1]
-    return margins
+    margins = np.linalg.svd(scaled, compute_uv=False)[..., -1]
+    return np.asarray(margins, dtype=np.float64)
 
 
 def dexterity(jacobian: FloatArray, types: tuple[JointType, ...], *, reach: float) -> tuple[float, float]:
@@ -72,4 +72,5 @@ def _without_units(types: tuple[JointType, ...], reach: float) -> FloatArray:
     length = reach or 1.0
     rows = np.array([1 / length] * 3 + [1.0] * 3)[:, None]
     columns = np.array([length if kind is JointType.PRISMATIC else 1.0 for kind in types])
-    return rows * columns
+    factors: FloatArray = rows * columns
+    return factors
