@@ -15,6 +15,8 @@ _WINDOW_S = 2.0
 # Loads, as shares of the available time.
 _TOO_MUCH, _ENOUGH_ROOM, _FINE_AGAIN = 1.15, 0.8, 1.05
 _COARSE_AFTER_S, _FINE_AFTER_S, _REPORT_AFTER_S = 2.0, 5.0, 5.0
+# Half the interval of `frames`: one message of a moving robot arrives within it before or after any time.
+_NEAR_S = 1.0 / 120.0
 # Time of a picture with anti-aliasing over time without, until it is measured.
 _USUAL_COST = 2.0
 
@@ -36,6 +38,18 @@ def next_view(views: Iterable[AnyDue], now: float) -> tuple[AnyDue | None, float
     if soonest is None:
         return None, math.inf
     return (soonest if soonest.due_at <= now else None), soonest.due_at
+
+
+def due_with_placements(due_at: float, moved_at: float) -> float:
+    """Return when to draw a view, so that it shows placements that have just arrived.
+
+    A picture at its exact time would show placements of half their interval before, in the mean.
+
+    Args:
+        due_at: Time of the view's next picture at its rate.
+        moved_at: Time at which the newest placements arrived.
+    """
+    return due_at - _NEAR_S if moved_at >= due_at - _NEAR_S else due_at + _NEAR_S
 
 
 def next_due(due_at: float, now: float, interval_s: float) -> float:

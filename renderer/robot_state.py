@@ -1,6 +1,7 @@
 """The latest state of a robot, and the texts of its pictures."""
 
 import math
+import time
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -42,6 +43,7 @@ class RobotState:
         trail: Past positions of the tool with their times [ns], oldest first.
         source_time_ns: Source time of the placements.
         dated_by: Id of the publisher of that time.
+        moved_at: Time at which placements arrived that differ from those before, on the monotonic clock [s].
         version: Incremented by each message that changes the picture.
     """
 
@@ -56,6 +58,7 @@ class RobotState:
     trail: deque[tuple[int, FloatArray]] = field(default_factory=lambda: deque(maxlen=_TRAIL_POINTS))
     source_time_ns: int = 0
     dated_by: int | None = None
+    moved_at: float = -math.inf
     version: int = 0
     _noticed: dict[str, FloatArray] = field(default_factory=dict)
 
@@ -88,6 +91,7 @@ class RobotState:
         # Compared with the placements of the last version, so that slow movement is noticed too.
         if not _same(placements, self._noticed):
             self._noticed = placements
+            self.moved_at = time.monotonic()
             self.version += 1
 
     def _extend_trail(self, tool: FloatArray, now_ns: int) -> None:

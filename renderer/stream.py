@@ -13,7 +13,7 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from renderer.composition import Composition, RobotSnapshot, compose, looks
 from renderer.errors import RendererError
-from renderer.frame_scheduler import next_due
+from renderer.frame_scheduler import due_with_placements, next_due
 from renderer.key_frames import KeyFrameClock
 from renderer.overlay import inside
 from renderer.post_processing import EncodedPicture, PictureJob
@@ -99,7 +99,8 @@ class Stream:
         if self._video_watched and self._key_frames.asked:
             return self._not_before
         if self._moves():
-            return max(self._next_frame_at, self._not_before)
+            moved_at = max(state.moved_at for state in (self.state, *self._host.neighbours(self.state)))
+            return max(due_with_placements(self._next_frame_at, moved_at), self._not_before)
         return max(self._drawn_at + 1.0 / _IDLE_HZ, self._not_before)
 
     @property

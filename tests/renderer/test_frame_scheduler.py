@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from renderer.frame_scheduler import FrameScheduler, next_due, next_view
+from renderer.frame_scheduler import FrameScheduler, due_with_placements, next_due, next_view
 
 
 @dataclass
@@ -120,3 +120,27 @@ def test_reset_clears_the_measurements():
     assert (scheduler.coarse, scheduler.slow) == (True, True)
     scheduler.reset()
     assert (scheduler.coarse, scheduler.slow, scheduler.rate_hz(20.0)) == (False, False, 0.0)
+
+
+@pytest.mark.parametrize("fps", [30.0, 60.0])
+def test_a_picture_of_a_moving_robot_shows_placements_that_have_just_arrived(fps):
+    arrivals = [(i + 0.2 * ((7 * i) % 10) / 10) / 60.0 for i in range(600)]
+    due_at, ages = 0.0, []
+    for i, moved_at in enumerate(arrivals[:-1]):
+        # At the arrival, or after it if no other arrives before.
+        now = max(moved_at, due_with_placements(due_at, moved_at))
+        if now < arrivals[i + 1]:
+            due_at = next_due(due_at, now, 1.0 / fps)
+            ages.append(now - moved_at)
+    assert len(ages) == pytest.approx(fps * 10.0, rel=0.02)
+    assert sum(ages) / len(ages) < 0.001
+
+
+def test_a_view_keeps_its_rate_without_new_placements():
+    view = View(30.0)
+    view.due_at, now, drawn_at = 0.0, 0.0, []
+    while now < 2.0:
+        now = due_with_placements(view.due_at, moved_at=-1.0)
+        view.due_at = next_due(view.due_at, now, 1.0 / view.fps)
+        drawn_at.append(now)
+    assert len(drawn_at) == pytest.approx(60, abs=2)
