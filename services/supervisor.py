@@ -19,6 +19,7 @@ import random
 import signal
 import sys
 import time
+import traceback
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -410,6 +411,8 @@ def _be(
         main()
     except SystemExit as end:
         status = end.code
+    except BaseException:
+        traceback.print_exc()
     finally:
         # The supervisor's code must not go on in this process.
         atexit._run_exitfuncs()

@@ -207,10 +207,10 @@ def test_a_temporary_lack_of_processes_ends_no_program(monkeypatch):
 
 
 @contextlib.contextmanager
-def forking(*programs, **how):
+def forking(*programs, code=FORKING, **how):
     """Yield a supervisor that has forked programs, each given as its name and its arguments."""
     process = subprocess.Popen(
-        [sys.executable, "-c", FORKING, *programs],
+        [sys.executable, "-c", code, *programs],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -273,6 +273,14 @@ def test_an_optional_fork_waits_for_the_site_and_no_fork_outlives_its_supervisor
         assert forks.keys() == {"endless", "optional"}, "it has run and ended before the site is ready"
         process.kill()
         wait_until(lambda: not any(map(alive, forks.values())), what="orphans")
+
+
+@pytest.mark.slow
+def test_a_fault_of_a_forks_code_is_in_the_log():
+    faulty = FORKING.replace("main.main", "lambda: 1 / 0")
+    with forking("endless x", code=faulty) as process:
+        until_line(process, "endless | ZeroDivisionError")
+        until_line(process, "endless | ended (exit status 1); restarting in 0.1 s")
 
 
 @pytest.mark.slow
