@@ -82,7 +82,7 @@ class GatewaySite:
         self.id += 1
         fields = {"lease": self.secret, "id": self.id, **fields}
         request = schema.CommandRequest(command=command, **fields)
-        return await self.session.ask(self.key(f"command/{operator}"), request)
+        return await self.session.ask(self.key(f"command/{operator}"), request, timeout_s=10.0)
 
     async def units(self, number):
         """Wait until the gateway has published this many more units of the controller."""

@@ -46,6 +46,12 @@ TWO = CellDescription(
 )
 
 
+@pytest.fixture(autouse=True)
+def patient(monkeypatch):
+    """Let a check take its time: these tests are about what it finds, on a busy machine too."""
+    monkeypatch.setattr("protocol_gateway.checking.checker.MOTION_TIMEOUT_S", 8.0)
+
+
 async def checked(site):
     """Wait until motions can be checked, then home."""
     await until(lambda: not site.controller.check_text, timeout_s=60)

@@ -163,7 +163,8 @@ class _Client:
     def _leave_port(self) -> None:
         if self._listener is not None:
             self._listener.close()
-        if self._joined is not None and self._joined.done() and not self._joined.cancelled():
+        # A connection that is accepted but not joined yet is closed as it joins.
+        if self._joined is not None and not self._joined.cancel() and not self._joined.cancelled():
             self._joined.result().close()
         self._listener = self._joined = None
 
