@@ -24,7 +24,7 @@ from services.router.router import read_access
 from services.site_file.site import load
 from services.site_file.started_robots import may_start
 from tests.conftest import free_port
-from tests.site import ONE_ARM, robomesh, running_site, site_file
+from tests.site import ONE_ARM, robomesh, running_site, site_file, wait_until
 
 
 def a_site(folder):
@@ -465,6 +465,10 @@ def test_a_site_with_keys_runs_over_tls(tmp_path, monkeypatch):
     with running_site(tmp_path, robots="", more=more, services=["recorder"]) as site:
         router = site.router.replace("tcp/", "tls/")
         mo = str(tmp_path / "keys" / "people" / "mo.pem")
-        listed = robomesh("list", "--json", "--connect", router, "--keys", mo)
-        services = {row["service"] for row in json.loads(listed.stdout)["services"]}
-        assert {"router", "console", "recorder"} <= services
+
+        def services():
+            listed = robomesh("list", "--json", "--connect", router, "--keys", mo)
+            return {row["service"] for row in json.loads(listed.stdout)["services"]}
+
+        # The page is served before the router has given a new monitor all that is known.
+        wait_until(lambda: {"router", "console", "recorder"} <= services())
