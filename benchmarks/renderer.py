@@ -38,6 +38,7 @@ from renderer.drawing import Drawing
 from renderer.mesh import Mesh, prepared
 from renderer.opengl import open_context
 from renderer.scene import Part, Scene
+from renderer.vertex_light import ordered
 from robots.description import load
 from robots.glb import link_meshes
 from robots.model import build_model, link_placements
@@ -213,13 +214,19 @@ def subdivided(mesh: Mesh) -> Mesh:
         middle = values[unique].astype(np.float64).mean(axis=1)
         return np.concatenate([values, middle.astype(values.dtype)])
 
+    positions, normals, surface = (halved(each) for each in (mesh.positions, mesh.normals, mesh.surface))
+    triangles = np.concatenate([np.stack(piece, axis=1) for piece in pieces]).astype(np.uint32)
+    triangles, vertex_lit = ordered(
+        positions.astype(np.float64), normals.astype(np.float64), surface[:, 1] / 255.0, triangles
+    )
     return replace(
         mesh,
-        positions=halved(mesh.positions),
-        normals=halved(mesh.normals),
+        positions=positions,
+        normals=normals,
         colors=halved(mesh.colors),
-        surface=halved(mesh.surface),
-        triangles=np.concatenate([np.stack(piece, axis=1) for piece in pieces]).astype(np.uint32),
+        surface=surface,
+        triangles=triangles,
+        vertex_lit=vertex_lit,
     )
 
 

@@ -10,40 +10,10 @@ from renderer.shaders import COLORS, COMMON
 # Towards the lamp that casts the shadows; the floor's shadow falls the other way.
 KEY = (0.28, 0.36, 0.89)
 
-BODY_VERTEX = (
-    COMMON
-    + """
-uniform mat4 site_to_clip, part_to_site;
-uniform vec4 tint;                    // its share in .a
-uniform float opacity;
-in vec3 position, normal;
-in vec4 paint, surface;
-out vec4 at;                          // .w: the share of the sky that it sees
-out vec3 facing;
-out vec4 body_paint;
-flat out vec2 material;               // roughness, metalness: the same at a triangle's corners
-void main() {
-    vec4 place = part_to_site * vec4(position, 1.0);
-    at = vec4(place.xyz, surface.r);
-    facing = mat3(part_to_site) * normal;
-    body_paint = vec4(mix(to_linear(paint.rgb), tint.rgb, tint.a), paint.a * opacity);
-    material = vec2(clamp(surface.g, 0.15, 1.0), surface.b);
-    gl_Position = site_to_clip * place;
-}
-"""
-)
-
 # FULL: also the lamp's shadow on bodies.
-BODY_FRAGMENT = (
-    COLORS
-    + """
+_LIGHT = """
 uniform vec3 eye, forward, key;       // eye: of a perspective camera; forward: of an orthographic one
 uniform float orthographic, stale, floor_height, per_near_floor;
-in vec4 at;
-in vec3 facing;
-in vec4 body_paint;
-flat in vec2 material;
-out vec4 color;
 
 // The reflected studio: a bright ceiling with a soft box, dim walls, the floor. `up` and `lamp`: the
 // reflected way's share upwards and towards the lamp.
@@ -67,8 +37,8 @@ uniform sampler2DShadow lamp;
 uniform mat4 site_to_lamp;
 uniform float lamp_texel_m;
 // Five samples, each a mean of four texels, for a soft edge like that of a large lamp.
-float lit(vec3 n) {
-    vec3 from = (site_to_lamp * vec4(at.xyz + n * 1.5 * lamp_texel_m, 1.0)).xyz * 0.5 + 0.5;
+float lit(vec3 at, vec3 n) {
+    vec3 from = (site_to_lamp * vec4(at + n * 1.5 * lamp_texel_m, 1.0)).xyz * 0.5 + 0.5;
     float step = 1.3 / float(textureSize(lamp, 0).x);
     vec2 one = vec2(step, 0.45 * step), other = vec2(-0.45 * step, step);
     float sum = texture(lamp, from) + texture(lamp, from + vec3(one, 0.0));
@@ -76,10 +46,11 @@ float lit(vec3 n) {
     return (sum + texture(lamp, from + vec3(other, 0.0)) + texture(lamp, from - vec3(other, 0.0))) / 5.0;
 }
 #else
-float lit(vec3 n) { return 1.0; }
+float lit(vec3 at, vec3 n) { return 1.0; }
 #endif
 
-void main() {
+// The colour of a surface. at.w: the share of the sky that it sees; material: roughness, metalness.
+vec4 seen_color(vec4 at, vec3 facing, vec4 body_paint, vec2 material) {
     vec3 n = normalize(facing);
     vec3 to_eye = orthographic > 0.5 ? -forward : normalize(eye - at.xyz);
     float straight = dot(n, to_eye);
@@ -99,7 +70,7 @@ void main() {
     // The lamp: its light, and its gleam around h = key + to_eye, half-way between both and of the squared
     // length hh. Products with h instead of its unit vector save roots.
     float lambert = dot(n, key), key_eye = dot(key, to_eye);
-    float lamp_light = max(lambert, 0.0) * lit(n) * mix(0.6, 1.0, open);
+    float lamp_light = max(lambert, 0.0) * lit(at.xyz, n) * mix(0.6, 1.0, open);
     float hh = 2.0 + 2.0 * key_eye, along = max(lambert + straight, 0.0);
     float a = roughness * roughness;
     float spread = along * along * (a * a - 1.0) + hh;
@@ -120,10 +91,75 @@ void main() {
     vec3 seen = to_srgb(toned(light));
     float grey = dot(seen, vec3(0.2126, 0.7152, 0.0722));
     seen = mix(seen, mix(vec3(mix(0.60, grey, 0.55)), vec3(0.76, 0.78, 0.81), 0.34), stale);
-    color = vec4(seen, 1.0) * body_paint.a;
+    return vec4(seen, 1.0) * body_paint.a;
+}
+"""
+
+# Shared by both programs of bodies, whose triangles meet without gaps.
+_PLACED = """
+invariant gl_Position;
+uniform mat4 site_to_clip, part_to_site;
+uniform vec4 tint;                    // its share in .a
+uniform float opacity;
+in vec3 position, normal;
+in vec4 paint, surface;
+vec4 painted() { return vec4(mix(to_linear(paint.rgb), tint.rgb, tint.a), paint.a * opacity); }
+vec2 material_of() { return vec2(clamp(surface.g, 0.15, 1.0), surface.b); }
+"""
+
+# Light for each pixel.
+BODY_VERTEX = (
+    COMMON
+    + _PLACED
+    + """
+out vec4 at;
+out vec3 facing;
+out vec4 body_paint;
+flat out vec2 material;               // the same at a triangle's corners
+void main() {
+    vec4 place = part_to_site * vec4(position, 1.0);
+    at = vec4(place.xyz, surface.r);
+    facing = mat3(part_to_site) * normal;
+    body_paint = painted();
+    material = material_of();
+    gl_Position = site_to_clip * place;
 }
 """
 )
+
+BODY_FRAGMENT = (
+    COLORS
+    + _LIGHT
+    + """
+in vec4 at;
+in vec3 facing;
+in vec4 body_paint;
+flat in vec2 material;
+out vec4 color;
+void main() { color = seen_color(at, facing, body_paint, material); }
+"""
+)
+
+# Light for each vertex, for triangles on which it differs little from that of each pixel.
+LIT_VERTEX = (
+    COMMON
+    + _LIGHT
+    + _PLACED
+    + """
+centroid out vec4 shade;
+void main() {
+    vec4 place = part_to_site * vec4(position, 1.0);
+    shade = seen_color(vec4(place.xyz, surface.r), mat3(part_to_site) * normal, painted(), material_of());
+    gl_Position = site_to_clip * place;
+}
+"""
+)
+
+LIT_FRAGMENT = """#version 330
+centroid in vec4 shade;
+out vec4 color;
+void main() { color = shade; }
+"""
 
 EDGE_VERTEX = """#version 330
 uniform mat4 site_to_clip, part_to_site;

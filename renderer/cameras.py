@@ -92,6 +92,19 @@ def site_to_clip(camera: Camera, aspect: float, *, center: FloatArray, radius: f
     return projection(camera, aspect, near=near, far=far) @ site_to_camera(camera)
 
 
+def scales(camera: Camera, height: int, distances: FloatArray) -> FloatArray:
+    """Return the (n,) scale of bodies [px/m] in a picture of a height [px].
+
+    Args:
+        distances: (n,) from the eye along the view direction [m].
+    """
+    if camera.half_height is not None:
+        return np.full(len(distances), height / (2.0 * camera.half_height))
+    across = 2.0 * np.tan(camera.field_of_view / 2.0) * np.maximum(distances, _NEAREST_M)
+    found: FloatArray = height / across
+    return found
+
+
 def pixels(
     camera: Camera, size: tuple[int, int], points: FloatArray, *, aspect: float | None = None
 ) -> FloatArray:

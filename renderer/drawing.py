@@ -7,6 +7,7 @@ halves the time. Without anti-aliasing the bodies are drawn on the picture itsel
 
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
+from typing import NamedTuple
 
 import cv2
 import moderngl
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from renderer.backdrop import EDGE_ON, Backdrops
 from renderer.body_shaders import KEY
-from renderer.cameras import Camera, site_to_clip
+from renderer.cameras import Camera, scales, site_to_clip
 from renderer.lighting import LampShadow
 from renderer.mesh import Mesh
 from renderer.obstruction import contains, hides
@@ -23,6 +24,7 @@ from renderer.opengl import Uploaded, columns, compile_programs, device_name, se
 from renderer.ribbons import ribbons
 from renderer.scene import Finish, Line, Part, Scene
 from renderer.shadow import FloorShadow
+from renderer.vertex_light import counts_at
 
 Picture = NDArray[np.uint8]
 FloatArray = NDArray[np.float64]
@@ -56,6 +58,14 @@ class Shading(StrEnum):
 
     FAST = "fast"
     FULL = "full"
+
+
+class _Body(NamedTuple):
+    """A body to draw; `vertex_lit`: number of its first triangles that are lit at their vertices."""
+
+    part: Part
+    uploaded: Uploaded
+    vertex_lit: int
 
 
 class Drawing:
@@ -193,16 +203,17 @@ class Drawing:
     ) -> None:
         context, programs = self.context, self._programs
         key = np.array(KEY) / np.linalg.norm(KEY)
-        set_uniforms(
-            programs.body,
-            site_to_clip=columns(matrix),
-            eye=tuple(camera.eye),
-            forward=tuple(camera.forward),
-            orthographic=float(camera.orthographic),
-            floor_height=_NO_FLOOR if scene.floor is None else scene.floor,
-            per_near_floor=1.0 / (0.18 * scene.radius),
-            key=tuple(key),
-        )
+        for program in (programs.body, programs.vertex_lit):
+            set_uniforms(
+                program,
+                site_to_clip=columns(matrix),
+                eye=tuple(camera.eye),
+                forward=tuple(camera.forward),
+                orthographic=float(camera.orthographic),
+                floor_height=_NO_FLOOR if scene.floor is None else scene.floor,
+                per_near_floor=1.0 / (0.18 * scene.radius),
+                key=tuple(key),
+            )
         set_uniforms(programs.edge, site_to_clip=columns(matrix))
         self._bodies.scissor = rectangle
         # The picture keeps its colours, a layer begins transparent.
@@ -216,57 +227,72 @@ class Drawing:
         # The projection flips the picture, and with it the winding of faces.
         context.front_face = "cw"
         solid, glass, ghosts = [], [], []
-        for pair in sorted(bodies, key=lambda pair: _depth(pair, camera)):
-            part, uploaded = pair
-            if part.finish is Finish.GHOST:
-                ghosts.append(pair)
-            elif uploaded.mesh.transparent or part.mesh in through:
-                glass.append(pair)
+        for body in self._by_distance(bodies, camera):
+            if body.part.finish is Finish.GHOST:
+                ghosts.append(body)
+            elif body.uploaded.mesh.transparent or body.part.mesh in through:
+                glass.append(body)
             else:
-                solid.append(pair)
+                solid.append(body)
         # The nearest first and without blending, so that hidden faces cost least.
         context.disable(moderngl.BLEND)
-        for pair in solid:
-            self._draw_faces(pair)
+        for body in solid:
+            self._draw_faces(body)
         context.enable(moderngl.BLEND)
-        for pair in solid:
-            self._draw_edges(pair)
+        for body in solid:
+            self._draw_edges(body)
         self._draw_lines(scene.lines, matrix)
         # Transparent bodies last, the farthest first; then the ghost over everything.
-        for pair in reversed(glass):
-            self._draw_faces(pair, opacity=_SEEN_THROUGH if pair[0].mesh in through else 1.0)
-            self._draw_edges(pair)
+        for body in reversed(glass):
+            self._draw_faces(body, opacity=_SEEN_THROUGH if body.part.mesh in through else 1.0)
+            self._draw_edges(body)
         # Only a ghost's nearest faces: draw depth first, then the faces with that depth.
         self._bodies.color_mask = (False,) * 4
-        for pair in ghosts:
-            self._draw_faces(pair)
+        for body in ghosts:
+            self._draw_faces(body)
         self._bodies.color_mask = (True,) * 4
         context.depth_func = "<="
-        for pair in ghosts:
-            self._draw_faces(pair)
-            self._draw_edges(pair)
+        for body in ghosts:
+            self._draw_faces(body)
+            self._draw_edges(body)
         context.depth_func = "<"
         self._bodies.scissor = 0, 0, *self.size
 
-    def _draw_faces(self, pair: tuple[Part, Uploaded], *, opacity: float = 1.0) -> None:
-        part, uploaded = pair
-        if uploaded.body is None:
-            return
+    def _by_distance(self, bodies: Bodies, camera: Camera) -> list[_Body]:
+        """Return the bodies, the nearest first."""
+        if not bodies:
+            return []
+        distances = (_corners(bodies).reshape(-1, 8, 3) - camera.eye) @ camera.forward
+        counts = np.array([uploaded.mesh.vertex_lit for _, uploaded in bodies])
+        if self._lamp is not None:
+            counts[:] = 0  # shadows on bodies have edges within triangles
+        lit = counts_at(scales(camera, self.size[1], distances.min(axis=1)), counts).tolist()
+        order = np.argsort(distances.mean(axis=1), kind="stable").tolist()
+        return [_Body(bodies[number][0], bodies[number][1], lit[number]) for number in order]
+
+    def _draw_faces(self, body: _Body, *, opacity: float = 1.0) -> None:
+        part, uploaded, vertex_lit = body
         tint, own_opacity = _FINISHES[part.finish]
         # Slightly farther away, so that the edges drawn on the faces are not hidden.
         self.context.polygon_offset = _BACK[part.finish is Finish.GHOST]
-        set_uniforms(
-            self._programs.body,
-            part_to_site=columns(part.part_to_site),
-            tint=tint,
-            opacity=opacity * own_opacity,
-            stale=float(part.finish is Finish.STALE),
+        draws = (
+            (self._programs.vertex_lit, uploaded.vertex_lit, 0, vertex_lit),
+            (self._programs.body, uploaded.body, vertex_lit, len(uploaded.mesh.triangles)),
         )
-        uploaded.body.render()
+        for program, array, first, end in draws:
+            if array is not None and first < end:
+                set_uniforms(
+                    program,
+                    part_to_site=columns(part.part_to_site),
+                    tint=tint,
+                    opacity=opacity * own_opacity,
+                    stale=float(part.finish is Finish.STALE),
+                )
+                array.render(first=3 * first, vertices=3 * (end - first))
         self.context.polygon_offset = 0.0, 0.0
 
-    def _draw_edges(self, pair: tuple[Part, Uploaded]) -> None:
-        part, uploaded = pair
+    def _draw_edges(self, body: _Body) -> None:
+        part, uploaded, _ = body
         if uploaded.edges is not None:
             red, green, blue, share = _EDGE_TONE
             tone = red, green, blue, share * _FINISHES[part.finish][1]
@@ -312,16 +338,14 @@ def _scene_bounds(scene: Scene, fixtures: Bodies) -> tuple[FloatArray, float]:
     return (low + high) / 2.0, radius
 
 
-def _depth(pair: tuple[Part, Uploaded], camera: Camera) -> float:
-    return float((_corners([pair]).mean(axis=0) - camera.eye) @ camera.forward)
-
-
 def _corners(bodies: Bodies) -> FloatArray:
     """Return the (8n, 3) corners of the boxes around bodies, in the site's frame [m]."""
-    boxes = [
-        uploaded.corners @ part.part_to_site[:3, :3].T + part.part_to_site[:3, 3] for part, uploaded in bodies
-    ]
-    return np.concatenate([np.empty((0, 3)), *boxes])
+    if not bodies:
+        return np.empty((0, 3))
+    boxes = np.array([uploaded.corners for _, uploaded in bodies])
+    placements = np.array([part.part_to_site for part, _ in bodies])
+    corners: FloatArray = boxes @ placements[:, :3, :3].swapaxes(1, 2) + placements[:, None, :3, 3]
+    return corners.reshape(-1, 3)
 
 
 def _rectangle(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from renderer.creases import CREASE, FloatArray, IntArray, crease_normals, sharp_edges, weld
 from renderer.glb import Surface, read_glb
 from renderer.occlusion import open_sky
+from renderer.vertex_light import SCALES, ordered
 
 # More triangles take time for each picture and hardly change it (96,000 instead of 20,000 for a
 # whole arm: 37 instead of 18 ms at 720p).
@@ -39,6 +40,8 @@ class Mesh:
         surface: (v, 4) uint8: the share of the sky that the vertex sees past its own link,
             roughness, metalness, unused.
         triangles: (t, 3) uint32, vertex numbers.
+        vertex_lit: Number of the first triangles that are lit at their vertices, for each of
+            `renderer.vertex_light.SCALES`.
         edges: (2e, 3) float32, ends of the sharp edges.
         shadow: (3s, 3) float32, a coarse copy that casts the shadow.
     """
@@ -48,6 +51,7 @@ class Mesh:
     colors: NDArray[np.uint8]
     surface: NDArray[np.uint8]
     triangles: NDArray[np.uint32]
+    vertex_lit: NDArray[np.uint32]
     edges: NDArray[np.float32]
     shadow: NDArray[np.float32]
 
@@ -86,12 +90,16 @@ def prepared(glb: bytes, *, color: str = "", most_triangles: int = MOST_TRIANGLE
     unique, numbers = _unique(vertices)
     points, normals = (unique[name].astype(np.float64) for name in ("position", "normal"))
     unique["surface"][:, 0] = np.round(open_sky(points, normals, numbers.reshape(-1, 3)) * 255.0)
+    triangles, vertex_lit = numbers.reshape(-1, 3), np.zeros(len(SCALES), dtype=np.uint32)
+    if (unique["color"][:, 3] == 255).all():  # the order of transparent triangles is visible
+        triangles, vertex_lit = ordered(points, normals, unique["surface"][:, 1] / 255.0, triangles)
     return Mesh(
         positions=unique["position"],
         normals=unique["normal"],
         colors=unique["color"],
         surface=unique["surface"],
-        triangles=numbers.reshape(-1, 3),
+        triangles=triangles,
+        vertex_lit=vertex_lit,
         edges=_joined([body.edges.reshape(-1, 3) for body in bodies], 3).astype(np.float32),
         shadow=_coarse(corners).astype(np.float32),
     )

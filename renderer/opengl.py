@@ -127,6 +127,7 @@ class Programs:
     """The compiled shaders."""
 
     body: moderngl.Program
+    vertex_lit: moderngl.Program
     edge: moderngl.Program
     ribbon: moderngl.Program
     lamp: moderngl.Program
@@ -144,6 +145,7 @@ def compile_programs(context: moderngl.Context, *, samples: int, full: bool) -> 
         body = f"#define FULL\n{body}"
     return Programs(
         body=context.program(body_shaders.BODY_VERTEX, f"{shaders.VERSION}{body}"),
+        vertex_lit=context.program(body_shaders.LIT_VERTEX, body_shaders.LIT_FRAGMENT),
         edge=context.program(body_shaders.EDGE_VERTEX, body_shaders.EDGE_FRAGMENT),
         ribbon=context.program(body_shaders.RIBBON_VERTEX, body_shaders.RIBBON_FRAGMENT),
         lamp=context.program(body_shaders.LAMP_VERTEX, body_shaders.LAMP_FRAGMENT),
@@ -167,6 +169,7 @@ class Uploaded:
     mesh: Mesh
 
     body: moderngl.VertexArray | None
+    vertex_lit: moderngl.VertexArray | None
     edges: moderngl.VertexArray | None
     shadow: moderngl.VertexArray | None
     lamp: moderngl.VertexArray | None
@@ -175,7 +178,7 @@ class Uploaded:
 
     def release(self) -> None:
         """Release the GPU memory."""
-        for array in (self.body, self.edges, self.shadow, self.lamp):
+        for array in (self.body, self.vertex_lit, self.edges, self.shadow, self.lamp):
             if array is not None:
                 array.release()
         for buffer in self._buffers:
@@ -193,12 +196,13 @@ def upload(context: moderngl.Context, programs: Programs, mesh: Mesh) -> Uploade
     vertices = np.zeros(len(mesh.positions), dtype=VERTEX)
     vertices["position"], vertices["normal"] = mesh.positions, mesh.normals
     vertices["color"], vertices["surface"] = mesh.colors, mesh.surface
-    body = edges = shadow = lamp = None
+    body = vertex_lit = edges = shadow = lamp = None
     if len(mesh.triangles):
         content = buffer(vertices.tobytes())
         layout = (content, "3f 3f 4f1 4f1", "position", "normal", "paint", "surface")
         indices = buffer(mesh.triangles.astype("u4").tobytes())
         body = context.vertex_array(programs.body, [layout], index_buffer=indices)
+        vertex_lit = context.vertex_array(programs.vertex_lit, [layout], index_buffer=indices)
         lamp = context.vertex_array(programs.lamp, [(content, "3f 20x", "position")], index_buffer=indices)
     if len(mesh.edges):
         ends = buffer(mesh.edges.tobytes())
@@ -208,7 +212,7 @@ def upload(context: moderngl.Context, programs: Programs, mesh: Mesh) -> Uploade
     low, high = (mesh.positions.min(axis=0), mesh.positions.max(axis=0)) if len(vertices) else (0.0, 0.0)
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=np.float64)
     box = low + corners * np.subtract(high, low)
-    return Uploaded(mesh, body, edges, shadow, lamp, box, buffers)
+    return Uploaded(mesh, body, vertex_lit, edges, shadow, lamp, box, buffers)
 
 
 def columns(matrix: NDArray[np.float64]) -> bytes:
