@@ -55,6 +55,13 @@ HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
 """
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item):
+    """Skip each test of a browser where there is none, before its site starts."""
+    if item.get_closest_marker("browser") and not CHROMIUM.exists():
+        pytest.skip(f"no {CHROMIUM}: the page is not driven here")
+
+
 @dataclass
 class Plant:
     """A running site.
@@ -77,7 +84,7 @@ class Plant:
     address: str = ""
     endpoint: str = field(default_factory=lambda: f"tcp/127.0.0.1:{free_port()}")
     legacy_port: int = field(default_factory=free_port)
-    loop: asyncio.AbstractEventLoop = field(default_factory=asyncio.new_event_loop)
+    loop: asyncio.AbstractEventLoop = field(init=False)
     session: Session | None = None
     controllers: dict = field(default_factory=dict)
     _end: asyncio.Event = field(default_factory=asyncio.Event)
@@ -184,6 +191,7 @@ class Plant:
                 await self.stop_controller(name)
 
     def run(self):
+        self.loop = asyncio.new_event_loop()
         try:
             self.loop.run_until_complete(self._run())
         finally:
@@ -215,8 +223,6 @@ def plant(request, tmp_path_factory) -> Iterator[Plant]:
 
 def run_plant(running: Plant) -> Iterator[Plant]:
     """Run a plant for as long as a fixture lasts."""
-    if not CHROMIUM.exists():
-        pytest.skip(f"no {CHROMIUM}: the page is not driven here")
     build_page.build()
     thread = threading.Thread(target=running.run, name="plant")
     thread.start()

@@ -10,7 +10,6 @@ import pytest
 from playwright.sync_api import expect
 
 from robomesh.session import open_session
-from tests.browser.conftest import CHROMIUM
 from tests.browser.robot_page import (
     events,
     keep_picture,
@@ -57,8 +56,6 @@ SLOWLY_MS = 40_000
 
 @pytest.fixture(scope="module")
 def plant(tmp_path_factory):
-    if not CHROMIUM.exists():
-        pytest.skip(f"no {CHROMIUM}: the page is not driven here")
     build_page.build()
     with running_site(tmp_path_factory.mktemp("cell"), robots=SITE, services=()) as site:
         deadline = time.monotonic() + READY_S

@@ -30,8 +30,6 @@ pytestmark = [pytest.mark.browser, pytest.mark.processes]
 @pytest.fixture
 def site(tmp_path, request):
     """Yield a site with the services that a test names."""
-    if not CHROMIUM.exists():
-        pytest.skip(f"no {CHROMIUM}: the page is not driven here")
     with running_site(tmp_path, services=getattr(request, "param", ())) as running:
         yield running
 

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from tests.browser.conftest import CHROMIUM
 from tests.site import running_site
 from web import build_page
 
@@ -13,8 +12,6 @@ from web import build_page
 @pytest.fixture(scope="package")
 def plant(tmp_path_factory):
     """Yield a site of real processes: its page, the folder of its robots, the store of Define's files."""
-    if not CHROMIUM.exists():
-        pytest.skip(f"no {CHROMIUM}: the page is not driven here")
     build_page.build()
     cache = tmp_path_factory.mktemp("cache")
     with pytest.MonkeyPatch.context() as patch:

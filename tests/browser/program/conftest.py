@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from tests.browser.conftest import CHROMIUM
 from tests.site import running_site
 from web import build_page
 
@@ -27,8 +26,6 @@ pose = { xyz = [300.0, 200.0, 450.0], rpy = [0.0, 0.0, 0.0] }
 @pytest.fixture(scope="package")
 def plant(tmp_path_factory):
     """Yield a site of an arm next to a post: its page, and the site."""
-    if not CHROMIUM.exists():
-        pytest.skip(f"no {CHROMIUM}: the page is not driven here")
     build_page.build()
     with running_site(tmp_path_factory.mktemp("site"), robots=SITE, services=["store"]) as site:
         yield SimpleNamespace(address=site.console.rstrip("/"), site=site)
