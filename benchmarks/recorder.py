@@ -14,7 +14,7 @@ For comparison, the bare writers run in a loop in one process: ours (to the syst
 index), mcap's, foxglove-sdk's. Then a file of 1 GB: the time to the first message of each topic at random
 seconds of it.
 
-Target: 50,000 messages/s and the hundred robots with no loss; any second within 50 ms.
+Target: 100,000 messages/s and the hundred robots with no loss; any second within 50 ms.
 """
 
 import argparse

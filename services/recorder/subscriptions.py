@@ -28,9 +28,11 @@ log = logging.getLogger(__name__)
 
 # Interval of draining, and so the accuracy of receive times.
 _DRAIN_EVERY_S = 0.004
-# Limit of the thread's load: with many robots the interval grows up to a maximum.
+# Limit of the thread's load: with many robots the interval grows up to a maximum, unless a ring fills.
 _MAX_BUSY = 0.2
 _MAX_INTERVAL_S = 0.02
+# Other threads run for this time while rings fill faster than that.
+_MIN_INTERVAL_S = 0.0005
 # A ring holds twenty seconds of its topic at its full rate, in case this thread does not run, or a burst of
 # a topic without a rate. Rings fill over time, 270 bytes a message, so their size is real memory.
 _RING_S, _SMALLEST_RING = 20.0, 512
@@ -91,12 +93,15 @@ class _TopicSubscription:
         self._ignored = ignored
         self.row = topic(key_expr.split("/", 3)[3])
         self._is_video = self.row.history is History.KEY_FRAME
+        # It describes the robot and is published only once, before the recording.
+        self.is_static = self.row.history is History.LAST and self.row.stale_after_s is None
         # Lost publications, and what a new file lacks, by key.
         self.lost: Counter[str] = Counter()
         self.preamble: dict[str, _Preamble] = {}
         # Sinks that received the newest picture.
         self._begun: frozenset[Sink] = frozenset()
         self.begun_ns = time.time_ns()
+        self._ring = _ring(self.row)
         self._session = session
         self._sequences: dict[str, _Sequence] = {}
         self._replies: deque[zenoh.Sample] = deque()
@@ -106,11 +111,6 @@ class _TopicSubscription:
         if self.row.history in (History.LAST_100, History.KEY_FRAME) or self.is_static:
             self._blocked_until = time.monotonic() + _REPLY_TIMEOUT_S
             self.query()
-
-    @property
-    def is_static(self) -> bool:
-        """True if the topic describes the robot and is published only once, before the recording."""
-        return self.row.history is History.LAST and self.row.stale_after_s is None
 
     def query(self) -> None:
         """Query the publisher for earlier messages."""
@@ -140,8 +140,8 @@ class _TopicSubscription:
         if self.row.history is History.LAST_100 or self.is_static:
             self.query()
 
-    def drain(self, sinks: Iterable[Sink]) -> int:
-        """Deliver received messages to the sinks; return the number taken from the ring."""
+    def drain(self, sinks: Iterable[Sink]) -> float:
+        """Deliver received messages to the sinks; return how full the ring was, as a share of its places."""
         blocked = time.monotonic() < self._blocked_until  # read first: the reply arrives before it ends
         while self._replies:
             reply = self._replies.popleft()
@@ -151,7 +151,7 @@ class _TopicSubscription:
             except (MessageError, ValueError) as error:  # ValueError: an invalid timestamp
                 log.warning("%s: a message is not recorded: %s", self.key_expr, error)
         if blocked:
-            return 0
+            return 0.0
         taken = 0
         take: Callable[[], zenoh.Sample | None] = self._subscriber.try_recv
         while taken < _MAX_BATCH and (sample := take()) is not None:
@@ -171,7 +171,7 @@ class _TopicSubscription:
                 # Read after taking the message, so that it is never before the publication.
                 received_ns = time.monotonic_ns()
                 self._deliver(key, header, sample.payload.to_bytes(), received_ns, sinks)
-        return taken
+        return 1.0 if taken == _MAX_BATCH else taken / self._ring
 
     def close(self) -> None:
         """End the subscription."""
@@ -285,14 +285,15 @@ class RobotSubscriptions:
         self._sinks: dict[Sink, tuple[frozenset[str], Counter[str]]] = {}
         self._sinks_of: dict[str, tuple[Sink, ...]] = {}
 
-    def drain(self) -> None:
-        """Deliver received messages to the sinks."""
+    def drain(self) -> float:
+        """Deliver received messages to the sinks; return how full the fullest ring was."""
         if not self._sinks:
-            return
-        taken = sum(topic.drain(self._sinks_of[name]) for name, topic in self._topics.items())
-        if taken:
+            return 0.0
+        full = max((topic.drain(self._sinks_of[name]) for name, topic in self._topics.items()), default=0.0)
+        if full:
             for sink in self._sinks:
                 sink.drained()
+        return full
 
     def attach(self, sink: Sink, names: frozenset[str]) -> None:
         """Give a sink the last values of static topics, and every publication of these from now on."""
@@ -366,19 +367,30 @@ class Subscriptions:
         while not self._closed.wait(wait_s):
             begun = time.monotonic()
             with self.lock:
-                for robot in tuple(self._robots.values()):
-                    self._drain(robot, begun)
-            took_s = time.monotonic() - begun
-            wait_s = min(max(_DRAIN_EVERY_S, took_s / _MAX_BUSY - took_s), _MAX_INTERVAL_S)
+                full = max((self._drain(each, begun) for each in tuple(self._robots.values())), default=0.0)
+            wait_s = interval_s(time.monotonic() - begun, full)
 
-    def _drain(self, robot: RobotSubscriptions, now_s: float) -> None:
+    def _drain(self, robot: RobotSubscriptions, now_s: float) -> float:
         """Drain a robot's rings; an error must not end other robots' recordings."""
         try:
-            robot.drain()
+            return robot.drain()
         except Exception:
             if now_s >= self._log_at:
                 self._log_at = now_s + _LOG_INTERVAL_S
                 log.exception("a received message could not be recorded")
+        return 0.0
+
+
+def interval_s(took_s: float, full: float) -> float:
+    """Return the wait until the rings are drained again [s].
+
+    Args:
+        took_s: Duration of the last draining.
+        full: How full the fullest ring was then, as a share of its places.
+    """
+    if full >= 0.25:
+        return _MIN_INTERVAL_S
+    return min(max(_DRAIN_EVERY_S, took_s / _MAX_BUSY - took_s), _MAX_INTERVAL_S)
 
 
 _Ring = zenoh.Handler[zenoh.Sample]

@@ -4,6 +4,7 @@ import asyncio
 import time
 from types import SimpleNamespace
 
+import pytest
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from robomesh.header import Header, pack
@@ -16,6 +17,7 @@ from services.recorder import subscriptions
 from services.recorder.disk import RecordingLevel
 from services.recorder.file_writer import Part
 from services.recorder.settings import Flight
+from services.recorder.subscriptions import interval_s
 from tests.conftest import run
 from tests.recordings import KEY_PICTURE, PICTURE, START_NS
 from tests.services.recording import (
@@ -313,3 +315,10 @@ def test_a_history_with_events_before_the_first_live_one_is_recorded_whole(mesh)
     taken, lost = run(main())
     assert sorted(number for _, number in taken) == [2, 3, 4, 5, 6, 7]
     assert not +lost
+
+
+def test_a_ring_that_fills_is_drained_at_once_however_busy_the_thread_is():
+    # 100,000 joint states a second: the ring of 2,000 places would overflow in the longest interval.
+    assert interval_s(took_s=0.006, full=0.5) < 0.001
+    assert interval_s(took_s=0.006, full=0.1) == pytest.approx(0.02)
+    assert interval_s(took_s=0.0, full=0.0) == pytest.approx(0.004)
