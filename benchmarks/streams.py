@@ -43,7 +43,7 @@ JOINTS = ("waist", "shoulder", "elbow", "wrist", "roll")
 VIEWS = ("front", "top", "left", "free")
 ARM = "robomesh/hall/arm"
 # Requested views in full size and rate are an eighth of these.
-_MANY = 256
+_MANY = 1024
 
 
 def main() -> None:
