@@ -53,7 +53,8 @@ def test_too_near_pose_reports_the_least_distance_of_the_tool() -> None:
     distance = float(reason.values["distance"].removesuffix(" mm"))
     tools = [tool_placement(model, positions)[:3, 3] for positions in allowed_positions(model, 5000)]
     nearest = 1000 * np.linalg.norm(np.array(tools) - target[:3, 3], axis=1).min()
-    assert nearest - 20 < distance < nearest
+    # 5,000 random positions come this near to the least distance.
+    assert nearest - 30 < distance < nearest
 
 
 def test_a_solution_beyond_limits_names_joint_value_and_range() -> None:
