@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-# Half the squared error [m^2 + rad^2], for an error within 1e-4.
-TOLERANCE = 5e-9
+# Half the squared error [m^2 + rad^2], for an error within 1e-5.
+TOLERANCE = 5e-11
 # For solvers that take a tenth of a second for each target.
 SLOW_TARGETS = 100
 
@@ -44,7 +44,7 @@ def toolbox(arm: dict[str, Any]) -> dict[str, Any]:
     for target in arm["targets"]:
         begin = time.perf_counter()
         # The best damping for it, of 1, 0.1 and 0.01.
-        solution = ets.ik_LM(target, tol=TOLERANCE, method="chan", k=0.1)
+        solution = ets.ik_LM(target, q0=arm["home"], tol=TOLERANCE, method="chan", k=0.1)
         times.append(time.perf_counter() - begin)
         found.append(np.asarray(solution.q if hasattr(solution, "q") else solution[0]).tolist())
 
