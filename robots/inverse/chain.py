@@ -30,6 +30,9 @@ class Chain:
         axes, origins: (c, 3) of the chain's joints in the base frame, at position zero [m].
         tool_to_base: (4, 4) at position zero.
         reach: Upper bound of the tool's distance from the first joint, ignoring rotary limits [m].
+        _placement: The tool, relative to the target of `aim`, from the last forward kinematics.
+        _placement_with_jacobian: The same from the last Jacobian, whose computation places the tool as well.
+        _base: The first joint in the base frame.
     """
 
     joints: Joints
@@ -48,6 +51,8 @@ class Chain:
     _data: Any
     _frame: int
     _placement: Any
+    _placement_with_jacobian: Any
+    _base: Any
     _factors: FloatArray | None
     _offsets: FloatArray
 
@@ -97,9 +102,23 @@ def build_chain(description: RobotDescription) -> Chain:
         _data=data,
         _frame=frame,
         _placement=data.oMf[frame],
+        # Pinocchio holds it among the placements of links relative to others.
+        _placement_with_jacobian=data.iMf[0],
+        _base=pin.SE3(model.jointPlacements[1]) if numbers else None,
         _factors=None if serial else factors,
         _offsets=offsets,
     )
+
+
+def aim(chain: Chain, target: Any) -> None:
+    """Take a target, a pin.SE3, as the frame in which the chain's tool is placed.
+
+    The deviation of the tool is then its placement: a product of matrices less in each step of a search.
+    """
+    if chain._base is not None:
+        chain._model.jointPlacements[1] = target.actInv(chain._base)
+    else:
+        chain._model.frames[chain._frame].placement = target.actInv(pin.SE3(chain.tool_to_base))
 
 
 def placement_misses(chain: Chain, x: FloatArray, target: Any, rows: int) -> tuple[float, float]:
@@ -109,6 +128,7 @@ def placement_misses(chain: Chain, x: FloatArray, target: Any, rows: int) -> tup
         target: A pin.SE3, tool to base.
         rows: See `misses`.
     """
+    aim(chain, target)
     q = x if chain._factors is None else chain._factors @ x + chain._offsets
     pin.framesForwardKinematics(chain._model, chain._data, q)
-    return misses(chain._placement.actInv(target).homogeneous.ravel().tolist(), rows)
+    return misses(chain._placement.homogeneous.ravel().tolist(), rows)

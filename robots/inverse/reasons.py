@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import islice
-from math import degrees
+from math import degrees, dist
 from typing import Any
 
 import numpy as np
@@ -88,7 +88,8 @@ def beyond_reach(chain: Chain, target: Any) -> bool:
 def _distance(chain: Chain, target: Any) -> float:
     # Without a joint that moves the tool, measure from the tool.
     first = chain.origins[0] if len(chain.origins) else chain.tool_to_base[:3, 3]
-    return float(np.linalg.norm(target.translation - first))
+    # For three numbers, this takes a third of the time of NumPy's norm.
+    return dist(target.translation.tolist(), first.tolist())
 
 
 def _nearest_turns(chain: Chain, x: FloatArray) -> FloatArray:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import chain as joined
 from itertools import islice
 from typing import Any
 
@@ -191,10 +190,14 @@ def _search_starts(
     guesses: list[list[float]],
     seed: int,
 ) -> Iterator[FloatArray]:
-    """Return the starts of a search: the arm's position, approximations, home, random positions."""
-    first = [around[chain.moving], *map(np.array, guesses)]
+    """Yield the starts of a search: the arm's position, approximations, home, random positions."""
+    yield around[chain.moving]
+    yield from map(np.array, guesses)
     unlikely = bool(exact) or beyond_reach(chain, target)
-    return islice(joined(first, starts(chain, seed)), len(first) + (_FEW_TRIES if unlikely else _TRIES))
+    others = islice(starts(chain, seed), _FEW_TRIES if unlikely else _TRIES)
+    if around is chain.joints.home:
+        next(others)
+    yield from others
 
 
 def _search(
@@ -229,9 +232,12 @@ def _search(
         if (found or rough) and number + 1 >= soon:
             break
     assert nearest is not None
-    start = around[chain.moving]
-    weights = np.array([weight for _, _, weight in chain.limits])
-    return sorted(found or rough, key=lambda each: float(np.square(each.x - start) @ weights)), nearest
+    kept = found or rough
+    if len(kept) > 1:
+        start = around[chain.moving]
+        weights = np.array([weight for _, _, weight in chain.limits])
+        kept.sort(key=lambda each: float(np.square(each.x - start) @ weights))
+    return kept, nearest
 
 
 def _allowed(chain: Chain, x: FloatArray, around: FloatArray) -> bool:

@@ -100,10 +100,10 @@ def tool_misses(tool: FloatArray, wanted: FloatArray, task: Task) -> tuple[float
 
 
 def misses(placement: list[float], rows: int) -> tuple[float, float]:
-    """Return the deviation of a target from the tool: [m] and [rad].
+    """Return the deviation of the tool from a target: [m] and [rad].
 
     Args:
-        placement: The 16 numbers of target to tool, by rows.
+        placement: The 16 numbers of target to tool, or of tool to target, by rows.
         rows: Compared rows: 6 for the pose, 5 for position and axis, 3 for the position.
     """
     xx, xy, xz, x, yx, yy, yz, y, zx, zy, zz, z, *_ = placement
