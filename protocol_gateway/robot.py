@@ -133,8 +133,8 @@ class Robot:
         self._signals = Signals(publisher("signals"), self._journal, joints.names, confirmed)
         self._telemetry = Telemetry(
             joints,
-            fast=publisher("joints"),
-            slow=publisher("joints/slow"),
+            fast=session.declare_publisher(site, settings.name, "joints", together=True),
+            slow=session.declare_publisher(site, settings.name, "joints/slow", together=True),
             raw=publisher("raw"),
             signals=self._signals,
             journal=self._journal,

@@ -16,6 +16,7 @@ from robomesh import keys
 from robomesh.endpoints import wait_until_declared
 from robomesh.header import Header, pack
 from robomesh.messages import PROTOBUF
+from robomesh.outbox import Outbox
 from robomesh.schemas.robomesh_pb2 import VideoFrames
 from robomesh.topics import History, Topic, topic
 from robomesh.wall_clock import WallClock
@@ -31,10 +32,21 @@ class Publisher:
     """The publisher of one topic of one robot.
 
     Safe to use from any one thread at a time; late joiners are answered on Zenoh's thread.
+
+    Args:
+        outbox: Takes the messages, which the event loop's thread alone may then publish; None: they are put
+            immediately.
     """
 
     def __init__(
-        self, session: zenoh.Session, site: str, robot: str, name: str, *, on_get: OnGet | None = None
+        self,
+        session: zenoh.Session,
+        site: str,
+        robot: str,
+        name: str,
+        *,
+        on_get: OnGet | None = None,
+        outbox: Outbox | None = None,
     ) -> None:
         self.key = keys.robot_key(site, robot, name)
         self.topic: Topic = topic(name)
@@ -45,6 +57,7 @@ class Publisher:
         self._dated_by: int | None = None
         self._sequence = 0
         self._closed = False
+        self._outbox = outbox
         self._lock = threading.Lock()
         self._history: deque[tuple[Header, bytes]] = deque(maxlen=_history_length(self.topic))
         self._publisher: Any = _declare(session, self.key, self.topic)
@@ -100,7 +113,10 @@ class Publisher:
                 self._history.clear()
             if not (self.topic.history is History.KEY_FRAME and not (key_frame or self._history)):
                 self._history.append((header, payload))
-        self._publisher.put(payload, attachment=pack(header))
+        if self._outbox is None:
+            self._publisher.put(payload, attachment=pack(header))
+        else:
+            self._outbox.add(self._publisher, payload, pack(header))
         return header
 
     def _clock_is_another(self, dated_by: int | None) -> bool:
@@ -159,6 +175,8 @@ class Publisher:
         if self._closed:
             return
         self._closed = True
+        if self._outbox is not None:
+            self._outbox.flush()
         if self._listener is not None:
             self._listener.undeclare()
         if self._queryable is not None:

@@ -1,14 +1,15 @@
 """Queues of requests from Zenoh to the event loop, so that a flood of requests delays no stop.
 
     stop             Zenoh's thread -> event loop, immediately
-    command, lease   queue -> reading thread, a few each millisecond -> event loop, one at a time
+    command, lease   queue -> thread of the callback, a few each millisecond -> event loop, one at a time
     other requests   ring  -> reading thread -> event loop, in the same way
 
 With a plain callback Python would run for each request as fast as requests arrive: the event loop would wait
 for the interpreter lock again and again, and Zenoh's queue in front of the callback blocks the whole session
 when it is full. Commands and leases have a separate connection, where blocking is intended: a flood waits at
 its sender and takes no processor time from a stop. Other requests share a connection, which must not block:
-they wait in a ring, and Zenoh ends a request that the ring drops without an answer.
+they wait in a ring, and Zenoh ends a request that the ring drops without an answer. A thread that reads a
+ring wakes up ten times a second to notice signals, the thread of a callback only for requests.
 """
 
 import asyncio
@@ -22,11 +23,8 @@ import zenoh
 
 # The reading thread runs again long before a flood fills this ring.
 RING = 1024
-# Queue of commands and leases; when it is full, Zenoh stops reading their connection. It is short because a
-# request waits for all requests before it.
-QUEUE = 64
-# The reading thread reads a few requests, then leaves the interpreter to the event loop. Without the pause
-# the system often suspends this thread while it holds the interpreter lock, and a stop waits for it.
+# A thread takes a few requests, then leaves the interpreter to the event loop. Without the pause the system
+# often suspends this thread while it holds the interpreter lock, and a stop waits for it.
 _BATCH = 32
 _PAUSE_S = 0.001
 # Limits of one robot's commands and lease requests: burst, and rate [1/s]. The system wakes a mostly idle
@@ -124,6 +122,27 @@ def read(ring: zenoh.Handler[zenoh.Query], take: Callable[[zenoh.Query], None]) 
                     time.sleep(_PAUSE_S)
         except zenoh.ZError:  # undeclared
             return
+
+
+def paced(take: Callable[[zenoh.Query], None]) -> Callable[[zenoh.Query], None]:
+    """Return a callback that passes each query to `take`, with a pause after a few of a flood.
+
+    Zenoh calls it in a thread of its own, behind a queue of 256 queries. When the queue is full, Zenoh stops
+    reading the connection.
+    """
+    begun_s = 0.0
+    taken = 0
+
+    def take_paced(query: zenoh.Query) -> None:
+        nonlocal begun_s, taken
+        if (now_s := time.monotonic()) - begun_s > _PAUSE_S:
+            begun_s, taken = now_s, 0
+        take(query)
+        taken += 1
+        if taken > _BATCH:
+            time.sleep(_PAUSE_S)
+
+    return take_paced
 
 
 def begin_now(loop: asyncio.AbstractEventLoop, work: Coroutine[Any, Any, None]) -> asyncio.Task[None] | None:

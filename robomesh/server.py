@@ -21,7 +21,7 @@ from robomesh.ignored import REQUEST, Ignored
 from robomesh.latencies import Latencies
 from robomesh.messages import JSON, PROTOBUF, TEXT, decode_request, encode, is_json
 from robomesh.reasons import RETRY, Reason, to_parameters
-from robomesh.request_queue import QUEUE, RING, Queue, RateLimit, RoundRobin, begin_now, read
+from robomesh.request_queue import RING, Queue, RateLimit, RoundRobin, begin_now, paced, read
 
 log = logging.getLogger(__name__)
 
@@ -132,12 +132,11 @@ class Answerer:
             # Directly from Zenoh's thread, so that a stop changes threads only once.
             at_once = zenoh.handlers.Callback(self._hand_over_at_once, indirect=False)
             self._queryable = session.declare_queryable(key, at_once)
+        elif self._row.own_link:
+            # Its queue may block a flooding sender, because the connection carries nothing else.
+            self._queryable = session.declare_queryable(key, paced(self._hand_over))
         else:
-            self._queryable = session.declare_queryable(
-                key,
-                # A queue on a separate connection may block a flooding sender; a shared one must not block.
-                zenoh.handlers.FifoChannel(QUEUE) if self._row.own_link else zenoh.handlers.RingChannel(RING),
-            )
+            self._queryable = session.declare_queryable(key, zenoh.handlers.RingChannel(RING))
             reading = (self._queryable.handler, self._hand_over)
             # Not a daemon, as in `Subscription`.
             threading.Thread(target=read, args=reading, name=f"read {key}").start()

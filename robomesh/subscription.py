@@ -2,6 +2,11 @@
 
 Zenoh puts samples into a ring, so that a slow consumer does not delay other subscriptions. A thread of the
 subscription reads the ring, drops duplicates, and wakes the event loop.
+
+For a consumer that pauses between its batches, the event loop itself reads the ring while samples keep
+coming, which saves the thread's wake for each of them:
+
+    thread reads --several in a pause--> event loop reads after each pause --none for 3--> thread reads
 """
 
 import asyncio
@@ -32,6 +37,8 @@ _ZENOH_RING = 1024
 _QUERY_AFTER_S = 0.1
 # How long a reply waits for live samples that it overtook [s].
 _EARLY_S = 0.5
+# Pauses without a sample after which the thread reads again.
+_IN_VAIN = 3
 # For rows with a key for each process or view: a key without samples for this time is forgotten [s].
 _FORGOTTEN_AFTER_S = 3600.0
 _FORGET_EACH_S = 60.0
@@ -100,7 +107,6 @@ class Subscription:
         newest: int,
         history: bool,
         ignored: Ignored,
-        pause_s: float = 0.0,
     ) -> None:
         self.key_expr = key_expr
         self._ignored = ignored
@@ -118,7 +124,10 @@ class Subscription:
         self._lock = threading.Lock()
         self._malformed = 0
         self._received = 0
-        self._pause_s = pause_s
+        # Whether the event loop reads the ring and not the thread, and when it did so last.
+        self._pause_s = self._loop_read_at = 0.0
+        self._read_by_loop = False
+        self._thread_reads = threading.Event()
         self._history = history
         self._closed = False
         self._query_timer: asyncio.TimerHandle | None = None
@@ -167,14 +176,42 @@ class Subscription:
         """Block the calling thread until a sample arrives or the subscription is closed; False: timeout."""
         return self._arrived.wait(timeout_s)
 
-    async def next_batch(self) -> list[Sample]:
-        """Wait for a sample and return all samples received; empty after `close`."""
-        async for sample in self:
-            with self._lock:
-                samples = [sample, *self._ring]
-                self._ring.clear()
+    async def next_batch(self, *, pause_s: float = 0.0) -> list[Sample]:
+        """Wait for a sample and return all samples received; empty after `close`.
+
+        Args:
+            pause_s: Pause after the samples that have arrived [s]: those of the pause are returned together
+                after it, so many keys wake the process less often. A sample after a longer gap is not
+                delayed. A consumer that pauses reads only batches.
+        """
+        self._pause_s = pause_s
+        in_vain = 0
+        while not (samples := self._take_all()) and not self._closed:
+            if not self._read_by_loop:
+                await self._ready.wait()
+                continue
+            await asyncio.sleep(self._loop_read_at + pause_s - time.monotonic())
+            in_vain = 0 if self._read_in_loop() else in_vain + 1
+            if in_vain == _IN_VAIN:
+                self._read_by_loop = False
+                self._thread_reads.set()
+        return samples
+
+    def _read_in_loop(self) -> int:
+        """Take the samples that wait, for a consumer that is about to look; return their number."""
+        self._loop_read_at = time.monotonic()
+        self._awaited = False
+        return 0 if self._closed else self._read_waiting()
+
+    def _take_all(self) -> list[Sample]:
+        with self._lock:
+            samples = [*self._ring]
+            self._ring.clear()
+            if not samples:
+                self._arrived.clear()
+                self._ready.clear()
+                self._awaited = True
             return samples
-        return []
 
     def age_s(self, key: str) -> float | None:
         """Return the age of a key's newest live sample [s]; None: no live sample arrived.
@@ -243,6 +280,7 @@ class Subscription:
             if self._query_timer is not None:
                 self._query_timer.cancel()
             self._subscriber.undeclare()
+            self._thread_reads.set()
             self._wake()
 
     def join(self) -> None:
@@ -311,19 +349,36 @@ class Subscription:
 
     def _read(self) -> None:
         try:
-            ring = self._subscriber.handler
-            while True:
-                sample = ring.recv()
-                while sample is not None:
-                    self._receive(sample)
-                    sample = ring.try_recv()
-                if self._pause_s:
+            while not self._closed:
+                self._receive(self._subscriber.handler.recv())
+                more = self._read_waiting()
+                if self._pause_s and more:
+                    self._hand_over()
+                elif self._pause_s:
                     time.sleep(self._pause_s)
         except zenoh.ZError:
             if not self._closed:  # `close` before the first read raises too
                 raise
         finally:
             self._finished.set()
+
+    def _hand_over(self) -> None:
+        """Let the event loop read the ring, until it finds no sample after several pauses."""
+        self._thread_reads.clear()
+        if not self._closed:
+            self._loop_read_at = time.monotonic()
+            self._read_by_loop = True
+            self._wake()
+            self._thread_reads.wait()
+
+    def _read_waiting(self) -> int:
+        """Take the samples that wait in the ring, and return their number."""
+        number = 0
+        with suppress(zenoh.ZError):  # closed: the thread's next read raises, too
+            while (sample := self._subscriber.handler.try_recv()) is not None:
+                self._receive(sample)
+                number += 1
+        return number
 
     def _receive(self, sample: zenoh.Sample) -> None:
         with self._lock:

@@ -305,6 +305,7 @@ _REQUESTS = (
         priority=Priority.BACKGROUND,
         owners=_GATEWAY,
         askers=EVERYONE,
+        own_link="queries",
     ),
     # With the engineer's name.
     Request(
@@ -314,6 +315,7 @@ _REQUESTS = (
         priority=Priority.DATA,
         owners=_GATEWAY,
         askers=_CELL_EDITORS,
+        own_link="queries",
         in_name=True,
     ),
     Request(

@@ -150,7 +150,8 @@ def observe(
         The state, and whether motion without a command began.
     """
     began = moving and authority.moving is not True and not _just_stopped(authority, now)
-    authority = replace(authority, moving=moving)
+    if authority.moving is not moving:
+        authority = replace(authority, moving=moving)
     lease = authority.lease
     if lease is not None and lease.motion is not None:
         if not moving:

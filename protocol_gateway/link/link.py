@@ -128,6 +128,8 @@ class ControllerLink:
     ) -> None:
         self._settings = settings
         self._driver = driver
+        # Checked once: before Python 3.12 a check takes as long as a unit.
+        self._stop_depends = driver if isinstance(driver, StopDepends) else None
         self._on_status = on_status
         self._on_channel = on_channel
         self._on_fate_unknown = on_fate_unknown
@@ -254,8 +256,8 @@ class ControllerLink:
         """Motion that a stop request ends now; None: it cannot be sent, or the controller refuses it."""
         if not self.carries(Carries.STOP):
             return None
-        if isinstance(self._driver, StopDepends):
-            return self._driver.stop_ends_now(self._monotonic_s())
+        if self._stop_depends is not None:
+            return self._stop_depends.stop_ends_now(self._monotonic_s())
         return self._driver.capabilities.stop_ends
 
     def defer_in_flood(self, kind: Hashable, call: Callable[[], None]) -> bool:

@@ -5,10 +5,7 @@ import signal
 import struct
 import subprocess
 import sys
-import threading
-import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 import zenoh
@@ -241,36 +238,75 @@ def test_slow_consumer_keeps_the_newest_and_delays_no_other(mesh):
     run(main())
 
 
-def test_samples_within_a_pause_arrive_after_it_in_order(mesh, monkeypatch):
-    pauses, go_on = [], threading.Event()
-
-    def pause(seconds):
-        pauses.append(seconds)
-        go_on.wait(60.0)
-
-    monkeypatch.setattr(subscription_module, "time", SimpleNamespace(sleep=pause, monotonic=time.monotonic))
-
+def test_samples_within_a_pause_arrive_in_order_whichever_thread_reads(mesh):
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
-            states = monitor.subscribe("robomesh/site/arm/joints", newest=10, history=False, pause_s=0.5)
+            states = monitor.subscribe("robomesh/site/arm/joints", newest=1000, history=False)
             publisher = gateway.declare_publisher("site", "arm", "joints")
             await until(lambda: publisher.watched)
-            publisher.put(joints(0.0))
-            assert [sample.message() for sample in await states.next_batch()] == [joints(0.0)]
-            await until(lambda: pauses == [0.5])
-            for number in range(1, 5):
-                publisher.put(joints(float(number)))
-            await answered(gateway, publisher.key)
-            assert states.take() is None
-            go_on.set()
-            later = [await anext(states) for _ in range(4)]
-            assert [sample.message() for sample in later] == [joints(float(each)) for each in range(1, 5)]
-            assert states.missed(publisher.key) == 0
+            came, sent = [], 0
 
-    try:
-        run(main())
-    finally:
-        go_on.set()
+            async def take():
+                while samples := await states.next_batch(pause_s=0.05):
+                    came.extend(sample.message() for sample in samples)
+
+            taking = asyncio.create_task(take())
+            await until(lambda: states._pause_s)
+            for _ in range(3):
+                while not states._read_by_loop:  # several samples in a pause
+                    for _ in range(3):
+                        publisher.put(joints(float(sent)))
+                        sent += 1
+                    await asyncio.sleep(0.01)
+                publisher.put(joints(float(sent)))
+                sent += 1
+                while len(came) < sent or states._read_by_loop:
+                    await asyncio.sleep(0.01)
+            assert came == [joints(float(each)) for each in range(sent)]
+            assert states.missed(publisher.key) == 0
+            states.close()
+            await taking
+
+    run(main())
+
+
+def test_a_consumer_that_pauses_hears_of_the_end(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            states = monitor.subscribe("robomesh/site/arm/joints", newest=1000, history=False)
+            publisher = gateway.declare_publisher("site", "arm", "joints")
+            await until(lambda: publisher.watched)
+            while not states._read_by_loop:
+                waiting = asyncio.create_task(states.next_batch(pause_s=0.05))
+                await until(lambda: states._pause_s)
+                for each in range(3):
+                    publisher.put(joints(float(each)))
+                assert await waiting
+            states.close()
+            while await states.next_batch(pause_s=0.05):
+                pass
+            await asyncio.to_thread(states.join)
+
+    run(main())
+
+
+def test_messages_put_together_keep_their_order_and_leave_before_the_end(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            states = monitor.subscribe("robomesh/site/*/joints", newest=10, history=False)
+            one = gateway.declare_publisher("site", "one", "joints", together=True)
+            two = gateway.declare_publisher("site", "two", "joints", together=True)
+            await until(lambda: one.watched and two.watched)
+            sent = [(one, 0.0), (two, 1.0), (one, 2.0), (two, 3.0)]
+            for publisher, position in sent:
+                publisher.put(joints(position))
+            two.close()
+            came = [await anext(states) for _ in sent]
+            assert [(each.key, each.message()) for each in came] == [
+                (publisher.key, joints(position)) for publisher, position in sent
+            ]
+
+    run(main())
 
 
 def test_gap_in_the_numbers_is_counted_as_lost(mesh):
