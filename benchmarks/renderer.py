@@ -9,6 +9,10 @@ pyrender and mujoco; a peer that it cannot import or run is reported and left ou
 triangles and views. Each program is a separate process, which draws and reads back to NumPy; they take turns,
 row by row, so that other load affects all of them. Ours draws more than the task for the peers: the floor and
 its grid, the arm's soft shadow, edges, dimmed hollows; its rows "full" add the lamp's shadow on the arm.
+20k is the arm's file, 100k a file with each of its triangles divided into four. "ours" is what the service
+draws of it: levels of detail, and light at vertices where that is enough. The peers and "ours, whole" draw
+every triangle. "differs" compares "ours" with pictures of every triangle and light at each pixel: the
+largest difference of 255 levels, the shares of pixels that differ by more than 8 and 20, and PSNR.
 Medians of all turns; the spread is from p10 to p90. On a machine with other load, pictures for a second of
 one core's time are a better measure than pictures a second.
 """
@@ -32,13 +36,13 @@ if __name__ == "__main__":
     # Import from the root: this program has the same name as a package.
     sys.path[0] = str(Path(__file__).parents[1])
 
-from benchmarks.renderer_peers import serve
+from benchmarks.renderer_peers import drawn, reason
 from renderer.cameras import Camera
 from renderer.drawing import Drawing
-from renderer.mesh import Mesh, prepared
+from renderer.glb import Surface, read_glb
+from renderer.mesh import MOST_TRIANGLES, Mesh, prepared_surfaces
 from renderer.opengl import open_context
 from renderer.scene import Part, Scene
-from renderer.vertex_light import ordered
 from robots.description import load
 from robots.glb import link_meshes
 from robots.model import build_model, link_placements
@@ -106,7 +110,7 @@ def measure(
         here = Path(__file__)
         own = [sys.executable, str(here), "--serve", str(scene)]
         own += [] if device is None else ["--device", str(device)]
-        commands = {"ours": own, "ours, full": own}
+        commands = {"ours": own, "ours, whole": own, "ours, full": own}
         if peers_python:
             peers = here.with_name("renderer_peers.py")
             commands |= {peer: [peers_python, str(peers), peer, str(scene)] for peer in PEERS}
@@ -118,13 +122,13 @@ def measure(
             for _ in range(rounds):
                 for number, row in enumerate(wanted):
                     for name, server in [*here_now.items()]:
-                        shading = "full" if name.endswith("full") else "fast"
-                        answer = server.ask({**row, "turns": turns, "shading": shading})
+                        answer = server.ask({**row, "turns": turns, "variant": name.partition(", ")[2]})
                         if "missing" in answer:
                             versions[name] = answer
                             del here_now[name]
                         answers.setdefault((number, name), []).append(answer)
                     print(f"row {number + 1} of {len(wanted)}", file=sys.stderr, flush=True)
+            differs = [servers["ours"].ask({**row, "compare": True}) for row in wanted]
         finally:
             for server in servers.values():
                 server.close()
@@ -134,7 +138,11 @@ def measure(
         "programs": {name: version["ready"] for name, version in versions.items() if "ready" in version},
         "missing": {name: version["missing"] for name, version in versions.items() if "missing" in version},
         "rows": [
-            {**row, **{name: summary(answers[number, name], row["views"]) for name in here_now}}
+            {
+                **row,
+                **{name: summary(answers[number, name], row["views"]) for name in here_now},
+                "differs": differs[number],
+            }
             for number, row in enumerate(wanted)
         ],
     }
@@ -171,12 +179,13 @@ def write_scene(path: Path) -> dict[str, int]:
     }
     totals = {}
     for count in ("20k", "100k"):
-        meshes = [mesh_of(glb, count) for glb in glbs.values()]
-        totals[count] = sum(len(mesh.triangles) for mesh in meshes)
+        meshes = [mesh_of(glb, count, whole=True) for glb in glbs.values()]
+        totals[count] = sum(len(mesh.finest) for mesh in meshes)
         for number, mesh in enumerate(meshes):
-            arrays[f"{count}/{number}/positions"] = mesh.positions
-            arrays[f"{count}/{number}/normals"] = mesh.normals
-            arrays[f"{count}/{number}/triangles"] = mesh.triangles
+            used = mesh.finest.max() + 1  # those of other levels of detail follow
+            arrays[f"{count}/{number}/positions"] = mesh.positions[:used]
+            arrays[f"{count}/{number}/normals"] = mesh.normals[:used]
+            arrays[f"{count}/{number}/triangles"] = mesh.finest
             arrays[f"{count}/{number}/color"] = mesh.colors[:, :3].mean(axis=0) / 255.0
     arrays["placements"] = np.array(
         [
@@ -197,51 +206,54 @@ def write_scene(path: Path) -> dict[str, int]:
 
 
 @cache
-def mesh_of(glb: bytes, count: str) -> Mesh:
-    return prepared(glb) if count == "20k" else subdivided(prepared(glb, most_triangles=10**9))
+def mesh_of(glb: bytes, count: str, *, whole: bool = False, exact: bool = False) -> Mesh:
+    """Return a mesh as the service draws it, or with every triangle, also with light at each pixel."""
+    surfaces = read_glb(glb)
+    if count == "100k":
+        surfaces = tuple(map(subdivided, surfaces))
+    mesh = prepared_surfaces(surfaces, most_triangles=10**9 if whole else MOST_TRIANGLES)
+    if not whole:
+        return mesh
+    vertex_lit = mesh.vertex_lit[:1] * (0 if exact else 1)
+    return replace(mesh, levels=mesh.levels[:2], errors=mesh.errors[:1], vertex_lit=vertex_lit)
 
 
-def subdivided(mesh: Mesh) -> Mesh:
+def subdivided(surface: Surface) -> Surface:
     """Divide each triangle into four."""
-    faces = mesh.triangles.astype(np.int64)
+    faces = surface.triangles
     sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     unique, numbers = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
-    ab, bc, ca = numbers.reshape(3, -1) + len(mesh.positions)
+    ab, bc, ca = numbers.reshape(3, -1) + len(surface.positions)
     a, b, c = faces.T
     pieces = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
 
     def halved(values: np.ndarray) -> np.ndarray:
-        middle = values[unique].astype(np.float64).mean(axis=1)
-        return np.concatenate([values, middle.astype(values.dtype)])
+        return np.concatenate([values, values[unique].mean(axis=1)])
 
-    positions, normals, surface = (halved(each) for each in (mesh.positions, mesh.normals, mesh.surface))
-    triangles = np.concatenate([np.stack(piece, axis=1) for piece in pieces]).astype(np.uint32)
-    triangles, vertex_lit = ordered(
-        positions.astype(np.float64), normals.astype(np.float64), surface[:, 1] / 255.0, triangles
-    )
+    normals = None if surface.normals is None else halved(surface.normals)
+    if normals is not None:
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return replace(
-        mesh,
-        positions=positions,
+        surface,
+        positions=halved(surface.positions),
         normals=normals,
-        colors=halved(mesh.colors),
-        surface=surface,
-        triangles=triangles,
-        vertex_lit=vertex_lit,
+        colors=None if surface.colors is None else halved(surface.colors),
+        triangles=np.concatenate([np.stack(piece, axis=1) for piece in pieces]),
     )
 
 
 def serve_ours(path: Path, device: int | None) -> None:
-    """Answer rows as the peers do."""
+    """Answer rows as the peers do, and compare pictures."""
     scene = dict(np.load(path))
     glbs = link_meshes(load(ROBOT))
     print(json.dumps({"ready": "robomesh"}), flush=True)
 
     def make(row: dict[str, Any]) -> Any:
-        drawing = Drawing(
-            open_context(device), tuple(row["size"]), samples=row["samples"], shading=row["shading"]
-        )
+        whole, exact = (row["variant"] in names for names in (("whole", "exact"), ("exact",)))
+        shading = "full" if row["variant"] == "full" else "fast"
+        drawing = Drawing(open_context(device), tuple(row["size"]), samples=row["samples"], shading=shading)
         for name, glb in glbs.items():
-            drawing.add(name, mesh_of(glb, row["count"]))
+            drawing.add(name, mesh_of(glb, row["count"], whole=whole, exact=exact))
         cameras = [
             Camera(eye, TARGET, np.array([0.0, 0.0, 1.0]), field_of_view=FIELD_OF_VIEW) for eye in EYES
         ]
@@ -252,7 +264,32 @@ def serve_ours(path: Path, device: int | None) -> None:
 
         return render, drawing.close, drawing.renderer_name
 
-    serve(make, scene)
+    for line in sys.stdin:
+        row = json.loads(line)
+        try:
+            answer = compared(make, scene, row) if row.get("compare") else drawn(make, scene, row)
+        except Exception as error:
+            answer = {"missing": reason(error)}
+        print(json.dumps(answer), flush=True)
+
+
+def compared(make: Any, scene: dict[str, Any], row: dict[str, Any]) -> dict[str, float]:
+    """Return how pictures of the service differ from those with every triangle and light at each pixel."""
+    pictures = []
+    for variant in ("", "exact"):
+        render, close, _ = make({**row, "variant": variant})
+        pictures.append(
+            [render(scene["placements"][turn], view) for turn in (0, 10, 20) for view in range(len(EYES))]
+        )
+        close()
+    levels = np.abs(np.subtract(*np.array(pictures, dtype=np.int16))).astype(np.float64)
+    most = levels.max(axis=3)
+    return {
+        "most_levels": float(most.max()),
+        "share_over_8": float((most > 8).mean()),
+        "share_over_20": float((most > 20).mean()),
+        "psnr_db": float(10.0 * np.log10(255.0**2 / max(float(np.square(levels).mean()), 1e-9))),
+    }
 
 
 class Server:
@@ -287,7 +324,8 @@ class Server:
 
 
 def tell(result: dict[str, Any]) -> None:
-    names = [name for name in result["rows"][0] if name not in ("size", "samples", "count", "views")]
+    others = ("size", "samples", "count", "views", "differs")
+    names = [name for name in result["rows"][0] if name not in others]
     print(f"{result['robot']}, {result['triangles']} triangles; {result['programs']}")
     for name, why in result["missing"].items():
         print(f"{name} not measured: {why}")
@@ -302,6 +340,12 @@ def tell(result: dict[str, Any]) -> None:
                 f"    {name:<12} {cell['pictures_per_core_s']:7.1f} {cell['pictures_per_s']:7.1f}   "
                 f"({cell['ms']:6.1f}, {cell['ms_p10']:.1f} to {cell['ms_p90']:.1f}; {cell['rss_mib']:.0f})"
             )
+        differs = row["differs"]
+        print(
+            f"    differs at most {differs['most_levels']:.0f} levels, "
+            f"{differs['share_over_8']:.2%} of pixels > 8, {differs['share_over_20']:.2%} > 20, "
+            f"PSNR {differs['psnr_db']:.1f} dB"
+        )
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from renderer.backdrop import EDGE_ON, Backdrops
 from renderer.body_shaders import KEY
 from renderer.cameras import Camera, scales, site_to_clip
+from renderer.level_of_detail import LevelsOfDetail
 from renderer.lighting import LampShadow
 from renderer.mesh import Mesh
 from renderer.obstruction import contains, hides
@@ -61,11 +62,13 @@ class Shading(StrEnum):
 
 
 class _Body(NamedTuple):
-    """A body to draw; `vertex_lit`: number of its first triangles that are lit at their vertices."""
+    """A body to draw, and its triangles: those from `first` to `middle` are lit at their vertices."""
 
     part: Part
     uploaded: Uploaded
-    vertex_lit: int
+    first: int
+    middle: int
+    end: int
 
 
 class Drawing:
@@ -103,6 +106,7 @@ class Drawing:
             programs.ribbon, [(self._ribbon_buffer, "4f 4f", "place", "tone")]
         )
         self._meshes: dict[str, Uploaded] = {}
+        self._levels = LevelsOfDetail()
         self._pixels = np.empty((size[1], size[0], 4), dtype=np.uint8)
 
     def has(self, name: str) -> bool:
@@ -147,7 +151,7 @@ class Drawing:
             box = uploaded.corners
             if part.finish is not Finish.GHOST and (eye >= box[0]).all() and (eye <= box[-1]).all():
                 mesh = uploaded.mesh
-                if contains(mesh.positions.astype(np.float64), mesh.triangles, eye):
+                if contains(mesh.positions.astype(np.float64), mesh.finest, eye):
                     return part.name
         return ""
 
@@ -263,24 +267,32 @@ class Drawing:
         if not bodies:
             return []
         distances = (_corners(bodies).reshape(-1, 8, 3) - camera.eye) @ camera.forward
-        counts = np.array([uploaded.mesh.vertex_lit for _, uploaded in bodies])
+        scale = scales(camera, self.size[1], distances.min(axis=1))
+        levels = self._levels.of(bodies, camera, scale)
+        counts = np.array(
+            [uploaded.mesh.vertex_lit[level] for (_, uploaded), level in zip(bodies, levels, strict=True)]
+        )
         if self._lamp is not None:
             counts[:] = 0  # shadows on bodies have edges within triangles
-        lit = counts_at(scales(camera, self.size[1], distances.min(axis=1)), counts).tolist()
-        order = np.argsort(distances.mean(axis=1), kind="stable").tolist()
-        return [_Body(bodies[number][0], bodies[number][1], lit[number]) for number in order]
+        lit = counts_at(scale, counts).tolist()
+        found = []
+        for number in np.argsort(distances.mean(axis=1), kind="stable").tolist():
+            part, uploaded = bodies[number]
+            first, end = uploaded.levels[levels[number]]
+            found.append(_Body(part, uploaded, first, first + lit[number], end))
+        return found
 
     def _draw_faces(self, body: _Body, *, opacity: float = 1.0) -> None:
-        part, uploaded, vertex_lit = body
+        part, uploaded, first, middle, end = body
         tint, own_opacity = _FINISHES[part.finish]
         # Slightly farther away, so that the edges drawn on the faces are not hidden.
         self.context.polygon_offset = _BACK[part.finish is Finish.GHOST]
         draws = (
-            (self._programs.vertex_lit, uploaded.vertex_lit, 0, vertex_lit),
-            (self._programs.body, uploaded.body, vertex_lit, len(uploaded.mesh.triangles)),
+            (self._programs.vertex_lit, uploaded.vertex_lit, first, middle),
+            (self._programs.body, uploaded.body, middle, end),
         )
-        for program, array, first, end in draws:
-            if array is not None and first < end:
+        for program, array, begin, stop in draws:
+            if array is not None and begin < stop:
                 set_uniforms(
                     program,
                     part_to_site=columns(part.part_to_site),
@@ -288,11 +300,11 @@ class Drawing:
                     opacity=opacity * own_opacity,
                     stale=float(part.finish is Finish.STALE),
                 )
-                array.render(first=3 * first, vertices=3 * (end - first))
+                array.render(first=3 * begin, vertices=3 * (stop - begin))
         self.context.polygon_offset = 0.0, 0.0
 
     def _draw_edges(self, body: _Body) -> None:
-        part, uploaded, _ = body
+        part, uploaded = body.part, body.uploaded
         if uploaded.edges is not None:
             red, green, blue, share = _EDGE_TONE
             tone = red, green, blue, share * _FINISHES[part.finish][1]

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.body_shaders import KEY
+from renderer.level_of_detail import next_level
 from renderer.opengl import Programs, Uploaded, columns, set_uniforms
 from renderer.scene import Part
 
@@ -15,6 +16,8 @@ FloatArray = NDArray[np.float64]
 _TEXELS = 640
 # Smaller movements do not update the map; as a share of the scene's radius.
 _NOTICEABLE = 5e-4
+# Largest error of the bodies in the map: less than the distance from which they cast shadows on themselves.
+_ERROR = 5e-4
 
 
 class LampShadow:
@@ -51,7 +54,8 @@ class LampShadow:
         for part, uploaded in parts:
             if uploaded.lamp is not None:
                 set_uniforms(self._programs.lamp, part_to_site=columns(part.part_to_site))
-                uploaded.lamp.render()
+                first, end = uploaded.levels[next_level(uploaded.errors, _ERROR * radius, None)]
+                uploaded.lamp.render(first=3 * first, vertices=3 * (end - first))
         self._context.polygon_offset = 0.0, 0.0
 
 

@@ -1,27 +1,28 @@
 """Preparation of a link's mesh for drawing: fewer triangles, smooth curved surfaces, sharp edges."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import fast_simplification
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.creases import CREASE, FloatArray, IntArray, crease_normals, sharp_edges, weld
+from renderer.creases import FloatArray, IntArray, crease_normals, sharp_edges, weld
 from renderer.glb import Surface, read_glb
 from renderer.occlusion import open_sky
+from renderer.simplification import simplified
 from renderer.vertex_light import SCALES, ordered
 
-# More triangles take time for each picture and hardly change it (96,000 instead of 20,000 for a
-# whole arm: 37 instead of 18 ms at 720p).
-MOST_TRIANGLES = 4_000
+# Of the finest level: more take memory and time to prepare, and are seen only from very near.
+MOST_TRIANGLES = 16_000
+# Errors of levels of detail [m], and the share of triangles from which a level is worth its memory.
+_ERRORS_M = tuple(0.0005 * 2.0**step for step in range(6))
+_WORTHWHILE = 0.75
+# Bodies with fewer triangles are in all levels as they are.
+_LEAST = 32
 _SHADOW_TRIANGLES = 300
 # How fast the simplifier's steps grow (its default: 7).
 _GENTLE = 3.0
-# 1: every material loses the same share of its triangles; 0: all keep the same number.
-_EVENNESS = 0.55
-# A simplified round surface has larger angles between faces.
-_COARSE_CREASE = float(np.deg2rad(48.0))
 _PLAIN_COLOR = (0.62, 0.64, 0.66, 1.0)
 
 
@@ -39,9 +40,11 @@ class Mesh:
         colors: (v, 4) uint8, sRGB and opacity.
         surface: (v, 4) uint8: the share of the sky that the vertex sees past its own link,
             roughness, metalness, unused.
-        triangles: (t, 3) uint32, vertex numbers.
-        vertex_lit: Number of the first triangles that are lit at their vertices, for each of
-            `renderer.vertex_light.SCALES`.
+        triangles: (t, 3) uint32, vertex numbers, of all levels of detail, the finest first.
+        levels: (k + 1,) the first triangle of each level, and the number of all.
+        errors: (k,) of each level [m]; 0 for the finest.
+        vertex_lit: (k, s) number of the first triangles of each level that are lit at their vertices, for
+            each of `renderer.vertex_light.SCALES`.
         edges: (2e, 3) float32, ends of the sharp edges.
         shadow: (3s, 3) float32, a coarse copy that casts the shadow.
     """
@@ -51,9 +54,16 @@ class Mesh:
     colors: NDArray[np.uint8]
     surface: NDArray[np.uint8]
     triangles: NDArray[np.uint32]
+    levels: NDArray[np.uint32]
+    errors: FloatArray
     vertex_lit: NDArray[np.uint32]
     edges: NDArray[np.float32]
     shadow: NDArray[np.float32]
+
+    @property
+    def finest(self) -> NDArray[np.uint32]:
+        """(t, 3) triangles of the finest level."""
+        return self.triangles[: self.levels[1]]
 
     @property
     def transparent(self) -> bool:
@@ -66,40 +76,42 @@ def prepared(glb: bytes, *, color: str = "", most_triangles: int = MOST_TRIANGLE
 
     Args:
         color: "#rrggbb" for surfaces without a colour in the file.
-        most_triangles: A mesh with more triangles is simplified to about this number.
+        most_triangles: A mesh with more triangles is simplified to at most this number, if an error of
+            16 mm is enough for it.
 
     Raises:
         GlbError: If it is not GLB.
     """
-    surfaces = [surface for surface in read_glb(glb) if len(surface.triangles)]
-    counts = np.array([len(surface.triangles) for surface in surfaces], dtype=np.float64)
-    kept = np.ones(len(counts))
-    if counts.sum() > most_triangles:
-        # A small part keeps a larger share of its triangles, or a round cap would become a polygon.
-        shares = counts**_EVENNESS
-        kept = np.minimum(1.0, most_triangles * shares / shares.sum() / counts)
+    return prepared_surfaces(read_glb(glb), color=color, most_triangles=most_triangles)
+
+
+def prepared_surfaces(
+    given: Sequence[Surface], *, color: str = "", most_triangles: int = MOST_TRIANGLES
+) -> Mesh:
+    """Return a mesh prepared from the surfaces of a GLB file; arguments as for `prepared`."""
+    surfaces = [surface for surface in given if len(surface.triangles)]
     plain = srgb(color) if color else _PLAIN_COLOR
-    bodies = [_Body.of(surface, plain, float(share)) for surface, share in zip(surfaces, kept, strict=True)]
+    error, bodies = _limited([_Body.of(surface, plain) for surface in surfaces], most_triangles)
     corners = _joined([body.corners() for body in bodies], 3)
-    vertices = np.zeros(len(corners), dtype=VERTEX)
-    vertices["position"] = corners
-    vertices["normal"] = np.round(_joined([body.normals.reshape(-1, 3) for body in bodies], 3), 4)
-    vertices["color"] = _bytes(_joined([body.colors.reshape(-1, 4) for body in bodies], 4))
-    vertices["surface"] = _bytes(_joined([body.surface() for body in bodies], 4))
-    # Merged vertices are shaded once, which saves a third of the time in software OpenGL.
-    unique, numbers = _unique(vertices)
-    points, normals = (unique[name].astype(np.float64) for name in ("position", "normal"))
-    unique["surface"][:, 0] = np.round(open_sky(points, normals, numbers.reshape(-1, 3)) * 255.0)
-    triangles, vertex_lit = numbers.reshape(-1, 3), np.zeros(len(SCALES), dtype=np.uint32)
-    if (unique["color"][:, 3] == 255).all():  # the order of transparent triangles is visible
-        triangles, vertex_lit = ordered(points, normals, unique["surface"][:, 1] / 255.0, triangles)
+    vertices, numbers = _unique(_vertices(bodies))
+    points, normals = (vertices[name].astype(np.float64) for name in ("position", "normal"))
+    sky = open_sky(points, normals, numbers.reshape(-1, 3))
+    by_body = np.split(sky[numbers], np.cumsum([3 * len(body.triangles) for body in bodies], dtype=np.int64))
+    bodies = [replace(body, sky=own.reshape(-1, 3)) for body, own in zip(bodies, by_body[:-1], strict=True)]
+    levels = [_level(*each) for each in _levels(bodies, error)]
+    first_vertex = np.cumsum([0, *(len(level.vertices) for level in levels)])
+    joined = np.concatenate([level.vertices for level in levels])
     return Mesh(
-        positions=unique["position"],
-        normals=unique["normal"],
-        colors=unique["color"],
-        surface=unique["surface"],
-        triangles=triangles,
-        vertex_lit=vertex_lit,
+        positions=joined["position"],
+        normals=joined["normal"],
+        colors=joined["color"],
+        surface=joined["surface"],
+        triangles=np.concatenate(
+            [level.triangles + np.uint32(first) for level, first in zip(levels, first_vertex, strict=False)]
+        ),
+        levels=np.cumsum([0, *(len(level.triangles) for level in levels)]).astype(np.uint32),
+        errors=np.array([level.error for level in levels]),
+        vertex_lit=np.array([level.vertex_lit for level in levels]),
         edges=_joined([body.edges.reshape(-1, 3) for body in bodies], 3).astype(np.float32),
         shadow=_coarse(corners).astype(np.float32),
     )
@@ -120,34 +132,32 @@ class _Body:
     normals: FloatArray
     colors: FloatArray
     edges: FloatArray
+    sky: FloatArray
     roughness: float
     metallic: float
 
     @classmethod
-    def of(cls, surface: Surface, plain: tuple[float, float, float, float], kept: float) -> "_Body":
+    def of(cls, surface: Surface, plain: tuple[float, float, float, float]) -> "_Body":
+        positions, triangles = weld(surface.positions, surface.triangles)
         color = np.array(surface.color or plain)
-        if kept < 1.0:
-            positions, triangles = _simplified(*weld(surface.positions, surface.triangles), kept)
-        else:
-            positions, triangles = weld(surface.positions, surface.triangles)
-        crease = CREASE if kept == 1.0 else _COARSE_CREASE
-        untouched = kept == 1.0 and len(triangles) == len(surface.triangles)
         colors = np.tile(color, (len(triangles), 3, 1))
+        untouched = len(triangles) == len(surface.triangles)
         if untouched and surface.colors is not None:
             colors = surface.colors[surface.triangles] * (color if surface.color else 1.0)
         elif surface.colors is not None:
-            # Simplification loses the vertices' colours: their mean is a better substitute than white.
+            # Without triangles that have no area, corners are not known: the mean is better than white.
             colors = colors * surface.colors.mean(axis=0)
         if untouched and surface.normals is not None:
             normals = surface.normals[surface.triangles]
         else:
-            normals = crease_normals(positions, triangles, crease=crease)
+            normals = crease_normals(positions, triangles)
         return cls(
             positions=positions,
             triangles=triangles,
             normals=normals,
             colors=colors,
-            edges=sharp_edges(positions, triangles, crease=crease),
+            edges=sharp_edges(positions, triangles),
+            sky=np.ones((len(triangles), 3)),
             roughness=surface.roughness,
             metallic=surface.metallic,
         )
@@ -156,7 +166,85 @@ class _Body:
         return self.positions[self.triangles].reshape(-1, 3)
 
     def surface(self) -> FloatArray:
-        return np.tile((1.0, self.roughness, self.metallic, 0.0), (3 * len(self.triangles), 1))
+        others = np.tile((self.roughness, self.metallic, 0.0), (3 * len(self.triangles), 1))
+        return np.concatenate([self.sky.reshape(-1, 1), others], axis=1)
+
+    @property
+    def plain(self) -> bool:
+        """True if all its triangles have one colour."""
+        return bool((np.abs(self.colors - self.colors[:1, :1]) < 1e-3).all())
+
+    def simpler(self, error: float) -> "_Body":
+        """Return the body with fewer triangles, within an error [m]."""
+        if len(self.triangles) < _LEAST:
+            return self
+        values = np.concatenate([self.normals, self.sky[..., None], self.colors], axis=2)
+        positions, triangles, values = simplified(self.positions, self.triangles, values, error=error)
+        return replace(
+            self,
+            positions=positions,
+            triangles=triangles,
+            normals=values[..., :3],
+            sky=values[..., 3],
+            colors=values[..., 4:],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Level:
+    """A level of detail: distinct vertices, the triangles between them, `Mesh.vertex_lit`."""
+
+    error: float
+    vertices: NDArray[np.void]
+    triangles: NDArray[np.uint32]
+    vertex_lit: NDArray[np.uint32]
+
+
+def _limited(bodies: list[_Body], most_triangles: int) -> tuple[float, list[_Body]]:
+    """Return the error [m] with which bodies have at most a number of triangles, and these bodies."""
+    done = 0.0
+    for error in _ERRORS_M:
+        if _count(bodies) <= most_triangles:
+            break
+        bodies, done = [body.simpler(error - done) for body in bodies], error
+    return done, bodies
+
+
+def _levels(bodies: list[_Body], done: float) -> Iterator[tuple[float, list[_Body]]]:
+    """Yield the error [m] of each level of detail and its bodies, the finest first."""
+    yield done, bodies
+    for error in _ERRORS_M:
+        if error > done:
+            # Each level is made from the one before, so their errors add up. A flat face may have a pattern.
+            fewer = [body.simpler(error - done) if body.plain else body for body in bodies]
+            if _count(fewer) < _WORTHWHILE * _count(bodies):
+                done, bodies = error, fewer
+                yield error, bodies
+
+
+def _count(bodies: Sequence[_Body]) -> int:
+    return sum(len(body.triangles) for body in bodies)
+
+
+def _level(error: float, bodies: Sequence[_Body]) -> _Level:
+    # Merged vertices are shaded once, which saves a third of the time in software OpenGL.
+    vertices, numbers = _unique(_vertices(bodies))
+    triangles, vertex_lit = numbers.reshape(-1, 3), np.zeros(len(SCALES), dtype=np.uint32)
+    if (vertices["color"][:, 3] == 255).all():  # the order of transparent triangles is visible
+        points, normals = (vertices[name].astype(np.float64) for name in ("position", "normal"))
+        triangles, vertex_lit = ordered(points, normals, vertices["surface"][:, 1] / 255.0, triangles)
+    return _Level(error, vertices, triangles, vertex_lit)
+
+
+def _vertices(bodies: Sequence[_Body]) -> NDArray[np.void]:
+    """Return the (3t,) corners of all triangles."""
+    corners = _joined([body.corners() for body in bodies], 3)
+    vertices = np.zeros(len(corners), dtype=VERTEX)
+    vertices["position"] = corners
+    vertices["normal"] = np.round(_joined([body.normals.reshape(-1, 3) for body in bodies], 3), 4)
+    vertices["color"] = _bytes(_joined([body.colors.reshape(-1, 4) for body in bodies], 4))
+    vertices["surface"] = _bytes(_joined([body.surface() for body in bodies], 4))
+    return vertices
 
 
 def _simplified(positions: FloatArray, triangles: IntArray, kept: float) -> tuple[FloatArray, IntArray]:

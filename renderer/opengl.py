@@ -4,6 +4,7 @@ import ctypes
 import logging
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import moderngl
@@ -164,6 +165,8 @@ class Uploaded:
     Attributes:
         mesh: The source.
         corners: (8, 3) corners of the box around it, in the mesh's frame [m].
+        levels: First triangle and end of each level of detail.
+        errors: Of each level [m].
     """
 
     mesh: Mesh
@@ -174,6 +177,8 @@ class Uploaded:
     shadow: moderngl.VertexArray | None
     lamp: moderngl.VertexArray | None
     corners: NDArray[np.float64]
+    levels: tuple[tuple[int, int], ...]
+    errors: tuple[float, ...]
     _buffers: list[moderngl.Buffer] = field(default_factory=list)
 
     def release(self) -> None:
@@ -212,7 +217,11 @@ def upload(context: moderngl.Context, programs: Programs, mesh: Mesh) -> Uploade
     low, high = (mesh.positions.min(axis=0), mesh.positions.max(axis=0)) if len(vertices) else (0.0, 0.0)
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=np.float64)
     box = low + corners * np.subtract(high, low)
-    return Uploaded(mesh, body, vertex_lit, edges, shadow, lamp, box, buffers)
+    starts = mesh.levels.tolist()
+    levels = tuple(pairwise(starts))
+    return Uploaded(
+        mesh, body, vertex_lit, edges, shadow, lamp, box, levels, tuple(mesh.errors.tolist()), buffers
+    )
 
 
 def columns(matrix: NDArray[np.float64]) -> bytes:

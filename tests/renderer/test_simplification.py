@@ -1,0 +1,97 @@
+"""Simplification within an error, and the choice of a level of detail by it."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from renderer import level_of_detail
+from renderer.creases import crease_normals
+from renderer.level_of_detail import next_level
+from renderer.mesh import prepared
+from renderer.simplification import simplified
+from tests.renderer.bodies import ball, context_or_skip, cube
+from tests.renderer.make_pictures import program
+
+ERRORS = (0.0, 0.001, 0.004)
+
+
+def plate(cells):
+    """Return a flat plate of 1 m in cells, facing z: positions and triangles."""
+    x, y = np.meshgrid(np.linspace(0.0, 1.0, cells + 1), np.linspace(0.0, 1.0, cells + 1))
+    positions = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
+    first = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).ravel()
+    low, high = (first, first + 1, first + cells + 2), (first, first + cells + 2, first + cells + 1)
+    return positions, np.concatenate([np.stack(low, axis=1), np.stack(high, axis=1)])
+
+
+def area(positions, triangles):
+    a, b, c = (positions[triangles[:, corner]] for corner in range(3))
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+
+
+def test_an_open_plate_loses_triangles_but_not_its_border():
+    positions, triangles = plate(20)
+    points, faces, values = simplified(
+        positions, triangles, crease_normals(positions, triangles), error=0.001
+    )
+    assert len(faces) < len(triangles) / 4
+    assert area(points, faces) == pytest.approx(1.0)
+    assert np.allclose(values, [0.0, 0.0, 1.0])
+
+
+def test_corners_keep_the_values_of_their_own_side_of_an_edge():
+    positions, triangles = plate(20)
+    positions = np.where(positions[:, :1] > 0.5, positions + (positions[:, :1] - 0.5) * [-1, 0, 1], positions)
+    normals = crease_normals(positions, triangles)  # flat, then upright along the line x = 0.5
+    sides = (normals[..., 0] < -0.5)[..., None].astype(float)
+    points, faces, values = simplified(
+        positions, triangles, np.concatenate([normals, sides], axis=2), error=0.001
+    )
+    assert len(faces) < len(triangles) / 4
+    upright = (points[faces].max(axis=1)[:, 2] > 1e-6).astype(float)[:, None]
+    assert np.allclose(values[..., 3], upright, atol=1e-6)
+    assert np.allclose(values[..., 0], -upright, atol=1e-6)
+
+
+def test_a_balls_levels_stay_within_their_errors():
+    mesh = prepared(ball(0.3, rings=60, sectors=80))
+    assert len(mesh.errors) > 2
+    for (first, end), error in zip(pairwise(mesh.levels.tolist()), mesh.errors.tolist(), strict=True):
+        corners = mesh.positions[mesh.triangles[first:end]].astype(float)
+        distances = np.linalg.norm(
+            np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1), axis=2
+        )
+        assert np.abs(distances - 0.3).max() < error + 0.0012  # as far as the finest level is from the ball
+
+
+def test_a_cube_has_one_level():
+    assert prepared(cube(0.5)).levels.tolist() == [0, 12]
+
+
+def test_the_coarsest_level_with_an_allowed_error_is_chosen():
+    assert [next_level(ERRORS, allowed, None) for allowed in (0.0, 0.0009, 0.001, 0.1)] == [0, 0, 1, 2]
+
+
+def test_a_level_is_kept_near_its_limit_and_changes_beyond():
+    assert next_level(ERRORS, 0.0009, 1) == 1
+    assert next_level(ERRORS, 0.0008, 1) == 0
+    assert next_level(ERRORS, 0.0011, 0) == 0
+    assert next_level(ERRORS, 0.0013, 0) == 1
+    assert next_level(ERRORS, 0.1, 0) == 2
+
+
+def test_a_mesh_with_fewer_levels_than_before_gets_one_of_its_own():
+    assert next_level((0.0,), 0.1, 2) == 0
+
+
+@pytest.mark.slow
+def test_levels_of_detail_look_like_every_triangle(tmp_path, monkeypatch):
+    context_or_skip().release()
+    fewer = program(tmp_path, size=(1280, 720)).astype(float)
+    monkeypatch.setattr(level_of_detail, "_MOST_PX", 1e-9)
+    every = program(tmp_path, size=(1280, 720)).astype(float)
+    difference = np.abs(fewer - every)
+    assert difference.max() > 0.0
+    assert (difference.max(axis=2) > 20.0).mean() < 0.002
+    assert np.square(difference).mean() < 255.0**2 / 10**4.3  # 43 dB
