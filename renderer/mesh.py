@@ -15,6 +15,8 @@ from renderer.vertex_light import SCALES, ordered
 
 # Of the finest level: more take memory and time to prepare, and are seen only from very near.
 MOST_TRIANGLES = 16_000
+# Of a rough scan each side is sharp: the longest remain.
+_MOST_EDGES = 8_000
 # Errors of levels of detail [m], and the share of triangles from which a level is worth its memory.
 _ERRORS_M = tuple(0.0005 * 2.0**step for step in range(6))
 _WORTHWHILE = 0.75
@@ -112,7 +114,7 @@ def prepared_surfaces(
         levels=np.cumsum([0, *(len(level.triangles) for level in levels)]).astype(np.uint32),
         errors=np.array([level.error for level in levels]),
         vertex_lit=np.array([level.vertex_lit for level in levels]),
-        edges=_joined([body.edges.reshape(-1, 3) for body in bodies], 3).astype(np.float32),
+        edges=_longest(_joined([body.edges.reshape(-1, 3) for body in bodies], 3)).astype(np.float32),
         shadow=_coarse(corners).astype(np.float32),
     )
 
@@ -259,6 +261,16 @@ def _simplified(positions: FloatArray, triangles: IntArray, kept: float) -> tupl
         agg=_GENTLE,
     )
     return weld(points.astype(np.float64) * size, faces.astype(np.int64))
+
+
+def _longest(ends: FloatArray) -> FloatArray:
+    """Return the ends (2e, 3) of at most `_MOST_EDGES` edges."""
+    lengths = np.linalg.norm(ends[1::2] - ends[::2], axis=1)
+    if len(lengths) <= _MOST_EDGES:
+        return ends
+    longest = np.sort(np.argpartition(-lengths, _MOST_EDGES)[:_MOST_EDGES])
+    found: FloatArray = ends.reshape(-1, 2, 3)[longest].reshape(-1, 3)
+    return found
 
 
 def _coarse(corners: FloatArray) -> FloatArray:

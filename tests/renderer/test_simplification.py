@@ -10,7 +10,7 @@ from renderer.creases import crease_normals
 from renderer.level_of_detail import next_level
 from renderer.mesh import prepared
 from renderer.simplification import simplified
-from tests.renderer.bodies import ball, context_or_skip, cube
+from tests.renderer.bodies import ball, context_or_skip, cube, glb
 from tests.renderer.make_pictures import program
 
 ERRORS = (0.0, 0.001, 0.004)
@@ -67,6 +67,16 @@ def test_a_balls_levels_stay_within_their_errors():
 
 def test_a_cube_has_one_level():
     assert prepared(cube(0.5)).levels.tolist() == [0, 12]
+
+
+def test_a_rough_scan_keeps_its_longest_edges_only():
+    positions, triangles = plate(80)
+    positions[:, 2] = np.random.default_rng(0).normal(0.0, 0.02, len(positions))
+    positions[positions[:, 0] > 0.99, 0] += 0.05
+    mesh = prepared(glb(positions, triangles))
+    assert len(mesh.edges) == 2 * 8_000
+    # The longer sides at the moved border are among those that are kept.
+    assert mesh.edges[:, 0].max() == pytest.approx(1.05, abs=1e-6)
 
 
 def test_the_coarsest_level_with_an_allowed_error_is_chosen():
