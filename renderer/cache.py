@@ -14,7 +14,7 @@ from renderer.mesh import Mesh, prepared
 from robomesh.atomic_write import open_atomically, write_atomically
 
 # Incremented with each change of the preparation of meshes.
-_VERSION = 7
+_VERSION = 8
 
 
 def cache_folder() -> Path:

@@ -15,6 +15,9 @@ from renderer.vertex_light import SCALES, ordered
 
 # Of the finest level: more take memory and time to prepare, and are seen only from very near.
 MOST_TRIANGLES = 16_000
+# Meshes with more, such as scans, are first reduced to as many without a bound of the error: a simplification
+# with a bound of 400,000 rough triangles takes 15 s.
+_MOST_BOUNDED = 64_000
 # Of a rough scan each side is sharp: the longest remain.
 _MOST_EDGES = 8_000
 # Errors of levels of detail [m], and the share of triangles from which a level is worth its memory.
@@ -93,7 +96,8 @@ def prepared_surfaces(
     """Return a mesh prepared from the surfaces of a GLB file; arguments as for `prepared`."""
     surfaces = [surface for surface in given if len(surface.triangles)]
     plain = srgb(color) if color else _PLAIN_COLOR
-    error, bodies = _limited([_Body.of(surface, plain) for surface in surfaces], most_triangles)
+    kept = _MOST_BOUNDED / max(sum(len(surface.triangles) for surface in surfaces), 1)
+    error, bodies = _limited([_Body.of(surface, plain, kept) for surface in surfaces], most_triangles)
     corners = _joined([body.corners() for body in bodies], 3)
     vertices, numbers = _unique(_vertices(bodies))
     points, normals = (vertices[name].astype(np.float64) for name in ("position", "normal"))
@@ -139,8 +143,8 @@ class _Body:
     metallic: float
 
     @classmethod
-    def of(cls, surface: Surface, plain: tuple[float, float, float, float]) -> "_Body":
-        positions, triangles = weld(surface.positions, surface.triangles)
+    def of(cls, surface: Surface, plain: tuple[float, float, float, float], kept: float) -> "_Body":
+        positions, triangles = _simplified(*weld(surface.positions, surface.triangles), kept)
         color = np.array(surface.color or plain)
         colors = np.tile(color, (len(triangles), 3, 1))
         untouched = len(triangles) == len(surface.triangles)

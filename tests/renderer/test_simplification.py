@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from renderer import level_of_detail
+from renderer import mesh as mesh_module
 from renderer.creases import crease_normals
 from renderer.level_of_detail import next_level
 from renderer.mesh import prepared
@@ -77,6 +78,15 @@ def test_a_rough_scan_keeps_its_longest_edges_only():
     assert len(mesh.edges) == 2 * 8_000
     # The longer sides at the moved border are among those that are kept.
     assert mesh.edges[:, 0].max() == pytest.approx(1.05, abs=1e-6)
+
+
+def test_a_large_scan_is_reduced_before_its_errors_are_bounded(monkeypatch):
+    positions, triangles = plate(40)
+    positions[:, 2] = np.random.default_rng(0).normal(0.0, 0.3, len(positions))
+    scan = glb(positions, triangles)
+    assert len(prepared(scan).finest) == len(triangles)
+    monkeypatch.setattr(mesh_module, "_MOST_BOUNDED", 500)
+    assert 0 < len(prepared(scan).finest) < len(triangles) / 2
 
 
 def test_the_coarsest_level_with_an_allowed_error_is_chosen():
