@@ -1,15 +1,16 @@
 """Queues of requests from Zenoh to the event loop, so that a flood of requests delays no stop.
 
     stop             Zenoh's thread -> event loop, immediately
-    command, lease   queue -> thread of the callback, a few each millisecond -> event loop, one at a time
+    command, lease   queue -> thread of a paced callback -> event loop, one at a time
     other requests   ring  -> reading thread -> event loop, in the same way
 
 With a plain callback Python would run for each request as fast as requests arrive: the event loop would wait
 for the interpreter lock again and again, and Zenoh's queue in front of the callback blocks the whole session
-when it is full. Commands and leases have a separate connection, where blocking is intended: a flood waits at
-its sender and takes no processor time from a stop. Other requests share a connection, which must not block:
-they wait in a ring, and Zenoh ends a request that the ring drops without an answer. A thread that reads a
-ring wakes up ten times a second to notice signals, the thread of a callback only for requests.
+when it is full. So a thread takes a few requests each millisecond. The requests to a gateway have separate
+connections, one for control and one for the audit log and the cell, where blocking is intended: a flood waits
+at its sender and takes no processor time from a stop. Other requests share a connection, which must not
+block: they wait in a ring, and Zenoh ends a request that the ring drops without an answer. A thread that
+reads a ring wakes up ten times a second to notice signals, the thread of a callback only for requests.
 """
 
 import asyncio
