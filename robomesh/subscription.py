@@ -136,6 +136,8 @@ class Subscription:
         if history and self.topic.history in (History.LAST_100, History.KEY_FRAME):
             self._waiting = deque(maxlen=_ZENOH_RING)
         self._subscriber: Any = _declare(session, key_expr, self.topic)
+        # Taken now: while another thread ends the subscriber, nothing of it can be read.
+        self._handler = self._subscriber.handler
         self._finished = threading.Event()
         # Not a daemon: Python would end a daemon thread inside Zenoh's code, which aborts the process.
         self._thread = threading.Thread(target=self._read, name=f"read {key_expr}")
@@ -350,7 +352,7 @@ class Subscription:
     def _read(self) -> None:
         try:
             while not self._closed:
-                self._receive(self._subscriber.handler.recv())
+                self._receive(self._handler.recv())
                 more = self._read_waiting()
                 if self._pause_s and more:
                     self._hand_over()
@@ -375,7 +377,7 @@ class Subscription:
         """Take the samples that wait in the ring, and return their number."""
         number = 0
         with suppress(zenoh.ZError):  # closed: the thread's next read raises, too
-            while (sample := self._subscriber.handler.try_recv()) is not None:
+            while (sample := self._handler.try_recv()) is not None:
                 self._receive(sample)
                 number += 1
         return number

@@ -290,6 +290,32 @@ def test_a_consumer_that_pauses_hears_of_the_end(mesh):
     run(main())
 
 
+def test_a_subscription_that_is_closed_in_a_flood_ends_its_thread_without_an_error(mesh):
+    async def main():
+        async with open_session(mesh) as session:
+            publisher = session.declare_publisher("site", "arm", "joints")
+            flooding = True
+
+            def flood():
+                while flooding:
+                    publisher.put(joints(0.1))
+
+            flooded = asyncio.create_task(asyncio.to_thread(flood))
+            try:
+                for _ in range(50):
+                    states = session.subscribe("robomesh/site/arm/joints", history=False)
+                    async with asyncio.timeout(30.0):
+                        assert await states.next_batch()
+                    states.close()
+                    await asyncio.to_thread(states.join)
+            finally:
+                flooding = False
+                await flooded
+
+    # The thread's error would be a warning, which fails the test.
+    run(main())
+
+
 def test_messages_put_together_keep_their_order_and_leave_before_the_end(mesh):
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
