@@ -40,7 +40,7 @@ if __name__ == "__main__":
 
 from benchmarks.latency import free_port, process, service, summary, until_connectable
 from benchmarks.stops_beside import stops_beside
-from robomesh.errors import RefusedError, RobomeshError
+from robomesh.errors import NoAnswerError, RefusedError, RobomeshError
 from robomesh.messages import PROTOBUF
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session, SessionSettings, open_session
@@ -161,7 +161,7 @@ def operate(endpoint: str, with_session: bool, ready: Any) -> None:
 
 
 async def acquire(session: Session, operator: str, *, session_id: str = "", ttl_s: float = TTL_S) -> str:
-    """Return the secret of a lease as soon as the gateway grants one."""
+    """Return the secret of a lease as soon as the gateway runs and grants one."""
     deadline = time.monotonic() + 10.0
     while True:
         try:
@@ -171,7 +171,7 @@ async def acquire(session: Session, operator: str, *, session_id: str = "", ttl_
             )
             secret: str = answer.lease  # type: ignore[attr-defined]
             return secret
-        except RefusedError:
+        except (RefusedError, NoAnswerError):
             if time.monotonic() > deadline:
                 raise
             await asyncio.sleep(0.02)
