@@ -213,77 +213,28 @@ def simulate(
     connect: Connect = DEFAULT_ROUTER,
 ) -> None:
     """Run a simulated controller with the old text protocol, RTDE, HSES, SNPX, FTP or OPC UA."""
-    from services.command_line.site import launch
+    from services.command_line.site import simulated_controller
 
-    mesh = launch.faults_mesh(for_, site, connect)
-    if protocol is SimulatedProtocol.RTDE:
-        launch.launch_rtde_simulator(
-            robot=robot or "puma560",
-            listen=listen or "127.0.0.1:30004",
-            primary=primary,
-            scripts=scripts,
-            dashboard=dashboard,
-            demo=demo,
-            faults=tuple(fault or ()),
-            insecure=insecure,
-            mesh=mesh,
-        )
-        return
-    if protocol is SimulatedProtocol.HSES:
-        launch.launch_hses_simulator(
-            robot=robot or "puma560",
-            listen=listen or "127.0.0.1:10040",
-            yaskawa=yaskawa,
-            demo=demo,
-            faults=tuple(fault or ()),
-            insecure=insecure,
-            mesh=mesh,
-        )
-        return
-    if protocol is SimulatedProtocol.SNPX:
-        launch.launch_snpx_simulator(
-            robot=robot or "puma560",
-            listen=listen or "127.0.0.1:60008",
-            rmi=rmi,
-            fanuc=fanuc,
-            demo=demo,
-            faults=tuple(fault or ()),
-            insecure=insecure,
-            mesh=mesh,
-        )
-        return
-    if protocol is SimulatedProtocol.FANUC_FTP:
-        launch.launch_ftp_simulator(
-            robot=robot or "puma560",
-            listen=listen or "127.0.0.1:2121",
-            fanuc=fanuc,
-            demo=demo,
-            faults=tuple(fault or ()),
-            insecure=insecure,
-            mesh=mesh,
-        )
-        return
-    if protocol is SimulatedProtocol.OPCUA:
-        launch.launch_opcua_simulator(
-            robot=robot or "puma560",
-            listen=listen or "127.0.0.1:4840",
-            path=path,
-            demo=demo,
-            faults=tuple(fault or ()),
-            insecure=insecure,
-            mesh=mesh,
-        )
-        return
-    launch.launch_simulator(
-        robot=robot or "pt600",
-        listen=listen or "127.0.0.1:5400",
-        rate_hz=rate,
-        max_clients=max_clients,
+    simulated_controller.run(
+        protocol,
+        {
+            "rate": rate,
+            "max_clients": max_clients,
+            "code": code or [],
+            "primary": primary,
+            "scripts": scripts,
+            "dashboard": dashboard,
+            "yaskawa": yaskawa,
+            "fanuc": fanuc,
+            "rmi": rmi,
+            "path": path,
+        },
+        robot=robot,
+        listen=listen,
         demo=demo,
         faults=tuple(fault or ()),
-        codes=code or [],
         insecure=insecure,
-        mesh=mesh,
+        mesh=simulated_controller.faults_mesh(for_, site, connect),
     )
 
 
