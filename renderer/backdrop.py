@@ -1,4 +1,7 @@
-"""Static background: a gradient and the floor's grid, drawn once for each camera and cached."""
+"""Static background: a gradient and the floor's grid, kept for each camera that stands still."""
+
+import time
+from typing import NamedTuple
 
 import moderngl
 import numpy as np
@@ -13,8 +16,18 @@ FloatArray = NDArray[np.float64]
 # The floor is drawn as a line if the view direction's z is below this.
 EDGE_ON = 0.05
 _LINE_TONE = (0.30, 0.34, 0.39, 0.9)
-_MOST = 8
+# Largest memory of the kept backdrops: 36 of 1280 x 720.
+_MOST_BYTES = 128 << 20
+# A backdrop is replaced only after it was not used for this time [s]: views that take turns would otherwise
+# push each other out, and redraw all backdrops.
+_UNUSED_S = 10.0
+_MOST_NEW = 512
 _EXTENT, _SQUARES_PER_LARGE = 6.0, 5
+
+
+class _Kept(NamedTuple):
+    framebuffer: moderngl.Framebuffer
+    used_at: float
 
 
 class Backdrops:
@@ -26,7 +39,12 @@ class Backdrops:
         self._plane = context.vertex_array(programs.plane, [])
         self._line_buffer = context.buffer(reserve=24)
         self._line = context.vertex_array(programs.edge, [(self._line_buffer, "3f", "position")])
-        self._kept: dict[tuple[object, ...], moderngl.Framebuffer] = {}
+        # In the order of their last use.
+        self._kept: dict[tuple[object, ...], _Kept] = {}
+        self._most = max(_MOST_BYTES // (size[0] * size[1] * 4), 1)
+        # Cameras that were asked for once: one on a link moves, and needs a new backdrop for each picture.
+        self._new: dict[tuple[object, ...], None] = {}
+        self._not_kept: moderngl.Framebuffer | None = None
 
     def of(
         self,
@@ -37,7 +55,7 @@ class Backdrops:
         radius: float,
         floor: float | None,
     ) -> moderngl.Framebuffer:
-        """Return the backdrop of a camera, drawn at the first request.
+        """Return the backdrop of a camera; the next call may change one that is not kept.
 
         Args:
             site_to_clip: (4, 4) of the camera.
@@ -45,20 +63,36 @@ class Backdrops:
             radius: Radius of the workspace [m].
             floor: Height of the floor [m]; None: no floor.
         """
-        key = (site_to_clip.tobytes(), floor)
-        backdrop = self._kept.pop(key, None)
-        if backdrop is None:
-            # A camera on a link needs a new backdrop for each picture. The oldest is evicted, so the
-            # backdrops of other cameras, which are used more often, stay in the cache.
-            backdrop = self._free_framebuffer()
+        key, now = (site_to_clip.tobytes(), floor), time.monotonic()
+        kept = self._kept.pop(key, None)
+        if kept is None:
+            place = self._place(key, now)
+            framebuffer = self._temporary() if place is None else place
             middle = None if floor is None else np.array([*center[:2], floor])
-            self._draw(backdrop, camera, site_to_clip, middle, radius)
-        self._kept[key] = backdrop
-        return backdrop
+            self._draw(framebuffer, camera, site_to_clip, middle, radius)
+            if place is None:
+                return framebuffer
+            kept = _Kept(framebuffer, now)
+        self._kept[key] = kept._replace(used_at=now)
+        return kept.framebuffer
 
-    def _free_framebuffer(self) -> moderngl.Framebuffer:
-        if len(self._kept) >= _MOST:
-            return self._kept.pop(next(iter(self._kept)))
+    def _place(self, key: tuple[object, ...], now: float) -> moderngl.Framebuffer | None:
+        """Return where to keep a camera's backdrop; None: it is not kept."""
+        if key not in self._new:
+            if len(self._new) >= _MOST_NEW:
+                del self._new[next(iter(self._new))]
+            self._new[key] = None
+            return None
+        if len(self._kept) < self._most:
+            return self._framebuffer()
+        oldest = next(iter(self._kept))
+        return self._kept.pop(oldest).framebuffer if now - self._kept[oldest].used_at > _UNUSED_S else None
+
+    def _temporary(self) -> moderngl.Framebuffer:
+        self._not_kept = self._not_kept or self._framebuffer()
+        return self._not_kept
+
+    def _framebuffer(self) -> moderngl.Framebuffer:
         return self._context.framebuffer([self._context.renderbuffer(self._size, 4)])
 
     def _draw(
