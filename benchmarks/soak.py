@@ -6,8 +6,8 @@
 a page's WebSocket; half of each minute it records one robot, and then deletes the recording. With `--kills`
 it kills a service about that often (never the router, which benchmarks/wan.py kills), and the supervisor
 restarts the service. Each minute prints a line of JSON, the end one more: share of joint states delivered,
-memory and open files of each process with their slopes (a line through the last four fifths), events by
-code, latched stops.
+memory, open files and cores used of each process (of the last with its name; cores of all together), the
+slopes of memory and files (a line through the last four fifths), events by code, latched stops.
 
 Target: 99.995 % delivered without kills, no slope, no stop.
 """
@@ -139,10 +139,12 @@ class Grown:
     def __init__(self, site: int) -> None:
         self._site = psutil.Process(site)
         self._rows: dict[str, list[tuple[float, float, float]]] = {}
+        # By process: when it was looked at, and its processor time until then [s].
+        self._used: dict[int, tuple[float, float]] = {}
 
     def look(self) -> dict[str, Any]:
-        """Take one sample and return the current resident MiB and open files."""
-        now = {}
+        """Take one sample and return the current resident MiB, open files, and cores used since the last."""
+        now: dict[str, dict[str, float]] = {}
         for process in (self._site, *self._site.children(recursive=True)):
             with contextlib.suppress(psutil.Error, OSError):
                 name = self._name(process)
@@ -151,8 +153,19 @@ class Grown:
                 self._rows.setdefault(f"{name} {process.pid}", []).append(
                     (time.monotonic(), resident, process.num_fds())
                 )
-                now[name] = {"mib": round(resident, 1), "files": process.num_fds()}
+                cores = self._cores(process) + now.get(name, {}).get("cores", 0.0)
+                now[name] = {
+                    "mib": round(resident, 1),
+                    "files": process.num_fds(),
+                    "cores": round(cores, 3),
+                }
         return now
+
+    def _cores(self, process: psutil.Process) -> float:
+        at, used = time.monotonic(), sum(process.cpu_times()[:2])
+        before, used_before = self._used.get(process.pid, (at, used))
+        self._used[process.pid] = at, used
+        return (used - used_before) / max(at - before, 1e-9)
 
     def slopes(self) -> dict[str, dict[str, float]]:
         """Return the slopes in MiB and open files an hour."""

@@ -2,8 +2,9 @@
 
 import asyncio
 import logging
+import math
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Protocol
 
@@ -26,7 +27,13 @@ _MESH_TIMEOUT_S = 10.0
 _ASK_AGAIN_S = 2.0
 # Queue length for a site with many robots. Only each robot's newest sample is used.
 _RING = 512
-_TOPICS = ("description", "frames", "joints", "controller", "kinematics")
+# Topics that robots publish all the time.
+_LIVE = ("frames", "joints", "kinematics")
+_TOPICS = ("description", "controller", *_LIVE)
+# Samples that arrive within this time are taken together [s], while pictures are watched and otherwise.
+_TOGETHER_S, _TOGETHER_UNWATCHED_S = 0.004, 0.05
+# Interval in which live samples of a robot in no watched picture are taken [s]: for its tool's trail.
+_UNWATCHED_EACH_S = 0.2
 # The presence of one of these services means that a robot exists. The delay lets them restart without the
 # robot being removed.
 _PROVIDERS = ("gateway", "kinematics", "player")
@@ -36,6 +43,10 @@ _FORGET_AFTER_S, _FORGET_REPLAY_AFTER_S = 15.0, 1.0
 
 class RobotObserver(Protocol):
     """The receiver of meshes and of changes of robots."""
+
+    @property
+    def shown(self) -> Collection[str]:
+        """Names of the robots in watched pictures."""
 
     async def has_mesh(self, name: str) -> bool:
         """Return whether a mesh has been added."""
@@ -73,6 +84,9 @@ class Robots:
         self._session, self._site, self._observer = session, site, observer
         self._wanted, self._folder = wanted, folder
         self._subscriptions: dict[str, Subscription] = {}
+        # By key: when a live sample was taken, and the newest one that was not.
+        self._taken_at: dict[str, float] = {}
+        self._waiting: dict[str, Sample] = {}
         self._meshes: dict[str, set[str]] = {}
         self._loading: dict[str, asyncio.Task[None]] = {}
         self._providers: defaultdict[str, set[tuple[str, str]]] = defaultdict(set)
@@ -110,35 +124,70 @@ class Robots:
         """Names of the meshes of all robots."""
         return set().union(*self._meshes.values())
 
-    async def _take_all(self, subscription: Subscription, group: asyncio.TaskGroup) -> None:
-        async for sample in subscription:
-            robot = sample.parsed.robot
-            if not self._wanted(robot):
-                continue
-            state = self.states.setdefault(robot, RobotState(self._site, robot))
-            before = state.version
-            try:
-                self._take(state, sample, group)
-            except MessageError as error:
-                log.warning("%s: %s", sample.key, error)
-            except Exception:
-                # A publisher's invalid message must not stop the drawing of other robots.
-                log.exception("%s could not be processed", sample.key)
-            if state.version != before:
-                self._observer.on_changed(state)
+    def catch_up(self, state: RobotState) -> None:
+        """Take the samples of a robot and its cell that arrived while no watched picture showed them."""
+        for each in (state, *self.neighbours(state)):
+            for name in _LIVE:
+                sample = self._waiting.pop(robot_key(self._site, each.name, name), None)
+                if sample is not None:
+                    self._take(each, sample)
 
-    def _take(self, state: RobotState, sample: Sample, group: asyncio.TaskGroup) -> None:
-        message = sample.message()
-        if isinstance(message, FrameTransforms):
-            state.update_frames(message, sample.header.source_time_ns, sample.header.publisher)
-        elif isinstance(message, JointStates):
-            state.update_joints(message)
-        elif isinstance(message, ControllerState):
-            state.update_controller(message)
-        elif isinstance(message, KinematicState):
-            state.update_kinematics(message, self.states)
-        elif isinstance(message, Description):
-            self._describe(state, message, group)
+    async def _take_all(self, subscription: Subscription, group: asyncio.TaskGroup) -> None:
+        while samples := await subscription.next_batch(pause_s=self._pause_s):
+            for sample in {sample.key: sample for sample in samples}.values():
+                robot, topic = sample.parsed.robot, sample.parsed.topic
+                if not self._wanted(robot):
+                    continue
+                if (state := self.states.get(robot)) is None:
+                    state = self.states[robot] = RobotState(self._site, robot)
+                if topic in _LIVE and not self._is_due(robot, sample):
+                    self._waiting[sample.key] = sample
+                elif topic == "description":
+                    self._take_description(state, sample, group)
+                else:
+                    self._take(state, sample)
+
+    @property
+    def _pause_s(self) -> float:
+        return _TOGETHER_S if self._observer.shown else _TOGETHER_UNWATCHED_S
+
+    def _is_due(self, robot: str, sample: Sample) -> bool:
+        """Return whether to decode a live sample now: that takes longer than to receive it."""
+        before = self._taken_at.get(sample.key, -math.inf)
+        if robot not in self._observer.shown and sample.received - before < _UNWATCHED_EACH_S:
+            return False
+        self._taken_at[sample.key] = sample.received
+        self._waiting.pop(sample.key, None)
+        return True
+
+    def _take(self, state: RobotState, sample: Sample) -> None:
+        before = state.version
+        try:
+            message = sample.message()
+            if isinstance(message, FrameTransforms):
+                state.update_frames(message, sample.header.source_time_ns, sample.header.publisher)
+            elif isinstance(message, JointStates):
+                state.update_joints(message)
+            elif isinstance(message, ControllerState):
+                state.update_controller(message)
+            elif isinstance(message, KinematicState):
+                state.update_kinematics(message, self.states)
+        except MessageError as error:
+            log.warning("%s: %s", sample.key, error)
+        except Exception:
+            # A publisher's invalid message must not stop the drawing of other robots.
+            log.exception("%s could not be processed", sample.key)
+        if state.version != before:
+            self._observer.on_changed(state)
+
+    def _take_description(self, state: RobotState, sample: Sample, group: asyncio.TaskGroup) -> None:
+        try:
+            description = sample.message()
+            assert isinstance(description, Description)
+        except MessageError as error:
+            log.warning("%s: %s", sample.key, error)
+        else:
+            self._describe(state, description, group)
 
     def _describe(self, state: RobotState, description: Description, group: asyncio.TaskGroup) -> None:
         self._forgotten.discard(state.name)
@@ -228,6 +277,10 @@ class Robots:
         if loading is not None:
             loading.cancel()
         self._meshes.pop(robot, None)
+        for name in _LIVE:
+            key = robot_key(self._site, robot, name)
+            self._waiting.pop(key, None)
+            self._taken_at.pop(key, None)
         state = self.states.pop(robot, None)
         if state is not None:
             log.info("%s/%s is removed", state.site, state.name)

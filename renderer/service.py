@@ -140,6 +140,8 @@ class _Renderer:
         self._streams: dict[tuple[str, str], Stream] = {}
         self._answerers: dict[str, list[Answerer]] = {}
         self._active: set[Stream] = set()
+        # None: to be found again.
+        self._shown: frozenset[str] | None = frozenset()
         self._wake = asyncio.Event()
         self._scheduler = FrameScheduler()
         self._key_frames = Quota("key_frames", a_minute=settings.quotas.key_frames_a_minute)
@@ -169,7 +171,16 @@ class _Renderer:
     async def add_mesh(self, name: str, glb: bytes, color: str) -> None:
         await _in(self._drawing, self._studio.add_mesh, name, glb, color)
 
+    @property
+    def shown(self) -> frozenset[str]:
+        if self._shown is None:
+            states = [stream.state for stream in self._active]
+            others = [other for state in states for other in self._robots.neighbours(state)]
+            self._shown = frozenset(state.name for state in (*states, *others))
+        return self._shown
+
     def on_ready(self, state: RobotState) -> None:
+        self._shown = None  # its cell may be another
         if state.name in self._answerers:
             return  # the description has changed: its streams continue
         appearance, settings = state.appearance, self._settings
@@ -193,11 +204,11 @@ class _Renderer:
         log.info("%s/%s: views %s", state.site, state.name, ", ".join((*names, FAR)))
 
     def on_changed(self, state: RobotState) -> None:
-        cell = state.cell
-        if any(each.state is state or (cell and each.state.cell == cell) for each in self._active):
+        if state.name in self.shown:
             self._wake.set()
 
     def on_removed(self, state: RobotState) -> None:
+        self._shown = None
         for answerer in self._answerers.pop(state.name, ()):
             answerer.close()
         for key in [key for key in self._streams if key[0] == state.name]:
@@ -211,8 +222,12 @@ class _Renderer:
     def neighbours(self, state: RobotState) -> Sequence[RobotState]:
         return self._robots.neighbours(state)
 
+    def catch_up(self, state: RobotState) -> None:
+        self._robots.catch_up(state)
+
     def watchers_changed(self, stream: Stream) -> None:
         (self._active.add if stream.watched else self._active.discard)(stream)
+        self._shown = None
         self._reset_if_unwatched()
         self._wake.set()
 
@@ -237,6 +252,7 @@ class _Renderer:
     def _close(self, key: tuple[str, str]) -> None:
         stream = self._streams.pop(key)
         self._active.discard(stream)
+        self._shown = None
         self._reset_if_unwatched()
         stream.close()
         self._encoders.end(stream.name)

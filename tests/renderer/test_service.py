@@ -11,8 +11,10 @@ import pytest
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from renderer import frame_scheduler, post_processing, robots, service, stream
+from renderer.composition import compose
 from renderer.encoder import H264Encoder
 from renderer.errors import NoEncoderError, RendererError
+from renderer.robot_state import RobotState
 from renderer.service import Settings
 from renderer.studio import Studio
 from robomesh import reason_codes as codes
@@ -136,6 +138,59 @@ def test_nothing_is_drawn_without_subscribers(mesh, tmp_path):
             await picture(monitor)
             await asyncio.sleep(0.5)
             assert await monitor.last("robomesh/hall/arm/video/front", timeout_s=0.5) is None
+
+    run(main())
+
+
+def test_states_of_a_robot_that_nobody_watches_are_rarely_decoded(mesh, tmp_path, monkeypatch):
+    decoded, update = [], RobotState.update_frames
+
+    def count(state, *arguments):
+        decoded.append(state.name)
+        update(state, *arguments)
+
+    monkeypatch.setattr(RobotState, "update_frames", count)
+
+    async def decoded_of(published, number):
+        decoded.clear()
+        for _ in range(number):
+            await anext(published)
+        return len(decoded)
+
+    async def main():
+        async with renderer_site(mesh, tmp_path) as (robot, monitor), moving(robot):
+            await picture(monitor)
+            published = monitor.subscribe("robomesh/hall/arm/frames", newest=1000, history=False)
+            assert 1 <= await decoded_of(published, 60) <= 30
+            video = monitor.subscribe("robomesh/hall/arm/video/front", history=False)
+            await frames(video, 3)
+            assert await decoded_of(published, 60) > 30
+
+    run(main())
+
+
+def test_a_picture_of_a_robot_that_nobody_watches_shows_its_newest_state(mesh, tmp_path, monkeypatch):
+    shown = []
+
+    def composed(spec, appearance, snapshot, neighbours):
+        state = snapshot.state
+        shown.append((state.positions.get("waist"), state.source_time_ns))
+        return compose(spec, appearance, snapshot, neighbours)
+
+    monkeypatch.setattr(stream, "compose", composed)
+
+    async def main():
+        async with renderer_site(mesh, tmp_path) as (robot, monitor):
+            publisher = robot.declare_publisher("hall", "arm", "joints")
+            while not shown:
+                publisher.put(joints(HOME))
+                await monitor.last("robomesh/hall/arm/image/front", timeout_s=0.5)
+            # One after the other, so that the last ones are not decoded when they arrive.
+            for waist in (0.1, 0.2, 0.3, 0.4):
+                header = publisher.put(joints((waist, *HOME[1:])))
+                await asyncio.sleep(0.03)
+            while shown[-1] != (0.4, header.source_time_ns):
+                await picture(monitor)
 
     run(main())
 
