@@ -6,6 +6,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable
+from functools import partial
 from typing import Any
 
 import zenoh
@@ -15,6 +16,7 @@ from google.protobuf.message import Message
 from robomesh import keys
 from robomesh.endpoints import wait_until_declared
 from robomesh.header import Header, pack
+from robomesh.late_joiners import AnsweringThread
 from robomesh.messages import PROTOBUF
 from robomesh.outbox import Outbox
 from robomesh.schemas.robomesh_pb2 import VideoFrames
@@ -31,9 +33,10 @@ OnGet = Callable[[], Awaitable[Message | None]]
 class Publisher:
     """The publisher of one topic of one robot.
 
-    Safe to use from any one thread at a time; late joiners are answered on Zenoh's thread.
+    Safe to use from any one thread at a time.
 
     Args:
+        answering: Answers late joiners.
         outbox: Takes the messages, which the event loop's thread alone may then publish; None: they are put
             immediately.
     """
@@ -45,6 +48,7 @@ class Publisher:
         robot: str,
         name: str,
         *,
+        answering: AnsweringThread,
         on_get: OnGet | None = None,
         outbox: Outbox | None = None,
     ) -> None:
@@ -65,9 +69,11 @@ class Publisher:
         self._queryable: zenoh.Queryable[None] | None = None
         if on_get is not None:
             loop = asyncio.get_running_loop()
-            self._queryable = session.declare_queryable(self.key, lambda q: self._hand_over(q, on_get, loop))
+            self._queryable = _on_query(session, self.key, lambda q: self._hand_over(q, on_get, loop))
         elif self.topic.history is not History.NONE:
-            self._queryable = session.declare_queryable(self.key, self._answer)
+            self._queryable = _on_query(
+                session, self.key, lambda query: answering.add(partial(self._answer, query))
+            )
         wait_until_declared(session, self.topic.priority)
 
     def put(
@@ -163,7 +169,9 @@ class Publisher:
             if not loop.is_closed():
                 loop.call_soon_threadsafe(changed)
 
-        self._listener = self._publisher.declare_matching_listener(hand_over)
+        self._listener = self._publisher.declare_matching_listener(
+            zenoh.handlers.Callback(hand_over, indirect=False)
+        )
 
     @property
     def closed(self) -> bool:
@@ -203,6 +211,11 @@ class Publisher:
 
         if not loop.is_closed():
             asyncio.run_coroutine_threadsafe(answer(), loop)
+
+
+def _on_query(session: zenoh.Session, key: str, take: Callable[[zenoh.Query], None]) -> zenoh.Queryable[None]:
+    """Declare a queryable whose callback runs on Zenoh's own thread, so it must only pass the query on."""
+    return session.declare_queryable(key, zenoh.handlers.Callback(take, indirect=False))
 
 
 def _history_length(row: Topic) -> int:

@@ -18,6 +18,7 @@ from robomesh.counters import Counters, Measure
 from robomesh.endpoints import DEFAULT_ROUTER, Tls, client_config, first_line
 from robomesh.errors import BrokenAnswerError, NoAnswerError, NoRightError, SessionError
 from robomesh.ignored import REPLY, Ignored
+from robomesh.late_joiners import AnsweringThread
 from robomesh.outbox import Outbox
 from robomesh.publisher import OnGet, Publisher
 from robomesh.request_queue import RoundRobin
@@ -67,6 +68,7 @@ class Session:
     _declared_lock: threading.Lock = field(default_factory=threading.Lock)
     _tokens: list[zenoh.LivelinessToken] = field(default_factory=list)
     _refresher: asyncio.Task[None] | None = None
+    _answering: AnsweringThread = field(default_factory=AnsweringThread)
     # Of the publishers whose messages are put together.
     _outbox: Outbox | None = None
     # Starts the handlers of all answerers.
@@ -102,7 +104,15 @@ class Session:
         if together and self._outbox is None:
             self._outbox = Outbox()
         outbox = self._outbox if together else None
-        publisher = Publisher(self.zenoh_session, site, robot, topic, on_get=on_get, outbox=outbox)
+        publisher = Publisher(
+            self.zenoh_session,
+            site,
+            robot,
+            topic,
+            answering=self._answering,
+            on_get=on_get,
+            outbox=outbox,
+        )
         self._keep(publisher)
         return publisher
 
@@ -321,6 +331,7 @@ class Session:
         await asyncio.to_thread(self._join)
 
     def _join(self) -> None:
+        self._answering.close()
         for declared in self._declared:
             if isinstance(declared, Subscription):
                 declared.join()
