@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import math
+import time
 from collections import defaultdict
 from collections.abc import Callable, Collection
 from pathlib import Path
@@ -27,12 +28,15 @@ _MESH_TIMEOUT_S = 10.0
 _ASK_AGAIN_S = 2.0
 # Queue length for a site with many robots. Only each robot's newest sample is used.
 _RING = 512
-# Topics that robots publish all the time.
+_TOPICS = ("description", "controller")
+# Topics that robots publish all the time; subscribed while pictures are drawn, and for this time [s] after.
 _LIVE = ("frames", "joints", "kinematics")
-_TOPICS = ("description", "controller", *_LIVE)
+_REST_AFTER_S = 60.0
+# The first picture after a rest waits this long for live samples [s]; one without them looks stale.
+_LIVE_WITHIN_S = 0.3
 # Samples that arrive within this time are taken together [s], while pictures are watched and otherwise.
 _TOGETHER_S, _TOGETHER_UNWATCHED_S = 0.004, 0.05
-# Interval in which live samples of a robot in no watched picture are taken [s]: for its tool's trail.
+# Interval of decoding the states of a robot in no watched picture [s]: for the trail of its tool.
 _UNWATCHED_EACH_S = 0.2
 # The presence of one of these services means that a robot exists. The delay lets them restart without the
 # robot being removed.
@@ -83,7 +87,10 @@ class Robots:
         self.states: dict[str, RobotState] = {}
         self._session, self._site, self._observer = session, site, observer
         self._wanted, self._folder = wanted, folder
+        self._group = asyncio.TaskGroup()
         self._subscriptions: dict[str, Subscription] = {}
+        # When the live topics were subscribed, and when that may end [s].
+        self._live_since = self._rests_at = 0.0
         # By key: when a live sample was taken, and the newest one that was not.
         self._taken_at: dict[str, float] = {}
         self._waiting: dict[str, Sample] = {}
@@ -96,16 +103,14 @@ class Robots:
 
     async def follow(self) -> None:
         """Follow the site's robots until cancelled."""
-        async with asyncio.TaskGroup() as group:
-            for name in _TOPICS:
-                subscription = self._session.subscribe(f"{ROOT}/{self._site}/*/{name}", newest=_RING)
-                self._subscriptions[name] = subscription
-                group.create_task(self._take_all(subscription, group))
-            group.create_task(self._watch_providers(group))
+        async with self._group:
+            self._subscribe(_TOPICS)
+            self._subscribe_live()
+            self._group.create_task(self._watch_providers())
 
     def ages(self, state: RobotState) -> Ages:
         """Return the current ages of a robot's topics."""
-        age = {
+        age = dict.fromkeys(_LIVE) | {
             name: subscription.age_s(robot_key(state.site, state.name, name))
             for name, subscription in self._subscriptions.items()
             if name != "description"
@@ -124,15 +129,42 @@ class Robots:
         """Names of the meshes of all robots."""
         return set().union(*self._meshes.values())
 
-    def catch_up(self, state: RobotState) -> None:
-        """Take the samples of a robot and its cell that arrived while no watched picture showed them."""
-        for each in (state, *self.neighbours(state)):
-            for name in _LIVE:
-                sample = self._waiting.pop(robot_key(self._site, each.name, name), None)
-                if sample is not None:
+    async def catch_up(self, state: RobotState) -> None:
+        """Take the newest samples of a robot and its cell that were not decoded; end a rest."""
+        robots = (state, *self.neighbours(state))
+        keys = {name: [robot_key(self._site, each.name, name) for each in robots] for name in _LIVE}
+        self._subscribe_live()
+        while time.monotonic() < self._live_since + _LIVE_WITHIN_S and any(
+            self._subscriptions[name].age_s(key) is None for name in _LIVE for key in keys[name]
+        ):
+            await asyncio.sleep(0.005)
+            self._subscribe_live()
+        for name in _LIVE:
+            for each, key in zip(robots, keys[name], strict=True):
+                if (sample := self._waiting.pop(key, None)) is not None:
                     self._take(each, sample)
 
-    async def _take_all(self, subscription: Subscription, group: asyncio.TaskGroup) -> None:
+    def rest(self) -> None:
+        """Unsubscribe from the live topics if no picture has been drawn for some time."""
+        if not self._observer.shown and time.monotonic() >= self._rests_at:
+            for name in _LIVE:
+                if (subscription := self._subscriptions.pop(name, None)) is not None:
+                    subscription.close()
+
+    def _subscribe_live(self) -> None:
+        now = time.monotonic()
+        self._rests_at = now + _REST_AFTER_S
+        if _LIVE[0] not in self._subscriptions:
+            self._live_since = now
+            self._subscribe(_LIVE)
+
+    def _subscribe(self, names: Collection[str]) -> None:
+        for name in names:
+            subscription = self._session.subscribe(f"{ROOT}/{self._site}/*/{name}", newest=_RING)
+            self._subscriptions[name] = subscription
+            self._group.create_task(self._take_all(subscription))
+
+    async def _take_all(self, subscription: Subscription) -> None:
         while samples := await subscription.next_batch(pause_s=self._pause_s):
             for sample in {sample.key: sample for sample in samples}.values():
                 robot, topic = sample.parsed.robot, sample.parsed.topic
@@ -142,8 +174,6 @@ class Robots:
                     state = self.states[robot] = RobotState(self._site, robot)
                 if topic in _LIVE and not self._is_due(robot, sample):
                     self._waiting[sample.key] = sample
-                elif topic == "description":
-                    self._take_description(state, sample, group)
                 else:
                     self._take(state, sample)
 
@@ -152,7 +182,7 @@ class Robots:
         return _TOGETHER_S if self._observer.shown else _TOGETHER_UNWATCHED_S
 
     def _is_due(self, robot: str, sample: Sample) -> bool:
-        """Return whether to decode a live sample now: that takes longer than to receive it."""
+        """Return whether to decode a live sample now, which takes longer than to receive it."""
         before = self._taken_at.get(sample.key, -math.inf)
         if robot not in self._observer.shown and sample.received - before < _UNWATCHED_EACH_S:
             return False
@@ -172,6 +202,8 @@ class Robots:
                 state.update_controller(message)
             elif isinstance(message, KinematicState):
                 state.update_kinematics(message, self.states)
+            elif isinstance(message, Description):
+                self._describe(state, message)
         except MessageError as error:
             log.warning("%s: %s", sample.key, error)
         except Exception:
@@ -180,23 +212,14 @@ class Robots:
         if state.version != before:
             self._observer.on_changed(state)
 
-    def _take_description(self, state: RobotState, sample: Sample, group: asyncio.TaskGroup) -> None:
-        try:
-            description = sample.message()
-            assert isinstance(description, Description)
-        except MessageError as error:
-            log.warning("%s: %s", sample.key, error)
-        else:
-            self._describe(state, description, group)
-
-    def _describe(self, state: RobotState, description: Description, group: asyncio.TaskGroup) -> None:
+    def _describe(self, state: RobotState, description: Description) -> None:
         self._forgotten.discard(state.name)
         before = self._loading.get(state.name)
         if before is not None:
             before.cancel()
-        self._loading[state.name] = group.create_task(self._load(state, description))
+        self._loading[state.name] = self._group.create_task(self._load(state, description))
 
-    async def _describe_again(self, robot: str, group: asyncio.TaskGroup) -> None:
+    async def _describe_again(self, robot: str) -> None:
         """Query the description of a robot that has returned: the subscription reports changes only."""
         key = robot_key(self._site, robot, "description")
         while robot in self._forgotten and robot in self._providers:
@@ -207,7 +230,7 @@ class Robots:
                 return
             if isinstance(description, Description) and robot in self._forgotten:
                 state = self.states.setdefault(robot, RobotState(self._site, robot))
-                self._describe(state, description, group)
+                self._describe(state, description)
 
     async def _load(self, state: RobotState, description: Description) -> None:
         """Load a robot's meshes and make it ready to draw."""
@@ -254,7 +277,7 @@ class Robots:
         except RendererError as error:
             log.error("%s of %s/%s is not drawn: %s", body.name, state.site, state.name, error)
 
-    async def _watch_providers(self, group: asyncio.TaskGroup) -> None:
+    async def _watch_providers(self) -> None:
         async for who, alive in self._session.watch_presence(f"{ROOT}/{self._site}/*/alive/*/*"):
             if who.service not in _PROVIDERS:
                 continue
@@ -264,7 +287,7 @@ class Robots:
             if waiting is not None:
                 waiting.cancel()
             if alive and who.robot in self._forgotten and who.service in _DESCRIBERS:
-                group.create_task(self._describe_again(who.robot, group))
+                self._group.create_task(self._describe_again(who.robot))
             if not providers:
                 del self._providers[who.robot]
                 after_s = _FORGET_REPLAY_AFTER_S if is_replay(who.robot) else _FORGET_AFTER_S

@@ -222,8 +222,8 @@ class _Renderer:
     def neighbours(self, state: RobotState) -> Sequence[RobotState]:
         return self._robots.neighbours(state)
 
-    def catch_up(self, state: RobotState) -> None:
-        self._robots.catch_up(state)
+    async def catch_up(self, state: RobotState) -> None:
+        await self._robots.catch_up(state)
 
     def watchers_changed(self, stream: Stream) -> None:
         (self._active.add if stream.watched else self._active.discard)(stream)
@@ -372,6 +372,7 @@ class _Renderer:
     async def _tidy_forever(self) -> None:
         while True:
             await asyncio.sleep(_TIDY_EACH_S)
+            self._robots.rest()
             now = time.monotonic()
             heard = {stream.name for stream in self._streams.values()}
             for key, stream in list(self._streams.items()):

@@ -42,8 +42,8 @@ class StreamHost(Protocol):
     def neighbours(self, state: RobotState) -> Sequence[RobotState]:
         """Return the other robots of the robot's cell."""
 
-    def catch_up(self, state: RobotState) -> None:
-        """Update a robot and its cell, which are not kept up to date while nobody watches them."""
+    async def catch_up(self, state: RobotState) -> None:
+        """Update the state of a robot and its cell, which is older while no stream shows them."""
 
     def watchers_changed(self, stream: "Stream") -> None:
         """React to a stream that has gained or lost subscribers."""
@@ -150,7 +150,7 @@ class Stream:
 
     async def draw(self, now: float) -> Coroutine[Any, Any, None]:
         """Draw the picture that is due; return a coroutine that encodes and publishes it."""
-        self._host.catch_up(self.state)
+        await self._host.catch_up(self.state)
         self._next_frame_at = next_due(self._next_frame_at, now, 1.0 / self._rate_hz)
         self._drawn_at = now
         self._drawn_version = self._version()
@@ -272,7 +272,7 @@ class Stream:
 
     async def _draw_still(self, now: float) -> None:
         if now >= self._not_before:
-            self._host.catch_up(self.state)
+            await self._host.catch_up(self.state)
             await (await self._drawn(now, video=False, image=True))
 
 

@@ -142,7 +142,7 @@ def test_nothing_is_drawn_without_subscribers(mesh, tmp_path):
     run(main())
 
 
-def test_states_of_a_robot_that_nobody_watches_are_rarely_decoded(mesh, tmp_path, monkeypatch):
+def test_states_of_an_unwatched_robot_are_rarely_decoded(mesh, tmp_path, monkeypatch):
     decoded, update = [], RobotState.update_frames
 
     def count(state, *arguments):
@@ -169,7 +169,7 @@ def test_states_of_a_robot_that_nobody_watches_are_rarely_decoded(mesh, tmp_path
     run(main())
 
 
-def test_a_picture_of_a_robot_that_nobody_watches_shows_its_newest_state(mesh, tmp_path, monkeypatch):
+def test_a_picture_of_an_unwatched_robot_shows_its_newest_state(mesh, tmp_path, monkeypatch):
     shown = []
 
     def composed(spec, appearance, snapshot, neighbours):
@@ -191,6 +191,42 @@ def test_a_picture_of_a_robot_that_nobody_watches_shows_its_newest_state(mesh, t
                 await asyncio.sleep(0.03)
             while shown[-1] != (0.4, header.source_time_ns):
                 await picture(monitor)
+
+    run(main())
+
+
+def test_an_unwatched_renderer_unsubscribes_and_its_next_picture_is_live(mesh, tmp_path, monkeypatch):
+    monkeypatch.setattr(robots, "_REST_AFTER_S", 0.5)
+    monkeypatch.setattr(service, "_TIDY_EACH_S", 0.1)
+    monkeypatch.setattr(robots, "_LIVE_WITHIN_S", 20.0)  # on a busy machine too
+    decoded, ages, update = [], [], RobotState.update_frames
+
+    def count(state, *arguments):
+        decoded.append(state.name)
+        update(state, *arguments)
+
+    def composed(spec, appearance, snapshot, neighbours):
+        ages.append(snapshot.ages)
+        return compose(spec, appearance, snapshot, neighbours)
+
+    monkeypatch.setattr(RobotState, "update_frames", count)
+    monkeypatch.setattr(stream, "compose", composed)
+
+    async def main():
+        async with renderer_site(mesh, tmp_path) as (robot, monitor), moving(robot):
+            await picture(monitor)
+            published = monitor.subscribe("robomesh/hall/arm/frames", newest=1000, history=False)
+            deadline = time.monotonic() + 20.0
+            while decoded and time.monotonic() < deadline:
+                decoded.clear()
+                for _ in range(30):
+                    await anext(published)
+            assert not decoded
+            ages.clear()
+            video = monitor.subscribe("robomesh/hall/arm/video/front", history=False)
+            await frames(video, 20)
+            assert all(None not in (each.frames, each.joints, each.kinematics) for each in ages)
+            assert len(decoded) > 1
 
     run(main())
 
