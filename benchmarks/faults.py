@@ -72,6 +72,7 @@ ROWS = {
     "deluge": Row("SILENT", link(STATE.SILENT, "sends far too much"), "link.deluge", ceases=True),
     "drop": Row("DOWN", link(STATE.DOWN, "closed the connection"), "link.down"),
     "jump": Row("motion", lambda s: "motion.foreign" in s.events, "motion.foreign"),
+    "corrupt": Row("SILENT", link(STATE.SILENT, "far beyond its limits"), "controller.joint_values"),
     "local": Row("mode LOCAL", lambda s: s.controller.mode == STATE.LOCAL, "controller.local"),
     "fault": Row("activity FAULT", lambda s: s.controller.activity == STATE.FAULT, "controller.fault"),
     "mute": Row("mode UNKNOWN", lambda s: s.controller.mode == STATE.MODE_UNKNOWN, "status.gone"),

@@ -24,7 +24,7 @@ from typing import Any
 
 import zenoh
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
-from latency import STEP_DEG, process, summary
+from latency import STEP_DEG, STEPS, process, summary
 from legacy_clients import serve_old_programs
 from plant import RATE_HZ, cpu_s, paced, rss_mib, running_controllers, running_site, until
 
@@ -188,7 +188,7 @@ def carry(robots: int, seconds: float) -> dict[str, Any]:
 def decoded(key: str, payload: bytes, at: int) -> tuple[int, int, int] | None:
     """Return the robot, the unit's number and its arrival; None for a unit from before the measurement."""
     joints = JointStates.FromString(payload).joints
-    k = round(joints[-1].position * DEGREES / STEP_DEG) + round(joints[0].position * DEGREES) * 10_000
+    k = round(joints[-1].position * DEGREES / STEP_DEG) + round(joints[0].position * DEGREES) * STEPS
     return (int(key.split("/")[2].removeprefix("arm-")), k, at) if k else None
 
 

@@ -1,36 +1,42 @@
 """How far the tool moves after a jog should have ended: the overrun, and the speed while the button is held.
 
 A site runs as real processes (router, gateway, simulated controller, kinematics, console), and the Robot page
-in a real Chromium, whose pointer holds a button of the Tool panel. The moment of the end and the joint states
-have the clock of this machine; the tool's path follows from the recorded joint states by forward kinematics.
+in a real Chromium, whose pointer holds a button of the Tool panel: a mouse, or what `--hands` names, by
+Chromium's input events. A proxy between gateway and controller logs each unit and when it passed, by this
+machine's clock, as that of the end. The tool's path follows from the logged positions by forward kinematics.
 
-    release   the pointer is released
+    release   the pointer is released            other     a second finger, or the second button
+    left      it moves 16 px outside of it       cancel    a gesture of the system ends a touch (touch only)
+    blur      another window comes to the front  dialog    a dialog opens
+    covered   something is before the button     wheel     the page scrolls the button away (mouse only)
+    scroll    the finger moves before it rested: nothing may move (touch and pen)
+    taps      20 quick taps of Step 5° of a joint: degrees, not mm, after the last tap
     frozen    a loop blocks the page's main thread
     paused    SIGSTOP of the browser's renderer process
     killed    SIGKILL of the browser with all its processes
     cut       a proxy between browser and console forwards nothing more, and closes nothing
 
-    ./dev run python benchmarks/jog.py [--only release,frozen,paused,killed,cut] [--runs 5]
-                                       [--speed slow,medium,fast] [--json]
+    ./dev run python benchmarks/jog.py [--only release,frozen,paused,killed,cut] [--hands mouse,touch,pen]
+                                       [--runs 5] [--speed slow,medium,fast] [--json]
 
 Bound: 150 ms at the jog's speed, the controller's braking, and the delays of page, console and gateway; never
-more than 10 mm beyond the position at which the gateway sent its last part.
+more than 10 mm beyond the position at which the gateway sent its last part. Taps: two steps.
 """
 
 import argparse
 import contextlib
 import json
 import os
+import re
 import signal
-import socket
 import statistics
 import subprocess
 import sys
 import tempfile
-import threading
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -43,15 +49,19 @@ if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[1])
 
 import robomesh
+from benchmarks.jog_wire import Proxy, UnitLog, rest_ms, until_rest
 from benchmarks.latency import service, until_connectable
 from robots.description import load
 from robots.model import build_model, tool_placement
 from tests.browser.conftest import ARGUMENTS, CHROMIUM, NO_WEBGL
+from tests.browser.hand import COVER, KINDS, SHOW_DIALOG, UNCOVER, Hand
 from tests.browser.robot_page import take
 from tests.conftest import free_port
 from web import build_page
 
+BY_HAND = ("release", "left", "other", "cancel", "blur", "dialog", "covered", "wheel", "scroll", "taps")
 ENDS = ("release", "frozen", "paused", "killed", "cut")
+ONLY_BY = {"cancel": ("touch",), "wheel": ("mouse",), "scroll": ("touch", "pen")}
 SPEEDS = {"slow": "10", "medium": "50", "fast": "250"}
 MODEL = "pt600"
 START_DEG = [-40.0, 90.0, -90.0, 10.0, 0.0]
@@ -59,6 +69,7 @@ START_DEG = [-40.0, 90.0, -90.0, 10.0, 0.0]
 BUTTON = "Base Y +"
 HOLD_S = 0.8
 REST_S = 1.5
+TAPPED, TAPS, TAP_EACH_S = "waist +5°", 20, 0.05
 BLOCK = """(ms) => { setTimeout(() => {
   window.blockedAt = Date.now();
   while (Date.now() < window.blockedAt + ms);
@@ -68,44 +79,53 @@ BLOCK = """(ms) => { setTimeout(() => {
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--only", default=",".join(ENDS))
+    parser.add_argument("--hands", default="mouse")
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--speed", default="fast")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
-    ends, speeds = options.only.split(","), options.speed.split(",")
-    if unknown := [each for each in ends if each not in ENDS] + [
-        each for each in speeds if each not in SPEEDS
+    ends, speeds, hands = options.only.split(","), options.speed.split(","), options.hands.split(",")
+    known = {*BY_HAND, *ENDS}, SPEEDS, KINDS
+    if unknown := [
+        each
+        for some, all_ in zip((ends, speeds, hands), known, strict=True)
+        for each in some
+        if each not in all_
     ]:
         parser.error(f"unknown: {', '.join(unknown)}")
     build_page.build()
     found: dict[str, Any] = {"load": os.getloadavg()[0], "runs": options.runs, "speeds": {}}
     with (
         tempfile.TemporaryDirectory() as folder,
-        running_services(Path(folder)) as (router, console),
+        UnitLog() as log,
+        running_services(Path(folder), log) as (router, console),
         Proxy(console) as proxy,
         robomesh.connect(router, timeout_s=20.0) as mesh,
-        Bench(mesh, proxy, options.runs) as bench,
+        Bench(mesh, proxy, log, options.runs) as bench,
     ):
         for speed in speeds:
             rows = found["speeds"][speed] = {}
-            for end in ends:
-                rows[end] = bench.measure(end, speed)
+            for end, hand in product(ends, hands):
+                if hand not in ONLY_BY.get(end, hands if end in BY_HAND else hands[:1]):
+                    continue
+                row = rows[f"{end} {hand}"] = bench.measure(end, speed, hand)
                 if not options.json:
-                    print(f"{speed:7}{end:9}{text_of(rows[end])}", flush=True)
+                    print(f"{speed:7}{end:9}{hand:7}{text_of(row)}", flush=True)
     if options.json:
         print(json.dumps(found))
 
 
 @contextlib.contextmanager
-def running_services(folder: Path) -> Iterator[tuple[str, str]]:
+def running_services(folder: Path, log: UnitLog) -> Iterator[tuple[str, str]]:
     """Run the services that a jog needs; yield the router's and the console's addresses."""
     router, controller, console = (free_port() for _ in range(3))
+    log.forward_to("127.0.0.1", controller)
     endpoint = f"tcp/127.0.0.1:{router}"
     site = folder / "site.toml"
     site.write_text(
         f'site = "test"\n[router]\nlisten = ["{endpoint}"]\n[audit]\nfolder = "{folder}/audit"\n'
         f'[console]\nlisten = "127.0.0.1:{console}"\n[[robot]]\nname = "arm"\nmodel = "{MODEL}"\n'
-        f'controller = "tcp://127.0.0.1:{controller}"\nstop_proven = true\n'
+        f'controller = "tcp://{log.address}"\nstop_proven = true\n'
     )
     program = [sys.executable, "-m", "services.command_line.main", "simulate", "--robot", MODEL]
     simulator = subprocess.Popen(
@@ -121,6 +141,7 @@ def running_services(folder: Path) -> Iterator[tuple[str, str]]:
             for role in ("gateway", "kinematics", "console"):
                 stack.enter_context(service(role, site, endpoint))
             until_connectable(console)
+            until_rest(log)  # the gateway is connected
             yield endpoint, f"http://127.0.0.1:{console}/"
     finally:
         simulator.terminate()
@@ -129,141 +150,136 @@ def running_services(folder: Path) -> Iterator[tuple[str, str]]:
 
 def text_of(row: dict[str, Any]) -> str:
     """Return a row for people."""
-    overruns = " ".join(f"{each:.1f}" for each in row["overruns_mm"])
+    overruns = " ".join(f"{each:.1f}" for each in row["overruns"])
     why = ", ".join(sorted(set(row["why"])))
+    speed = f", at {row['speed_mm_s']:.0f} mm/s" if row["speed_mm_s"] else ""
     return (
-        f"overrun {row['median_mm']:5.1f} mm ({overruns}), at {row['speed_mm_s']:.0f} mm/s"
-        f" (5 to 95 %: {row['slowest_mm_s']:.0f} to {row['fastest_mm_s']:.0f}); {why}"
+        f"overrun {row['median']:5.1f} {row['unit']} ({overruns}), at rest after {row['rest_ms']:.0f} ms"
+        f" (most {row['most_rest_ms']:.0f}){speed}; {why}"
     )
 
 
-class Proxy:
-    """A TCP proxy to the console, which can stop forwarding."""
+@dataclass(frozen=True)
+class Run:
+    """What the controller's log says of one hold.
 
-    def __init__(self, console: str) -> None:
-        host, _, port = console.removeprefix("http://").rstrip("/").partition(":")
-        self._to = host, int(port)
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.address = f"http://127.0.0.1:{self._listener.getsockname()[1]}/"
-        self.cut = False
-        self._sockets: list[socket.socket] = []
+    Attributes:
+        overrun: Way after the end [mm], or [degrees] of taps.
+        rest_ms: From the end to the last motion.
+        speeds: Of the tool before the end [mm/s].
+        why: The page's sentence.
+    """
 
-    def __enter__(self) -> "Proxy":
-        threading.Thread(target=self._accept, daemon=True).start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._listener.close()
-        for each in self._sockets:
-            each.close()
-
-    def _accept(self) -> None:
-        with contextlib.suppress(OSError):
-            while True:
-                near, _ = self._listener.accept()
-                far = socket.create_connection(self._to)
-                for each in (near, far):
-                    each.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                self._sockets += [near, far]
-                for one, other in ((near, far), (far, near)):
-                    threading.Thread(target=self._forward, args=(one, other), daemon=True).start()
-
-    def _forward(self, one: socket.socket, other: socket.socket) -> None:
-        with contextlib.suppress(OSError):
-            while data := one.recv(65536):
-                if not self.cut:
-                    other.sendall(data)
-            other.shutdown(socket.SHUT_WR)
-
-
-@dataclass
-class States:
-    """Joint states with the gateway's times, as they arrive."""
-
-    times_s: list[float] = field(default_factory=list)
-    positions: list[tuple[float, ...]] = field(default_factory=list)
-
-    def collect(self, robot: robomesh.Robot) -> None:
-        for state in robot.joints(buffer=1000, on_stale="yield"):
-            self.times_s.append(state.time.timestamp())
-            self.positions.append(state.positions)
+    overrun: float
+    rest_ms: float
+    speeds: np.ndarray
+    why: str
 
 
 class Bench:
     """The page of a robot, and its joint states."""
 
-    def __init__(self, mesh: robomesh.Mesh, proxy: Proxy, runs: int) -> None:
-        self._robot, self._proxy, self._runs = mesh.robot("arm"), proxy, runs
+    def __init__(self, mesh: robomesh.Mesh, proxy: Proxy, log: UnitLog, runs: int) -> None:
+        self._robot, self._proxy, self._log, self._runs = mesh.robot("arm"), proxy, log, runs
         self._model = build_model(load(MODEL))
-        self._states = States()
         self._stack = contextlib.ExitStack()
         self._browser: Browser | None = None
         self._page: Page | None = None
+        self._other: Page | None = None
 
     def __enter__(self) -> "Bench":
         self._playwright = self._stack.enter_context(sync_playwright())
-        threading.Thread(target=self._states.collect, args=(self._robot,), daemon=True).start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def measure(self, end: str, speed: str) -> dict[str, Any]:
+    def measure(self, end: str, speed: str, hand: str) -> dict[str, Any]:
         """Return the overruns of some runs, and the speeds before the end."""
-        overruns, speeds, whys = [], [], []
+        runs: list[Run] = []
         tries = 0
-        while len(overruns) < self._runs and tries < 4 * self._runs:
+        while len(runs) < self._runs and tries < 4 * self._runs:
             tries += 1
-            found = self._run(end, speed)
-            if found is None:
-                print(f"ended before: {self._why()}", file=sys.stderr)
-                continue
-            overrun, profile, why = found
-            overruns.append(overrun)
-            speeds.append(profile)
-            whys.append(why)
-        if not overruns:
+            self._to_start()
+            page = self._in_control(speed, hand)
+            run = self._taps(page) if end == "taps" else self._run(end, page)
+            if run is not None:
+                runs.append(run)
+        if not runs:
             raise SystemExit(f"{end}: every jog ended by itself: the machine is too busy")
-        together = np.concatenate(speeds)
+        together = np.concatenate([run.speeds for run in runs])
+        slowest, median, fastest = np.percentile(together, (5, 50, 95)) if len(together) else (0.0, 0.0, 0.0)
         return {
-            "overruns_mm": overruns,
-            "median_mm": statistics.median(overruns),
-            "speed_mm_s": float(np.median(together)),
-            "slowest_mm_s": float(np.percentile(together, 5)),
-            "fastest_mm_s": float(np.percentile(together, 95)),
-            "greatest_mm_s": float(together.max()),
-            "why": whys,
-            "ended_before": tries - len(overruns),
+            "unit": "°" if end == "taps" else "mm",
+            "overruns": [run.overrun for run in runs],
+            "median": statistics.median(run.overrun for run in runs),
+            "rest_ms": statistics.median(run.rest_ms for run in runs),
+            "most_rest_ms": max(run.rest_ms for run in runs),
+            "speed_mm_s": float(median),
+            "slowest_mm_s": float(slowest),
+            "fastest_mm_s": float(fastest),
+            "why": [run.why for run in runs],
+            "ended_before": tries - len(runs),
         }
 
-    def _run(self, end: str, speed: str) -> tuple[float, np.ndarray, str] | None:
-        """Jog, end it, and return overrun [mm], speeds [mm/s] and the reason; None: it ended before."""
-        self._to_start()
-        page = self._in_control(speed)
-        button = page.get_by_role("button", name=BUTTON, exact=True)
-        place = button.bounding_box()
-        assert place is not None
-        page.mouse.move(place["x"] + place["width"] / 2, place["y"] + place["height"] / 2)
+    def _run(self, end: str, page: Page) -> Run | None:
+        """Hold, and end it; None: it ended before, for on a busy machine a keep-alive was late."""
+        box = page.get_by_role("button", name=BUTTON, exact=True).bounding_box()
+        assert box is not None
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
         pressed_s = time.time()
-        page.mouse.down()
-        time.sleep(HOLD_S)
-        ended_s = self._end(end, page)
+        self._hand.press(x, y)
+        if end == "scroll":
+            ended_s = time.time()
+            for moved in range(4, 120, 4):
+                self._hand.move(x, y - moved)
+        else:
+            time.sleep(HOLD_S)
+            ended_s = self._end(end, page, box)
         time.sleep(REST_S)
+        why = "nothing began" if end == "scroll" else self._why(end, page)
         with contextlib.suppress(Exception):
             if end not in ("killed", "paused"):
-                page.mouse.up()
-        times, path = self._tool_path(pressed_s)
-        why = self._why()
+                self._hand.lift()
+        times, positions = self._log.positions_since(pressed_s - 0.1)
         self._recover(end, page)
-        moving = np.linalg.norm(np.diff(path, axis=0), axis=1) / np.maximum(np.diff(times), 1e-6)
+        path = np.array([tool_placement(self._model, each)[:3, 3] for each in positions])
+        ways = np.linalg.norm(np.diff(path, axis=0), axis=1)
+        moving = ways / np.maximum(np.diff(times), 1e-6)
         at_end = moving[max(int(np.searchsorted(times, ended_s)) - 12, 0) :][:10]
-        if not len(at_end) or at_end.mean() < 1e-3:
-            return None  # on a busy machine a keep-alive was late
-        after = path[times >= ended_s - 0.005]
-        overrun = float(np.linalg.norm(np.diff(after, axis=0), axis=1).sum()) * 1000
+        by_itself = end in BY_HAND and re.search("late by|busy for|no keep-alive", why)
+        if by_itself or (end != "scroll" and (not len(at_end) or at_end.mean() < 1e-3)):
+            print(f"ended before: {why}", file=sys.stderr)
+            return None
         begun = times[1:][moving > 1e-3]
+        if end == "scroll" and len(begun):
+            why = "the arm moved"
         steady = (times[1:] > begun[0] + 0.25) & (times[1:] < ended_s) if len(begun) else np.zeros(0, bool)
-        return overrun, self._smoothed(times, path)[steady] * 1000, why
+        speeds = self._smoothed(times, path)[steady] * 1000 if len(begun) else np.zeros(0)
+        return Run(
+            1000 * float(ways[times[1:] > ended_s].sum()), rest_ms(times, moving > 1e-3, ended_s), speeds, why
+        )
+
+    def _taps(self, page: Page) -> Run:
+        """Tap a joint's step quickly; the overrun is what the joint turns after the last tap."""
+        page.locator(".panel.joints").get_by_role("button", name="5", exact=True).click()
+        box = page.get_by_role("button", name=TAPPED, exact=True).bounding_box()
+        assert box is not None
+        time.sleep(1.0)  # a control that has just moved ignores presses
+        begun_s = time.time()
+        for _ in range(TAPS):
+            self._hand.press(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+            self._hand.lift()
+            time.sleep(TAP_EACH_S)
+        ended_s = time.time()
+        until_rest(self._log)
+        times, positions = self._log.positions_since(begun_s - 0.1)
+        turned = np.degrees(np.array(positions)[:, 0])
+        taken = self._log.count(b"RELATIVE.DEG", since_s=begun_s)
+        after = float(turned[-1] - np.interp(ended_s, times, turned))
+        moving = np.abs(np.diff(turned)) > 1e-3
+        why = f"{turned[-1] - turned[0]:.1f}° by {taken} of {TAPS} taps"
+        return Run(after, rest_ms(times, moving, ended_s), np.zeros(0), why)
 
     @staticmethod
     def _smoothed(times: np.ndarray, path: np.ndarray) -> np.ndarray:
@@ -273,20 +289,11 @@ class Bench:
         speeds: np.ndarray = ((way - before) / 0.05)[1:]
         return speeds
 
-    def _tool_path(self, since_s: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return times (m,) and tool positions (m, 3) [m] since a time."""
-        count = len(self._states.positions)
-        times = np.array(self._states.times_s[:count])
-        chosen = times >= since_s - 0.1
-        positions = [
-            each for each, is_in in zip(self._states.positions[:count], chosen, strict=True) if is_in
-        ]
-        return times[chosen], np.array(
-            [tool_placement(self._model, np.array(each))[:3, 3] for each in positions]
-        )
-
-    def _why(self) -> str:
-        """Return the gateway's reason for the end of the newest jog."""
+    def _why(self, end: str, page: Page) -> str:
+        """Return the page's sentence about the end; of a page that is gone or cut off, the gateway's."""
+        if end not in ("killed", "paused", "cut"):
+            text = page.locator(".panel.tool").get_by_label("Outcome", exact=True).inner_text()
+            return text.rpartition("Ended: ")[2].rstrip(".")
         last = self._robot.last("events")
         events = [] if last is None else last.message.events
         for event in reversed(events):
@@ -294,11 +301,22 @@ class Bench:
                 return str(event.reason.causes[0].text)
         return "not ended"
 
-    def _end(self, end: str, page: Page) -> float:
+    def _end(self, end: str, page: Page, box: Any) -> float:
         """End the hold; return when, on this machine's clock."""
-        if end == "release":
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        by_hand: dict[str, Callable[[], object]] = {
+            "release": self._hand.lift,
+            "left": lambda: self._hand.move(x, box["y"] - 16),
+            "other": lambda: self._hand.press_another(x - 300, y),
+            "cancel": self._hand.cancel,
+            "blur": lambda: self._other and self._other.bring_to_front(),
+            "dialog": lambda: page.evaluate(SHOW_DIALOG),
+            "covered": lambda: page.evaluate(COVER, box),
+            "wheel": lambda: page.mouse.wheel(0, 200),
+        }
+        if end in by_hand:
             at = time.time()
-            page.mouse.up()
+            by_hand[end]()
             return at
         if end == "frozen":
             page.evaluate(BLOCK, int(REST_S * 1000))
@@ -326,7 +344,10 @@ class Bench:
             with contextlib.suppress(Exception):
                 assert self._browser is not None
                 self._browser.close()
-            self._browser = self._page = None
+            self._browser = self._page = self._other = None
+        else:
+            page.evaluate(UNCOVER)
+            page.bring_to_front()
 
     def _processes(self) -> list[psutil.Process]:
         """Return the browser's processes, the first one first: they are children of Playwright's driver."""
@@ -338,6 +359,7 @@ class Bench:
 
     def _to_start(self) -> None:
         """Put the arm at the start, without a latched stop."""
+        until_rest(self._log)
         with self._robot.control("bench", take="next run") as arm:
             state = self._robot.last("controller")
             if state is not None and state.message.HasField("stop"):
@@ -347,17 +369,22 @@ class Bench:
                 arm.home()
             arm.move_joints_deg(START_DEG)
 
-    def _in_control(self, speed: str) -> Page:
+    def _in_control(self, speed: str, hand: str) -> Page:
         """Return the page, in control, with the panel set to hold."""
         if self._page is None:
             self._browser = self._playwright.chromium.launch(
                 executable_path=CHROMIUM, args=ARGUMENTS, handle_sigint=False
             )
-            self._page = self._browser.new_page(viewport={"width": 1440, "height": 900})
+            context = self._browser.new_context(viewport={"width": 1440, "height": 900})
+            self._page, self._other = context.new_page(), context.new_page()
             # Drawing 3-D by the processor would block the page for longer than a keep-alive.
             self._page.add_init_script(NO_WEBGL)
             self._page.goto(f"{self._proxy.address}#/test/arm")
         page = self._page
+        self._hand = Hand(page, hand)
+        self._hand.focus_is_real(True)
+        page.bring_to_front()
+        page.wait_for_function("() => document.hasFocus()")
         take(page, "bench", slow=False)
         panel = page.locator(".panel.tool")
         for name in ("Base", "Jog", SPEEDS[speed]):

@@ -36,6 +36,8 @@ from robots.joints import joints_of
 RATE_HZ = 100
 # The counter is in the last joint, in steps that the protocol's text carries exactly.
 STEP_DEG = 0.01
+# The last joint goes back by 50 degrees then: the gateway shows no step that no drive can make.
+STEPS = 5_000
 
 
 def main() -> None:
@@ -137,7 +139,7 @@ async def take_joints(joints: Subscription, states: dict[int, int], sources: dic
         at = time.monotonic_ns()
         k = round(message.joints[-1].position * 180 / 3.141592653589793 / STEP_DEG)
         if k > 0:
-            k += round(message.joints[0].position * 180 / 3.141592653589793) * 10_000
+            k += round(message.joints[0].position * 180 / 3.141592653589793) * STEPS
             states[k] = at
             sources[sample.header.source_time_ns] = k
 
@@ -170,7 +172,7 @@ def controller_process(port: int, written: Any, units: int, go: Any) -> None:
         begun = time.monotonic()
         for k in range(1, units + 1):
             wait(begun + k / RATE_HZ)
-            turns, steps = divmod(k, 10_000)
+            turns, steps = divmod(k, STEPS)
             unit = f"1#ABSOLUTE.DEG*{turns}.00;{';'.join(middle)};{steps * STEP_DEG:.2f}@".encode()
             written[k] = time.monotonic_ns()
             client.sendall(unit)
@@ -224,7 +226,11 @@ def service(role: str, site: Path, endpoint: str) -> Iterator[subprocess.Popen[b
         yield running
     finally:
         running.terminate()
-        running.wait(10)
+        try:
+            running.wait(10)
+        except subprocess.TimeoutExpired:  # a backlog, which the figures show
+            running.kill()
+            running.wait()
 
 
 @contextlib.contextmanager

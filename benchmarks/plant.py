@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from latency import STEP_DEG, free_port, process, service, until_connectable, wait
+from latency import STEP_DEG, STEPS, free_port, process, service, until_connectable, wait
 
 RATE_HZ = 100
 # The units of a period leave in this many groups, a millisecond apart: a sleep costs as much as a unit.
@@ -61,14 +61,14 @@ def running_controllers(
 
 def unit_of(k: int) -> bytes:
     """Return a unit of five joints that carries a number: positions only, as the original controllers do."""
-    turns, steps = divmod(k, 10_000)
+    turns, steps = divmod(k, STEPS)
     return f"1#ABSOLUTE.DEG*{turns}.00;0.00;0.00;0.00;{steps * STEP_DEG:.2f}@".encode()
 
 
 def number_of(unit: bytes) -> int:
     """Return the number that a unit carries, with or without its "@"."""
     values = unit.partition(b"*")[2].rstrip(b"@").split(b";")
-    return round(float(values[0])) * 10_000 + round(float(values[-1]) / STEP_DEG)
+    return round(float(values[0])) * STEPS + round(float(values[-1]) / STEP_DEG)
 
 
 def controllers(ports: Any, written: Any, units: int, go: Any, unit_bytes: int) -> None:

@@ -5,6 +5,7 @@ import gc
 import logging
 from collections.abc import Mapping, Sequence
 from contextlib import AsyncExitStack
+from functools import partial
 
 from protocol_gateway.cell_changes import CellChanges, CellsOfGateway
 from protocol_gateway.checking.cell_occupancy import CellOccupancy
@@ -14,7 +15,10 @@ from protocol_gateway.link.metrics import measure_links
 from protocol_gateway.robot import Robot
 from protocol_gateway.settings import RobotSettings, Settings, check
 from protocol_gateway.signals import measure_signals
+from robomesh import reason_codes as codes
+from robomesh.loop_turns import turns_of
 from robomesh.quotas import Quota
+from robomesh.schemas.robomesh_pb2 import Event
 from robomesh.session import Session
 
 __all__ = ["RobotSettings", "Settings", "serve"]
@@ -66,6 +70,8 @@ async def serve(session: Session, settings: Settings) -> None:
         gc.collect()
         gc.freeze()
         stack.callback(gc.unfreeze)
+        await asyncio.sleep(0)  # the start itself is a long turn
+        turns_of(asyncio.get_running_loop()).on_long = partial(_report_long_turn, by_name)
         async with asyncio.TaskGroup() as tasks:
             for checker in {*checkers.values(), *planners.values()}:
                 tasks.create_task(checker.run())
@@ -101,6 +107,15 @@ def _cells(
         )
         found |= dict.fromkeys(own, cell)
     return found
+
+
+def _report_long_turn(robots: Mapping[str, Robot], took_s: float, what: object) -> None:
+    """Report a long turn at the robot with the controller that caused it, or at the first one."""
+    robot = next((name for name, each in robots.items() if each.link is what), "")
+    work = f"the controller of {robot}" if robot else what
+    reason = codes.GATEWAY_OCCUPIED(work=work, seconds=took_s)
+    at = robots[robot] if robot else next(iter(robots.values()))
+    at.journal.report(Event.WARNING, reason.code, reason.text, why=reason, seconds=f"{took_s:.3f}")
 
 
 def _measure_robots(session: Session, robots: Mapping[str, Robot]) -> None:

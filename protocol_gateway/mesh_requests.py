@@ -5,7 +5,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
+from google.protobuf.message import Message
+
 from protocol_gateway.audit.entry import Entry, Outcome
+from protocol_gateway.clocks import read_clocks
 from protocol_gateway.control.control import Control
 from protocol_gateway.control.deadlines import set_deadline
 from protocol_gateway.control.entries import MESH, entry_of
@@ -44,7 +47,9 @@ class MeshRequests:
         audit: Callable[[Entry], None],
     ) -> None:
         self._control, self._programs, self._jogs, self._audit = control, programs, jogs, audit
-        self._stops = session.answer(site, robot, "stop", self._answer_stop)
+        self._stops = session.answer(
+            site, robot, "stop", self._answer_stop, recall=control.answer_to_repeated_stop
+        )
 
         def answer(name: str, handler: Handler, what: str) -> Answerer:
             refused = partial(self._record_refused, what)
@@ -62,9 +67,14 @@ class MeshRequests:
         for each in (self._stops, *self._answerers):
             each.close()
 
-    def record_turned_away(self) -> None:
-        """Write the number of requests that were rejected because too many waited into the audit log."""
-        turned_away = sum(each.turned_away for each in self._answerers)
+    def record_counted(self) -> None:
+        """Write the numbers of repeated stops and of requests without a place into the audit log."""
+        if (repeated := self._stops.take_repeated()) is not None:
+            count, newest, answer = repeated
+            assert isinstance(answer, schema.StopAnswer)
+            by, reason = _by_and_reason(newest)
+            self._control.record_repeated_stops(count, answer.stop_id, by=by, reason=reason, source=MESH)
+        turned_away = sum(each.turned_away for each in (self._stops, *self._answerers))
         if more := turned_away - self._turned_away:
             self._turned_away = turned_away
             self._record_refused("REQUESTS", "", codes.TURNED_AWAY(), repeated=more - 1)
@@ -72,9 +82,8 @@ class MeshRequests:
     async def _answer_stop(self, request: Request) -> schema.StopAnswer:
         message = request.message
         assert isinstance(message, schema.StopRequest)
-        # A stop is never refused because of its texts.
-        by, reason = one_line(message.by).strip(), one_line(message.reason).strip()
-        return self._control.stop(by=by or "somebody", reason=reason, source=MESH, page=message.page)
+        by, reason = _by_and_reason(message)
+        return self._control.stop(by=by, reason=reason, source=MESH, page=message.page)
 
     async def _answer_lease(self, request: Request) -> schema.LeaseAnswer:
         message = request.message
@@ -86,7 +95,7 @@ class MeshRequests:
         message = request.message
         assert isinstance(message, schema.CommandRequest)
         operator = self._operator(_COMMAND, request)
-        set_deadline(message, request)
+        set_deadline(message, request, read_clocks())
         if message.HasField("recover"):
             message.recover.reason = one_line(message.recover.reason, LONGEST_TEXT).strip()
         if message.command == schema.CommandRequest.RUN_PROGRAM:
@@ -133,3 +142,9 @@ class MeshRequests:
             why=why,
         )
         self._audit(replace(entry, repeated=repeated))
+
+
+def _by_and_reason(message: Message) -> tuple[str, str]:
+    """Return the sender and the reason of a stop, which is never refused because of its texts."""
+    assert isinstance(message, schema.StopRequest)
+    return one_line(message.by).strip() or "somebody", one_line(message.reason).strip()

@@ -14,11 +14,12 @@ from protocol_gateway.audit.entry import audit_entry
 from protocol_gateway.audit.log import AuditLog, Entry
 from protocol_gateway.audit.persisted_state import ROTATE
 from protocol_gateway.audit.search import Query, SearchServer, find
-from protocol_gateway.authority.lease_rules import Authority, Now
+from protocol_gateway.authority.lease_rules import Authority
 from protocol_gateway.authority.preconditions import Controller
 from protocol_gateway.checking.cell_occupancy import CellOccupancy
 from protocol_gateway.checking.checker import Checker
 from protocol_gateway.checking.policy import Policy
+from protocol_gateway.clocks import read_clocks
 from protocol_gateway.control import events
 from protocol_gateway.control.audit_trail import AuditTrail
 from protocol_gateway.control.checks import Checks
@@ -32,7 +33,14 @@ from protocol_gateway.drivers.registry import driver_maker
 from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.journal import Journal
 from protocol_gateway.legacy.clients import LegacyClients
-from protocol_gateway.link.link import JOINT_COUNT, ControllerLink, LinkSettings, LinkState, LinkStatus
+from protocol_gateway.link.link import (
+    JOINT_COUNT,
+    JOINT_VALUES,
+    ControllerLink,
+    LinkSettings,
+    LinkState,
+    LinkStatus,
+)
 from protocol_gateway.link.status import transition_events
 from protocol_gateway.mesh_requests import MeshRequests
 from protocol_gateway.proofs import Proofs
@@ -154,10 +162,12 @@ class Robot:
                 reconnect_after_s=settings.reconnect_after_s,
             ),
             driver,
+            joints,
             on_event=self._telemetry.on_event,
             on_status=self._on_link,
             on_channel=self._on_channel,
             on_fate_unknown=lambda why: self._control.handle(events.FateUnknown(why)),
+            tolerates=self._tolerates,
         )
         self._missing_channels: set[str] = set()
         self._link_status = self._link.status
@@ -175,6 +185,7 @@ class Robot:
             publish=self._publish_state,
             confirm_set_up=self._signals.confirm,
             controlled=self._link.controlled,
+            other_gateway=self._other_gateway,
         )
         self._checks = Checks(
             settings.name,
@@ -227,6 +238,10 @@ class Robot:
         )
         session.answer(site, settings.name, "audit/find", SearchServer(audit_path).answer)
         self._operators = session.watch_presence(presence_key(site, settings.name, Role.OPERATOR.value, "*"))
+        self._gateways = session.watch_presence(presence_key(site, settings.name, Role.GATEWAY.value, "*"))
+        self._identity = session.identity
+        # Ids of other gateways that serve this robot.
+        self._others: set[str] = set()
         self._report_startup()
 
     def _persisted_authority(self) -> Authority:
@@ -318,9 +333,8 @@ class Robot:
         self._control.handle(
             events.LinkRestored()
         )  # no link yet, but the failed send makes it connect without pauses
-        link = asyncio.create_task(self._keep_running(self._link.run))
-        sessions = asyncio.create_task(self._keep_running(self._watch_sessions))
-        set_up = asyncio.create_task(self._keep_running(self._keep_set_up))
+        works = (self._link.run, self._watch_sessions, self._watch_gateways, self._keep_set_up)
+        tasks = [asyncio.create_task(self._keep_running(work)) for work in works]
         try:
             await self._keep_running(self._poll)
         finally:
@@ -328,10 +342,9 @@ class Robot:
                 # Before the link ends, because the stop is sent over it.
                 self._control.handle(events.LeaseEnded(codes.ENDED_GATEWAY()))
             finally:
-                link.cancel()
-                sessions.cancel()
-                set_up.cancel()
-                await asyncio.gather(link, sessions, set_up, return_exceptions=True)
+                for task in tasks:
+                    task.cancel()
+                await asyncio.gather(*tasks, return_exceptions=True)
 
     async def close(self) -> None:
         """Disconnect old client programs, write pending entries, and close the audit log."""
@@ -339,9 +352,10 @@ class Robot:
             await self._legacy.close()
         await self._jogs.close()
         await self._programs.close()
-        await self._control.close()
         # Stop answering before the audit log closes, so that every answer has an entry.
         self._requests.close()
+        self._requests.record_counted()
+        await self._control.close()
         await self._audit.close()
 
     async def _keep_running(self, work: Callable[[], Awaitable[None]]) -> None:
@@ -372,6 +386,7 @@ class Robot:
     async def _poll(self) -> None:
         next_s = 0.0
         while True:
+            self._control.arrivals.runs(time.monotonic())
             await asyncio.sleep(_POLL_S)
             self._control.handle(events.TimePassed())
             now_s = time.monotonic()
@@ -381,7 +396,7 @@ class Robot:
             if now_s >= next_s:
                 next_s = now_s + _HEARTBEAT_S
                 self._publish_state()
-                self._requests.record_turned_away()
+                self._requests.record_counted()
                 self._audit_trail.write_pending()
 
     async def _watch_sessions(self) -> None:
@@ -389,6 +404,18 @@ class Robot:
         async for who, alive in self._operators:
             if not alive:
                 self._control.handle(events.SessionEnded(who.id))
+
+    async def _watch_gateways(self) -> None:
+        """Follow which other gateways serve this robot."""
+        async for who, alive in self._gateways:
+            if who.id != self._identity:
+                (self._others.add if alive else self._others.discard)(who.id)
+
+    def _other_gateway(self) -> Reason | None:
+        """Return why another gateway forbids control: each refuses what the other one grants and sends."""
+        if not self._others:
+            return None
+        return codes.GATEWAY_TWICE(robot=self._settings.name, id=min(self._others))
 
     # ------------------------------------------------------------------ state
 
@@ -403,8 +430,8 @@ class Robot:
         before, self._link_status = self._link_status, status
         if status.state is LinkState.DOWN:
             self._telemetry.forget()
-        elif status.code == JOINT_COUNT:
-            self._telemetry.forget_positions()
+        elif status.code in (JOINT_COUNT, JOINT_VALUES):
+            self._telemetry.invalidate_positions(other_robot=status.code == JOINT_COUNT)
         for event in transition_events(before, status):
             self._journal.report(event.severity, event.code, event.text, why=event.reason)
         if before.state is not status.state:
@@ -451,6 +478,15 @@ class Robot:
     def _joints_unproven(self) -> Reason | None:
         return self._telemetry.undeclared_axes or self._proofs.joints_unproven(self._telemetry.software)
 
+    def _tolerates(self, why: Reason) -> bool:
+        """Publish positions of unproven joints that cannot be, marked: their comparison shows the reason."""
+        if self._joints_unproven() is None or why.code == codes.JOINT_NO_NUMBER.name:
+            if self._legacy is not None:
+                self._legacy.discard_states()
+            return False
+        self._telemetry.mark_invalid(why, time.monotonic())
+        return True
+
     def _on_activity(self, activity: Activity | None, dated_s: float) -> None:
         self._control.handle(events.StatusReported(activity, dated_s))
 
@@ -487,6 +523,7 @@ class Robot:
             positions=self._telemetry.positions(now_s) if unproven is None else None,
             positions_stale=self._no_joints or self._telemetry.positions_stale(now_s),
             unproven=unproven,
+            invalid=self._telemetry.invalid(now_s),
             software=software,
             software_unknown=self._proofs.software_unknown(software),
             reports_set_up=self._signals.has_set_up,
@@ -500,7 +537,7 @@ class Robot:
         )
 
     def _publish_state(self) -> None:
-        now = Now(time.monotonic(), time.time_ns())
+        now = read_clocks()
         last = self._link.last_received
         authority = self._control.authority
         self._controller_topic.put(

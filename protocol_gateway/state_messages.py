@@ -188,6 +188,8 @@ def _link_reasons(controller: Controller) -> list[Reason]:
         reasons.append(controller.positions_stale)
     if controller.unproven is not None and controller.link.state is LinkState.UP:
         reasons.append(controller.unproven)
+        if controller.invalid is not None:
+            reasons.append(controller.invalid)
     if controller.read_only is not None:
         reasons.append(codes.READ_ONLY(controller.read_only))
     return reasons
@@ -195,7 +197,7 @@ def _link_reasons(controller: Controller) -> list[Reason]:
 
 def lease_state(authority: Authority, now: Now) -> schema.Lease:
     """Return the public lease state, without the secret."""
-    message = schema.Lease(timestamp=timestamp(now.wall_ns))
+    message = schema.Lease(timestamp=timestamp(now.gateway_ns))
     if authority.ended is not None:
         message.ended = authority.ended.text
         message.ended_reason.CopyFrom(reason_message(authority.ended))
@@ -213,7 +215,7 @@ def lease_state(authority: Authority, now: Now) -> schema.Lease:
 
 def lease_answer(lease: Lease | None, now: Now) -> schema.LeaseAnswer:
     """Return the answer to the lease's holder, with the secret; without a lease, only the gateway's time."""
-    message = schema.LeaseAnswer(now=timestamp(now.wall_ns))
+    message = schema.LeaseAnswer(now=timestamp(now.gateway_ns))
     if lease is not None:
         message.lease = lease.secret
         message.holder = lease.holder

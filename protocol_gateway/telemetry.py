@@ -123,6 +123,7 @@ class Telemetry:
         self._activity_since_s = 0.0
         self._positions: tuple[tuple[float, ...], float] | None = None  # with their time
         self._fault = ""
+        self._invalid: tuple[Reason, float] | None = None  # with the time of the newest such positions
         self._lost = (False, False)
         self._joints_notice, self._status_notice, self._stop_notice = _Notice(), _Notice(), _Notice()
         self.controller_time_s: float | None = None
@@ -132,11 +133,30 @@ class Telemetry:
         self.motion_detector.forget()
         self._signals.forget()
 
-    def forget_positions(self) -> None:
-        """Mark the positions as stale: the controller may belong to another robot now."""
+    def invalidate_positions(self, *, other_robot: bool) -> None:
+        """Mark the positions as stale.
+
+        Args:
+            other_robot: The controller may belong to another robot now. Otherwise an arm that is elsewhere
+                afterwards has moved.
+        """
         if self._positions is not None:
             self._positions = self._positions[0], float("-inf")
-        self.motion_detector.forget()
+        if other_robot:
+            self.motion_detector.forget()
+
+    def mark_invalid(self, why: Reason, now_s: float) -> None:
+        """Note that positions cannot be the arm's, although they are published."""
+        first = self.invalid(now_s)
+        self._invalid = first or codes.JOINTS_INVALID(why), now_s
+        if first is None:
+            self._on_status()
+
+    def invalid(self, now_s: float) -> Reason | None:
+        """Return why newly published positions cannot be the arm's; None: they can."""
+        if self._invalid is None or now_s - self._invalid[1] >= self._stale_after_s:
+            return None
+        return self._invalid[0]
 
     def positions(self, now_s: float) -> tuple[float, ...] | None:
         """Return the newest positions [rad] or [m]; None: none since the link came up, or stale."""

@@ -4,7 +4,6 @@ Reads triangles, node placements, base colours, roughness and metalness, but no 
 animations: a link is one rigid, painted body. Source: glTF 2.0, Khronos Group.
 """
 
-import json
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import GlbError
+from robomesh import bounded_json
 from robots.meshes.mesh import Y_UP_TO_Z_UP
 
 _MAGIC = 0x46546C67
@@ -85,8 +85,8 @@ def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
         body = data[at + 8 : at + 8 + size]
         if kind == _JSON_CHUNK:
             try:
-                document = json.loads(body)
-            except ValueError as error:
+                document = bounded_json.loads(body)
+            except (ValueError, RecursionError) as error:
                 raise GlbError(f"the GLB's JSON chunk is invalid: {error}") from None
         elif kind == _BINARY_CHUNK:
             binary = body

@@ -11,10 +11,9 @@ from renderer.appearance import Appearance
 from renderer.errors import UnknownViewError, ViewRequestError
 from renderer.views import camera_from, camera_of, view_names
 from robomesh import reason_codes as codes
+from robomesh.keys import FAR
 from robomesh.schemas.robomesh_pb2 import View, ViewRequest
 
-# Name of the view for slow links.
-FAR = "far"
 IMAGE_HZ = 5.0
 _FAR_SIZE, _FAR_FPS, _FAR_BITS_PER_S = (640, 360), 15.0, 250e3
 

@@ -17,6 +17,7 @@ from renderer.appearance import Appearance, home_placements
 from renderer.clearance_line import ClearanceLine, line_of, same_line
 from renderer.overlay import Overlay, Row
 from robomesh.activity import activity_words
+from robomesh.enum_names import enum_word
 from robomesh.schemas.robomesh_pb2 import ControllerState, Description, KinematicState
 from robomesh.topics import stale_after_s
 
@@ -261,9 +262,9 @@ def _state_words(controller: ControllerState | None) -> str:
     if controller is None:
         return ""
     if controller.link != ControllerState.UP:
-        link = ControllerState.Link.Name(controller.link)
-        return f"controller {link.lower()}"
-    words = [activity_words(controller), ControllerState.Mode.Name(controller.mode).lower()]
+        link = enum_word(ControllerState.Link, controller.link)
+        return f"controller {link}"
+    words = [activity_words(controller), enum_word(ControllerState.Mode, controller.mode)]
     known = [word for word in words if not word.endswith(("unknown", "unspecified"))]
     if controller.HasField("stop"):
         known.insert(0, "stop request latched")
@@ -274,9 +275,8 @@ def _time(source_time_ns: int, *, dated: bool) -> str:
     if not source_time_ns:
         return ""
     local = datetime.fromtimestamp(source_time_ns * 1e-9, tz=UTC).astimezone()
-    return (
-        f"{local:%Y-%m-%d} " if dated else ""
-    ) + f"{local:%H:%M:%S}.{local.microsecond // 100_000} {local:%Z}"
+    date, _, time = local.isoformat(" ", "milliseconds").partition(" ")
+    return f"{f'{date} ' if dated else ''}{time[:10]}{time[12:]}"  # tenths
 
 
 def _row(joint: Description.Joint, position: float) -> Row:

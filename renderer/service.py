@@ -20,16 +20,16 @@ from renderer.encoding_threads import EncodingThread, EncodingThreads, thread_co
 from renderer.errors import NoRoomError, RendererError, UnknownViewError, ViewError
 from renderer.frame_scheduler import FrameScheduler, next_view
 from renderer.post_processing import EncodedPicture, PictureJob, PostProcessor
-from renderer.requested_views import FAR, ViewSpec, low_rate_view, requested_view, standard_view
+from renderer.requested_views import ViewSpec, low_rate_view, requested_view, standard_view
 from renderer.robot_state import Ages, RobotState
 from renderer.robots import Robots
 from renderer.stream import Stream
 from renderer.studio import Drawn, Studio, open_thread
 from renderer.view_budget import ViewBudget
-from renderer.views import CLOSE, FREE, camera_of, view_names
+from renderer.views import camera_of, view_names
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
-from robomesh.keys import WHOLE_SITE
+from robomesh.keys import CLOSE, FAR, FREE, WHOLE_SITE
 from robomesh.quotas import DEFAULT_QUOTAS, Quota, Quotas
 from robomesh.schemas.robomesh_pb2 import Event, KeyFrameAnswer, ViewAnswer, ViewRequest
 from robomesh.server import Answerer, Request

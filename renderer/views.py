@@ -12,13 +12,11 @@ from renderer.appearance import Appearance, frame_placements, home_placements
 from renderer.cameras import FIELD_OF_VIEW, Camera, fitted
 from renderer.errors import CameraError, UnknownViewError
 from robomesh import reason_codes as codes
+from robomesh.keys import CLOSE, FREE
 from robomesh.schemas.robomesh_pb2 import Vector3, View
 
 FloatArray = NDArray[np.float64]
 
-FREE = "free"
-# A view that follows the arm and has no texts, for the small pictures of a list.
-CLOSE = "close"
 ASPECT = 16.0 / 9.0
 
 # From the front right and a little above: waist, shoulder and elbow are visible.

@@ -1,5 +1,6 @@
 """Words for what a robot does, as its controller and its gateway report it."""
 
+from robomesh.enum_names import enum_word
 from robomesh.schemas.robomesh_pb2 import ControllerState
 
 # In these states, a robot does not move by itself even if a program runs.
@@ -8,7 +9,7 @@ _RESTS = frozenset({ControllerState.HOLDING, ControllerState.STOPPED, Controller
 
 def activity_words(state: ControllerState) -> str:
     """Return what a robot does, in lower case: "idle", "moving", "running, waits 0.4 s"."""
-    activity = ControllerState.Activity.Name(state.activity).lower().removeprefix("activity_")
+    activity = enum_word(ControllerState.Activity, state.activity)
     if not state.HasField("program") or state.HasField("stop") or state.activity in _RESTS:
         return activity
     if state.program.held:

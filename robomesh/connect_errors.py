@@ -6,6 +6,7 @@ Python's TLS, which reports the reason.
 
 import socket
 import ssl
+from collections.abc import Iterable
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -65,6 +66,11 @@ def left_s(file: Path, at_first: datetime) -> float:
         identity = None
     expires = at_first if identity is None or identity.expires is None else identity.expires
     return (expires - datetime.now(UTC)).total_seconds()
+
+
+def refusal_of_routers(endpoints: Iterable[str], tls: Tls | None) -> str | None:
+    """Return why the first reachable router refuses the connection; None: unknown."""
+    return next((reason for each in endpoints if (reason := refusal_of_router(each, tls))), None)
 
 
 def refusal_of_router(endpoint: str, tls: Tls | None) -> str | None:

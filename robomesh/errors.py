@@ -2,6 +2,7 @@
 
 RobomeshError
 ├── SessionError            a session that cannot be opened with its settings
+│   └── ForkedError         a session of the process from which this one was forked
 ├── NoAnswerError           a request without an answer in time
 │   └── BrokenAnswerError   a long answer that ended early
 └── CodedError              an error with a reason of the table
@@ -26,6 +27,10 @@ class RobomeshError(Exception):
 
 class SessionError(RobomeshError):
     """A session that cannot be opened with its settings."""
+
+
+class ForkedError(SessionError):
+    """A session of the process from which this one was forked; open one here."""
 
 
 class CodedError(RobomeshError):

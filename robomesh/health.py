@@ -14,6 +14,7 @@ import psutil
 
 from robomesh.clock import answer_clock
 from robomesh.keys import WHOLE_SITE
+from robomesh.loop_turns import MeasuredLoop
 from robomesh.publisher import Publisher
 from robomesh.schemas.robomesh_pb2 import ServiceHealth
 from robomesh.session import Session
@@ -50,6 +51,10 @@ async def present(
         SessionError: If the metrics cannot be served at their address.
     """
     health = _Health(session, served, zenoh_id)
+    if isinstance(loop := asyncio.get_running_loop(), MeasuredLoop):
+        turns = loop.turns
+        session.measure("longest_turn_seconds", "Longest turn of the event loop, lately", turns.longest_s)
+        session.measure("long_turns_total", "Turns of the event loop above 50 ms", lambda: turns.long_turns)
     if served.metrics is not None:
         from robomesh.metrics import serve_metrics  # Prometheus's client takes 0.1 s to import
 

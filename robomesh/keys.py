@@ -21,6 +21,12 @@ _REPLAY = "replay-"
 
 # Characters of a site's or robot's name, and of any other chunk of a key.
 LONGEST_NAME, LONGEST_CHUNK = 64, 200
+# Of a whole key; no topic or request comes near it.
+LONGEST_KEY = 1024
+
+FREE, CLOSE, FAR = "free", "close", "far"
+"""Views that every renderer has besides those of the robot's description: `close` follows the arm and has no
+texts, for the small pictures of a list; `far` is for slow links."""
 
 _NAME = re.compile(r"[a-z0-9][a-z0-9_-]*")
 # Names of operators and views come from people and certificates, so more characters are allowed.
@@ -119,12 +125,12 @@ def parse_expression(key_expr: str | Key) -> Key:
         key_expr: A parsed key is returned unchanged.
 
     Raises:
-        KeyNameError: If it does not have these three parts.
+        KeyNameError: If it does not have these three parts, or is longer than 1,024 characters.
     """
     if isinstance(key_expr, Key):
         return key_expr
     root, *rest = key_expr.split("/", 3)
-    if root != ROOT or len(rest) != 3 or not all(rest):
+    if root != ROOT or len(rest) != 3 or not all(rest) or len(key_expr) > LONGEST_KEY:
         raise KeyNameError(codes.KEY_OTHER(key=one_line(key_expr, LONGEST_CHUNK)))
     return Key(*rest)
 

@@ -4,7 +4,6 @@ Requests are checked more strictly than by protobuf: NaN, infinities and unspeci
 the error names the field.
 """
 
-import json
 import math
 from collections.abc import Iterator
 from functools import cache
@@ -15,6 +14,7 @@ from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.message import DecodeError, Message
 from google.protobuf.timestamp_pb2 import Timestamp
 
+from robomesh import bounded_json
 from robomesh import reason_codes as codes
 from robomesh.errors import MessageError
 from robomesh.reasons import Reason
@@ -26,6 +26,8 @@ TEXT = "text/plain"
 
 _FLOATS = (FieldDescriptor.TYPE_DOUBLE, FieldDescriptor.TYPE_FLOAT)
 _OWN = "robomesh"
+# Values in a field of JSON: protobuf's Python code converts 10,000 numbers in 5 ms.
+_MOST_ITEMS = 10_000
 _TIME = Timestamp.DESCRIPTOR.full_name
 # Years 1 to 9999, the range in timestamp.proto; converting another one raises ValueError.
 _FIRST_S, _LAST_S = -62_135_596_800, 253_402_300_799
@@ -98,7 +100,7 @@ def _from_json(schema: type[AnyMessage], payload: bytes) -> AnyMessage:
     name, message = schema.DESCRIPTOR.name, schema()
     try:
         text = payload.decode() or "{}"
-        values = json.loads(text)
+        values = bounded_json.loads(text)
         if not isinstance(values, dict):
             raise MessageError(codes.NOT_JSON_OBJECT())
         for key, value in values.items():
@@ -114,10 +116,12 @@ def _from_json(schema: type[AnyMessage], payload: bytes) -> AnyMessage:
 
 
 def _check_key(schema: type[Message], key: str, value: object) -> None:
-    """Check a field's name and enum value, with a clearer error text than protobuf's."""
+    """Check a field's name, number of values and enum value, with a clearer error text than protobuf's."""
     descriptor = schema.DESCRIPTOR
     fields = {name: field for field in descriptor.fields for name in (field.name, field.json_name)}
     field = fields.get(key)
+    if isinstance(value, list) and len(value) > _MOST_ITEMS:
+        raise MessageError(codes.NOT_JSON(detail=f"{key} has {len(value)} values, at most {_MOST_ITEMS}"))
     if field is None:
         names = ", ".join(field.name for field in descriptor.fields)
         raise MessageError(codes.UNKNOWN_FIELD(request=descriptor.name, field=key, fields=names))

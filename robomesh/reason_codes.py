@@ -137,6 +137,12 @@ PAGE_NOT_A_MESSAGE = Code("page.not_a_message", "not a message of a page: {detai
 PAGE_READS_TOO_SLOWLY = Code(
     "page.reads_too_slowly", "more than {bytes} bytes are waiting for a page that does not read"
 )
+PAGE_ASKS_TOO_MUCH = Code(
+    "page.asks_too_much",
+    "this page has sent more than the console reads from one page for more than {seconds:g} s",
+    "send less",
+)
+PAGE_STOPS_ONLY = Code("page.stops_only", "this connection takes requests for a stop only")
 PAGE_TOO_MANY_KEYS = Code("page.too_many_keys", "this page already watches {count} keys", "unwatch one first")
 PAGE_WATCH_WILDCARD = Code(
     "page.watch_wildcard",
@@ -285,6 +291,11 @@ COMMAND_LATE = Code(
     "it arrived {seconds:.2f} s after its not_after",
     "it was delayed, or not_after is not in the gateway's time (`now` in each lease answer)",
 )
+COMMAND_DEADLINE_FAR = Code(
+    "command.deadline_far",
+    "its not_after is {seconds:.0f} s ahead of the gateway's time; {command} may wait {most:g} s",
+    "use the gateway's time (`now` in each lease answer)",
+)
 COMMAND_WAITED = Code(
     "command.waited",
     "it waited {waited:.1f} s in the gateway (for the audit log, or for earlier requests); "
@@ -330,6 +341,11 @@ STOP_LATCHED = Code(
     "remove the cause, then send RESET with stop_id {id}",
 )
 
+GATEWAY_TWICE = Code(
+    "gateway.twice",
+    "another gateway ({id}) also serves robot {robot}, so nobody knows which of them grants control",
+    "stop one of the two",
+)
 ROBOT_READ_ONLY = Code("robot.read_only", "this robot is read-only: {cause}")
 READ_ONLY = Code("robot.is_read_only", "read-only: {cause}")
 READS_ONLY = Code("robot.reads_only", "the driver of its controller only reads", "move it from its own panel")
@@ -438,9 +454,18 @@ LINK_CLOSED_THERE = Code("link.closed_there", "the controller closed the connect
 LINK_REFUSED = Code("link.refused", "{where} refused the connection: {detail}")
 LINK_NO_DATA = Code("link.no_data", "{where} sends nothing")
 LINK_RECONNECTS = Code("link.reconnects", "{where} sends nothing; connecting again")
+GATEWAY_OCCUPIED = Code(
+    "gateway.occupied",
+    "{work} occupied the gateway's event loop for {seconds:.2f} s: everything else waited, also stops",
+)
 LINK_DELUGE = Code("link.deluge", "{where} sends far too much data: all of it is discarded")
 LINK_OTHER_JOINTS = Code("link.other_joints", "{where} sends {cause}")
 JOINT_VALUES = Code("joints.values", "{count} joint values, the description has {joints}")
+JOINT_NO_NUMBER = Code("joints.no_number", "no finite number for joint {name}")
+JOINT_FAR = Code("joints.far", "joint {name} at {value}, far beyond its limits {lower} to {upper}")
+JOINT_LEAP = Code(
+    "joints.leap", "joint {name} at {after} only {seconds:.2f} s after {before}: no drive is that fast"
+)
 LINK_JUST_ENDED = Code("link.just_ended", "the connection has just ended")
 LINK_BROKE = Code("link.broke", "the connection broke while it was written")
 LINK_CLOGGED = Code("link.clogged", "the controller does not read; connecting again")
@@ -631,6 +656,7 @@ JOINTS_OTHER_SOFTWARE = Code(
     "its joints are unproven: its controller's software is {now}, the comparison was made with {before}",
     "run robomesh robot verify again",
 )
+JOINTS_INVALID = Code("joints.invalid", "its joints cannot be right ({cause})")
 POSITIONS_UNKNOWN = Code("positions.unknown", "the robot's position is unknown ({cause})")
 POSITIONS_NONE = Code("positions.none", "the controller has not reported joint positions")
 

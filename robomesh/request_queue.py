@@ -27,7 +27,7 @@ RING = 1024
 # A thread takes a few requests, then leaves the interpreter to the event loop. Without the pause the system
 # often suspends this thread while it holds the interpreter lock, and a stop waits for it.
 _BATCH = 32
-_PAUSE_S = 0.001
+_PAUSE_S, _BACKGROUND_PAUSE_S = 0.001, 0.01
 # Limits of one robot's commands and lease requests: burst, and rate [1/s]. The system wakes a mostly idle
 # loop immediately even on a busy machine; a loop that is always busy waits for its time slice.
 _BURST = 256
@@ -125,23 +125,28 @@ def read(ring: zenoh.Handler[zenoh.Query], take: Callable[[zenoh.Query], None]) 
             return
 
 
-def paced(take: Callable[[zenoh.Query], None]) -> Callable[[zenoh.Query], None]:
+def paced(
+    take: Callable[[zenoh.Query], None], *, in_background: bool = False
+) -> Callable[[zenoh.Query], None]:
     """Return a callback that passes each query to `take`, with a pause after a few of a flood.
+
+    In the background the pause is longer: a flood waits at its sender, and takes less time from a stop.
 
     Zenoh calls it in a thread of its own, behind a queue of 256 queries. When the queue is full, Zenoh stops
     reading the connection.
     """
+    pause_s = _BACKGROUND_PAUSE_S if in_background else _PAUSE_S
     begun_s = 0.0
     taken = 0
 
     def take_paced(query: zenoh.Query) -> None:
         nonlocal begun_s, taken
-        if (now_s := time.monotonic()) - begun_s > _PAUSE_S:
+        if (now_s := time.monotonic()) - begun_s > pause_s:
             begun_s, taken = now_s, 0
         take(query)
         taken += 1
         if taken > _BATCH:
-            time.sleep(_PAUSE_S)
+            time.sleep(pause_s)
 
     return take_paced
 

@@ -56,14 +56,14 @@ class Request:
     Attributes:
         message: Message of the request's schema; None if the request has no schema.
         chunk: The chunk in place of the row's first `*`: the operator, the view, the mesh.
-        received_ns: Time of arrival, before any wait; ns since the Unix epoch.
+        received_s: Time of arrival, before any wait (monotonic).
         within_s: How long the caller waits from then on [s]; None: unknown.
     """
 
     key: keys.Key
     message: Message | None
     chunk: str
-    received_ns: int = 0
+    received_s: float = 0.0
     within_s: float | None = None
 
     @property
@@ -75,6 +75,8 @@ class Request:
 Handler = Callable[[Request], Awaitable[Message | bytes]]
 # Called with the chunk in place of the row's `*`, and the reason why the handler was not called.
 OnRefused = Callable[[str, Reason], None]
+# Returns the answer to a repeated request, which no handler sees; None: it is not a repeat. On any thread.
+Recall = Callable[[], Message | None]
 
 
 class Answerer:
@@ -85,6 +87,7 @@ class Answerer:
 
     Args:
         on_refused: Called for an invalid request, which no handler sees.
+        recall: For stops: returns what answers a repeated one.
         ignored: Counts requests on invalid keys.
 
     Attributes:
@@ -103,8 +106,12 @@ class Answerer:
         *,
         scheduler: RoundRobin,
         on_refused: OnRefused = lambda chunk, reason: None,
+        recall: Recall = lambda: None,
         ignored: Ignored,
     ) -> None:
+        self._recall = recall
+        self._repeated = 0
+        self._newest_repeated: tuple[zenoh.ZBytes | None, str, Message] | None = None
         self._ignored = ignored
         self._row = topics.request(name)
         self._own = keys.Key(site, robot, name)
@@ -112,7 +119,8 @@ class Answerer:
         self._on_refused = on_refused
         self._loop = asyncio.get_running_loop()
         self._tasks: set[asyncio.Task[None]] = set()
-        self._begun: dict[bytes, asyncio.Future[Message | bytes]] = {}
+        # Answers by the mark on both copies of a request; None: the first copy waits for the loop.
+        self._begun: dict[bytes, asyncio.Future[Message | bytes] | Message | None] = {}
         self._long = pieces.LongAnswers(in_name=self._row.in_name)
         # By the last chunk of the key, which is the caller if the row names one.
         self._unanswered: dict[str, int] = {}
@@ -120,7 +128,7 @@ class Answerer:
         self._most_of_one = _MOST_OF_ONE if "*" in name else _MOST
         self._counting = Lock()  # the reading thread counts up, the loop's down
         self._scheduler = scheduler
-        self._queue = Queue(limited=bool(self._row.own_link))
+        self._queue = Queue(limited=bool(self._row.own_link) and not self._row.unread)
         self._busy_answers = RateLimit(per_s=_BUSY_PER_S, burst=_BUSY_BURST)
         self.turned_away = self.over_quota = 0
         self.latencies = Latencies()
@@ -130,11 +138,13 @@ class Answerer:
         self._queryable: zenoh.Queryable[Any]
         if self._row.unread:
             # Directly from Zenoh's thread, so that a stop changes threads only once.
-            at_once = zenoh.handlers.Callback(self._hand_over_at_once, indirect=False)
+            at_once = zenoh.handlers.Callback(paced(self._hand_over_at_once), indirect=False)
             self._queryable = session.declare_queryable(key, at_once)
         elif self._row.own_link:
             # Its queue may block a flooding sender, because the connection carries nothing else.
-            self._queryable = session.declare_queryable(key, paced(self._hand_over))
+            in_background = self._row.priority is topics.Priority.BACKGROUND
+            take = paced(self._hand_over, in_background=in_background)
+            self._queryable = session.declare_queryable(key, take)
         else:
             self._queryable = session.declare_queryable(key, zenoh.handlers.RingChannel(RING))
             reading = (self._queryable.handler, self._hand_over)
@@ -166,22 +176,61 @@ class Answerer:
         return self._row.name
 
     def _hand_over_at_once(self, query: zenoh.Query) -> None:
-        """Start a stop on the event loop before all waiting requests."""
-        if not self._loop.is_closed():
+        """Start a stop on the event loop before all waiting requests.
+
+        While one waits for the loop, the next ones are answered from memory or queue, so that a flood delays
+        no other robot's stop. The second copy of a request gets the answer to the first one.
+        """
+        if self._loop.is_closed():
+            return
+        mark = self._mark(query)
+        with self._counting:
+            first, is_copy = not self._waiting, bool(mark) and mark in self._begun
+            if mark and not is_copy:
+                self._remember(mark, None)
+        if not first and not is_copy and (answer := self._recall()) is not None:
+            self._answer_repeated(query, mark, answer)
+        elif self._waiting >= _MOST:
+            self._turn_away(query)
+        else:
+            begin = partial(self._start, query, _ANY_CALLER, time.monotonic())
             self._count(_ANY_CALLER, 1)
-            self._loop.call_soon_threadsafe(self._start, query, _ANY_CALLER, time.time_ns())
+            if first:
+                self._loop.call_soon_threadsafe(begin)
+            else:
+                self._scheduler.add(self._queue, begin)
+
+    def _answer_repeated(self, query: zenoh.Query, mark: bytes, answer: Message) -> None:
+        with query:
+            if (key := self._own_key(str(query.key_expr))) is not None:
+                self._reply(query, key, answer)
+                with self._counting:
+                    if mark:
+                        self._remember(mark, answer)
+                    self._repeated += 1
+                    self._newest_repeated = query.payload, _encoding(query), answer
+
+    def take_repeated(self) -> tuple[int, Message, Message] | None:
+        """Return how many stops were answered from memory since the last call, the newest one, its answer."""
+        with self._counting:
+            count, self._repeated = self._repeated, 0
+        if not count or self._newest_repeated is None:
+            return None
+        payload, encoding, answer = self._newest_repeated
+        message = self._message(b"" if payload is None else payload.to_bytes(), encoding)
+        return None if message is None else (count, message, answer)
 
     def _hand_over(self, query: zenoh.Query) -> None:
         """Queue a request for the event loop, or refuse it if too many are waiting."""
         if self._long.reply_piece(query):
             return
-        received_ns = time.time_ns()
+        received_s = time.monotonic()
         asker = _last_chunk(str(query.key_expr))
         if self._waiting >= _MOST or self._unanswered.get(asker, 0) >= self._most_of_one:
             self._turn_away(query)
         else:
             self._count(asker, 1)
-            self._scheduler.add(self._queue, partial(self._start, query, asker, received_ns))
+            self._scheduler.add(self._queue, partial(self._start, query, asker, received_s))
 
     def _turn_away(self, query: zenoh.Query) -> None:
         self.turned_away += 1
@@ -199,35 +248,34 @@ class Answerer:
             else:
                 del self._unanswered[asker]
 
-    def _start(self, query: zenoh.Query, asker: str, received_ns: int) -> None:
+    def _start(self, query: zenoh.Query, asker: str, received_s: float) -> None:
         if self._closed:  # arrived during `close`
             query.drop()
             return
-        work = self._answer(query, received_ns)
+        work = self._answer(query, received_s)
         task = begin_now(self._loop, work) if self._row.unread else self._loop.create_task(work)
         if task is None:
-            self._end(asker, received_ns)
+            self._end(asker, received_s)
             return
         self._tasks.add(task)
-        task.add_done_callback(lambda task: self._done(task, asker, received_ns))
+        task.add_done_callback(lambda task: self._done(task, asker, received_s))
 
-    def _done(self, task: asyncio.Task[None], asker: str, received_ns: int) -> None:
+    def _done(self, task: asyncio.Task[None], asker: str, received_s: float) -> None:
         self._tasks.discard(task)
-        self._end(asker, received_ns)
+        self._end(asker, received_s)
 
-    def _end(self, asker: str, received_ns: int) -> None:
-        self.latencies.add((time.time_ns() - received_ns) * 1e-9)
+    def _end(self, asker: str, received_s: float) -> None:
+        self.latencies.add(time.monotonic() - received_s)
         self._count(asker, -1)
 
-    async def _answer(self, query: zenoh.Query, received_ns: int) -> None:
+    async def _answer(self, query: zenoh.Query, received_s: float) -> None:
         asked = str(query.key_expr)
         with query:
             key = self._own_key(asked)
             if key is None:
                 return
-            encoding = str(query.encoding) if query.encoding is not None else ""
             try:
-                request = self._read(key, asked, query, encoding, received_ns)
+                request = self._read(key, asked, query, received_s)
                 answer = await self._handled(request, query)
             except RefusedError as error:
                 self.over_quota += isinstance(error, QuotaError)
@@ -240,23 +288,30 @@ class Answerer:
                 log.exception("%s: a request failed", key)
                 _refuse(query, RefusedError(codes.FAILED(request=self._row.name)))
                 return
-            as_json = is_json(encoding)
-            if isinstance(answer, bytes):
-                self._long.reply(query, str(key), answer, _OCTETS)
-            else:
-                payload = encode(answer, as_json=as_json)
-                self._long.reply(query, str(key), payload, JSON if as_json else PROTOBUF)
+            self._reply(query, key, answer)
+
+    def _reply(self, query: zenoh.Query, key: keys.Key, answer: Message | bytes) -> None:
+        """Reply in the form of the request."""
+        if isinstance(answer, bytes):
+            self._long.reply(query, str(key), answer, _OCTETS)
+        else:
+            as_json = is_json(_encoding(query))
+            payload = encode(answer, as_json=as_json)
+            self._long.reply(query, str(key), payload, JSON if as_json else PROTOBUF)
 
     async def _handled(self, request: Request, query: zenoh.Query) -> Message | bytes:
         """Return the handler's answer; both copies of a request sent over two links get the same one."""
-        mark = query.attachment.to_bytes() if query.attachment is not None else b""
-        if not self._row.both_links or len(mark) != MARK_BYTES:
+        mark = self._mark(query)
+        if not mark:
             return await self._handler(request)
-        if (begun := self._begun.get(mark)) is not None:
+        begun = self._begun.get(mark)
+        if isinstance(begun, Message):
+            return begun
+        if begun is not None:
             return await asyncio.shield(begun)
-        begun = self._begun[mark] = self._loop.create_future()
-        if len(self._begun) > _MOST_MARKS:
-            del self._begun[next(iter(self._begun))]
+        begun = self._loop.create_future()
+        with self._counting:
+            self._remember(mark, begun)
         try:
             answer = await self._handler(request)
         except asyncio.CancelledError:
@@ -269,9 +324,19 @@ class Answerer:
         begun.set_result(answer)
         return answer
 
-    def _read(
-        self, key: keys.Key, asked: str, query: zenoh.Query, encoding: str, received_ns: int
-    ) -> Request:
+    def _mark(self, query: zenoh.Query) -> bytes:
+        """Return the mark on both copies of a request; empty: it has no second copy."""
+        if not self._row.both_links or query.attachment is None:
+            return b""
+        mark = query.attachment.to_bytes()
+        return mark if len(mark) == MARK_BYTES else b""
+
+    def _remember(self, mark: bytes, answer: "asyncio.Future[Message | bytes] | Message | None") -> None:
+        self._begun[mark] = answer
+        if len(self._begun) > _MOST_MARKS:
+            del self._begun[next(iter(self._begun))]
+
+    def _read(self, key: keys.Key, asked: str, query: zenoh.Query, received_s: float) -> Request:
         chunk = _chunk(self._row.name, key.topic)
         try:
             if keys.has_wildcard(asked):
@@ -280,8 +345,8 @@ class Answerer:
             else:
                 self._check_key(key, asked)
             payload = query.payload.to_bytes() if query.payload is not None else b""
-            message = self._message(payload, encoding)
-            return Request(key, message, chunk, received_ns, _within_s(query))
+            message = self._message(payload, _encoding(query))
+            return Request(key, message, chunk, received_s, _within_s(query))
         except (MessageError, KeyNameError) as error:
             reason = codes.INVALID(error.reason)
             self._on_refused(chunk, reason)
@@ -302,6 +367,11 @@ class Answerer:
         if schema is None:
             return None
         try:
+            if len(payload) > self._row.longest:
+                detail = f"at most {self._row.longest} are permitted"
+                raise MessageError(
+                    codes.NOT_MESSAGE(count=len(payload), message=schema.__name__, detail=detail)
+                )
             return decode_request(schema, payload, encoding)
         except MessageError:
             if self._row.unread:
@@ -333,6 +403,10 @@ def _refuse(query: zenoh.Query, error: RefusedError) -> None:
     else:
         encoding = f"{TEXT};{to_parameters(error.reason, when)}"
     query.reply_err(str(error).encode(), encoding=encoding)
+
+
+def _encoding(query: zenoh.Query) -> str:
+    return str(query.encoding) if query.encoding is not None else ""
 
 
 def _within_s(query: zenoh.Query) -> float | None:

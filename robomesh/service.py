@@ -3,6 +3,7 @@
 import asyncio
 import atexit
 import contextlib
+import copy
 import logging
 import os
 import queue
@@ -14,6 +15,7 @@ from collections.abc import Awaitable, Callable, Coroutine, Iterable
 from typing import Any, TypeVar
 
 from robomesh.health import Served, present
+from robomesh.loop_turns import MeasuredLoop
 from robomesh.session import Session, SessionSettings, open_session
 from robomesh.texts import for_terminal
 
@@ -90,7 +92,8 @@ def run_until_signalled(main: Coroutine[Any, Any, None], *, ends_within_s: float
             # busy machine.
             _exit_now()
 
-    asyncio.run(guarded())
+    with asyncio.Runner(loop_factory=MeasuredLoop) as runner:
+        runner.run(guarded())
 
 
 def _exit_now() -> None:
@@ -115,8 +118,11 @@ class _Stderr(logging.Handler):
         threading.Thread(target=self._write, name="log", daemon=True).start()
 
     def emit(self, record: logging.LogRecord) -> None:
+        # One line, whatever texts of others it holds; a traceback below it has several.
+        line = copy.copy(record)
+        line.msg, line.args = for_terminal(record.getMessage(), keep=""), None
         with contextlib.suppress(queue.Full):
-            self.lines.put_nowait(for_terminal(self.format(record)))
+            self.lines.put_nowait(for_terminal(self.format(line)))
 
     def flush_lines(self) -> None:
         """Wait briefly until all lines are written."""

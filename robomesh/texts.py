@@ -1,6 +1,7 @@
 """Untrusted texts for display: on one line, without characters that hide or reorder text."""
 
 import re
+import unicodedata
 
 # Characters that set the direction of the text around them (Unicode UAX #9, section 2): people may see such a
 # text in another order than a program reads it (CVE-2021-42574).
@@ -38,16 +39,21 @@ def show_direction(text: str) -> str:
     return text if text.isascii() else text.translate(_SHOWN)
 
 
-def for_terminal(text: str) -> str:
-    """Return lines for a terminal; only line ends, tabs and printable characters stay unchanged.
+def for_terminal(text: str, *, keep: str = "\n\t") -> str:
+    """Return a text without characters that a terminal interprets or hides: they are shown by their numbers.
 
-    Escape sequences, which can move the cursor, colour, or answer as the keyboard, lose their first
-    character; direction characters are shown by their numbers.
+    An escape sequence can move the cursor, colour, set a title, or answer as the keyboard. `<U+001B>`, which
+    begins it, cannot.
+
+    Args:
+        text: One line or several.
+        keep: Control characters that stay; none for a value that must not begin a new line.
     """
     if text.isprintable():
         return text
-    return "".join(c if c.isprintable() or c in "\n\t" else _replaced(c) for c in text)
+    return "".join(each if each.isprintable() or each in keep else _shown(each) for each in text)
 
 
-def _replaced(character: str) -> str:
-    return _SHOWN.get(ord(character), " " if character.isspace() else "\N{REPLACEMENT CHARACTER}")
+def _shown(character: str) -> str:
+    # Blanks of other widths are harmless.
+    return " " if unicodedata.category(character) == "Zs" else f"<U+{ord(character):04X}>"

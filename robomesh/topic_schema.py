@@ -91,6 +91,8 @@ class Request:
             handles it once.
         in_name: The last chunk is the caller's name; the router checks it against the certificate.
         administrators: A console sends it only for an administrator's account.
+        longest: Most bytes of its payload. The owner decodes it in one turn of its event loop, in which no
+            stop is handled.
     """
 
     name: str
@@ -105,3 +107,4 @@ class Request:
     both_links: bool = False
     in_name: bool = False
     administrators: bool = False
+    longest: int = 4 << 20

@@ -254,6 +254,10 @@ _TOPICS = (
     ),
 )
 
+# Bytes of requests to a gateway. A longer stop stops too, but its texts are lost, so it may have more. JSON
+# writes a character of a program as up to six.
+_SHORT, _STOP, _WITH_PROGRAM, _CELL = 16 * 1024, 256 * 1024, 512 * 1024, 128 * 1024
+
 _REQUESTS = (
     Request(
         name="stop",
@@ -266,6 +270,7 @@ _REQUESTS = (
         unread=True,
         own_link="stop",
         both_links=True,
+        longest=_STOP,
     ),
     Request(
         name="lease/request/*",
@@ -276,6 +281,7 @@ _REQUESTS = (
         askers=_COMMANDERS,
         own_link="requests",
         in_name=True,
+        longest=_SHORT,
     ),
     Request(
         name="command/*",
@@ -286,6 +292,7 @@ _REQUESTS = (
         askers=_COMMANDERS,
         own_link="requests",
         in_name=True,
+        longest=_WITH_PROGRAM,
     ),
     # Keep-alives of a jog, with the operator's name.
     Request(
@@ -297,6 +304,7 @@ _REQUESTS = (
         askers=_COMMANDERS,
         own_link="requests",
         in_name=True,
+        longest=_SHORT,
     ),
     Request(
         name="audit/find",
@@ -306,6 +314,7 @@ _REQUESTS = (
         owners=_GATEWAY,
         askers=EVERYONE,
         own_link="queries",
+        longest=_SHORT,
     ),
     # With the engineer's name.
     Request(
@@ -317,6 +326,7 @@ _REQUESTS = (
         askers=_CELL_EDITORS,
         own_link="queries",
         in_name=True,
+        longest=_CELL,
     ),
     Request(
         name="cell/prepare",

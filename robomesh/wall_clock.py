@@ -39,6 +39,24 @@ class WallClock:
         return monotonic_ns + self._most_ns
 
 
+class ForwardClock:
+    """The wall clock, except that it never goes back: a date that has passed stays passed.
+
+    While the wall clock is behind an earlier reading, the time goes on with the monotonic clock.
+    """
+
+    def __init__(self) -> None:
+        self._latest_s, self._read_s = time.time(), time.monotonic()
+
+    def now_s(self) -> float:
+        """Return the time since the Unix epoch [s]."""
+        # In this order, a suspension between the readings does not put the time ahead.
+        wall_s, read_s = time.time(), time.monotonic()
+        self._latest_s = max(wall_s, self._latest_s + read_s - self._read_s)
+        self._read_s = read_s
+        return self._latest_s
+
+
 def _bracket() -> tuple[int, int]:
     """Return bounds of the wall clock minus the monotonic clock [ns]."""
     before_ns = time.monotonic_ns()

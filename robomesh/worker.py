@@ -18,6 +18,7 @@ import sys
 from collections.abc import Callable, Iterator
 from typing import Any, BinaryIO
 
+from robomesh import bounded_json
 from robomesh import reason_codes as codes
 from robomesh.errors import CodedError, RobomeshError
 from robomesh.memory_limit import MEMORY_BYTES, limit_memory
@@ -199,7 +200,7 @@ class Worker:
             raise WorkerError(reason)
         body = await answers.readexactly(length)
         try:
-            kind, value = json.loads(body) if self._untrusted else pickle.loads(body)
+            kind, value = bounded_json.loads(body) if self._untrusted else pickle.loads(body)
         except (ValueError, TypeError, RecursionError) as error:
             raise WorkerError(codes.WORKER_ANSWER_INVALID(module=self._module, detail=error)) from None
         return kind, value

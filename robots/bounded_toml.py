@@ -13,18 +13,19 @@ from typing import Any
 MOST_CHARACTERS = 4_000_000
 MOST_DEPTH = 32
 
-# Match strings first, because they may contain text that looks like a key, a bracket or a comment.
-_STRING_OR_COMMENT = re.compile(
-    r"""
-      \"{3} (?: [^"\\]++ | \\. | "{1,2}(?!") )*+ "{3,5}
-    | '{3} (?: [^']++ | '{1,2}(?!') )*+ '{3,5}
-    | " (?: [^"\\\n]++ | \\. )*+ "
-    | ' [^'\n]*+ '
-    | \# [^\n]*+
-    """,
-    re.VERBOSE | re.DOTALL,
-)
-_LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{MOST_DEPTH}}}")
+# Strings and comments are taken out first, because they may contain text that looks like a key, a bracket or
+# each other. The end of each is searched from its begin; text without one is not TOML, and nothing after its
+# begin is parsed. All searches go forward, so the time is linear. Possessive quantifiers would also do, but
+# Python 3.11.2 matches them wrongly.
+_BEGIN = re.compile(r"""\"{3}|'{3}|["'#]""")
+_ENDS = {
+    '"""': re.compile(r'\\.|"{3,5}', re.DOTALL),
+    "'''": re.compile(r"'{3,5}"),
+    '"': re.compile(r'\\.|["\n]', re.DOTALL),
+    "'": re.compile(r"['\n]"),
+    "#": re.compile(r"$", re.MULTILINE),
+}
+_LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*){{{MOST_DEPTH}}}")
 _BRACKET = re.compile(r"[\[\]{}]")
 
 
@@ -64,7 +65,7 @@ def check_bounds(text: str) -> None:
     """
     if len(text) > MOST_CHARACTERS:
         raise tomllib.TOMLDecodeError(f"the file is longer than {MOST_CHARACTERS:,} characters")
-    bare = _STRING_OR_COMMENT.sub(lambda found: "" if found[0][0] == "#" else "s", text)
+    bare = _bare(text)
     long_key = _LONG_KEY.search(bare)
     if long_key is not None:
         raise tomllib.TOMLDecodeError(f"a key has more than {MOST_DEPTH} parts: '{long_key[0][:40]}...'")
@@ -73,3 +74,18 @@ def check_bounds(text: str) -> None:
         depth += 1 if bracket[0] in "[{" else -1
         if depth > MOST_DEPTH:
             raise tomllib.TOMLDecodeError(f"tables and lists are nested deeper than {MOST_DEPTH}")
+
+
+def _bare(text: str) -> str:
+    """Return the text without comments and with "s" for each string, up to a string that does not end."""
+    parts = []
+    at = 0
+    while (begin := _BEGIN.search(text, at)) is not None:
+        parts.append(text[at : begin.start()])
+        found = _ENDS[begin[0]].finditer(text, begin.end())
+        end = next((each for each in found if not each[0].startswith("\\")), None)
+        if end is None:
+            return "".join(parts)
+        parts.append("" if begin[0] == "#" else "s")
+        at = end.end()
+    return "".join((*parts, text[at:]))

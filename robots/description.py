@@ -21,7 +21,7 @@ from robots.example_robots import EXAMPLES, ExampleRobot, example_names, example
 from robots.schema import DhDescription, JointType, Pose, RobotDescription, UrdfDescription, nearest
 from robots.urdf.checks import urdf_problems
 from robots.urdf.files import files_of
-from robots.urdf.read import MOST_URDF_CHARACTERS, UrdfRobot, read_urdf
+from robots.urdf.read import MOST_URDF_BYTES, UrdfRobot, read_urdf
 from robots.urdf.srdf import ignored_beside
 
 __all__ = [
@@ -191,17 +191,26 @@ def _urdf_robot(description: UrdfDescription, *, confined: bool) -> UrdfRobot:
         return UrdfRobot(found.name, found.tree, found.notes)
     packages = [folder / package for package in description.packages]
     resolve = files_of(urdf, packages, confined=folder if confined else None)
-    robot = read_urdf(_text(urdf, most=MOST_URDF_CHARACTERS), urdf, resolve=resolve)
+    robot = read_urdf(_urdf_bytes(urdf), urdf, resolve=resolve)
     if confined and not urdf.resolve().is_relative_to(folder.resolve()):
         return robot
     ignored, note = ignored_beside(urdf, robot.name, robot.tree)
     return replace(robot, ignored=tuple(ignored), notes=(*robot.notes, *([note] if note else [])))
 
 
-def _text(path: Path, *, most: int = MOST_CHARACTERS) -> str:
+def _urdf_bytes(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(MOST_URDF_BYTES + 1)
+    except OSError as error:
+        raise DescriptionError(path, [f"cannot be read: {error.strerror}"]) from error
+
+
+def _text(path: Path) -> str:
     try:
         with path.open(encoding="utf-8") as file:
-            return file.read(most + 1)  # one more than the limit, so that the parser can reject the text
+            # One more than the limit, so that the parser can reject the text.
+            return file.read(MOST_CHARACTERS + 1)
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "is not UTF-8 text"
         raise DescriptionError(path, [f"cannot be read: {reason}"]) from error

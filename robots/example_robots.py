@@ -109,9 +109,8 @@ def example_values(robot: ExampleRobot) -> dict[str, Any]:
         "urdf": robot.urdf.name,
     }
     if robot.srdf.is_file():
-        text = robot.urdf.read_text(encoding="utf-8")
-        tree = read_urdf(text, robot.urdf, resolve=files_of(robot.urdf)).tree
-        home, ignored = read_srdf(robot.srdf.read_text(encoding="utf-8"), robot.srdf, tree)
+        tree = read_urdf(robot.urdf.read_bytes(), robot.urdf, resolve=files_of(robot.urdf)).tree
+        home, ignored = read_srdf(robot.srdf.read_bytes(), robot.srdf, tree)
         values["joint"] = [{"name": name, "home": position} for name, position in home.items()]
         values["collision"] = {"ignore": [list(pair) for pair in ignored]}
     return values

@@ -24,6 +24,7 @@ __all__ = [
     "constraint_values",
     "joints_of",
     "length_factor",
+    "position_text",
     "violations",
 ]
 
@@ -57,7 +58,11 @@ class Constraint:
 
 @dataclass(frozen=True, eq=False)
 class Joints:
-    """The joints of a robot, from the base to the tool; each array is (n,) in rad or m (and seconds)."""
+    """The joints of a robot, from the base to the tool; each array is (n,) in rad or m (and seconds).
+
+    Attributes:
+        continuous: The source gives no limits: lower and upper are defaults.
+    """
 
     names: tuple[str, ...]
     types: tuple[JointType, ...]
@@ -67,6 +72,7 @@ class Joints:
     max_acceleration: FloatArray
     max_jerk: FloatArray
     home: FloatArray
+    continuous: tuple[bool, ...]
     constraints: tuple[Constraint, ...] = ()
 
     def __len__(self) -> int:
@@ -99,6 +105,7 @@ def _row_joints(description: DhDescription) -> Joints:
         max_acceleration=column([joint.max_acceleration for joint in rows]),
         max_jerk=column([joint.max_jerk for joint in rows]),
         home=column([joint.home for joint in rows]),
+        continuous=(False,) * len(rows),
     )
 
 
@@ -132,7 +139,12 @@ def _urdf_joints(description: UrdfDescription) -> Joints:
         max_acceleration=accelerations,
         max_jerk=jerks,
         home=homes,
+        continuous=tuple(joint.continuous and not _has_limits(settings.get(joint.name)) for joint in free),
     )
+
+
+def _has_limits(given: JointSettings | None) -> bool:
+    return given is not None and given.limits is not None
 
 
 def _readonly(array: FloatArray) -> FloatArray:
@@ -195,7 +207,8 @@ def violations(joints: Joints, positions: ArrayLike) -> tuple[Reason, ...]:
             continue
         beyond = _limit_beyond(position, float(lower), float(upper), kind)
         if beyond is not None:
-            found.append(codes.JOINT_LIMIT(name=name, value=_text(position, kind), limit=_text(beyond, kind)))
+            value, limit = position_text(position, kind), position_text(beyond, kind)
+            found.append(codes.JOINT_LIMIT(name=name, value=value, limit=limit))
     if found:
         return tuple(found)
     for constraint, total in zip(joints.constraints, constraint_values(joints, array), strict=True):
@@ -205,7 +218,7 @@ def violations(joints: Joints, positions: ArrayLike) -> tuple[Reason, ...]:
             terms = _terms(joints, constraint)
             found.append(
                 codes.JOINT_CONSTRAINT(
-                    terms=terms, value=_text(float(total), kind), limit=_text(beyond, kind)
+                    terms=terms, value=position_text(float(total), kind), limit=position_text(beyond, kind)
                 )
             )
     return tuple(found)
@@ -218,7 +231,8 @@ def _limit_beyond(position: float, lower: float, upper: float, kind: JointType) 
     return upper if position > upper + rounding else None
 
 
-def _text(position: float, kind: JointType) -> str:
+def position_text(position: float, kind: JointType) -> str:
+    """Return a position [rad] or [m] in degrees or millimetres, as texts name it."""
     # Decimals mean nothing in a number this large, and its degrees may overflow.
     if abs(position) >= 1e6:
         return f"{position:.3g} {'rad' if kind is JointType.ROTARY else 'm'}"

@@ -1,7 +1,9 @@
 """Inspection of a robot's meshes: opens and measures each file."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from itertools import islice
+from pathlib import Path, PureWindowsPath
 
 import numpy as np
 
@@ -9,8 +11,10 @@ from robots.errors import MeshError
 from robots.glb import link_mesh
 from robots.kinematic_tree import Shape, tree_of
 from robots.meshes.mesh import bounds
-from robots.schema import RobotDescription, UrdfDescription
+from robots.schema import RobotDescription, UrdfDescription, similar
 
+# A robot's folder has fewer; another one, such as a home, may have millions.
+_MOST_FILES, _MOST_HINTS = 5_000, 20
 # Plausible size of a part of an arm [m].
 _LARGEST_M, _SMALLEST_M = 10.0, 1e-3
 
@@ -28,7 +32,11 @@ def mesh_findings(description: RobotDescription) -> tuple[list[Finding], list[Fi
     problems, warnings = [], []
     if isinstance(description, UrdfDescription):
         source = str(description.source)
-        problems += [Finding(source, f"mesh {name!r}: no such file") for name in description.robot.missing]
+        hints = _nearest(description.robot.missing[:_MOST_HINTS], description.source.parent)
+        problems += [
+            Finding(source, f"mesh {name!r}: no such file{hints.get(name, '')}")
+            for name in description.robot.missing
+        ]
         warnings += [Finding(source, note) for note in description.robot.notes]
     for link in tree_of(description).links:
         for shape in (*link.shapes, *link.collision):
@@ -52,6 +60,16 @@ def mesh_findings(description: RobotDescription) -> tuple[list[Finding], list[Fi
                 text = f"{subject}: is {size:.3g} m large at {scale:g} m per unit; check mesh_scale"
                 warnings.append(Finding(file, text))
     return problems, warnings
+
+
+def _nearest(addresses: Sequence[str], folder: Path) -> dict[str, str]:
+    """Return hints at files of similar names in the robot's folder, by address."""
+    if not addresses:
+        return {}
+    files = islice((each for each in folder.rglob("*") if each.is_file()), _MOST_FILES)
+    names = {each.name.casefold(): each.relative_to(folder).as_posix() for each in files}
+    near = {each: similar(PureWindowsPath(each).name.casefold(), names) for each in addresses}
+    return {each: f"; did you mean {names[name]!r}?" for each, name in near.items() if name}
 
 
 def _scale(shape: Shape) -> float:

@@ -20,12 +20,16 @@ class VerifiedPose(BaseModel):
     Attributes:
         positions: Of the joints [rad] or [m].
         distance_m, angle_rad: Between the tool of the model and that of the controller.
+        tool_to_base, tool_to_flange: Placements [m], (4, 4) row by row, as the controller computed them;
+            empty in files of earlier versions.
     """
 
     model_config = ConfigDict(frozen=True)
     positions: tuple[float, ...]
     distance_m: float
     angle_rad: float
+    tool_to_base: tuple[float, ...] = ()
+    tool_to_flange: tuple[float, ...] = ()
 
 
 class VerificationRecord(BaseModel):

@@ -1,11 +1,13 @@
 """What `dev` installs for which command, and its verdict on tests that pass only when repeated."""
 
+import json
 import re
 import sys
 from importlib.machinery import SourceFileLoader
 from importlib.metadata import PackageNotFoundError, requires
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from packaging.requirements import Requirement
@@ -141,6 +143,80 @@ def test_every_line_keeps_its_version_marker_and_hashes(dev):
     blocks = re.split(r"\n(?=\w)", text.strip())
     assert all(block in lock and "--hash=sha256:" in block for block in blocks)
     assert len(re.findall("^numpy==", text, re.MULTILINE)) == len(re.findall("^numpy==", lock, re.MULTILINE))
+
+
+@pytest.fixture
+def commands(dev, monkeypatch, tmp_path):
+    """Return the commands of a set-up in an empty folder."""
+    listed = []
+    for name in ("VENV", "BIN", "STAMP", "OWN"):
+        monkeypatch.setattr(dev, name, tmp_path / name.lower())
+    dev.VENV.mkdir()
+    monkeypatch.setattr(dev, "SETTLED_BY", (dev.LOCK, dev.OWN))
+    for name in ("system_libraries", "trim", "lend_openmp"):
+        monkeypatch.setattr(dev, name, lambda: None)
+    monkeypatch.setattr(dev, "uv", lambda: "uv")
+    monkeypatch.setattr(dev, "oldest_python", lambda: "/usr/bin/python3.11")
+    monkeypatch.setattr(dev, "left_out", lambda: dev.UNUSED)
+    monkeypatch.setattr(dev, "call", lambda *words, **_: listed.append(" ".join(map(str, words))))
+    return listed
+
+
+def test_a_users_packages_are_installed_whenever_the_environment_is_brought_in_step(dev, commands):
+    dev.OWN.write_text("./my-driver\n")
+    ours = f"--constraint {dev.VENV}/requirements.txt --requirement {dev.OWN}"
+
+    def installs():
+        syncs = [number for number, each in enumerate(commands) if " pip sync " in each]
+        own = [number for number, each in enumerate(commands) if each.endswith(ours)]
+        done = len(syncs) == len(own) and syncs <= own
+        commands.clear()
+        return len(own) if done else "removed"
+
+    dev.set_up()  # dev up
+    assert installs() == 1
+    dev.BIN.mkdir()
+    (dev.BIN / "python").touch()
+    dev.set_up()
+    assert installs() == 0
+    dev.set_up("step")  # dev add step
+    assert installs() == 1
+    dev.set_up("bench")  # the first dev test
+    assert installs() == 1
+    dev.OWN.write_text("./my-driver\n./another\n")  # as a changed lock
+    dev.set_up()
+    assert installs() == 1
+    dev.OWN.unlink()
+    dev.set_up()
+    assert not any("--requirement" in each for each in commands)
+
+
+def test_the_environment_is_made_anew_when_the_system_has_lost_its_python(dev, commands, monkeypatch):
+    monkeypatch.delenv("UV_PYTHON", raising=False)
+    dev.set_up("step")
+    dev.BIN.mkdir()
+    (dev.BIN / "python").symlink_to("/usr/bin/python3.10-of-yesterday")
+    commands.clear()
+    dev.set_up()
+    assert commands[0] == f"uv venv --quiet --clear --python /usr/bin/python3.11 {dev.VENV}"
+    assert dev.installed() == {"site", "step"}
+    monkeypatch.setenv("UV_PYTHON", "3.13")
+    commands.clear()
+    dev.set_up()
+    assert "--python 3.13" in commands[0]
+
+
+def test_of_several_pythons_the_oldest_that_fits_is_taken(dev, monkeypatch):
+    def python(version, *, implementation="cpython", variant="default"):
+        parts = dict(zip(("major", "minor", "patch"), map(int, version.split(".")), strict=True))
+        path = f"/{implementation}-{variant}-{version}"
+        return {"version_parts": parts, "path": path, "implementation": implementation, "variant": variant}
+
+    found = [python(each) for each in ("3.13.0", "3.11.7", "3.10.13", "3.11.2", "3.12.1")]
+    found += [python("3.11.0", implementation="pypy"), python("3.11.1", variant="freethreaded")]
+    monkeypatch.setattr(dev, "uv", lambda: "uv")
+    monkeypatch.setattr(dev.subprocess, "run", lambda *_, **__: SimpleNamespace(stdout=json.dumps(found)))
+    assert dev.oldest_python() == "/cpython-default-3.11.2"
 
 
 @pytest.mark.parametrize("parts", [{"site"}, {"site", "bench"}])

@@ -4,12 +4,18 @@ Each command is a process of its own, with its own exit status, output and signa
 `tests/robomesh/test_wheel.py` and the sites of processes start `robomesh` from nothing.
 """
 
+import contextlib
 import io
 import multiprocessing
 import os
+import select
+import signal
 import subprocess
 import sys
 import tempfile
+import termios
+import time
+import tty
 from pathlib import Path
 from typing import BinaryIO
 
@@ -23,6 +29,9 @@ _LOADED = (
     "numpy",
     "zenoh",
 )
+# A signal within a write would cut the output within a character or a sequence.
+_PAUSE_S = 0.4
+_LINES = 200
 _forks = multiprocessing.get_context("forkserver")
 _forks.set_forkserver_preload([*_LOADED])
 
@@ -52,6 +61,52 @@ def run(arguments: tuple[str, ...], *, timeout_s: float, text: str) -> subproces
         status = process.exitcode
         process.close()
         return subprocess.CompletedProcess(["robomesh", *arguments], status, _read(out), _read(errors))
+
+
+def on_terminal(
+    arguments: tuple[str, ...], *, timeout_s: float, columns: int, until: str = ""
+) -> tuple[int, bytes]:
+    """Run `robomesh` on a new terminal; return its exit status and the bytes that the terminal received.
+
+    Args:
+        arguments: The command's words.
+        timeout_s: Time to its end.
+        columns: Width of the terminal.
+        until: The command is interrupted when its output has this text and pauses; empty: it ends alone.
+
+    Raises:
+        subprocess.TimeoutExpired: If it takes longer; it is killed.
+    """
+    sys.audit("subprocess.Popen", "robomesh", arguments, None, None)  # `--quick` refuses it
+    ours, theirs = os.openpty()
+    try:
+        termios.tcsetwinsize(theirs, (_LINES, columns))
+        tty.setraw(theirs)
+        path = os.ttyname(theirs)
+        # A size in the environment has precedence over the terminal's.
+        size = {"COLUMNS": str(columns), "LINES": str(_LINES)}
+        environment = {**os.environ, "TERM": "xterm-256color", **size}
+        process = _forks.Process(target=_command, args=(arguments, (path,) * 3, str(Path.cwd()), environment))
+        process.start()
+        received, deadline, interrupted = b"", time.monotonic() + timeout_s, not until
+        while process.exitcode is None or select.select([ours], [], [], 0)[0]:
+            wait_s = 0.02 if interrupted else _PAUSE_S
+            if select.select([ours], [], [], wait_s)[0]:
+                received += os.read(ours, 1 << 16)
+            elif not interrupted and until.encode() in received:
+                interrupted = True
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(process.pid or 0, signal.SIGINT)
+            if time.monotonic() > deadline:
+                process.kill()
+                process.join()
+                raise subprocess.TimeoutExpired(["robomesh", *arguments], timeout_s, received)
+        status = process.exitcode
+        process.close()
+        return status or 0, received
+    finally:
+        os.close(ours)
+        os.close(theirs)
 
 
 def _read(file: BinaryIO) -> str:

@@ -3,6 +3,7 @@
     the first 5 of a kind within a second   an entry each
     further ones                            counted: one entry a second, with their number
     kinds beyond the 30th                   counted together, with the name "*"
+    repeats of a stop                       counted together, from the first
 
 A kind is an operator, a host and a request. A flood must neither fill the disk nor make the log unreadable,
 even under many invented names. Accepted requests are never counted, except stops, because a repeated stop
@@ -38,22 +39,29 @@ class FloodCounter:
 
     def __init__(self) -> None:
         self._kinds: dict[tuple[str, str, str], _Kind] = {}
+        self._stop_id = ""
 
     def admits(self, entry: Entry, now_s: float) -> bool:
         """Return whether to write an entry; otherwise it is counted."""
         if entry.outcome is not Outcome.REFUSED and entry.request != STOP:
             return True
         name = (entry.operator, _host(entry.source), entry.request)
+        stop_id = entry.values.get("stop_id", "") if entry.request == STOP else ""
+        repeat = stop_id != "" and stop_id == self._stop_id
+        if repeat:
+            name = (_MANY, _MANY, STOP)
+        elif stop_id:
+            self._stop_id = stop_id
         if name not in self._kinds and len(self._kinds) >= MOST_KINDS:
             # Stops are not counted with other requests, because the last stop's number must be in the log.
             name = (_MANY, _MANY, STOP if entry.request == STOP else _MANY)
         kind = self._kinds.setdefault(name, _Kind(now_s))
         if not kind.counted and now_s - kind.began_s >= WINDOW_S:
             kind.began_s, kind.in_full = now_s, 0
-        if kind.in_full < IN_FULL:
+        if kind.in_full < IN_FULL and not repeat:
             kind.in_full += 1
             return True
-        kind.counted += 1
+        kind.counted += 1 + entry.repeated
         kind.last = entry
         return False
 

@@ -13,6 +13,7 @@ from protocol_gateway.audit.entry import Entry, Outcome, audit_entry, parse_line
 from protocol_gateway.audit.files import lines_of, open_files
 from protocol_gateway.errors import AuditError
 from robomesh import reason_codes as codes
+from robomesh.enum_names import enum_name
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
@@ -27,6 +28,8 @@ _TIME = re.compile(rb'"time_ns":(\d{1,19}),"values":')
 # A search in the background releases the interpreter regularly.
 _LINES_AT_ONCE = 200
 _PAUSE_S = 0.0005
+# After a search the next one waits nine times as long, at most a second: stops need the interpreter.
+_REST_TIMES, _MOST_REST_S = 9.0, 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,6 +121,7 @@ class SearchServer:
         self._live = live
         self._lock = asyncio.Lock()
         self._pending = 0
+        self._next_s = 0.0
 
     async def answer(self, request: Request) -> schema.AuditList:
         """Return the matching entries.
@@ -132,7 +136,13 @@ class SearchServer:
         self._pending += 1
         try:
             async with self._lock:
-                return await asyncio.to_thread(self._list, query)
+                await asyncio.sleep(self._next_s - time.monotonic())
+                began_s = time.monotonic()
+                try:
+                    return await asyncio.to_thread(self._list, query)
+                finally:
+                    now_s = time.monotonic()
+                    self._next_s = now_s + min(_REST_TIMES * (now_s - began_s), _MOST_REST_S)
         except OSError as error:
             raise RefusedError(codes.AUDIT_UNREADABLE(file=self._live.name, detail=error.strerror)) from None
         finally:
@@ -156,7 +166,7 @@ def query_of(message: schema.AuditQuery) -> Query:
     return Query(
         operator=one_line(message.operator),
         request=one_line(message.request),
-        outcome=Outcome(outcomes.Name(message.outcome)) if message.HasField("outcome") else None,
+        outcome=Outcome(enum_name(outcomes, message.outcome)) if message.HasField("outcome") else None,
         since_ns=message.since.ToNanoseconds() if message.HasField("since") else None,
         until_ns=message.until.ToNanoseconds() if message.HasField("until") else None,
         most=message.most or DEFAULT_MOST,

@@ -5,6 +5,7 @@
                                 other content: refused; the first answer is kept
     id < the last one, or 0     refused
     not_after has passed        refused: it was delayed on the way
+    not_after is too far ahead  refused, except HOLD: it is not in the gateway's time, so no delay would show
     waited here for over 1 s    refused: its sender may have timed out
     a stop is latched           motion refused; RESET only with that stop's id, and while the robot rests
 
@@ -12,6 +13,7 @@
 """
 
 import hmac
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -27,11 +29,17 @@ from protocol_gateway.authority.lease_rules import (
     why_not_holder,
 )
 from robomesh import reason_codes as codes
+from robomesh.enum_names import enum_name
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest
 
-_RESET = CommandRequest.Command.RESET
+_C = CommandRequest.Command
+_RESET = _C.RESET
 
+# Longest time from now to a command's `not_after` [s], above what any client of robomesh waits for an answer.
+# HOLD has no limit, because it only ends motion.
+_LONGEST_DEADLINE_S = 5.0
+_LONGEST_DEADLINES_S = {_C.RUN_PROGRAM: 65.0, _C.HOLD: math.inf}
 # Well below the client's default timeout of 2 s.
 LONGEST_WAIT_S = 1.0
 
@@ -88,13 +96,27 @@ def content_of(request: CommandRequest) -> Content:
 
 
 def deadline_refusal(request: CommandRequest, now: Now) -> Answer | None:
-    """Return the refusal of a command after its deadline; None: it is in time."""
+    """Return the refusal of a command after its deadline, or long before it; None: it is in time."""
     if not request.HasField("not_after"):
         return None
-    late_s = (now.wall_ns - request.not_after.ToNanoseconds()) * 1e-9
-    if late_s <= 0:
-        return None
-    return not_sent(codes.COMMAND_LATE(seconds=late_s))
+    left_s = time_left_s(request, now)
+    longest_s = longest_deadline_s(request)
+    if left_s < 0:
+        return not_sent(codes.COMMAND_LATE(seconds=-left_s))
+    if left_s > longest_s:
+        name = enum_name(_C, request.command)
+        return not_sent(codes.COMMAND_DEADLINE_FAR(seconds=left_s, command=name, most=longest_s))
+    return None
+
+
+def longest_deadline_s(request: CommandRequest) -> float:
+    """Return the longest time from now to a command's `not_after` [s]."""
+    return _LONGEST_DEADLINES_S.get(request.command, _LONGEST_DEADLINE_S)
+
+
+def time_left_s(request: CommandRequest, now: Now) -> float:
+    """Return the time until a command's `not_after`, negative after it [s]."""
+    return (request.not_after.ToNanoseconds() - now.gateway_ns) * 1e-9
 
 
 def wait_refusal(arrived_s: float, now: Now) -> Answer | None:

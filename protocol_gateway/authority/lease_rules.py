@@ -32,6 +32,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from robomesh import reason_codes as codes
+from robomesh.enum_names import enum_name
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from robomesh.texts import one_line
@@ -54,10 +55,17 @@ MOTION_COMMANDS = frozenset({_C.HOME, _C.RESUME, _C.MOVE_ABSOLUTE, _C.MOVE_RELAT
 
 
 class Now(NamedTuple):
-    """Both clocks: the monotonic one measures durations, the wall clock gives published times."""
+    """The gateway's clocks at one moment (`clocks.py`).
+
+    Attributes:
+        monotonic_s: For durations; any origin.
+        wall_ns: For times that people read, ns since the Unix epoch. A person or NTP may set it.
+        gateway_ns: For deadlines that others send, about ns since the Unix epoch. It never steps.
+    """
 
     monotonic_s: float
     wall_ns: int
+    gateway_ns: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +152,10 @@ class Content(NamedTuple):
 
     def description(self) -> str:
         """Return a readable line."""
-        words = [CommandRequest.Command.Name(self.command), *(f"{each:.6g}" for each in self.joint_positions)]
+        words = [
+            enum_name(CommandRequest.Command, self.command),
+            *(f"{each:.6g}" for each in self.joint_positions),
+        ]
         if self.speed_percent is not None:
             words.append(f"{self.speed_percent:g} %")
         if self.stop_id:
@@ -417,7 +428,7 @@ def _add_asker(authority: Authority, operator: str, reason: str, now: Now) -> Au
     """Add an operator's request for control, or renew it."""
     others = [each for each in _current_askers(authority, now) if each.operator != operator]
     asker = Asker(
-        operator=operator, reason=reason, since_ns=now.wall_ns, until_s=now.monotonic_s + ASKED_FOR_S
+        operator=operator, reason=reason, since_ns=now.gateway_ns, until_s=now.monotonic_s + ASKED_FOR_S
     )
     return replace(authority, asked_by=(*others, asker)[-MOST_ASKERS:])
 
@@ -432,7 +443,7 @@ def _with_expiry(lease: Lease, ttl_s: float, now: Now) -> Lease:
         lease,
         ttl_s=kept,
         until_s=now.monotonic_s + kept,
-        until_ns=now.wall_ns + round(kept * 1e9),
+        until_ns=now.gateway_ns + round(kept * 1e9),
     )
 
 

@@ -41,6 +41,7 @@ from protocol_gateway.drivers.driver import (
 )
 from protocol_gateway.link.link import LinkState, LinkStatus
 from robomesh import reason_codes as codes
+from robomesh.enum_names import enum_name
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest
 from robomesh.schemas.robomesh_pb2 import Recover as RecoverMessage
@@ -80,6 +81,7 @@ class Controller:
         positions_stale: Reason if positions are stale; None: they are current, or none were received.
         unproven: Reason why the joints that it sends may not be those of the model, so that `positions` has
             none; None: they are.
+        invalid: Reason why joints that were published, unproven, cannot be right; None: they can.
         software: Version of its software, in its words; empty: not reported.
         software_unknown: Reason why it must be reported before a motion is sent; None: it need not be.
         reports_set_up: It reports tool, payload or frame.
@@ -99,6 +101,7 @@ class Controller:
     positions: tuple[float, ...] | None = None
     positions_stale: Reason | None = None
     unproven: Reason | None = None
+    invalid: Reason | None = None
     software: str = ""
     software_unknown: Reason | None = None
     reports_set_up: bool = False
@@ -144,7 +147,7 @@ def _ability_obstacle(request: CommandRequest, controller: Controller) -> Reason
         return None
     if request.command == _C.HOME and capabilities.absolute:
         return codes.ROBOT_HOMED_BY_NATURE()
-    return codes.COMMAND_NOT_THERE(command=_C.Name(request.command))
+    return codes.COMMAND_NOT_THERE(command=enum_name(_C, request.command))
 
 
 def _recovery_obstacle(request: CommandRequest, controller: Controller) -> Reason | None:
@@ -334,4 +337,4 @@ def controller_command(request: CommandRequest) -> ControllerCommand:
             return MoveRelative(offsets=tuple(request.joint_positions))
         case _C.RECOVER if request.recover.recovery in _RECOVERIES:
             return Recover(_RECOVERIES[request.recover.recovery])
-    raise ValueError(f"{_C.Name(request.command)} is not a controller's command")
+    raise ValueError(f"{enum_name(_C, request.command)} is not a controller's command")

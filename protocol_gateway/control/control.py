@@ -11,15 +11,17 @@ import logging
 import secrets
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from protocol_gateway.authority.admission import Verdict, admit_all
+from protocol_gateway.authority.admission import Verdict, admit_all, wait_refusal
 from protocol_gateway.authority.lease_rules import Answer, Authority, Now
 from protocol_gateway.authority.preconditions import Controller
-from protocol_gateway.control import effects, events
+from protocol_gateway.clocks import read_clocks
+from protocol_gateway.control import effects, entries, events
 from protocol_gateway.control.audit_trail import AuditTrail
 from protocol_gateway.control.checks import Checks
+from protocol_gateway.control.deadlines import Arrivals
 from protocol_gateway.control.effects import Finding, Program, Seen
 from protocol_gateway.control.entries import PROGRAM, page_values
 from protocol_gateway.control.evaluation import RunningProgram
@@ -37,11 +39,6 @@ from robomesh.schemas import robomesh_pb2 as schema
 log = logging.getLogger(__name__)
 
 
-def read_clocks() -> Now:
-    """Return the present time on both clocks."""
-    return Now(time.monotonic(), time.time_ns())
-
-
 @dataclass(kw_only=True)
 class Ports:
     """Targets of the effects of one robot's authority.
@@ -53,6 +50,7 @@ class Ports:
         publish: Publishes the state of lease, stop and program.
         confirm_set_up: Takes tool, payload and frame as they are now for right.
         controlled: Tells the driver whether an operator controls the robot.
+        other_gateway: Returns why another gateway of the robot forbids control; None: there is none.
     """
 
     audit_trail: AuditTrail
@@ -63,6 +61,7 @@ class Ports:
     publish: Callable[[], None]
     confirm_set_up: Callable[[], None] = lambda: None
     controlled: Callable[[bool], None] = lambda taken: None
+    other_gateway: Callable[[], Reason | None] = lambda: None
 
 
 class Control:
@@ -70,6 +69,9 @@ class Control:
 
     Args:
         checks: None: motions are not checked.
+
+    Attributes:
+        arrivals: Times of arrival of commands, which learns here that the gateway runs.
     """
 
     def __init__(self, robot_authority: RobotAuthority, ports: Ports, checks: Checks | None = None) -> None:
@@ -79,6 +81,7 @@ class Control:
         self._command_lock = asyncio.Lock()
         self._preparing: set[asyncio.Future[Reason]] = set()
         self._timer: asyncio.TimerHandle | None = None
+        self.arrivals = Arrivals()
 
     @property
     def authority(self) -> Authority:
@@ -100,6 +103,21 @@ class Control:
         event = events.StopRequested(by=by, reason=reason, source=source, page=shown)
         result: events.StopResult = self.handle(event)
         return stop_answer(result)
+
+    def answer_to_repeated_stop(self) -> schema.StopAnswer | None:
+        """Return the answer to a stop while the unit of another one is in transit; None: none is.
+
+        On any thread: it reads immutable values only.
+        """
+        result = self._robot_authority.stop_in_transit(read_clocks())
+        return None if result is None else stop_answer(result)
+
+    def record_repeated_stops(self, count: int, stop_id: int, *, by: str, reason: str, source: str) -> None:
+        """Audit stops that were answered from memory, as one entry with the newest one's sender."""
+        result = events.StopResult(codes.STOP_SENT(id=stop_id), stop_id, sent=True)
+        event = events.StopRequested(by=by, reason=reason, source=source)
+        entry = entries.stop_entry(event, result, read_clocks())
+        self._ports.audit_trail.write_later(replace(entry, repeated=count - 1))
 
     async def lease(self, request: schema.LeaseRequest, *, operator: str, source: str) -> schema.LeaseAnswer:
         """Answer a lease request.
@@ -148,7 +166,7 @@ class Control:
             requests=tuple(requests),
             operator=operator,
             source=source,
-            arrived=read_clocks(),
+            arrived=self._arrived(),
             program=program,
             refused=refused,
         )
@@ -166,7 +184,14 @@ class Control:
     def admit(self, request: schema.CommandRequest, operator: str) -> Verdict:
         """Evaluate whether a command is the holder's, in time and new, and no stop forbids it."""
         self.handle(events.TimePassed())
-        return admit_all(self.authority, (request,), operator=operator, now=read_clocks())
+        now = read_clocks()
+        if (late := wait_refusal(self._arrived().monotonic_s, now)) is not None:
+            return Verdict(late)
+        return admit_all(self.authority, (request,), operator=operator, now=now)
+
+    def _arrived(self) -> Now:
+        now = read_clocks()
+        return now._replace(monotonic_s=self.arrivals.arrived_s(now.monotonic_s))
 
     @contextlib.contextmanager
     def preparing_program(self) -> Iterator[asyncio.Future[Reason]]:
@@ -278,7 +303,8 @@ class Control:
             now=read_clocks(),
             controller=self._ports.controller(),
             latch_problem=self._ports.latch.problem,
-            cell_closed=None if self._checks is None else self._checks.cell_closed,
+            closed=self._ports.other_gateway()
+            or (None if self._checks is None else self._checks.cell_closed),
         )
 
     def _send(self, effect: effects.Send) -> Reason | None:

@@ -32,13 +32,13 @@ class Seen:
 
     Attributes:
         latch_problem: Reason why a restart would lose a stop now; None: it would not.
-        cell_closed: Reason why no robot of the cell may be controlled or moved now; None: they may.
+        closed: Reason why the robot may not be controlled or moved now, whatever its state; None: it may.
     """
 
     now: Now
     controller: Controller
     latch_problem: Reason | None = None
-    cell_closed: Reason | None = None
+    closed: Reason | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,6 @@ import contextlib
 import math
 from collections.abc import Mapping
 from hashlib import sha256
-from typing import Any
 
 from protocol_gateway.audit.entry import Entry, Outcome
 from protocol_gateway.audit.log import GATEWAY
@@ -18,6 +17,7 @@ from protocol_gateway.control.events import (
     StopResult,
 )
 from protocol_gateway.text_limits import LONGEST_SENTENCE, LONGEST_TEXT
+from robomesh.enum_names import enum_name
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest, Jog, LeaseRequest, PageReport, Recover
 from robomesh.texts import one_line
@@ -62,7 +62,7 @@ def lease_entry(event: LeaseRequested, outcome: Outcome, answer: Answer, now: No
     """Create the entry of a lease request."""
     request = event.request
     return entry_of(
-        LeaseRequest.Action.Name(request.action),
+        enum_name(LeaseRequest.Action, request.action),
         time_ns=now.wall_ns,
         operator=event.operator,
         source=event.source,
@@ -72,7 +72,7 @@ def lease_entry(event: LeaseRequested, outcome: Outcome, answer: Answer, now: No
         ttl_s=request.ttl_s,
         to=request.to,
         reason=request.reason,
-        cause=LeaseRequest.Cause.Name(request.cause) if request.cause else "",
+        cause=enum_name(LeaseRequest.Cause, request.cause) if request.cause else "",
     )
 
 
@@ -80,7 +80,7 @@ def command_entries(event: CommandsRequested, outcome: Outcome, answer: Answer) 
     """Create the entries of commands, one each."""
     return tuple(
         entry_of(
-            CommandRequest.Command.Name(request.command),
+            enum_name(CommandRequest.Command, request.command),
             time_ns=event.arrived.wall_ns,
             operator=event.operator,
             source=event.source,
@@ -106,8 +106,8 @@ def _jog_values(request: CommandRequest) -> Mapping[str, str]:
         return {}
     jog = request.jog
     return {
-        "jog_frame": _name(Jog.Frame, jog.frame),
-        "jog_axis": f"joint {jog.joint}" if jog.frame == Jog.JOINT else _name(Jog.Axis, jog.axis),
+        "jog_frame": enum_name(Jog.Frame, jog.frame),
+        "jog_axis": f"joint {jog.joint}" if jog.frame == Jog.JOINT else enum_name(Jog.Axis, jog.axis),
         "jog_speed": f"{jog.speed:.6g}",
     }
 
@@ -124,12 +124,7 @@ def _recover_values(request: CommandRequest) -> Mapping[str, str]:
 
 def recovery_name(request: CommandRequest) -> str:
     """Return the name of a recovery, as the site file has it."""
-    return _name(Recover.Recovery, request.recover.recovery).lower()
-
-
-def _name(kind: Any, number: int) -> str:
-    """Return the name of an enum's value; a later schema may have more."""
-    return str(kind.Name(number)) if number in kind.values() else str(number)
+    return enum_name(Recover.Recovery, request.recover.recovery).lower()
 
 
 def page_values(report: PageReport) -> Mapping[str, str]:

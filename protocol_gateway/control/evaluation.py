@@ -95,7 +95,7 @@ def refusal_of(
             or deadline_refusal(request, seen.now)
             or stop_refusal(authority, request)
             or _latch_refusal(request, seen)
-            or _cell_refusal(request, seen)
+            or _closed_refusal(request, seen)
             or (None if command.step else _program_refusal(request, program))
             or _recover_refusal(request, authority)
             or controller_refusal(request, authority, controller, seen, joints)
@@ -151,10 +151,10 @@ def _latch_refusal(request: CommandRequest, seen: Seen) -> Answer | None:
     return not_sent(codes.COMMAND_NOT_LATCHED(seen.latch_problem))
 
 
-def _cell_refusal(request: CommandRequest, seen: Seen) -> Answer | None:
-    if seen.cell_closed is None or request.command not in MOTION_COMMANDS | {_C.RECOVER}:
+def _closed_refusal(request: CommandRequest, seen: Seen) -> Answer | None:
+    if seen.closed is None or request.command not in MOTION_COMMANDS | {_C.RECOVER}:
         return None
-    return not_sent(seen.cell_closed)
+    return not_sent(seen.closed)
 
 
 def _program_refusal(request: CommandRequest, program: RunningProgram | None) -> Answer | None:

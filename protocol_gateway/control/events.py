@@ -13,6 +13,7 @@ from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, Leas
 from protocol_gateway.control.effects import Finding, Program
 from protocol_gateway.drivers.driver import Activity
 from robomesh import reason_codes as codes
+from robomesh.enum_names import enum_name
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 
@@ -100,7 +101,7 @@ class CommandsRequested:
     @property
     def names(self) -> str:
         """Names of the commands."""
-        return ", ".join(_C.Name(each.command) for each in self.requests)
+        return ", ".join(enum_name(_C, each.command) for each in self.requests)
 
 
 @dataclass(frozen=True, kw_only=True)

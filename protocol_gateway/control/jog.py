@@ -32,6 +32,7 @@ from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import CheckError
 from protocol_gateway.journal import Journal
 from robomesh import reason_codes as codes
+from robomesh.enum_names import enum_word
 from robomesh.errors import RefusedError
 from robomesh.messages import reason_message
 from robomesh.reasons import Reason
@@ -487,4 +488,4 @@ def _name(jog: schema.Jog) -> str:
     sign = "+" if jog.speed > 0 else "-"
     if jog.frame == _J.JOINT:
         return f"joint {jog.joint} {sign}"
-    return f"{_J.Frame.Name(jog.frame).lower()} {_J.Axis.Name(jog.axis).lower()} {sign}"
+    return f"{enum_word(_J.Frame, jog.frame)} {enum_word(_J.Axis, jog.axis)} {sign}"

@@ -16,9 +16,11 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from protocol_gateway.authority.admission import time_left_s
 from protocol_gateway.authority.lease_rules import Answer, refused
 from protocol_gateway.authority.preconditions import Controller
 from protocol_gateway.checking.worker_messages import Checked
+from protocol_gateway.clocks import read_clocks
 from protocol_gateway.control.abort import abort_reason
 from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.control import Control, command_answer, refusal
@@ -190,7 +192,7 @@ class Programs:
         """
         waits_s = PREPARE_TIMEOUT_S
         if request.HasField("not_after"):
-            waits_s = (request.not_after.ToNanoseconds() - time.time_ns()) * 1e-9 - _ANSWER_MARGIN_S
+            waits_s = time_left_s(request, read_clocks()) - _ANSWER_MARGIN_S
         prepared = asyncio.ensure_future(self._prepare(request, operator))
         try:
             within_s = max(0.0, min(waits_s, PREPARE_TIMEOUT_S))

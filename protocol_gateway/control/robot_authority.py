@@ -28,7 +28,7 @@ from protocol_gateway.audit.entry import Outcome
 from protocol_gateway.audit.log import GATEWAY
 from protocol_gateway.authority import lease_rules, motion_owner, stop_rules
 from protocol_gateway.authority.admission import Verdict, keep_answer
-from protocol_gateway.authority.lease_rules import Answer, Authority, LeaseEnd, not_sent, refused
+from protocol_gateway.authority.lease_rules import Answer, Authority, LeaseEnd, Now, not_sent, refused
 from protocol_gateway.authority.preconditions import (
     Controller,
     controller_command,
@@ -46,12 +46,15 @@ from protocol_gateway.link.link import LinkState
 from protocol_gateway.motion import has_arrived, motion_may_be_held
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
+from robomesh.request_queue import RateLimit
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest, Recover
 from robots.joints import Joints
 
 _A = LeaseRequest.Action
 _C = CommandRequest.Command
 
+# New stops while one is latched; those beyond count as repeated.
+NEW_STOPS_PER_S, NEW_STOPS_BURST = 1.0, 5
 # Longer than any arm needs to come to rest: after this time, a moving arm has ignored its stop unit.
 HEED_TIMEOUT_S = 2.0
 
@@ -75,7 +78,9 @@ class RobotAuthority:
         self._orphan = orphan
         self._last_unit_s = float("-inf")  # when the newest unit of commands was sent
         self._disobeyed_reported_s = 0.0
-        self._last_stop: tuple[str, str, StopResult] | None = None  # operator, source
+        # The latched stop, if its unit was sent and no RESET is under way: its operator, source and result.
+        self._last_stop: tuple[str, str, StopResult] | None = None
+        self._new_stops = RateLimit(per_s=NEW_STOPS_PER_S, burst=NEW_STOPS_BURST)
 
     @property
     def authority(self) -> Authority:
@@ -147,6 +152,13 @@ class RobotAuthority:
                 assert_never(event)
         return None
 
+    def stop_in_transit(self, now: Now) -> StopResult | None:
+        """Return the result of the latched stop if its unit was sent just now. On any thread."""
+        last, authority = self._last_stop, self._authority
+        if last is None or authority.stop is None or authority.stop.id != last[2].id:
+            return None
+        return None if stop_rules.in_transit_since(authority, now) is None else last[2]
+
     def obstacle(self, request: CommandRequest, seen: Seen) -> Answer | None:
         """Return the refusal of a command by the controller's present state; None: allowed."""
         return evaluation.controller_refusal(request, self._authority, seen.controller, seen, self._joints)
@@ -154,17 +166,24 @@ class RobotAuthority:
     # ------------------------------------------------------------------ stops
 
     def _stop(self, stop: events.StopRequested, seen: Seen) -> Effects[StopResult]:
-        """Send the stop unit and latch the stop; a repeated request of its sender is the same stop."""
+        """Send the stop unit and latch the stop.
+
+        While one is latched, a repeated request of its sender is the same stop; so is any other request
+        beyond a rate, because a flood may have many names. Its unit is sent again unless one is in transit.
+        """
         read_only, up = seen.controller.read_only, seen.controller.link.state is LinkState.UP
         sent_s = stop_rules.in_transit_since(self._authority, seen.now) if up else None
         if read_only is not None:
             # No operator could reset the latch, and the gateway never sends motion to this robot.
             result = StopResult(codes.STOP_READ_ONLY(read_only))
             yield reports.stop_not_sent(stop, result)
-        elif sent_s is not None and self._last_stop and self._last_stop[:2] == (stop.by, stop.source):
-            result = self._last_stop[2]
+        elif (problem := (yield from self._send_stop_unit()) if sent_s is None else None) is None and (
+            repeated := self._repeated(stop, seen)
+        ):
+            result = repeated
+            if sent_s is None:
+                self._authority = stop_rules.stop_sent(self._authority, result.id, seen.now.monotonic_s)
         else:
-            problem = (yield from self._send_stop_unit()) if sent_s is None else None
             number = yield effects.NumberStop(self._authority.last_stop_id)
             self._authority, latched = stop_rules.stop(
                 self._authority, by=stop.by, reason=stop.reason, now=seen.now, number=number
@@ -184,6 +203,14 @@ class RobotAuthority:
             yield reports.stop_latched(stop, result)
         yield effects.AppendLater(entries.stop_entry(stop, result, seen.now))
         return result
+
+    def _repeated(self, stop: events.StopRequested, seen: Seen) -> StopResult | None:
+        """Return the result of the latched stop if a request repeats it; None: it is a new stop."""
+        if self._authority.stop is None or self._last_stop is None:
+            return None
+        by, source, result = self._last_stop
+        same = (by, source) == (stop.by, stop.source)
+        return result if same or not self._new_stops.take(seen.now.monotonic_s) else None
 
     def _stop_by_gateway(self, reason: Reason, seen: Seen) -> Effects[None]:
         yield from self._stop(events.StopRequested(by=GATEWAY, reason=reason, source=GATEWAY), seen)
@@ -248,8 +275,8 @@ class RobotAuthority:
         read_only = seen.controller.read_only
         if read_only is not None and event.request.action in (_A.ACQUIRE, _A.TAKE):
             return lease_rules.LeaseOutcome(self._authority, refused(codes.ROBOT_READ_ONLY(read_only)))
-        if seen.cell_closed is not None and event.request.action in (_A.ACQUIRE, _A.TAKE):
-            return lease_rules.LeaseOutcome(self._authority, refused(seen.cell_closed))
+        if seen.closed is not None and event.request.action in (_A.ACQUIRE, _A.TAKE):
+            return lease_rules.LeaseOutcome(self._authority, refused(seen.closed))
         return lease_rules.request_lease(
             self._authority, event.request, operator=event.operator, now=seen.now, secret=event.secret
         )
@@ -327,6 +354,8 @@ class RobotAuthority:
         self, command: events.CommandsRequested, unit: bytes | None, finding: Finding
     ) -> Effects[Answer]:
         warning = finding.warning
+        if any(request.command == _C.RESET for request in command.requests):
+            self._last_stop = None  # a stop from now on is a new one, and the RESET does not clear it
         accepted = Answer(True, "" if warning is None else warning.text, warning)
         unwritten, seen = yield effects.Append(entries.command_entries(command, Outcome.ACCEPTED, accepted))
         if unwritten is not None:
@@ -476,6 +505,7 @@ class RobotAuthority:
         # The next connection may reach another controller.
         first_percent = seen.controller.capabilities.first_speed_percent
         self._authority = replace(self._authority, speed_percent=first_percent)
+        self._last_stop = None
         lease = self._authority.lease
         if lease is not None and lease.motion is not None:
             yield from self._stop_by_gateway(codes.STOP_LINK_LOST(holder=lease.holder, detail=why), seen)

@@ -118,7 +118,13 @@ class LegacyClients:
                 asyncio.get_running_loop().call_soon(self._send_states)
             self._units.append(unit)
 
+    def discard_states(self) -> None:
+        """Discard the units of the present read: their positions cannot be."""
+        self._units.clear()
+
     def _send_states(self) -> None:
+        if not self._units:
+            return
         *earlier, newest = self._units
         self._units.clear()
         for client in self._clients:

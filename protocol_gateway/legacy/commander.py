@@ -14,6 +14,7 @@ from contextlib import suppress
 
 from protocol_gateway.authority.admission import LONGEST_WAIT_S
 from protocol_gateway.authority.lease_rules import holds
+from protocol_gateway.clocks import read_clocks
 from protocol_gateway.control.control import Control
 from protocol_gateway.control.events import LeaseEnded
 from protocol_gateway.core.records import Error
@@ -112,14 +113,15 @@ class Commander:
         requests = requests_of(unit.records, self._joints)
         if isinstance(requests, Error):
             return requests
-        waited_s = time.monotonic() - received_s
+        now = read_clocks()
+        left_s = LONGEST_WAIT_S - (now.monotonic_s - received_s)
         for request in requests:
             if request.command == _RESET:
                 stop = stop_to_reset(self._control.authority, received_s)
                 if isinstance(stop, Error):
                     return stop
                 request.stop_id = stop
-            request.not_after.FromNanoseconds(time.time_ns() + int((LONGEST_WAIT_S - waited_s) * 1e9))
+            request.not_after.FromNanoseconds(now.gateway_ns + int(left_s * 1e9))
         return requests
 
     async def _do(self, unit: Unit, requests: Sequence[CommandRequest]) -> None:

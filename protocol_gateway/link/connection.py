@@ -16,8 +16,8 @@ from robomesh.reasons import Reason
 # A unit has some hundred bytes. With a small send buffer, a controller that does not read causes an error
 # immediately, instead of kilobytes of commands that it would execute late.
 _SEND_BUFFER_BYTES = 4096
-# A chunk of this size holds so few units that parsing it delays no other robot.
-READ_BYTES = 16 * 1024
+# A chunk of this size holds so few units, even of one byte each, that parsing it delays no other robot.
+READ_BYTES = 4 * 1024
 """Most bytes of one read; a read of this size means that more may wait."""
 # Sent data that the controller's host has not acknowledged for this long break the connection.
 _UNACKNOWLEDGED_MS = 3000

@@ -6,8 +6,8 @@
 
 The sockets are read continuously, because data waiting in the kernel's buffers would look new later. Of a
 flood, and of a burst after a gap, the newest of each kind is dispatched and the rest is counted (`flood`).
-The link is SILENT if the controller's units have another joint count, or if it sends over 2 MiB a second. It
-stays connected then, so that a stop can be sent.
+The link is SILENT if the controller's units have another joint count, or positions that cannot be
+(`plausibility`), or if it sends over 2 MiB a second. It stays connected then, so that a stop can be sent.
 
 Data is stamped once: with the time of the read, or earlier by the controller's clock (`timestamping`); an
 answer without such a clock in the middle between its question and its receipt.
@@ -49,11 +49,14 @@ from protocol_gateway.link.channel import KeptChannel
 from protocol_gateway.link.connection import READ_BYTES
 from protocol_gateway.link.flood import EventDispatcher, FloodDetector
 from protocol_gateway.link.health import Arrivals, LinkHealth, LossCounter, Questions, ResponseTimer
+from protocol_gateway.link.plausibility import Plausibility
 from protocol_gateway.link.status import LinkState, LinkStatus
 from protocol_gateway.link.timestamping import Received, Timestamper
 from robomesh import reason_codes as codes
+from robomesh.loop_turns import LoopTurns, turns_of
 from robomesh.reasons import Reason
 from robomesh.wall_clock import WallClock
+from robots.joints import Joints
 
 __all__ = [
     "ControllerLink",
@@ -66,9 +69,10 @@ __all__ = [
 
 logger = logging.getLogger(__name__)
 
-# Of a deluge, one chunk of 16 KiB is discarded this often: cheap, and its end is detected.
-_DELUGE_EACH_S = 0.01
-JOINT_COUNT = "controller.joint_count"
+# Of a deluge, one chunk of 4 KiB is discarded this often: cheap, and its end is detected.
+_DELUGE_EACH_S = 0.0025
+JOINT_COUNT, JOINT_VALUES = "controller.joint_count", "controller.joint_values"
+"""Codes of units whose positions are unusable: they invalidate all positions for the stale time."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,17 +117,22 @@ class ControllerLink:
     queue, no task switch. They must return soon, and an exception in them ends `run`. `on_channel` gets each
     change of a channel that does not carry READING: why it is not connected; None: it is. `on_fate_unknown`
     gets why the driver wants a stop.
+
+    Args:
+        tolerates: Returns whether joint positions that cannot be are passed on, given the reason.
     """
 
     def __init__(
         self,
         settings: LinkSettings,
         driver: Driver,
+        joints: Joints,
         *,
         on_event: Callable[[ControllerEvent, Received], None],
         on_status: Callable[[LinkStatus], None] = lambda status: None,
         on_channel: Callable[[Channel, Reason | None], None] = lambda channel, why: None,
         on_fate_unknown: Callable[[Reason], None] = lambda why: None,
+        tolerates: Callable[[Reason], bool] = lambda why: False,
         monotonic_s: Callable[[], float] = time.monotonic,
     ) -> None:
         self._settings = settings
@@ -133,6 +142,7 @@ class ControllerLink:
         self._on_status = on_status
         self._on_channel = on_channel
         self._on_fate_unknown = on_fate_unknown
+        self._tolerates = tolerates
         self._monotonic_s = monotonic_s
         self._wall_clock = WallClock()
         self._where = f"{settings.host}:{settings.port}"
@@ -141,6 +151,7 @@ class ControllerLink:
         self._in_a_hurry: set[str] = set()
         self._failed: asyncio.Future[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
+        self._ran: Callable[[object, float], None] = LoopTurns().ran
         self._is_controlled = False
         self._unasked = UnaskedSends(driver.requests_a_second)
         self._connected_s = self._units_at_connect = 0.0
@@ -151,6 +162,7 @@ class ControllerLink:
         self._unusable: tuple[float, Reason, str] | None = (
             None  # time of the last unusable data, reason, and the event's code
         )
+        self._plausibility = Plausibility(joints)
         self._timestamper = Timestamper()
         self._arrivals = Arrivals()
         self._losses = LossCounter()
@@ -196,7 +208,9 @@ class ControllerLink:
 
     async def run(self) -> None:
         """Keep the channels connected until cancelled; then close them."""
-        self._failed = asyncio.get_running_loop().create_future()
+        loop = asyncio.get_running_loop()
+        self._failed = loop.create_future()
+        self._ran = turns_of(loop).ran
         try:
             self._tell(self._driver.started(self._monotonic_s()))
             self.controlled(self._is_controlled)
@@ -320,7 +334,9 @@ class ControllerLink:
 
     def _end_timer(self) -> None:
         self._timer = None
-        self._tell(self._driver.timer_ended(self._monotonic_s()))
+        now_s = self._monotonic_s()
+        self._tell(self._driver.timer_ended(now_s))
+        self._ran(self, now_s)
 
     def _open(self, effect: Open) -> None:
         self._close(effect.channel.name)
@@ -379,6 +395,7 @@ class ControllerLink:
         reads = Carries.READING in kept.channel.carries
         if reads:
             self._timestamper.connected()
+            self._plausibility.connected()
             self._losses.forget()
             self._dispatcher.flood = FloodDetector()
             self._unusable = None
@@ -411,16 +428,23 @@ class ControllerLink:
         """Return how long to wait for units, or why to connect again; report silence."""
         if Carries.READING not in kept.channel.carries:
             return math.inf
-        now_s, connected_s = self._monotonic_s(), self._connected_s
+        now_s = self._monotonic_s()
         patience_s, limit_s = self._settings.stale_after_s, self._settings.reconnect_after_s
-        last_s = self._last_received.monotonic_s if self._last_received else connected_s
-        quiet_s = now_s - max(last_s, connected_s)
+        quiet_s = now_s - self._heard_s
         mute_s = quiet_s if self._unusable is None else now_s - self._unusable[0]
         if mute_s >= limit_s:
             return codes.LINK_RECONNECTS(where=kept.where)
-        if quiet_s >= patience_s and self._status.state is LinkState.UP:
-            self._fall_silent()
+        self._note_silence(now_s)
         return patience_s - quiet_s if quiet_s < patience_s else limit_s - mute_s
+
+    @property
+    def _heard_s(self) -> float:
+        """Time of the last unit, or of the connection if there was none since."""
+        return max(self._last_received.monotonic_s if self._last_received else 0.0, self._connected_s)
+
+    def _note_silence(self, now_s: float) -> None:
+        if self._status.state is LinkState.UP and now_s - self._heard_s >= self._settings.stale_after_s:
+            self._fall_silent()
 
     def _readable(self) -> Iterator[KeptChannel]:
         """Yield the connected channels that carry READING."""
@@ -435,9 +459,12 @@ class ControllerLink:
         # Stamped before it is parsed, so that parsing does not count as age.
         now = self._now()
         self._counts["bytes_received"] += len(data)
+        # A gateway that was itself suspended has seen nothing, although the system kept the units for it.
+        self._note_silence(now.monotonic_s)
         if self._is_deluge(kept, len(data), now.monotonic_s):
             return
         self._tell(self._driver.received(kept.channel, data, now.monotonic_s), now)
+        self._ran(self, now.monotonic_s)
 
     def _report(self, report: Report, now: Received) -> None:
         events, units = report.events, report.units
@@ -448,9 +475,9 @@ class ControllerLink:
         for event in events:
             self._count(event, now.monotonic_s)
         self._dispatcher.flood.add_units(max(units, len(events)))
-        other_joints = self._sends_other_joints(now.monotonic_s)
-        if other_joints:
-            # The link reports this once. Which of the positions belong to this robot is unknown.
+        unusable = self._sends_unusable_joints(now.monotonic_s)
+        if unusable:
+            # The link reports this once. Which of the positions are this robot's is unknown.
             events = [each for each in events if not _is_of_joints(each)]
             self._fall_silent()
         for event in events:
@@ -458,7 +485,7 @@ class ControllerLink:
         if report.asked_s is not None:
             now = self._questions.answered(report.asked_s, now)
         dates = self._timestamper.timestamps(events, now)
-        if units > report.refusals and not other_joints:
+        if units > report.refusals and not unusable:
             self._refusal, self._unusable = "", None
             self._unit_received(max(dates, key=attrgetter("monotonic_s"), default=now), now)
         elif not units and self._unusable is not None and self._status.state is LinkState.SILENT:
@@ -483,9 +510,9 @@ class ControllerLink:
             self._losses.forget()
         return before or self._dispatcher.flood.deluge
 
-    def _sends_other_joints(self, now_s: float) -> bool:
-        """Return whether a unit with another joint count was received within the stale time."""
-        if self._unusable is None or self._unusable[2] != JOINT_COUNT:
+    def _sends_unusable_joints(self, now_s: float) -> bool:
+        """Return whether a unit with unusable joints was received within the stale time."""
+        if self._unusable is None or self._unusable[2] not in (JOINT_COUNT, JOINT_VALUES):
             return False
         return now_s - self._unusable[0] < self._settings.stale_after_s
 
@@ -521,13 +548,18 @@ class ControllerLink:
 
     def _count(self, event: ControllerEvent, now_s: float) -> None:
         match event:
+            case JointsReceived(positions, velocities):
+                why = self._plausibility.problem(positions, velocities, now_s)
+                if why is not None and not self._tolerates(why):
+                    self._counts["units_malformed"] += 1
+                    self._note_unusable(now_s, why, JOINT_VALUES)
             case StatusReceived():
+                self._plausibility.follow(event)
                 self._response_timer.event_received(event, now_s)
             case MalformedReceived():
                 self._counts["units_malformed"] += 1
                 if event.joint_count is not None:
-                    reason = codes.LINK_OTHER_JOINTS(event.joint_count, where=self._where)
-                    self._unusable = now_s, reason, JOINT_COUNT
+                    self._note_unusable(now_s, event.joint_count, JOINT_COUNT)
             case UnknownReceived():
                 self._counts["records_unknown"] += 1
             case Refused(_, text):
@@ -535,6 +567,15 @@ class ControllerLink:
                 self._counts["refusals"] += 1
                 if self._status.state is not LinkState.UP:
                     self._refusal = text
+
+    def _note_unusable(self, now_s: float, why: Reason, code: str) -> None:
+        """Keep the first reason: each unit may have another one."""
+        before = self._unusable
+        if before is None or before[2] != code:
+            reason = codes.LINK_OTHER_JOINTS(why, where=self._where)
+        else:
+            reason = before[1]
+        self._unusable = now_s, reason, code
 
     def _set_status(self, state: LinkState, reason: Reason, code: str = "") -> None:
         flooding = self._dispatcher.flood.active and state is not LinkState.DOWN

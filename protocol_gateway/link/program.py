@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import Self, cast
 
 from protocol_gateway.errors import LinkDownError
+from protocol_gateway.link.connection import READ_BYTES
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.texts import one_line
@@ -66,6 +67,7 @@ class ProgramOutput(asyncio.SubprocessProtocol):
             *(sys.executable, "-P", "-m", module, str(os.getpid()), *arguments),
             stdin=asyncio.subprocess.DEVNULL,
             start_new_session=True,  # Ctrl-C must reach only the gateway
+            pipesize=READ_BYTES,  # asyncio reads all that a pipe holds in one turn of the loop
         )
         return program
 

@@ -23,7 +23,7 @@ from robomesh.client.robot import AsyncRobot, CheckResult, InverseResult, Matrix
 from robomesh.client.samples import Alarm, Event, JointState, Sample, SignalState
 from robomesh.client.streams import AsyncStream, OnStale, Stream
 from robomesh.endpoints import DEFAULT_ROUTER
-from robomesh.errors import SessionError
+from robomesh.errors import ForkedError, SessionError
 from robomesh.schemas import robomesh_pb2 as schema
 
 T = TypeVar("T")
@@ -55,7 +55,8 @@ class Arm:
         return self
 
     def __exit__(self, error_type: type[BaseException] | None, *_: object) -> None:
-        self._run(self._arm.leave(failed=error_type is not None))
+        with contextlib.suppress(ForkedError):  # a forked process never had control
+            self._run(self._arm.leave(failed=error_type is not None))
 
     @property
     def operator(self) -> str:

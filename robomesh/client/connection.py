@@ -1,5 +1,7 @@
 """A program's connection to the mesh: addresses of routers, and its certificate."""
 
+import asyncio
+import time
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -8,6 +10,9 @@ from robomesh.certificate_identity import Identity, read_identity
 from robomesh.endpoints import DEFAULT_ROUTER, bundle
 from robomesh.errors import NoAnswerError, SessionError
 from robomesh.session import Session, SessionSettings, open_session
+
+# A router that has just started does not know itself yet.
+_STARTING_S, _POLL_S = 1.0, 0.1
 
 
 def own_identity(keys: Path | None) -> Identity | None:
@@ -66,13 +71,15 @@ async def connected(settings: SessionSettings) -> AsyncIterator[Session]:
     async with open_session(settings) as session:
         # A router without rules for the name accepts the session and hides everything, itself too.
         if session.principal is not None:
+            until_s = time.monotonic() + _STARTING_S
             try:
-                shown = await session.present()
+                while not await session.present():
+                    if time.monotonic() > until_s:
+                        raise SessionError(
+                            f"the router shows {session.principal.name} nothing: its certificate was "
+                            "revoked, or the router has not read this site's list yet (robomesh keys list)"
+                        )
+                    await asyncio.sleep(_POLL_S)
             except NoAnswerError as error:
                 raise SessionError(f"the router closed the connection or is restarting: {error}") from None
-            if not shown:
-                raise SessionError(
-                    f"the router shows {session.principal.name} nothing: its certificate was revoked, or the "
-                    "router has not read this site's list yet (robomesh keys list)"
-                )
         yield session

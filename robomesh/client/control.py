@@ -127,7 +127,7 @@ class AsyncArm:
             answer = await self._session.ask(self._lease_key, request)
             assert isinstance(answer, schema.LeaseAnswer)
             self._reports, self._lease = reports, answer.lease
-            self._clock_ns = answer.now.ToNanoseconds() - time.monotonic_ns()
+            self._set_clock(answer)
             self._close = undo.pop_all()
         return self
 
@@ -441,7 +441,13 @@ class AsyncArm:
 
     async def _renew(self, ttl_s: float) -> None:
         renewal = _A(action=_A.RENEW, lease=self._lease, ttl_s=ttl_s)
-        await self._session.ask(self._lease_key, renewal, timeout_s=_RENEWAL_TIMEOUT_S)
+        answer = await self._session.ask(self._lease_key, renewal, timeout_s=_RENEWAL_TIMEOUT_S)
+        assert isinstance(answer, schema.LeaseAnswer)
+        self._set_clock(answer)
+
+    def _set_clock(self, answer: schema.LeaseAnswer) -> None:
+        """Take over the gateway's clock, because over hours two monotonic clocks drift apart."""
+        self._clock_ns = answer.now.ToNanoseconds() - time.monotonic_ns()
 
     @property
     def _lease_key(self) -> str:

@@ -3,6 +3,7 @@
 import asyncio
 import atexit
 import contextlib
+import os
 import signal
 import threading
 import weakref
@@ -11,6 +12,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, TypeVar
 
 from robomesh.errors import RobomeshError, SessionError
+from robomesh.forked import check_owner
 
 T = TypeVar("T")
 
@@ -64,6 +66,7 @@ class EventLoopThread:
 
         Raises:
             SessionError: If the loop has been closed, or is closed before the coroutine ends.
+            ForkedError: In a process that was forked from the loop's.
         """
         return self._running.run(coroutine, waiting)
 
@@ -84,6 +87,7 @@ class _Running:
         self.closing: Callable[[], Coroutine[Any, Any, None]] | None = None
         self._stopping = asyncio.Event()
         self._ended = False
+        self._pid = os.getpid()
         # Not `Thread.join`: a Ctrl-C at Python's exit may leave a thread's lock locked.
         self._finished = threading.Event()
         self._thread = threading.Thread(target=self._run, name="robomesh")
@@ -95,6 +99,7 @@ class _Running:
         """See `EventLoopThread.run`."""
         if self._has_ended():
             coroutine.close()
+            check_owner(self._pid)
             raise _closed()
         result: Future[T] = Future()
         tasks: list[asyncio.Task[T]] = []

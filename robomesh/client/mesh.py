@@ -18,7 +18,6 @@ from robomesh.endpoints import DEFAULT_ROUTER
 from robomesh.errors import RobomeshError, SessionError
 from robomesh.keys import ROOT, WHOLE_SITE, PresenceKey
 from robomesh.last_values import last_values
-from robomesh.presence import SILENT
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 
@@ -152,8 +151,7 @@ class AsyncMesh:
 
     async def services(self) -> list[Service]:
         """Return the running services of all sites, by name."""
-        present = await self.session.present()
-        return [Service(*key) for key in present if key.service not in SILENT]
+        return [Service(*key) for key in await self.session.present()]
 
     def events(self, *, history: bool = True) -> AsyncStream[Event]:
         """Return the events of all robots and services.

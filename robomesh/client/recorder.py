@@ -80,6 +80,20 @@ class RecorderFile:
         self._session, self._site, self.name, self._asker = session, site, name, asker
         self._on_quota = on_quota or self._log_quota
 
+    @property
+    def saved_name(self) -> str:
+        """The name for a copy: it comes from another machine, so it must be no path and no hidden file.
+
+        Raises:
+            RecordingError: If it is.
+        """
+        plain = Path(self.name).name == self.name and self.name.isprintable() and "\\" not in self.name
+        if not plain or not self.name or self.name.startswith("."):
+            raise RecordingError(
+                f"the recorder of {self._site} names the file {self.name!r}, which is not a plain file name"
+            )
+        return self.name
+
     async def describe(self) -> schema.Recording:
         """Return the description of the recording.
 
@@ -210,12 +224,8 @@ class RecorderFile:
             RobomeshError: If the recorder refuses or does not answer.
             OSError: If the copy cannot be written.
         """
-        # The name comes from another machine: accept no path.
-        if self.name in ("", ".", "..") or Path(self.name).name != self.name or not self.name.isprintable():
-            raise RecordingError(
-                f"the recorder of {self._site} names the file {self.name!r}, which is not a plain file name"
-            )
-        out = out / self.name if await asyncio.to_thread(out.is_dir) else out
+        name = self.saved_name
+        out = out / name if await asyncio.to_thread(out.is_dir) else out
         if out.exists() and not out.is_file():  # the copy would replace it
             raise RecordingError(f"{out} is not a file: choose another path for the copy")
         fetched = await self._fetch_newest(out, on_progress)

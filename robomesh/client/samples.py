@@ -12,6 +12,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.message import Message
 from google.protobuf.timestamp_pb2 import Timestamp
 
+from robomesh.enum_names import enum_name
 from robomesh.errors import MessageError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.subscription import Sample as RawSample
@@ -257,7 +258,7 @@ def event_of(site: str, robot: str, event: schema.Event) -> Event:
         site=site,
         robot=robot,
         time=_utc(event.timestamp),
-        severity=_name_of(schema.Event.Severity, event.severity),
+        severity=enum_name(schema.Event.Severity, event.severity).lower(),
         code=event.code,
         text=event.text,
         source=event.source,
@@ -276,8 +277,8 @@ def alarm_of(alarm: schema.Alarm) -> Alarm:
         site=alarm.site,
         robot=alarm.robot,
         since=_utc(alarm.since),
-        priority=_name_of(schema.Alarm.Priority, alarm.priority),
-        state=_name_of(schema.Alarm.State, alarm.state),
+        priority=enum_name(schema.Alarm.Priority, alarm.priority).lower(),
+        state=enum_name(schema.Alarm.State, alarm.state).lower(),
         code=alarm.code,
         text=alarm.text,
         advice=alarm.advice,
@@ -290,9 +291,3 @@ def _utc(timestamp: Timestamp) -> datetime:
         return timestamp.ToDatetime(tzinfo=UTC)
     except (ValueError, OverflowError):
         raise MessageError("a time is out of range") from None
-
-
-def _name_of(values: Any, number: int) -> str:
-    """Return the name of an enum's value; of a value that a newer program added, its number."""
-    name: str = values.Name(number).lower() if number in values.values() else str(number)
-    return name

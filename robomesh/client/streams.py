@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import math
+import os
 import time
 import weakref
 from collections import deque
@@ -12,6 +13,7 @@ from typing import Generic, Literal, Self, TypeVar
 
 from robomesh.client.samples import Sample
 from robomesh.errors import MessageError, RobomeshError, UnknownTopicError
+from robomesh.forked import check_owner
 from robomesh.header import Header
 from robomesh.subscription import Sample as RawSample
 from robomesh.subscription import Subscription
@@ -85,6 +87,7 @@ class Reading(Generic[T]):
         self._values: deque[T] = deque()
         # Of the last message of each key that the stream returned.
         self._returned: dict[str, Header] = {}
+        self._pid = os.getpid()
         self._current_s = time.monotonic()
         self._deadline_s = None if limit_s is None else self._current_s + max(limit_s, _FIRST_S)
 
@@ -101,7 +104,9 @@ class Reading(Generic[T]):
 
         Raises:
             StaleError: If the topic has fallen silent.
+            ForkedError: In a process that was forked from the stream's.
         """
+        check_owner(self._pid)
         while not self._values and (sample := self.subscription.take(awaited=awaited)) is not None:
             self._accept(sample)
         if self._values:

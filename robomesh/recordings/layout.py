@@ -34,6 +34,10 @@ from robomesh.recordings.records import (
 )
 
 _BLOCK_BYTES = 1 << 20
+# A chunk with more channels is read whatever is asked for: layouts are kept, and may have many chunks.
+_MOST_LISTED = 4096
+# Metadata of ours is shorter; layouts are kept.
+_MOST_METADATA_BYTES = 1 << 20
 _ATTACHMENT = struct.Struct("<QQ")
 _LENGTH = struct.Struct("<I")
 # Head of a chunk: start and end time, unpacked size, checksum.
@@ -154,7 +158,8 @@ def _metadata_of(stream: IO[bytes], summary: Summary, size: int) -> tuple[Metada
         size -= length
         if opcode != Opcode.METADATA or size < 0:
             raise ValueError("the summary lists invalid metadata")
-        found.append(Metadata.read(stream_of(stream.read(length))))
+        if length <= _MOST_METADATA_BYTES:
+            found.append(Metadata.read(stream_of(stream.read(length))))
     return tuple(found)
 
 
@@ -204,7 +209,7 @@ def _block_of(chunk: ChunkIndex, size: int) -> Block:
         chunk.message_end_time,
         chunk.chunk_start_offset,
         chunk.chunk_length,
-        frozenset(chunk.message_index_offsets) or None,
+        frozenset(listed) if 0 < len(listed := chunk.message_index_offsets) <= _MOST_LISTED else None,
         chunk=True,
         unpacked=chunk.uncompressed_size,
     )
@@ -357,7 +362,7 @@ def _note(scan: _Scan, opcode: int, offset: int, content: bytes) -> None:
     elif opcode == Opcode.CHANNEL:
         channel = Channel.read(stream)
         scan.channels[channel.id] = channel
-    elif opcode == Opcode.METADATA:
+    elif opcode == Opcode.METADATA and len(content) <= _MOST_METADATA_BYTES:
         scan.metadata.append(Metadata.read(stream))
     elif opcode == Opcode.CHUNK:
         # A chunk is one block, so end the block of unchunked messages before it.

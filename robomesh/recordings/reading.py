@@ -27,6 +27,8 @@ FOREVER_NS = 1 << 64
 # Messages that wait for sorting because their chunk overlaps the next one; above this limit the file's order
 # counts.
 _MOST_WAITING_BYTES = 64 << 20
+# What each of them needs besides its payload, about.
+_WAITING_BYTES = 400
 # Messages of a topic between the two records of one publication.
 _MOST_BETWEEN = 2000
 
@@ -181,14 +183,16 @@ class RecordingFile:
         for block in self.layout.blocks:
             if block.end_ns < start_ns or block.start_ns >= end_ns or not _has(block, wanted):
                 continue
-            while waiting and (
-                waiting[0].received_ns < block.start_ns or waiting_bytes > _MOST_WAITING_BYTES
-            ):
-                waiting_bytes -= len(waiting[0].data)
+            while waiting and waiting[0].received_ns < block.start_ns:
+                waiting_bytes -= len(waiting[0].data) + _WAITING_BYTES
                 yield heapq.heappop(waiting)
             for message in self._read(block, wanted, start_ns, end_ns):
                 heapq.heappush(waiting, message)
-                waiting_bytes += len(message.data)
+                waiting_bytes += len(message.data) + _WAITING_BYTES
+                # One small chunk may unpack to millions of messages.
+                while waiting_bytes > _MOST_WAITING_BYTES:
+                    waiting_bytes -= len(waiting[0].data) + _WAITING_BYTES
+                    yield heapq.heappop(waiting)
         while waiting:
             yield heapq.heappop(waiting)
 

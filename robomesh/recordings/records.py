@@ -42,8 +42,8 @@ _WHOLE_MESSAGE = struct.Struct("<BQHIQQ")
 _FOOTER = struct.Struct("<BQQQ")
 # A longer record is damaged: attachments and our chunks are smaller.
 MOST_RECORD_BYTES = 256 << 20
-# What all chunks of a file may unpack to: this, or a multiple of the file. States compress to a tenth.
-_MOST_UNPACKED_BYTES, _MOST_TIMES_THE_FILE = 1 << 30, 200
+# What all chunks of a file may unpack to: this, and a multiple of the file. States compress to a tenth.
+_MOST_UNPACKED_BYTES, _MOST_TIMES_THE_FILE = MOST_RECORD_BYTES, 200
 _READ_BYTES = 1 << 20
 # Exceptions of the library for a truncated or modified file.
 DAMAGE = (McapError, EOFError, struct.error, ValueError, KeyError, IndexError, OverflowError, MemoryError)

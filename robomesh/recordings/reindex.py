@@ -101,8 +101,9 @@ def rewrite(
 class _Source:
     """A file being copied: maps its ids of schemas and channels to those of the new file."""
 
-    def __init__(self, writer: IndexedWriter) -> None:
+    def __init__(self, writer: IndexedWriter, size: int) -> None:
         self._writer = writer
+        self._size, self._unpacked = size, 0
         self._schemas: dict[int, tuple[int, Schema]] = {}
         self._channels: dict[int, int] = {}
         self._gaps = _Gaps()
@@ -136,6 +137,8 @@ class _Source:
                 except records.DAMAGE:
                     self._writer.copied.damaged += 1
                     return
+                self._unpacked += len(unpacked)
+                records.check_unpacked(self._unpacked, self._size)
                 for each in records.walk_chunk(unpacked):
                     self.take(*each)
 
@@ -189,8 +192,8 @@ def _copy(path: Path, writer: IndexedWriter, report: Callable[[int], None]) -> N
     Raises:
         CaptureError: If it is damaged other than at its end or within a chunk.
     """
-    source, reported, end, whole = _Source(writer), 0, 0, False
     size = path.stat().st_size
+    source, reported, end, whole = _Source(writer, size), 0, 0, False
     with path.open("rb") as stream:
         statistics = _statistics(stream)
         stream.seek(0)

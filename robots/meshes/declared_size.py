@@ -4,7 +4,6 @@ A count that the file cannot hold is rejected before memory is allocated for it.
 axis and the names of textures and of other files are kept here, because the libraries drop them.
 """
 
-import json
 import re
 import struct
 from collections.abc import Callable, Mapping
@@ -13,8 +12,10 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
+from robomesh import bounded_json
 from robots.errors import MeshError
-from robots.meshes.text_repair import check_instances, counted_from_first, plain_text, utf8_xml
+from robots.meshes.text_repair import check_instances, counted_from_first, plain_text
+from robots.xml_text import XmlError, xml_text
 
 # A robot's link is far smaller. The console reads uploaded files, so the limits must be firm.
 MAX_BYTES = 1 << 30
@@ -135,7 +136,7 @@ def _obj(path: Path, data: bytes) -> Declared:
     files: list[Path] = []
     text = plain_text(data)
     rewritten = counted_from_first(path, text)
-    for found in re.findall(r"(?m)^[ \t]*mtllib[ \t]+(.+?)[ \t\r]*$", text)[:100]:
+    for found in _named("mtllib", text)[:100]:
         library = _below(path, found)
         files += [library] if library is not None else []
         if library is not None and library.is_file():
@@ -144,7 +145,7 @@ def _obj(path: Path, data: bytes) -> Declared:
             missing.append(found)
             warnings.append(f"materials: no file {found!r} in this file's folder; drawn grey")
     _check_obj_numbers(path, rewritten)
-    names = set(re.findall(r"(?m)^[ \t]*usemtl[ \t]+(.+?)[ \t\r]*$", rewritten))
+    names = set(_named("usemtl", rewritten))
     if len(names) > _MOST_MATERIALS:
         rewritten = re.sub(r"(?m)^[ \t]*usemtl[ \t].*$", "", rewritten)
         warnings.append(f"{len(names)} materials, more than {_MOST_MATERIALS}: all ignored, drawn grey")
@@ -158,6 +159,11 @@ def _obj(path: Path, data: bytes) -> Declared:
         warnings=tuple(warnings),
         rewritten=None if rewritten.encode() == data else rewritten.encode(),
     )
+
+
+def _named(keyword: str, text: str) -> list[str]:
+    """Return the name in each line that begins with a keyword, without its outer blanks."""
+    return [name.rstrip(" \t\r") for name in re.findall(rf"(?m)^[ \t]*{keyword}[ \t]+(\S.*)$", text)]
 
 
 def _check_obj_numbers(path: Path, text: str) -> None:
@@ -205,12 +211,16 @@ def _mtl_textures(library: Path) -> dict[str, str]:
 
 
 def _dae(path: Path, data: bytes) -> Declared:
-    given, data = data, utf8_xml(data)
+    try:
+        text, notes = xml_text(data)
+    except XmlError as error:
+        raise MeshError(path, str(error)) from None
+    data = text.encode()
     if b"<!ENTITY" in data or b"<!DOCTYPE" in data:
         raise MeshError(path, "has a DOCTYPE or ENTITY, which can expand without limit; remove it")
     if b"COLLADA" not in data[:4096]:
         raise MeshError(path, "is not a COLLADA file: the first element must be COLLADA")
-    unit = re.search(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']\s*([-+0-9.eE]+)", data)
+    unit = re.search(rb"<unit\b[^<>]*\bmeter\s*=\s*[\"']\s*([-+0-9.eE]+)", data)
     axis = re.search(rb"<up_axis>\s*([XYZ])_UP\s*</up_axis>", data)
     try:
         unit_m = float(unit.group(1)) if unit else 1.0
@@ -218,12 +228,12 @@ def _dae(path: Path, data: bytes) -> Declared:
         unit_m = 1.0
     check_instances(path, data)
     letter = axis.group(1).decode().lower() if axis else "y"
-    warnings = ("its upward axis is x: rotate the mesh by hand",) if letter == "x" else ()
+    warnings = (*notes, *(("its upward axis is x: rotate the mesh by hand",) if letter == "x" else ()))
     return Declared(
         unit_m=unit_m if 0 < unit_m < 1e6 else 1.0,
         up="z" if letter == "x" else letter,
         warnings=warnings,
-        rewritten=None if data == given else data,
+        rewritten=data,  # the bytes that were checked
     )
 
 
@@ -244,7 +254,7 @@ def _glb(path: Path, data: bytes) -> Declared:
 
 def _json(path: Path, data: bytes) -> dict[str, Any]:
     try:
-        document = json.loads(data)
+        document = bounded_json.loads(data)
     except (ValueError, RecursionError) as error:
         raise MeshError(path, f"its JSON is invalid: {error}") from error
     if not isinstance(document, dict):

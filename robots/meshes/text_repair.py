@@ -1,48 +1,26 @@
 """Repairs to the text of OBJ and COLLADA files for trimesh, and a limit on COLLADA instances."""
 
-import codecs
 import re
 import xml.etree.ElementTree as Xml
 from collections.abc import Iterator
 from pathlib import Path
 
 from robots.errors import MeshError
+from robots.xml_text import unicode_of
 
 # Geometry instances, counted once for each instance, and the numbers in their face lists.
 _MOST_INSTANCES = 20_000
 _MOST_NUMBERS = 50_000_000
 _MOST_NESTED = 100
 
-_UTF16 = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
 _NEGATIVE_FACE = re.compile(r"(?m)^[ \t]*[fF][ \t][^\n]*-")
 _COUNTED = re.compile(r"[ \t]*(v|vt|vn|f)[ \t]")
 
 
 def plain_text(data: bytes) -> str:
     """Decode text as UTF-16, with or without a byte order mark, or as UTF-8; replace invalid bytes."""
-    for mark, encoding in _UTF16.items():
-        if data.startswith(mark):
-            return data[len(mark) :].decode(encoding, errors="replace")
-    # In ASCII text encoded as UTF-16, every other byte is zero.
-    head = data[:64]
-    for encoding, zeros, letters in (
-        ("utf-16-le", head[1::2], head[::2]),
-        ("utf-16-be", head[::2], head[1::2]),
-    ):
-        if len(head) > 3 and not any(zeros) and all(letters):
-            return data.decode(encoding, errors="replace")
-    return data.removeprefix(codecs.BOM_UTF8).decode("utf-8", errors="replace")
-
-
-def utf8_xml(data: bytes) -> bytes:
-    """Return an XML document as UTF-8, without leading blank lines.
-
-    Some programs write an empty first line, which XML does not allow but other readers accept.
-    """
-    text = plain_text(data)
-    if data.removeprefix(codecs.BOM_UTF8)[:64] == text[:64].encode():
-        return data.lstrip()
-    return re.sub(r"^\s*<\?xml[^>]*\?>", "", text).encode()
+    encoding, mark = unicode_of(data)
+    return data[mark:].decode(encoding, errors="replace")
 
 
 def counted_from_first(path: Path, text: str) -> str:

@@ -23,8 +23,9 @@ Words are separated by blanks. Roll, pitch and yaw rotate about the fixed x, y a
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from math import radians
 
 import numpy as np
@@ -59,13 +60,16 @@ MOST_STEPS = 100_000
 MOST_DEPTH = 20
 _MOST_PROBLEMS = 100
 _LONGEST_NAME = 64
+# Names that the unknown one of a problem is compared with; a comparison takes 20 us.
+_MOST_COMPARED = 100
 
 _STATEMENTS = (
     *("home", "move_joints", "move_line", "move_line_by", "point"),
     *("speed", "tool_speed", "wait", "trace", "repeat"),
 )
 _NAME = re.compile(r"[a-z][a-z0-9_-]*")
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+# Each digit has one place, so that a long word that is no number is rejected in linear time.
+_NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 # Beyond any arm. A larger number is a typing error, and sums of such numbers may overflow.
 _FARTHEST = 100_000.0
 _POSE_WORDS = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -200,7 +204,7 @@ class _Parser:
                 if list(rest) not in (["on"], ["off"]):
                     raise _LineError(codes.TRACE_FORM(given=_given(rest)))
                 return Trace(line, rest[0] == "on")
-        if near := similar(word.lower(), (*_STATEMENTS, "end")):
+        if near := self._similar(word, (*_STATEMENTS, "end")):
             raise _LineError(codes.STATEMENT_NEAR(word=_short(word), near=near))
         raise _LineError(codes.STATEMENT_UNKNOWN(word=_short(word), names=", ".join((*_STATEMENTS, "end"))))
 
@@ -215,12 +219,17 @@ class _Parser:
         return _pose_target(word, rest)
 
     def _no_point(self, word: str, name: str) -> Reason:
-        shown, defined = _short(name), ", ".join(self._defined)
+        shown, defined = _short(name), ", ".join(islice(self._defined, _MOST_COMPARED))
         if not self._defined:
             return codes.POINT_NONE(word=word, name=shown)
-        if near := similar(name.lower(), self._defined):
+        if near := self._similar(name, self._defined):
             return codes.POINT_NEAR(word=word, name=shown, near=near)
         return codes.POINT_UNKNOWN(word=word, name=shown, names=defined)
+
+    def _similar(self, word: str, names: Iterable[str]) -> str:
+        """Return the most similar name of the first hundred, for a problem that is listed; empty: none."""
+        listed = len(self._problems) < _MOST_PROBLEMS
+        return similar(word.lower(), islice(names, _MOST_COMPARED)) if listed else ""
 
     def _joint_target(self, word: str, rest: Sequence[str]) -> JointTarget:
         values = _numbers(word, rest, self._joints.names, codes.JOINT_NUMBERS)

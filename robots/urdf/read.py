@@ -23,8 +23,9 @@ from robots.schema import JointType
 from robots.urdf.files import Resolve
 from robots.urdf.shapes import Shapes
 from robots.urdf.values import WrongElement, numbers, origin, quoted
+from robots.xml_text import XmlError, read_xml
 
-MOST_URDF_CHARACTERS = 20_000_000
+MOST_URDF_BYTES = 20_000_000
 _MOST_LINKS = 2_000
 _TYPES = {"revolute": JointType.ROTARY, "continuous": JointType.ROTARY, "prismatic": JointType.PRISMATIC}
 # A continuous joint gets limits, which sliders, planners and controllers need. Every direction can be
@@ -54,10 +55,11 @@ class UrdfRobot:
     ignored: tuple[tuple[tuple[str, str], str], ...] = ()
 
 
-def read_urdf(text: str, source: Path, *, resolve: Resolve) -> UrdfRobot:
-    """Return the robot in a URDF's text.
+def read_urdf(data: bytes | str, source: Path, *, resolve: Resolve) -> UrdfRobot:
+    """Return the robot in a URDF.
 
     Args:
+        data: Its text, or its bytes in its own encoding.
         source: Name of the file for error messages.
         resolve: Returns the file for an address in the URDF, or None if there is none.
 
@@ -65,28 +67,26 @@ def read_urdf(text: str, source: Path, *, resolve: Resolve) -> UrdfRobot:
         DescriptionError: If it is not a URDF of an arm; the text names the element and what it must be.
     """
     try:
-        return _Reading(_root(text), resolve).robot()
+        root, notes = _root(data)
+        robot = _Reading(root, resolve).robot()
+        return replace(robot, notes=(*notes, *robot.notes))
     except WrongElement as error:
         raise DescriptionError(source, [str(error)]) from None
 
 
-def _root(text: str) -> Xml.Element:
-    if len(text) > MOST_URDF_CHARACTERS:
-        raise WrongElement(f"has {len(text):,} characters; at most {MOST_URDF_CHARACTERS:,} are read")
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise WrongElement("has a DOCTYPE or ENTITY, which no URDF needs; remove it")
+def _root(data: bytes | str) -> tuple[Xml.Element, tuple[str, ...]]:
+    if len(data) > MOST_URDF_BYTES:
+        raise WrongElement(f"has {len(data):,} bytes; at most {MOST_URDF_BYTES:,} are read")
     try:
-        root = Xml.fromstring(text.lstrip("\ufeff \t\r\n"))
-    except (Xml.ParseError, ValueError) as error:
-        if "<xacro:" in text:
-            raise WrongElement(_XACRO) from None
-        raise WrongElement(f"is not XML: {error}") from None
+        root, notes = read_xml(data)
+    except XmlError as error:
+        raise WrongElement(str(error)) from None
     if any("xacro" in element.tag or any("${" in value for value in element.attrib.values())
            for element in root.iter() if isinstance(element.tag, str)):  # fmt: skip
         raise WrongElement(_XACRO)
     if root.tag != "robot":
         raise WrongElement(f"<{root.tag}>: a URDF's outermost element must be <robot>")
-    return root
+    return root, notes
 
 
 _XACRO = "is xacro; convert it to a URDF first: xacro robot.xacro > robot.urdf"

@@ -10,7 +10,7 @@ from robots.meshes.mesh import Material, Mesh, Part
 from robots.meshes.normals import creased
 from robots.meshes.solids import Solid, ball, box, turned
 from robots.poses import FloatArray
-from robots.urdf.files import Resolve
+from robots.urdf.files import Resolve, is_exact
 from robots.urdf.values import WrongElement, numbers, origin
 
 _ROUND = 32
@@ -99,6 +99,9 @@ class Shapes:
             if address not in self.missing:
                 self.missing.append(address)
             return None
+        if not is_exact(path, address):
+            note = f"mesh {address!r}: is taken for {path.parent.name}/{path.name}"
+            self.notes += [] if note in self.notes else [note]
         # As in ROS, the colour applies only to formats without colours.
         if path.suffix.lower() != ".stl":
             color, opacity = None, None

@@ -9,6 +9,7 @@ from pathlib import Path
 from robots.errors import DescriptionError
 from robots.kinematic_tree import Tree
 from robots.urdf.values import WrongElement, numbers
+from robots.xml_text import XmlError, read_xml
 
 _MOST_BYTES = 4_000_000
 # Usual names of a robot's home position, the preferred first.
@@ -58,8 +59,8 @@ def _may_be(named: str, robot: str) -> bool:
 
 def _robot_name(path: Path) -> str:
     try:
-        return Xml.fromstring(path.read_text(encoding="utf-8").strip()).get("name", "")
-    except (OSError, ValueError, Xml.ParseError):
+        return read_xml(path.read_bytes())[0].get("name", "")
+    except (OSError, XmlError):
         return ""
 
 
@@ -71,14 +72,14 @@ def ignored_beside(urdf: Path, robot: str, tree: Tree) -> tuple[list[tuple[tuple
     try:
         if path.stat().st_size > _MOST_BYTES:
             return [], f"{path.name}: has more than {_MOST_BYTES:,} bytes, so it is not used"
-        _, pairs = read_srdf(path.read_text(encoding="utf-8"), path, tree)
-    except (OSError, UnicodeDecodeError, DescriptionError) as error:
+        _, pairs = read_srdf(path.read_bytes(), path, tree)
+    except (OSError, DescriptionError) as error:
         reason = error.problems[0] if isinstance(error, DescriptionError) else "cannot be read"
         return [], f"{path.name}: {reason}; it is not used"
     return [(pair, path.name) for pair in pairs], ""
 
 
-def read_srdf(text: str, source: Path, tree: Tree) -> tuple[dict[str, float], list[tuple[str, str]]]:
+def read_srdf(data: bytes | str, source: Path, tree: Tree) -> tuple[dict[str, float], list[tuple[str, str]]]:
     """Return home positions by joint name [rad] or [m], and excluded pairs, for joints and links of the tree.
 
     Pairs excluded because they never touched in samples (MoveIt's reason "Never") are not returned, so that
@@ -87,14 +88,10 @@ def read_srdf(text: str, source: Path, tree: Tree) -> tuple[dict[str, float], li
     Raises:
         DescriptionError: If it is not an SRDF.
     """
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise DescriptionError(source, ["has a DOCTYPE or ENTITY, which no SRDF needs; remove it"])
     try:
-        root = Xml.fromstring(text.strip())
+        root, _ = read_xml(data)
         return _home(root, tree), _ignored(root, tree)
-    except (Xml.ParseError, ValueError) as error:
-        raise DescriptionError(source, [f"is not XML: {error}"]) from None
-    except WrongElement as error:
+    except (XmlError, WrongElement) as error:
         raise DescriptionError(source, [str(error)]) from None
 
 

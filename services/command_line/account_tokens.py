@@ -1,6 +1,5 @@
 """`robomesh accounts tokens`: addresses that show one view of one robot without a sign-in."""
 
-import json
 from datetime import UTC, datetime, timedelta
 from typing import Annotated
 
@@ -8,6 +7,7 @@ import typer
 
 from services.command_line.accounts_file import Where, accounts_file
 from services.command_line.options import Json, command_group
+from services.command_line.output import print_json, print_line
 from services.console.accounts.file import read_accounts
 from services.console.accounts.view_access import add_token, revoke_token
 from services.console.accounts.view_token import ViewToken
@@ -39,11 +39,11 @@ def add(
     endings |= {kind: f"/image/{robot}/{view}.{kind}" for kind in ("jpg", "png")}
     if as_json:
         added = _row(read_accounts(path).tokens[name])
-        print(json.dumps(added | {"token": token, "addresses": endings}))
+        print_json(added | {"token": token, "addresses": endings})
         return
-    print(f"{path}: token {name} opens the view {view} of {robot}. Its addresses, at the console's own:")
+    print_line(f"{path}: token {name} opens the view {view} of {robot}. Its addresses, at the console's own:")
     for ending in endings.values():
-        print(f"{ending}?token={token}")
+        print_line(f"{ending}?token={token}")
 
 
 @app.command("list")
@@ -52,10 +52,10 @@ def list_(where: Where, as_json: Json = False) -> None:
     path, _ = accounts_file(where)
     for token in read_accounts(path).tokens.values():
         if as_json:
-            print(json.dumps(_row(token)))
+            print_json(_row(token))
         else:
             opens = f"{token.robot}/{token.view}"
-            print(f"{token.name:<32}  {opens:<32}  since {token.created:%Y-%m-%d}{_end(token)}")
+            print_line(f"{token.name:<32}  {opens:<32}  since {token.created:%Y-%m-%d}{_end(token)}")
 
 
 @app.command()
@@ -63,7 +63,7 @@ def revoke(where: Where, name: _Name) -> None:
     """Revoke a token; what it shows ends within a second."""
     path, _ = accounts_file(where)
     revoke_token(path, name)
-    print(f"{path}: token {name} is revoked")
+    print_line(f"{path}: token {name} is revoked")
 
 
 def _end(token: ViewToken) -> str:

@@ -5,7 +5,6 @@ process of the machine could read it.
 """
 
 import getpass
-import json
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -15,6 +14,7 @@ import typer
 from services.command_line import account_tokens
 from services.command_line.accounts_file import Where, accounts_file
 from services.command_line.options import Json, command_group
+from services.command_line.output import print_json, print_line
 from services.console.accounts.auth_service import change_account
 from services.console.accounts.file import check_account_name, read_accounts, role_of
 from services.console.accounts.passwords import check_password, hash_password
@@ -39,7 +39,7 @@ def add(
     if path.exists() and name in read_accounts(path).accounts:
         raise AccountsError(f"{path}: an account {name} exists already")
     change_account(path, "add", name, role=wanted, hashed=_hashed_password(name, site))
-    print(f"{path}: {name} may sign in as {wanted.value}")
+    print_line(f"{path}: {name} may sign in as {wanted.value}")
 
 
 @app.command("list")
@@ -49,10 +49,12 @@ def list_(where: Where, as_json: Json = False) -> None:
     for account in read_accounts(path).accounts.values():
         if as_json:
             row = {"name": account.name, "role": account.role.value, "created": account.created.isoformat()}
-            print(json.dumps(row | {"disabled": account.disabled}))
+            print_json(row | {"disabled": account.disabled})
         else:
             state = "  disabled" if account.disabled else ""
-            print(f"{account.name:<32}  {account.role.value:<8}  since {account.created:%Y-%m-%d}{state}")
+            print_line(
+                f"{account.name:<32}  {account.role.value:<8}  since {account.created:%Y-%m-%d}{state}"
+            )
 
 
 @app.command()
@@ -63,7 +65,7 @@ def passwd(where: Where, name: _Name) -> None:
     if name not in accounts:
         raise AccountsError(f"{path}: no account {name!r}; accounts: {', '.join(accounts) or 'none'}")
     change_account(path, "password", name, hashed=_hashed_password(name, site))
-    print(f"{path}: {name} has a new password")
+    print_line(f"{path}: {name} has a new password")
 
 
 @app.command()
@@ -76,7 +78,7 @@ def role(
     path, _ = accounts_file(where)
     wanted = role_of(role)
     change_account(path, "role", name, role=wanted)
-    print(f"{path}: {name} is {wanted.value} now")
+    print_line(f"{path}: {name} is {wanted.value} now")
 
 
 @app.command()
@@ -100,7 +102,7 @@ def remove(where: Where, name: _Name) -> None:
 def _change(where: Path, name: str, action: str, done: str) -> None:
     path, _ = accounts_file(where)
     change_account(path, action, name)
-    print(f"{path}: {name} {done}")
+    print_line(f"{path}: {name} {done}")
 
 
 def _hashed_password(name: str, site: str) -> str:

@@ -4,25 +4,26 @@ import json
 import re
 from collections import defaultdict
 from collections.abc import Iterable
-from datetime import datetime
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from google.protobuf.timestamp_pb2 import Timestamp
 
 from robomesh.endpoints import DEFAULT_ROUTER
+from robomesh.enum_names import enum_name, enum_word
 from robomesh.keys import WHOLE_SITE, check_chunk, robot_key
 from robomesh.messages import to_json
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line import discovery
 from services.command_line.alarm_lists import lists
 from services.command_line.live.listing_text import since
+from services.command_line.local_time import time_text
 from services.command_line.options import Connect, Json, command_group
+from services.command_line.output import console, print_json, print_line, styled
 from services.errors import ServiceError
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
     from rich.padding import Padding
-    from rich.text import Text
 
 app = command_group("alarms", "Alarms: list, acknowledge, shelve.")
 
@@ -52,7 +53,7 @@ def list_(connect: Connect = DEFAULT_ROUTER, as_json: Json = False) -> None:
 
     found = discovery.run(collect())
     if as_json:
-        discovery.print_json({"alarms": [record(alarm) for each in found for alarm in each.alarms]})
+        print_json({"alarms": [record(alarm) for each in found for alarm in each.alarms]})
         return
     _print(found)
 
@@ -120,9 +121,9 @@ def _ask(
 
     changed, answers = discovery.run(ask())
     if as_json:
-        discovery.print_json({"alarms": [record(alarm) for each in answers for alarm in each.alarms]})
+        print_json({"alarms": [record(alarm) for each in answers for alarm in each.alarms]})
         return
-    print(f"{done}: {', '.join(changed)}")
+    print_line(f"{done}: {', '.join(changed)}")
     _print(answers)
 
 
@@ -173,38 +174,34 @@ def _seconds(text: str) -> float:
 
 def _print(found: list[schema.AlarmList]) -> None:
     if not found:
-        print("no site here runs a watch, so there are no alarms (robomesh watch starts one)")
+        print_line("no site here runs a watch, so there are no alarms (robomesh watch starts one)")
         return
     if not any(each.alarms for each in found):
-        print(f"no alarms at {', '.join(each.site for each in found)}")
+        print_line(f"no alarms at {', '.join(each.site for each in found)}")
         return
-    from rich.console import Console
-
-    console = Console()
+    screen = console()
     for each in found:
         for alarm in each.alarms:
             head, name, rest = alarm_text(each.site, alarm)
             # Let the terminal wrap a long name, so that it can be copied whole.
-            console.print(head, soft_wrap=True)
-            console.print(name, soft_wrap=True)
-            console.print(rest)
+            screen.print(head, soft_wrap=True)
+            screen.print(name, soft_wrap=True)
+            screen.print(rest)
 
 
-def alarm_text(site: str, alarm: schema.Alarm) -> "tuple[Text, Text, Padding]":
+def alarm_text(site: str, alarm: schema.Alarm) -> "tuple[RenderableType, RenderableType, Padding]":
     """Return an alarm's texts: priority, state and kind; its name; what happened and what to do."""
+    from rich.console import Group
     from rich.padding import Padding
-    from rich.text import Text
 
     quiet = alarm.state in (_Alarm.SHELVED, _Alarm.RETURNED)
     style = "dim" if quiet else _STYLES.get(alarm.priority, "")
-    head = Text(_Alarm.Priority.Name(alarm.priority), style=style)
-    state = _Alarm.State.Name(alarm.state).lower()
+    head = styled(enum_name(_Alarm.Priority, alarm.priority), style)
+    state = enum_word(_Alarm.State, alarm.state)
     at = since(alarm.since.ToNanoseconds() * 1e-9)
-    head.append(f"  {state}  {at}  {_kind(alarm)}", style="not bold")
-    rest = Text(alarm.text)
-    for line in _more(alarm):
-        rest.append(f"\n{line}", style="dim")
-    return head, Text(f"  {site}/{alarm.id}", style="" if quiet else "bold"), Padding(rest, (0, 0, 0, 4))
+    head.append_text(styled(f"  {state}  {at}  {_kind(alarm)}", "not bold"))
+    rest = [styled(alarm.text), *(styled(line, "dim") for line in _more(alarm))]
+    return head, styled(f"  {site}/{alarm.id}", "" if quiet else "bold"), Padding(Group(*rest), (0, 0, 0, 4))
 
 
 def _more(alarm: schema.Alarm) -> list[str]:
@@ -213,9 +210,5 @@ def _more(alarm: schema.Alarm) -> list[str]:
     if alarm.by:
         words.append(f"by {alarm.by}")
     if alarm.state == _Alarm.SHELVED:
-        return [", ".join([*words, f"until {_local(alarm.shelved_until):%H:%M}: {alarm.reason}"])]
+        return [", ".join([*words, f"until {time_text(alarm.shelved_until, 'minutes')}: {alarm.reason}"])]
     return [line for line in (", ".join(words), alarm.advice) if line]
-
-
-def _local(at: Timestamp) -> datetime:
-    return datetime.fromtimestamp(at.ToNanoseconds() * 1e-9).astimezone()

@@ -6,7 +6,6 @@ A command imports the reader of logs when it runs: with the gateway's modules it
 import asyncio
 import math
 import re
-import sys
 from collections.abc import Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -15,13 +14,15 @@ from typing import Annotated, Any, NamedTuple
 import typer
 
 from robomesh.endpoints import DEFAULT_ROUTER
+from robomesh.enum_names import enum_name
 from robomesh.errors import NoAnswerError
 from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 from services.command_line import discovery
-from services.command_line.discovery import print_json
+from services.command_line.local_time import time_text
 from services.command_line.options import Connect, Json, command_group
+from services.command_line.output import print_json, print_line
 from services.errors import ServiceError
 
 app = command_group("audit", "The gateway's audit log.")
@@ -29,6 +30,7 @@ app = command_group("audit", "The gateway's audit log.")
 # A gateway may search its whole log, at low priority.
 _TIMEOUT_S = 30.0
 _POSITIONS = "joint_positions"
+_ACCEPTED = schema.AuditEntry.Outcome.ACCEPTED
 _ROTARY = schema.Description.Joint.Type.ROTARY
 _UNITS = {"s": "seconds", "m": "minutes", "h": "hours", "d": "days"}
 
@@ -85,12 +87,12 @@ def verify(
             }
         )
     elif not result.entries and result.ok:
-        print(f"{file}: has no entries, as an emptied log would")
+        print_line(f"{file}: has no entries, as an emptied log would")
     elif result.ok:
         taken = f"; entries 1 to {result.first - 1}, in older parts, are not here" if result.first > 1 else ""
-        print(f"{file}: {result.entries} entries, complete and unchanged{taken}")
+        print_line(f"{file}: {result.entries} entries, complete and unchanged{taken}")
     else:
-        print(f"{file}: {result.text}")
+        print_line(f"{file}: {result.text}")
     if not result.ok or not result.entries:
         raise typer.Exit(1)
 
@@ -227,7 +229,7 @@ async def _ask_or_warn(session: Session, robot: discovery.Robot, query: schema.A
             return await _ask(session, robot, query)
     except NoAnswerError:
         pass
-    print(f"robomesh: {robot}: no gateway answers, and the log is on the gateway's disk", file=sys.stderr)
+    print_line(f"robomesh: {robot}: no gateway answers, and the log is on the gateway's disk", err=True)
     return []
 
 
@@ -240,7 +242,7 @@ def _values(row: _Row) -> dict[str, Any]:
         "operator": entry.operator,
         "source": entry.source,
         "request": entry.request,
-        "outcome": schema.AuditEntry.Outcome.Name(entry.outcome),
+        "outcome": enum_name(schema.AuditEntry.Outcome, entry.outcome),
         "text": entry.text,
         "values": dict(entry.values),
         "repeated": entry.repeated_count,
@@ -250,14 +252,13 @@ def _values(row: _Row) -> dict[str, Any]:
 
 def _print(rows: Sequence[_Row], *, of_all: bool) -> None:
     if not rows:
-        print("no entry matches")
+        print_line("no entry matches")
     width = max((len(row.robot) for row in rows), default=0)
     for row in rows:
         entry = row.entry
-        asked = datetime.fromtimestamp(entry.timestamp.ToNanoseconds() * 1e-9).astimezone()
-        outcome = schema.AuditEntry.Outcome.Name(entry.outcome)
+        outcome = enum_name(schema.AuditEntry.Outcome, entry.outcome)
         parts = (
-            f"{asked:%Y-%m-%d %H:%M:%S}.{asked.microsecond // 1000:03d}",
+            time_text(entry.timestamp, "milliseconds"),
             f"{row.robot:<{width}}" if of_all else "",
             f"{entry.number:>6}",
             f"{entry.operator:<12}",
@@ -267,9 +268,7 @@ def _print(rows: Sequence[_Row], *, of_all: bool) -> None:
             entry.text,
             " ".join(f"{name}={_plain(row, name, value)}" for name, value in sorted(entry.values.items())),
         )
-        line = "  ".join(filter(None, parts)).rstrip()
-        # secho colours text on a terminal only.
-        typer.secho(line, fg=None if outcome == "ACCEPTED" else typer.colors.RED)
+        print_line("  ".join(filter(None, parts)).rstrip(), red=entry.outcome != _ACCEPTED)
 
 
 def _plain(row: _Row, name: str, value: str) -> str:

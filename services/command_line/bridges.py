@@ -9,6 +9,7 @@ import typer
 from robomesh.endpoints import DEFAULT_ROUTER
 from services.command_line.connection_options import attachment, own_identity
 from services.command_line.options import Connect, Metrics, command_group
+from services.command_line.output import print_line
 from services.site_file.listen_address import check_reach, split_address
 
 Robots = Annotated[
@@ -96,7 +97,7 @@ def _write_layout(path: Path, robots: list[str], router: str) -> None:
         raise typer.BadParameter(
             f"{path}: cannot be written: {error.strerror}", param_hint="--layout"
         ) from None
-    print(f"{path}: in Foxglove or Lichtblick, Layouts, Import from file")
+    print_line(f"{path}: in Foxglove or Lichtblick, Layouts, Import from file")
 
 
 @app.command()

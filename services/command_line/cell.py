@@ -13,9 +13,9 @@ from robomesh.keys import check_chunk, robot_key
 from robomesh.messages import to_json
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
-from robomesh.texts import for_terminal
 from services.command_line import discovery
 from services.command_line.options import Connect, Json, Robot, command_group
+from services.command_line.output import print_line, print_text
 from services.errors import ServiceError
 
 app = command_group("cell", "Fixtures and the floor of a robot's cell: show, set, move, undo.")
@@ -44,9 +44,9 @@ def show(robot: Robot, connect: Connect = DEFAULT_ROUTER, as_json: Json = False)
 
     state = discovery.run(ask())
     if as_json:
-        print(to_json(state))
+        print_line(to_json(state))
         return
-    print(for_terminal(_text(state)), end="")
+    print_text(_text(state))
 
 
 @app.command("set")
@@ -168,14 +168,14 @@ def _changed(
 
     answer = discovery.run(ask())
     if answer is None:
-        typer.echo("nothing was changed", err=as_json)
+        print_line("nothing was changed", err=as_json)
         raise typer.Exit(1)
     if as_json:
-        print(to_json(answer))
+        print_line(to_json(answer))
         return
     if dry_run or yes:
         _print(answer)
-    print("nothing was changed: --dry-run" if dry_run else f"changed: version {answer.version[:12]}")
+    print_line("nothing was changed: --dry-run" if dry_run else f"changed: version {answer.version[:12]}")
 
 
 async def _state(session: Session, robot: discovery.Robot) -> schema.CellState:
@@ -189,7 +189,7 @@ def _print(answer: schema.CellAnswer, *, err: bool = False) -> None:
     from services.site_file.cell_content import summary
 
     for each in answer.changes:
-        typer.echo(for_terminal(summary([each])), err=err)
+        print_line(summary([each]), err=err)
 
 
 def _text(state: schema.CellState) -> str:

@@ -11,6 +11,8 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
+from services.command_line.output import print_line
+
 
 class Row(NamedTuple):
     """A row of the table.
@@ -152,5 +154,5 @@ def _options() -> list[Any]:
 
 def _print_version(asked: bool) -> None:
     if asked:
-        print(f"robomesh {importlib.metadata.version('robomesh')}")
+        print_line(f"robomesh {importlib.metadata.version('robomesh')}")
         raise typer.Exit

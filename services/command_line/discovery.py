@@ -1,8 +1,7 @@
-"""A session for one command, robots by name, and JSON output."""
+"""A session for one command, and robots by name."""
 
 import asyncio
 import getpass
-import json
 import re
 from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
@@ -11,13 +10,10 @@ from typing import Any, NamedTuple, TypeVar
 from robomesh.client.connection import connected
 from robomesh.client.mesh import RobotNotFoundError, find_robot
 from robomesh.session import Session
-from robomesh.texts import DIRECTION
 from services.command_line.alarm_lists import gone_sites, lists
 from services.command_line.connection_options import attachment, own_identity
 
 T = TypeVar("T")
-
-_ESCAPED = {ord(each): f"\\u{ord(each):04x}" for each in DIRECTION}
 
 
 class Robot(NamedTuple):
@@ -60,16 +56,6 @@ async def find(session: Session, text: str) -> Robot:
             gone = gone_sites(await lists(session)).keys() - {key.site for key in alive}
             error.gone_sites = tuple(sorted(gone))
         raise
-
-
-def print_json(value: Any) -> None:
-    """Print one line of JSON, with direction characters escaped."""
-    print(json_line(value), flush=True)
-
-
-def json_line(value: Any) -> str:
-    """Return a value as one line of JSON, with direction characters escaped."""
-    return json.dumps(value, ensure_ascii=False, allow_nan=False).translate(_ESCAPED)
 
 
 def own_name() -> str:

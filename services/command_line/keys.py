@@ -3,10 +3,9 @@
 A command imports the authority when it runs: only what changes keys needs the package `cryptography`.
 """
 
-import json
 import os
 from collections.abc import Iterator
-from datetime import timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,7 +13,9 @@ import typer
 
 from robomesh.topic_schema import Role
 from robots.bounded_toml import read_toml
+from services.command_line.local_time import time_text
 from services.command_line.options import Json, command_group
+from services.command_line.output import print_json, print_line
 from services.pki.errors import KeysError
 from services.pki.folder import Folder
 
@@ -53,7 +54,7 @@ def init(
         with site.open("a", encoding="utf-8") as file:
             file.write(_SECTION)
         read = site_file.load(site)
-        print(f'{site}: [keys] folder = "keys" is added: its services connect by TLS from now on')
+        print_line(f'{site}: [keys] folder = "keys" is added: its services connect by TLS from now on')
     assert read.keys.folder is not None
     folder = Folder(read.keys.folder)
     made = authority.prepare(
@@ -64,8 +65,8 @@ def init(
         routers=public(read.router, read.keys),
         started=may_start(read),
     )
-    print(f"{folder.path}: {len(made)} new certificates" + (f": {', '.join(made)}" if made else ""))
-    print(
+    print_line(f"{folder.path}: {len(made)} new certificates" + (f": {', '.join(made)}" if made else ""))
+    print_line(
         f"{folder.authority_key} signs: routers and services do not need it, so it may be kept elsewhere "
         "until something is issued or renewed"
     )
@@ -110,7 +111,7 @@ def issue(
     if as_json:
         _print(_record(entry) | {"file": file})
         return
-    print(f"{file}: {entry.name}, {entry.role.value}, until {entry.expires:%Y-%m-%d %H:%M} UTC")
+    print_line(f"{file}: {entry.name}, {entry.role.value}, until {_when(entry.expires)}")
     earlier = before.find(entry.name)
     if (
         earlier is not None
@@ -118,14 +119,14 @@ def issue(
         and earlier.expires is not None
         and earlier.expires > authority.now()
     ):
-        print(
-            f"{entry.name} had a certificate, until {earlier.expires:%Y-%m-%d %H:%M}; now both are valid. "
+        print_line(
+            f"{entry.name} had a certificate, until {_when(earlier.expires)}; now both are valid. "
             f"robomesh keys renew {entry.name} issues one with the same validity; keys revoke ends all."
         )
     use = f"robomesh keys accept {Path(file).name}, at {guest}," if guest else f"robomesh list --keys {file}"
-    print(f"Hand it over as a secret; {use} uses it.")
+    print_line(f"Hand it over as a secret; {use} uses it.")
     if where.access.read_bytes() != rules:
-        print(
+        print_line(
             "The routers reload their rules now: a robot that moves under a lease stops, unless the site has "
             "two routers."
         )
@@ -148,7 +149,7 @@ def accept(
         site = authority.accept(keys_folder(folder), certificate, sites=_listed(sites))
     except KeysError as error:
         raise KeysError(f"{file}: {error}") from None
-    print(f'site {site} admits us: connect = ["{site}"] under [router] in the site file links to it')
+    print_line(f'site {site} admits us: connect = ["{site}"] under [router] in the site file links to it')
 
 
 @app.command()
@@ -164,9 +165,9 @@ def opcua(
     from services.pki.opcua import make
 
     made = make(file, now(), timedelta(days=days))
-    print(f'{file}: write certificate = "{file}" below [robot.opcua]')
-    print(f"{made.public}: let the server trust it; {made.uri}, until {made.expires:%Y-%m-%d}")
-    print(f"  fingerprint sha256:{made.fingerprint}")
+    print_line(f'{file}: write certificate = "{file}" below [robot.opcua]')
+    print_line(f"{made.public}: let the server trust it; {made.uri}, until {made.expires:%Y-%m-%d}")
+    print_line(f"  fingerprint sha256:{made.fingerprint}")
 
 
 @app.command()
@@ -185,8 +186,8 @@ def renew(
             _print(_record(entry))
         return
     for entry in renewed:
-        print(f"{entry.name}: until {entry.expires:%Y-%m-%d %H:%M} UTC")
-    print(
+        print_line(f"{entry.name}: until {_when(entry.expires)}")
+    print_line(
         f"{len(renewed)} renewed"
         if renewed
         else "no service's certificate expires within ten days; renew people's and guests' by name"
@@ -202,10 +203,10 @@ def revoke(name: str, folder: KeysFolder = None) -> None:
     from services.pki import authority
 
     entry = authority.revoke(keys_folder(folder), name)
-    print(
+    print_line(
         f"{entry.name} has no rights any more: the site's router disconnects it now; each of two routers does"
     )
-    print("when it has this folder's access.json5, the second up to 12 s after the first.")
+    print_line("when it has this folder's access.json5, the second up to 12 s after the first.")
 
 
 @app.command("list")
@@ -219,17 +220,17 @@ def list_(folder: KeysFolder = None, as_json: Json = False) -> None:
         if as_json:
             _print(_record(entry))
             continue
-        until = "by its own site" if entry.expires is None else f"until {entry.expires:%Y-%m-%d %H:%M}"
+        until = "by its own site" if entry.expires is None else f"until {_when(entry.expires)}"
         now = authority.now()
         if entry.revoked is not None:
-            until = f"revoked {entry.revoked:%Y-%m-%d %H:%M}"
+            until = f"revoked {_when(entry.revoked)}"
         elif entry.expires is not None and entry.expires <= now:
-            until = f"EXPIRED {entry.expires:%Y-%m-%d %H:%M}"
+            until = f"EXPIRED {_when(entry.expires)}"
         elif entry.expires is not None and entry.expires <= now + RENEW_WITHIN:
             until += ", renew it"
         what = f"{entry.role.value:<11}{until}"
         for_ = ", ".join(entry.sites or entry.robots or ())
-        print(f"{entry.name:<28}{what}" + (f"   {for_}" if for_ else ""))
+        print_line(f"{entry.name:<28}{what}" + (f"   {for_}" if for_ else ""))
 
 
 def _record(entry: Any) -> dict[str, Any]:
@@ -237,8 +238,12 @@ def _record(entry: Any) -> dict[str, Any]:
     return record
 
 
+def _when(at: datetime | None) -> str:
+    return "-" if at is None else time_text(at, "minutes")
+
+
 def _print(record: dict[str, Any]) -> None:
-    print(json.dumps(record, ensure_ascii=False), flush=True)
+    print_json(record)
 
 
 def _listed(text: str) -> tuple[str, ...]:
@@ -276,7 +281,7 @@ def keys_folder(given: Path | None, *, quiet: bool = False) -> Folder:
             raise KeysError(f"site files here name {names}: choose one with --folder")
         for path in found.values():
             if not quiet:
-                print(f"keys in {path}")
+                print_line(f"keys in {path}")
             return Folder(path)
     raise KeysError(
         "no keys found: no site file here names a folder of keys, there is no ./keys, and ROBOMESH_KEYS is "

@@ -12,14 +12,14 @@ import typer
 
 from robomesh.extras import EXTRAS, missing
 from services.command_line.commands import root
-from services.command_line.output import discard, print_or_discard, show_directions
+from services.command_line.output import discard, print_line, print_text, protect
 from services.command_line.reading_limits import limit
 
 
 def main() -> None:
     """Run the command that the arguments name."""
-    show_directions()
-    limit(next(iter(sys.argv[1:]), ""))
+    protect()
+    limit(*sys.argv[1:])
     status = run(sys.argv[1:])
     try:
         # Flush now: at the interpreter's exit a broken pipe would print a warning.
@@ -75,7 +75,7 @@ def _reader_is_gone() -> bool:
 def _wrong_usage(error: typer.TyperException) -> int:
     text = error.format_message()
     if text.startswith("Usage: "):  # a group without a command
-        print_or_discard(text, sys.stderr)
+        print_text(text, err=True)
         return 2
     context = getattr(error, "ctx", None)
     command = "robomesh" if context is None else context.command_path
@@ -89,7 +89,7 @@ def _failed_ourselves(error: Exception) -> int:
 
 
 def _failed(text: str) -> int:
-    print_or_discard(f"robomesh: {text}", sys.stderr)
+    print_line(f"robomesh: {text}", err=True)
     return 2
 
 

@@ -3,7 +3,7 @@
 A command imports the readers and writers when it runs: with numpy they take half a second.
 """
 
-import sys
+import contextlib
 from collections.abc import Callable
 from math import isfinite
 from pathlib import Path
@@ -13,11 +13,11 @@ import typer
 
 from robomesh.atomic_write import write_atomically
 from services.command_line.options import command_group
+from services.command_line.output import print_json, print_line, progress
 from services.errors import ServiceError
 
 if TYPE_CHECKING:
     from robots.meshes.mesh import Mesh
-    from robots.meshes.read import Progress
 
 # A smaller file is read before a progress display would be useful.
 _LARGE_BYTES = 2_000_000
@@ -36,25 +36,23 @@ def info(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in the file's own units.")] = False,
 ) -> None:
     """Show triangles, bounds and materials of a mesh file, in its own units and axes."""
-    from robots.meshes.read import read_mesh
     from robots.meshes.unit_guess import guess
     from robots.summary import mesh_summary
-    from services.command_line.discovery import print_json
 
-    mesh = read_mesh(file, _progress(file), within=file.absolute().parent)
+    mesh = _read(file)
     summary = mesh_summary(mesh)
     if as_json:
         print_json(summary)
         return
-    print(f"{file.name}: {summary['triangles']} triangles")
-    print(f"  from {_triple(summary['min'])} to {_triple(summary['max'])}, in the file's own units")
-    print(f"  {guess(mesh).sentence}")
-    print(f"  materials: {', '.join(filter(None, summary['materials'])) or 'none named'}")
+    print_line(f"{file.name}: {summary['triangles']} triangles")
+    print_line(f"  from {_triple(summary['min'])} to {_triple(summary['max'])}, in the file's own units")
+    print_line(f"  {guess(mesh).sentence}")
+    print_line(f"  materials: {', '.join(filter(None, summary['materials'])) or 'none named'}")
     listed = summary["colors"][:_MOST_COLORS]
     more = len(summary["colors"]) - len(listed)
-    print(f"  colors: {', '.join(listed) or 'none'}{f' and {more} more' if more else ''}")
+    print_line(f"  colors: {', '.join(listed) or 'none'}{f' and {more} more' if more else ''}")
     for warning in summary["warnings"]:
-        print(f"  warning: {warning}")
+        print_line(f"  warning: {warning}")
 
 
 @app.command()
@@ -71,7 +69,6 @@ def convert(
 ) -> None:
     """Convert a mesh to the format of OUT's ending; warns of what that format cannot hold."""
     from robots.meshes.mesh import transformed_mesh
-    from robots.meshes.read import read_mesh
 
     ending = target.suffix.lower()
     if ending not in _WRITERS:
@@ -82,7 +79,7 @@ def convert(
         raise ConversionError(f"--scale {scale}: a number above 0 is right")
     if target.exists() and source.exists() and target.samefile(source):
         raise ConversionError(f"{target}: is the input file; name another output")
-    mesh = read_mesh(source, _progress(source), within=source.absolute().parent)
+    mesh = _read(source)
     for warning in mesh.warnings:
         _warn(f"{source.name}: {warning}")
     if not mesh.parts and not mesh.wires:
@@ -96,7 +93,7 @@ def convert(
         raise ConversionError(f"{target}: {error}") from None
     for path, content in files.items():
         _write(path, content)
-    print(f"{target}: {placed.triangle_count} triangles")
+    print_line(f"{target}: {placed.triangle_count} triangles")
 
 
 def _placement(mesh: "Mesh", ending: str, scale: float | None, up: str | None) -> Any:
@@ -186,20 +183,17 @@ def _write(path: Path, content: bytes) -> None:
         raise ConversionError(f"{path}: cannot be written: {error.strerror}") from None
 
 
-def _progress(file: Path) -> "Progress | None":
-    """Return a display of the percentage read, for a large file on a terminal."""
-    if not sys.stderr.isatty() or not file.is_file() or file.stat().st_size < _LARGE_BYTES:
-        return None
+def _read(file: Path) -> "Mesh":
+    """Read a mesh, with a progress bar for a large file."""
+    from robots.meshes.read import read_mesh
 
-    def show(done: float) -> None:
-        sys.stderr.write(f"\rreading {file.name}: {done:4.0%}" if done < 1 else "\r\x1b[K")
-        sys.stderr.flush()
-
-    return show
+    large = file.is_file() and file.stat().st_size >= _LARGE_BYTES
+    with progress(f"reading {file.name}") if large else contextlib.nullcontext() as show:
+        return read_mesh(file, show, within=file.absolute().parent)
 
 
 def _warn(text: str) -> None:
-    print(f"robomesh: {text}", file=sys.stderr)
+    print_line(f"robomesh: {text}", err=True)
 
 
 def _triple(values: Any) -> str:

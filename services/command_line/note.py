@@ -9,10 +9,11 @@ from robomesh.client.notes import Note, read_notes, withdraw_note, write_note
 from robomesh.endpoints import DEFAULT_ROUTER
 from robomesh.keys import check_name
 from robomesh.session import Session
-from robomesh.texts import for_terminal
 from services.command_line import discovery
 from services.command_line.audit import moment
+from services.command_line.local_time import time_text
 from services.command_line.options import Connect, Json, Robot, command_group
+from services.command_line.output import print_json, print_line
 from services.errors import ServiceError
 
 app = command_group()
@@ -60,11 +61,11 @@ def note(
 
     for each in (found := discovery.run(ask())):
         if as_json:
-            discovery.print_json(_values(each))
+            print_json(_values(each))
         else:
-            print(for_terminal(_line(each)))
+            print_line(_line(each))
     if not found and not as_json:
-        print("no notes")
+        print_line("no notes")
 
 
 async def _place(session: Session, text: str) -> tuple[str, str]:
@@ -80,10 +81,9 @@ def _time(text: str, now: datetime) -> datetime | None:
 
 
 def _line(note: Note) -> str:
-    begin = note.begin.astimezone()
-    until = f" to {note.end.astimezone():%Y-%m-%d %H:%M:%S}" if note.end else ""
+    until = f" to {time_text(note.end)}" if note.end else ""
     gone = f"  (withdrawn by {note.withdrawn_by})" if note.withdrawn_by else ""
-    return f"{note.id}  {begin:%Y-%m-%d %H:%M:%S}{until}  {note.author}: {note.text}{gone}"
+    return f"{note.id}  {time_text(note.begin)}{until}  {note.author}: {note.text}{gone}"
 
 
 def _values(note: Note) -> dict[str, Any]:

@@ -15,8 +15,9 @@ from typing import Annotated
 
 import typer
 
-from robomesh.texts import for_terminal, one_line
+from robomesh.texts import one_line
 from services.command_line.options import Json, command_group
+from services.command_line.output import print_json, print_line
 from services.errors import ServiceError
 
 app = command_group()
@@ -76,17 +77,16 @@ def probe(
     information to UDP port 10040, where it does not listen first. Of an OPC UA server it asks the endpoints,
     and shows the certificate's fingerprint. Exit status 1: no protocol that robomesh reads.
     """
-    from services.command_line.discovery import print_json
 
     found = examine(address)
     if as_json:
         print_json({"address": address, **asdict(found)})
     else:
-        print(for_terminal(f"{address}: {found.text}"))
+        print_line(f"{address}: {found.text}")
         received = "" if found.received_bytes is None else f"; received: {found.received_bytes} bytes"
-        print(f"  sent: {found.sent}{received}")
+        print_line(f"  sent: {found.sent}{received}")
         if found.next:
-            print(f"  {found.next}")
+            print_line(f"  {found.next}")
     if not found.protocol:
         raise typer.Exit(1)
 

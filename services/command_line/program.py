@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from services.command_line.options import Json, SiteFile, command_group
+from services.command_line.output import print_json, print_line, print_text
 from services.errors import ServiceError
 
 if TYPE_CHECKING:
@@ -51,7 +52,6 @@ def check(
 ) -> None:
     """Show a program's duration and all its violations; exit status 1 if there is one."""
     from robots.programs.check import check_program
-    from services.command_line.discovery import print_json
 
     text = program_text(file)
     cell, name = _cell(robot, site, exact=exact)
@@ -90,7 +90,6 @@ def plan(
     from robots.programs.plan import plan_program
     from robots.programs.text import parse_program
     from robots.programs.write import steps_text
-    from services.command_line.discovery import print_json
 
     cell, name = _cell(robot, site, exact=False)
     arm = cell.arms[name]
@@ -98,15 +97,15 @@ def plan(
         program = parse_program(program_text(file), arm.joints)
     except ProgramError as error:
         for line, text in error.problems:
-            print(f"{file}: line {line}: {text}", file=sys.stderr)
+            print_line(f"{file}: line {line}: {text}", err=True)
         raise typer.Exit(1) from None
     found = plan_program(program, arm, build_solver(arm.description), _start(start, arm.joints))
     if as_json:
         print_json({"ok": not found.violations, "steps": [_step_json(step) for step in found.steps]})
     else:
-        print(steps_text(found.steps, arm.joints), end="")
+        print_text(steps_text(found.steps, arm.joints))
     for violation in found.violations:
-        print(f"{file}: line {violation.line}: {violation.text}", file=sys.stderr)
+        print_line(f"{file}: line {violation.line}: {violation.text}", err=True)
     if found.violations:
         raise typer.Exit(1)
 
@@ -148,7 +147,7 @@ def from_dxf(
     )
     text = program_from_dxf(file, path)
     if out is None:
-        print(text, end="")
+        print_text(text)
         return
     try:
         with out.open("w" if force else "x", encoding="utf-8") as opened:
@@ -157,7 +156,7 @@ def from_dxf(
         raise ProgramFileError(f"{out}: exists already; --force overwrites it") from None
     except OSError as error:
         raise ProgramFileError(f"{out}: cannot be written: {error.strerror}") from None
-    print(out)
+    print_line(out)
 
 
 # ------------------------------------------------------------------------------ input
@@ -285,19 +284,19 @@ def _print_result(file: str, result: "CheckResult", notes: list[str]) -> None:
 
     errors = [each for each in result.violations if each.kind is ViolationKind.PROGRAM]
     for each in errors:
-        print(f"{file}: line {each.line}: {each.text}")
+        print_line(f"{file}: line {each.line}: {each.text}")
     for group in _groups(each for each in result.violations if each.kind is not ViolationKind.PROGRAM):
-        print(f"{file}: {_group_text(group)}")
+        print_line(f"{file}: {_group_text(group)}")
     for note in notes:
-        print(f"note: {note}")
+        print_line(f"note: {note}")
     if errors:
-        print(f"{file}: {len(errors)} error{'' if len(errors) == 1 else 's'} in the text")
+        print_line(f"{file}: {len(errors)} error{'' if len(errors) == 1 else 's'} in the text")
         return
     count = len(result.violations)
     fine = "nothing wrong, but only the arm itself was checked" if result.alone else "nothing wrong"
     found = f"{count} violation{'' if count == 1 else 's'}" if count else fine
-    print(f"{file}: {number(round(result.duration_s, 2))} s, {found}")
-    print(f"assumed of the controller: {result.interpolation}")
+    print_line(f"{file}: {number(round(result.duration_s, 2))} s, {found}")
+    print_line(f"assumed of the controller: {result.interpolation}")
 
 
 def _groups(violations: Iterable["Violation"]) -> list[list["Violation"]]:

@@ -3,7 +3,6 @@
 import json
 import os
 from collections.abc import Coroutine
-from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -11,14 +10,17 @@ import typer
 
 from robomesh.atomic_write import write_atomically
 from robomesh.endpoints import DEFAULT_ROUTER
+from robomesh.enum_names import enum_word
 from robomesh.keys import ROOT, WHOLE_SITE, check_chunk, check_name, robot_key
 from robomesh.last_values import last_values
 from robomesh.messages import to_json
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
-from robomesh.texts import for_terminal
+from robomesh.texts import is_file_title
 from services.command_line import discovery
+from services.command_line.local_time import time_text
 from services.command_line.options import Connect, Json, Robot, command_group
+from services.command_line.output import print_json, print_line, print_text
 from services.command_line.program import program_text
 from services.command_line.text_diff import unified_diff
 from services.errors import ServiceError
@@ -30,6 +32,7 @@ _Operator = Annotated[str, typer.Option(help="The author's name; else yours.")]
 _Version, _Request = schema.ProgramVersion, schema.ProgramRequest
 _TIMEOUT_S = 10.0
 _ENDING = ".prog"
+_LONGEST_NAME = 60  # as in a store
 _WORDS = {
     _Version.SAVED: "saved",
     _Version.ASIDE: "put aside",
@@ -135,13 +138,13 @@ def list_(
         if deleted or not _is_deleted(each)
     ]
     if as_json:
-        discovery.print_json({"programs": [{"robot": name, **_record(each)} for name, each in found]})
+        print_json({"programs": [{"robot": name, **_record(each)} for name, each in found]})
         return
     for name, each in found:
         lost = f", deleted: {each.current.reason}" if _is_deleted(each) else ""
-        print(for_terminal(f"{name}  {each.current.name}  {_line(each.current)}{lost}"))
+        print_line(f"{name}  {each.current.name}  {_line(each.current)}{lost}")
     if not found:
-        print("no stored programs")
+        print_line("no stored programs")
 
 
 @app.command()
@@ -164,7 +167,7 @@ def show(
 
     content = _run(ask, robot, connect)
     if as_json:
-        discovery.print_json(
+        print_json(
             {
                 **(_record(content.program) if content.HasField("program") else {}),
                 "version": _version(content.version),
@@ -175,9 +178,9 @@ def show(
     elif versions:
         for each in reversed(content.versions):
             reason = f": {each.reason}" if each.reason else ""
-            print(for_terminal(f"{_line(each)}  {_WORDS.get(each.change, 'changed')} {each.name}{reason}"))
+            print_line(f"{_line(each)}  {_change(each)} {each.name}{reason}")
     else:
-        print(for_terminal(content.text), end="" if content.text.endswith("\n") else "\n")
+        print_text(content.text)
 
 
 @app.command()
@@ -262,7 +265,7 @@ def diff(
     sides = _run(ask, robot, connect)
     names = (f"{each.version.name}\tversion {each.version.number}" for each in sides)
     text = unified_diff(*(each.text for each in sides), *names)
-    print(for_terminal(text), end="")
+    print_text(text)
     if text:
         raise typer.Exit(1)
 
@@ -282,6 +285,12 @@ def export(
         return [await store.content(each) for each in wanted]
 
     contents = _run(ask, robot, connect)
+    for each in contents:
+        # Also a store of another version or maker: "../../x" would be written outside the folder.
+        if not is_file_title(each.version.name, _LONGEST_NAME):
+            raise StoredProgramError(
+                f"{each.version.name!r}: is no file's name; export the other programs with --name"
+            )
     files = {folder / f"{each.version.name}{_ENDING}": each.text for each in contents}
     there = [str(path) for path in files if os.path.lexists(path)]
     if there and not force:
@@ -290,7 +299,7 @@ def export(
         folder.mkdir(parents=True, exist_ok=True)
         for path, text in files.items():
             write_atomically(path, text.encode(), mode=0o644)
-            print(for_terminal(str(path)))
+            print_line(str(path))
     except OSError as error:
         raise StoredProgramError(f"{folder}: cannot be written: {error.strerror}") from None
 
@@ -352,24 +361,29 @@ def _changed(ask: Any, robot: str, connect: str, as_json: bool) -> None:
 def _print(answer: schema.ProgramAnswer, as_json: bool) -> None:
     version, current = answer.version, answer.program.current
     if as_json:
-        discovery.print_json({**_record(answer.program), "version": _version(version)})
+        print_json({**_record(answer.program), "version": _version(version)})
         return
-    words = f"{version.name}: version {version.number}, {_WORDS.get(version.change, 'changed')}"
+    words = f"{version.name}: version {version.number}, {_change(version)}"
     if version.change == _Version.ASIDE:
         words += (
             f": {current.author} has changed it meanwhile (version {current.number}). Compare with `robomesh "
             f"programs diff`, then save on version {current.number}, or restore version {version.number}"
         )
-    print(for_terminal(words))
+    print_line(words)
 
 
 def _is_deleted(program: schema.StoredProgram) -> bool:
     return bool(program.current.change == _Version.DELETED)
 
 
+def _change(version: schema.ProgramVersion) -> str:
+    return _WORDS.get(version.change) or f"changed: {enum_word(_Version.Change, version.change)}"
+
+
 def _line(version: schema.ProgramVersion) -> str:
-    at = datetime.fromtimestamp(version.timestamp.ToNanoseconds() * 1e-9).astimezone()
-    return f"version {version.number}  {at:%Y-%m-%d %H:%M:%S}  {version.author}  {version.bytes} bytes"
+    return (
+        f"version {version.number}  {time_text(version.timestamp)}  {version.author}  {version.bytes} bytes"
+    )
 
 
 def _version(version: schema.ProgramVersion) -> dict[str, Any]:

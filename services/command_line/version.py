@@ -11,6 +11,7 @@ import typer
 
 from robomesh.endpoints import DEFAULT_ROUTER
 from services.command_line.options import Connect, Json, command_group
+from services.command_line.output import print_json, print_line
 
 app = command_group()
 
@@ -42,9 +43,10 @@ def version(
         except (RobomeshError, TimeoutError) as error:
             found["problem"] = str(error) or f"no answer in {_ANSWER_S:g} s"
     if as_json:
-        discovery.print_json(found)
+        print_json(found)
     else:
-        print("\n".join(_lines(found)))
+        for line in _lines(found):
+            print_line(line)
 
 
 def installed(package: str) -> str | None:
@@ -72,7 +74,6 @@ async def _services(router: str) -> list[dict[str, Any]]:
     """
     from robomesh.keys import ROOT, WHOLE_SITE
     from robomesh.last_values import last_values
-    from robomesh.presence import SILENT
     from robomesh.schemas.robomesh_pb2 import ServiceHealth
     from services.command_line import discovery
 
@@ -81,7 +82,7 @@ async def _services(router: str) -> list[dict[str, Any]]:
             session.present(), last_values(session, f"{ROOT}/*/{WHOLE_SITE}/health/*")
         )
     versions = {each.id: each.version for each in health.values() if isinstance(each, ServiceHealth)}
-    processes = {(key.site, key.service, key.id) for key in alive if key.service not in SILENT}
+    processes = {(key.site, key.service, key.id) for key in alive}
     counted = Counter((site, service, versions.get(id_)) for site, service, id_ in processes)
     return [
         {"site": site, "service": service, "version": version, "processes": count}

@@ -17,7 +17,6 @@ from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddle
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
-from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Scope
 from starlette.websockets import WebSocket
 
@@ -32,7 +31,7 @@ from robomesh.session import Session
 from services.console.accounts.auth_middleware import SIGNED_OUT, AuthMiddleware, cookie_name
 from services.console.accounts.auth_service import AuthService
 from services.console.accounts.rights import operator_name
-from services.console.accounts.routes import AccountRoutes
+from services.console.accounts.routes import AccountRoutes, client_address
 from services.console.accounts.sessions import MOST_PAGES, SignedIn
 from services.console.define.routes import Define
 from services.console.define.settings import DefineSettings
@@ -43,6 +42,7 @@ from services.console.http.guard import Guard
 from services.console.http.layouts import layout_response
 from services.console.http.listener import listening
 from services.console.http.meshes import MeshCache, mesh_response
+from services.console.http.page_files import PageFiles
 from services.console.http.pictures import MJPEG, Pictures
 from services.console.http.recorded_video import RecordedVideo
 from services.console.http.recordings import Recordings
@@ -56,6 +56,7 @@ from services.console.http.view_page import ViewPage
 from services.console.requested_views import Views
 from services.console.websocket.page_connection import Browser
 from services.console.websocket.shared_subscriptions import SharedSubscriptions
+from services.console.websocket.websocket_transport import transport_of
 from services.site_file.listen_address import check_page_reach, split_address
 
 log = logging.getLogger(__name__)
@@ -194,12 +195,15 @@ class Hub:
         await self.recorded_video.close()
 
     async def browse(self, websocket: WebSocket) -> None:
-        """Serve one browser's WebSocket."""
+        """Serve one browser's WebSocket; a browser sends its stops over one of their own."""
+        stops_only = websocket.scope["path"].endswith("/stop")
         user: SignedIn | None = websocket.scope.get("signed_in")
-        if user is not None and len(user.pages) >= MOST_PAGES:
+        if user is not None and len(user.pages) >= MOST_PAGES and not stops_only:
             refused = RefusedRequest(403, codes.PAGE_TOO_MANY_PAGES(count=MOST_PAGES))
             await websocket.send_denial_response(as_json(refused))
             return
+        asker = client_address(websocket.scope) if user is None else user.account.name
+        await transport_of(websocket).limit(asker, stops=stops_only)
         await websocket.accept()
         browser = Browser(
             self.session,
@@ -209,12 +213,14 @@ class Hub:
             site=self.settings.site,
             user=user,
             own_name=self._own_name(user),
+            stops_only=stops_only,
         )
-        for each in self._alive:
-            browser.send_message(_presence(each, alive=True))
-        self._browsers.add(browser)
-        if self._presence_known:
-            browser.greet()  # again, now that it has all presence
+        if not stops_only:
+            for each in self._alive:
+                browser.send_message(_presence(each, alive=True))
+            self._browsers.add(browser)
+            if self._presence_known:
+                browser.greet()  # again, now that it has all presence
         try:
             if user is None:
                 await browser.run(websocket)
@@ -303,7 +309,7 @@ class Hub:
 async def _serve_signed_in(browser: Browser, user: SignedIn, websocket: WebSocket) -> None:
     """Serve a page as long as its session lasts; close it with the reason when the session ends."""
     try:
-        with user.serving(), user.with_page(browser):
+        with user.serving(), contextlib.nullcontext() if browser.stops_only else user.with_page(browser):
             await browser.run(websocket)
     except asyncio.CancelledError:
         if not user.ended:
@@ -314,8 +320,8 @@ async def _serve_signed_in(browser: Browser, user: SignedIn, websocket: WebSocke
 def application(hub: Hub) -> ASGIApp:
     """Return the app with all its routes; with accounts, every request passes the authentication middleware.
 
-    `/mesh` (WebSocket), `/mesh/<site>/<robot>/<name>`, layouts of other viewers, pictures, pages of single
-    views, recordings, Define, `/account`, `/health`, the page.
+    `/mesh` and `/mesh/stop` (WebSockets), `/mesh/<site>/<robot>/<name>`, layouts of other viewers, pictures,
+    pages of single views, recordings, Define, `/account`, `/health`, the page.
     """
     settings, secure = hub.settings, hub.settings.certificate is not None
     cookie = cookie_name(settings.site, secure=secure)
@@ -335,6 +341,7 @@ def application(hub: Hub) -> ASGIApp:
         Route("/health", health, methods=["GET"]),
         *account.routes(),
         WebSocketRoute("/mesh", hub.browse),
+        WebSocketRoute("/mesh/stop", hub.browse),
         Route("/mesh/{site}/{robot}/{name}", mesh, methods=["GET"]),
         Route("/layout/{site}/{robot}.json", layout, methods=["GET"]),
         *viewing,
@@ -368,17 +375,6 @@ async def _refused_by_routing(request: Request, error: Exception) -> Response:
 
 async def _failed(request: Request, _: Exception) -> Response:
     return as_text(RefusedRequest(500, codes.FAILED(request=request.url.path)))
-
-
-class PageFiles(StaticFiles):
-    """The built page; browsers may cache hashed assets, and fetch the rest each time."""
-
-    async def get_response(self, path: str, scope: Scope) -> Response:
-        """Return a file with its caching headers."""
-        response = await super().get_response(path, scope)
-        hashed = path.startswith("assets/") and response.status_code == 200
-        response.headers["Cache-Control"] = "public, max-age=31536000, immutable" if hashed else "no-store"
-        return response
 
 
 def _presence(token: PresenceKey, *, alive: bool) -> ToPage:

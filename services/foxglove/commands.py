@@ -15,6 +15,7 @@ from typing import Any
 import foxglove
 from foxglove import MessageSchema, Schema, ServiceRequest, ServiceSchema
 
+from robomesh import bounded_json
 from robomesh import reason_codes as codes
 from robomesh.client.commands import CommandResult, Progress, request_stop
 from robomesh.client.control import AsyncArm
@@ -178,7 +179,7 @@ def _values(name: str, payload: bytes) -> dict[str, Any]:
         RefusedError: If it is not a JSON object, or has a field that this command does not have.
     """
     try:
-        values = json.loads(payload or b"{}", parse_constant=_not_finite)
+        values = bounded_json.loads(payload or b"{}", parse_constant=_not_finite)
     except (ValueError, RecursionError) as error:
         raise RefusedError(codes.NOT_JSON(detail=error)) from None
     if not isinstance(values, dict):

@@ -82,10 +82,13 @@ def log_of(event: bytes, robot: str) -> bytes:
         DecodeError: If it is not an event.
     """
     decoded = schema.Event.FromString(event)
+    level = _LEVELS.get(decoded.severity, Log.UNKNOWN)
+    # The log has no number for the severity of a newer program.
+    more = f" severity {decoded.severity}" if level == Log.UNKNOWN and decoded.severity else ""
     log = Log(
         timestamp=decoded.timestamp,
-        level=_LEVELS.get(decoded.severity, Log.UNKNOWN),
-        message=f"{decoded.text} [{decoded.code}]",
+        level=level,
+        message=f"{decoded.text} [{decoded.code}]{more}",
         name=f"{robot} {decoded.source}".strip(),
     )
     return log.SerializeToString()

@@ -10,14 +10,14 @@ from typing import Any
 
 from robomesh.errors import RobomeshError
 from robomesh.header import Header
-from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.keys import CLOSE, FAR, WHOLE_SITE, robot_key
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 from robots.urdf.viewers import prefixed, without_joints
 
 _MESH_WITHIN_S = 10.0
 _PICTURE_WITHIN_S = 5.0
-_PICTURES = ("close", "far")
+_PICTURES = (CLOSE, FAR)
 # Keys of the site file with secret values.
 _SECRET = re.compile(r"(?im)^(\s*[\w.-]*(?:password|secret|token|passphrase|key)[\w.-]*\s*=\s*).*$")
 _SECRET_INLINE = re.compile(r"(?i)([\w-]*(?:password|secret|token|passphrase|key)[\w-]*\s*=\s*)\"[^\"]*\"")

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from robomesh import reason_codes as codes
 from robomesh.errors import MessageError, RefusedError
-from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.keys import CLOSE, FAR, FREE, WHOLE_SITE, robot_key
 from robomesh.reasons import Reason
 from robomesh.recordings.capture import Capture
 from robomesh.recordings.changes import set_labels
@@ -154,9 +154,9 @@ class _Robot:
         known = self.recorder.descriptions.known.get(self.name)
         if known is None or not known.description.views:
             return
-        names = [view.name for view in known.description.views]
+        names = [*(view.name for view in known.description.views), FREE, CLOSE, FAR]
         for view in views:
-            if view not in (*names, "-", "far") and not view.startswith("free-"):
+            if view not in (*names, "-") and not view.startswith("free-"):
                 raise RefusedError(codes.VIEW_UNKNOWN_OF(view=view, robot=self.name, views=", ".join(names)))
 
     def _on_open(self, part: Part) -> None:

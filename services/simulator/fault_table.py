@@ -1,12 +1,14 @@
 """Table of the faults, for the simulator, the command line, its errors and docs/faults.md."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
 COPIES = {"flood": 50, "deluge": 1000}
 LEAP = 10.0  # degrees or mm
+_CORRUPTED = 1e5  # degrees or mm
+_CORRUPTED_EACH_S, _CORRUPTED_FOR_S = 4.0, 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +35,9 @@ FAULTS: Mapping[str, Fault] = MappingProxyType(
         "deluge": Fault(effect=f"every unit is sent {COPIES['deluge']} times, more than any link can carry"),
         "drop": Fault(effect="all connections are closed, each second again"),
         "jump": Fault(effect=f"the first joint jumps by {LEAP:g} each second, with unchanged status"),
+        "corrupt": Fault(
+            effect=f"the first joint is {_CORRUPTED:g} off for a moment, each {_CORRUPTED_EACH_S:g} s"
+        ),
         "local": Fault(effect="reports local mode and refuses commands except stop"),
         "fault": Fault(effect="stops and reports a fault until it is reset"),
         "deaf": Fault(effect="ignores stop"),
@@ -46,6 +51,14 @@ FAULTS: Mapping[str, Fault] = MappingProxyType(
         "loss": Fault(effect="does not answer every third question"),
     }
 )
+
+
+def displacement(active: Collection[str], now_s: float) -> float:
+    """Return by how many degrees or mm the first joint is reported too high."""
+    if "corrupt" in active and now_s % _CORRUPTED_EACH_S < _CORRUPTED_FOR_S:
+        return _CORRUPTED
+    return LEAP if "jump" in active and int(now_s) % 2 else 0.0
+
 
 UNIT_FAULTS = tuple(name for name in FAULTS if name not in ("busy", "loss"))
 """Faults of a controller with the unit protocol: it is not asked for its state."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from protocol_gateway.core.records import AbsolutePositions, Command, Error, Record, Status, Velocities
 from robomesh import reason_codes as codes
 from services.simulator.errors import FaultError
-from services.simulator.fault_table import COPIES, FAULTS, LEAP
+from services.simulator.fault_table import COPIES, FAULTS, displacement
 from services.simulator.unit_execution import FAULT, LOCAL, asks_to_stop
 
 _TEXT = "drive of axis 1 overheated (simulated)"
@@ -112,9 +112,10 @@ def faulty_records(records: Sequence[Record], active: Collection[str], now_s: fl
     for record in records:
         match record:
             case AbsolutePositions(values):
-                leap = LEAP if "jump" in active and int(now_s) % 2 else 0.0
                 more = (0.0,) if "joints" in active else ()
-                changed.append(AbsolutePositions((values[0] + leap, *values[1:], *more)))
+                changed.append(
+                    AbsolutePositions((values[0] + displacement(active, now_s), *values[1:], *more))
+                )
             case _ if "bare" in active:
                 pass
             case Velocities(values) if "joints" in active:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, StrictBool, field_validator
 
+from services.site_file.listen_address import split_address
 from services.site_file.part import PART_CONFIG
 
 _ORIGIN = re.compile(r"https?://(?:[a-z0-9.-]+|\[[0-9a-f:]+\])(?::\d{1,5})?")
@@ -56,9 +57,12 @@ class Console(BaseModel):
         return origins
 
     @property
-    def scheme(self) -> str:
-        """Scheme of the page's address."""
-        return "https" if self.tls is not None else "http"
+    def url(self) -> str:
+        """Address of the page, seen from the same machine if it listens on all addresses."""
+        host, port = split_address(self.listen)
+        host = "127.0.0.1" if host in ("0.0.0.0", "::") else host
+        scheme = "http" if self.tls is None else "https"
+        return f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}/"
 
 
 def resolve_paths(console: Console, folder: Path) -> Console:

@@ -5,12 +5,13 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
+from robomesh.keys import CLOSE, FAR
 from services.site_file.part import PART_CONFIG
 
 Pixels = Annotated[int, Field(ge=64, le=4096, multiple_of=2)]
 
 # Views of every robot, in addition to those of the site file.
-ALWAYS_RENDERED = ("close", "far")
+ALWAYS_RENDERED = (CLOSE, FAR)
 
 
 class FlightRecorder(BaseModel):

@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 
 from robomesh import reason_codes as codes
+from robomesh.enum_names import enum_word
 from robomesh.errors import MessageError, RefusedError
 from robomesh.keys import ROOT, WHOLE_SITE, check_name, is_replay
 from robomesh.messages import reason_message
@@ -205,7 +206,7 @@ class _Service:
         async with self._one_at_a_time:
             await asyncio.to_thread(self._layouts.change, asked, author, time.time_ns())
             self._layout_list.put(self._layouts.message)
-        action = schema.LayoutRequest.Action.Name(asked.action).lower()
+        action = enum_word(schema.LayoutRequest.Action, asked.action)
         log.info("%s: %s layout %r", author, action, asked.name)
         return self._layouts.message
 

@@ -24,6 +24,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 from robomesh import reason_codes as codes
+from robomesh.enum_names import enum_word
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import Alarm as AlarmMessage
 from robomesh.schemas.robomesh_pb2 import Reason as ReasonMessage
@@ -104,6 +105,14 @@ class Alarms:
     # Times at which alarms became unacknowledged.
     _annunciations: list[float] = field(default_factory=list)
     flooding: bool = False
+
+    def active(self) -> dict[tuple[str, ...], float]:
+        """Return 1 for robot, name and priority of each active alarm that is not shelved; on any thread."""
+        return {
+            (each.robot, each.code, enum_word(AlarmMessage.Priority, each.priority)): 1.0
+            for each in tuple(self.by_id.values())
+            if each.active and each.shelved_until is None
+        }
 
     def active_by_priority(self) -> dict[str, float]:
         """Return the number of active alarms that are not shelved, by priority; on any thread."""

@@ -52,6 +52,11 @@ RULES: Mapping[str, Rule] = MappingProxyType(
             HIGH, "A device other than a controller sends there, or the controller is broken."
         ),
         "controller.joint_count": Rule(HIGH, "The site file names another model than the controller has."),
+        "controller.joint_values": Rule(
+            HIGH,
+            "The line corrupts data, or the site file names another model: see the controller's own display.",
+        ),
+        "gateway.occupied": _NONE,
         "link.channel_lost": Rule(
             MEDIUM,
             "Look at this port in the controller's services, in the site file and in firewalls.",

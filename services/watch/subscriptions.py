@@ -34,14 +34,20 @@ class EventHandler:
         self.last_event_ns[_name(key)] = _time_ns(event)
         self._apply(key.robot, event, now, reporter)
 
-    def handle_history(self, key: Key, events: Sequence[Event], now: float, *, reporter: str = "") -> None:
-        """Handle those events of a publisher's history that are new; oldest first."""
+    def handle_history(
+        self, key: Key, events: Sequence[Event], now: float, *, wall_s: float, reporter: str = ""
+    ) -> None:
+        """Handle those events of a publisher's history that are new; oldest first.
+
+        Args:
+            wall_s: Wall clock, for the comparison with the publisher's, which may have been set back with it.
+        """
         last_event_ns = self.last_event_ns.get(_name(key), round((now - _START_S) * 1e9))
         times_ns = [_time_ns(event) for event in events]
         if last_event_ns in times_ns:
             # By order, not by time: clocks may be set.
             new = events[len(times_ns) - times_ns[::-1].index(last_event_ns) :]
-        elif last_event_ns > now * 1e9:
+        elif last_event_ns > wall_s * 1e9:
             new = events  # a date in the future cannot separate old from new
         else:
             new = [event for event, at_ns in zip(events, times_ns, strict=True) if at_ns > last_event_ns]

@@ -18,6 +18,7 @@ from robomesh.session import Session
 from robomesh.subscription import Subscription
 from robomesh.texts import one_line
 from robomesh.topics import check_operator
+from robomesh.wall_clock import ForwardClock
 from services.watch.alarm_registry import AlarmRegistry
 from services.watch.alarms import AlarmError
 from services.watch.conditions import Condition, ConditionTracker, robot_conditions
@@ -65,6 +66,8 @@ class _Watch:
     def __init__(self, session: Session, settings: Settings) -> None:
         self._session, self._site, self._settled_s = session, settings.site, settings.settled_s
         self._mesh = Mesh()
+        # A clock that is set back must not hide an alarm for longer than it was shelved.
+        self._clock = ForwardClock()
         self._expected = Expected()
         self._states: dict[str, schema.ControllerState] = {}
         self._registry = AlarmRegistry(settings.folder / f"{settings.site}.json", self._publish_event)
@@ -80,6 +83,12 @@ class _Watch:
         self._zenoh_id = str(session.zenoh_session.info.zid())
         session.measure(
             "alarms", "Alarms that are not over and seen", lambda: len(self._registry.alarms.by_id)
+        )
+        session.measure(
+            "alarm",
+            "1: the alarm is active and not shelved",
+            self._registry.alarms.active,
+            labels=("robot", "alarm", "priority"),
         )
         session.measure(
             "alarms_active",
@@ -141,10 +150,10 @@ class _Watch:
             except MessageError as error:
                 log.warning("%s: %s", sample.key, error)
                 continue
-            now, key, events = time.time(), sample.parsed, self._registry.events
+            now, key, events = self._clock.now_s(), sample.parsed, self._registry.events
             if isinstance(message, schema.EventList):
                 reporter = self._reporter(key.robot, message.events[-1].source) if message.events else ""
-                events.handle_history(key, message.events, now, reporter=reporter)
+                events.handle_history(key, message.events, now, wall_s=time.time(), reporter=reporter)
             elif isinstance(message, schema.Event):
                 events.handle(key, message, now, reporter=self._reporter(key.robot, message.source))
 
@@ -202,7 +211,7 @@ class _Watch:
     async def _run_checks(self, before: dict[str, Condition]) -> None:
         rounds, begun_s = 0, time.monotonic()
         while True:
-            now, now_s = time.time(), time.monotonic()
+            now, now_s = self._clock.now_s(), time.monotonic()
             if now_s - begun_s > self._settled_s + _KNOWN_AFTER_S:
                 before = {}
             self._publish_ignored(tuple(self._session.ignored.examples))
@@ -323,7 +332,7 @@ class _Watch:
         assert isinstance(asked, schema.AlarmRequest)
         by = check_operator(request.chunk[:_NAMES_MOST])
         try:
-            await self._registry.apply_request(asked, by, time.time())
+            await self._registry.apply_request(asked, by, self._clock.now_s())
         except AlarmError as error:
             raise RefusedError(error.reason) from None
         message = self._registry.message(self._site)

@@ -21,6 +21,7 @@ from robomesh.schemas.robomesh_pb2 import Event
 from robomesh.session import Session, SessionSettings, open_session
 from robots.cells import Fixture
 from services.console import app
+from services.console.websocket import shared_subscriptions
 from services.kinematics import kinematics
 from services.simulator import simulator
 from services.simulator.fault_requests import Mesh
@@ -223,6 +224,8 @@ def plant(request, tmp_path_factory) -> Iterator[Plant]:
 
 def run_plant(running: Plant) -> Iterator[Plant]:
     """Run a plant for as long as a fixture lasts."""
+    # A page must not receive the messages of another test.
+    shared_subscriptions._LINGER_S = 0.0
     build_page.build()
     thread = threading.Thread(target=running.run, name="plant")
     thread.start()

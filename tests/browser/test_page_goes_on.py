@@ -19,9 +19,11 @@ from tests.browser.robot_page import (
 pytestmark = pytest.mark.browser
 
 # A connection through which nothing passes any more, a machine that sleeps, and time that passes.
-DEAD, SLEPT, PASSED = "sockets.at(-1).dead = true", "wall += {}", "steady += {}"
+LINE_DEAD, STOPS_DEAD = "sockets.at(-1).dead = true", "stopSockets.at(-1).dead = true"
+DEAD, SLEPT, PASSED = f"{LINE_DEAD}; {STOPS_DEAD}", "wall += {}", "steady += {}"
 WORLD = """
 window.sockets = [];
+window.stopSockets = [];
 window.wall = window.steady = 0;
 const [date, now] = [Date.now.bind(Date), performance.now.bind(performance)];
 Date.now = () => date() + wall + steady;
@@ -29,7 +31,7 @@ performance.now = () => now() + steady;
 window.WebSocket = class extends WebSocket {
   constructor(...values) {
     super(...values);
-    sockets.push(this);
+    (this.url.endsWith("/stop") ? stopSockets : sockets).push(this);
   }
   send(data) {
     if (this.dead) this.lost = (this.lost ?? 0) + 1;
@@ -86,6 +88,18 @@ def test_a_stop_request_that_a_dead_line_swallowed_is_sent_by_another(open_page)
     page.evaluate("wall -= 60e3")  # it is recent, however slow this machine is
     until(page, "sockets[0].lost > 0 && sockets.length > 1")
     expect(stop_notice(page)).to_contain_text("Stop sent to hall/arm")
+    take(page)
+    clear_stop(page)
+
+
+@pytest.mark.parametrize("dead", [LINE_DEAD, STOPS_DEAD])
+def test_a_stop_request_needs_only_one_of_the_pages_two_lines(open_page, dead):
+    page = open_idle(open_page)
+    until(page, "stopSockets.at(-1)?.readyState === WebSocket.OPEN")
+    page.evaluate(dead)
+    stop_button(page).click()
+    expect(stop_notice(page)).to_contain_text("Stop sent to hall/arm")
+    assert page.evaluate("sockets.length") == 1
     take(page)
     clear_stop(page)
 

@@ -8,14 +8,19 @@ from protocol_gateway.authority.lease_rules import Now
 from protocol_gateway.control import control
 
 
+def later(now, seconds):
+    """Return the time on each clock, some time later."""
+    return Now(now.monotonic_s + seconds, *(each + round(seconds * 1e9) for each in now[1:]))
+
+
 class Clock:
     """Clock of Control, advanced by the test."""
 
     def __init__(self):
-        self.now = Now(time.monotonic(), time.time_ns())
+        self.now = Now(time.monotonic(), time.time_ns(), time.time_ns())
 
     def advance(self, seconds):
-        self.now = Now(self.now.monotonic_s + seconds, self.now.wall_ns + round(seconds * 1e9))
+        self.now = later(self.now, seconds)
 
 
 @pytest.fixture

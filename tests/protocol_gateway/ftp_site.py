@@ -5,6 +5,7 @@ import contextlib
 from dataclasses import replace
 
 from protocol_gateway.drivers.fanuc.axes import FanucSettings
+from protocol_gateway.drivers.fanuc.files import Reading
 from services.simulator.fanuc.service import FtpSettings, serve_ftp
 
 SETTINGS = FanucSettings(j23=1, rate_hz=20.0, registers=(1,))
@@ -25,6 +26,13 @@ async def controller(**settings):
     finally:
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
+
+
+def read(steps, file):
+    """Return what a parser finds in a whole file."""
+    reading = Reading(steps)
+    reading.receive(file if isinstance(file, bytes) else file.encode("latin-1"))
+    return reading.result()
 
 
 def position(*groups, cfg_first=True):

@@ -200,6 +200,22 @@ class Mover:
         """Keep the next motion back, and what follows it on its wire; return what releases it."""
         raise NotImplementedError
 
+    @staticmethod
+    def corrupted(data):
+        """Return bytes of the controller with another position of the first joint, if there is one."""
+        raise NotImplementedError
+
+    def corrupt(self, times=1):
+        """Corrupt that many of the next positions."""
+
+        def answers(data):
+            nonlocal times
+            changed = self.corrupted(data) if times else data
+            times -= changed != data
+            return [changed]
+
+        self.wires[""].answers = answers
+
 
 class UnitMover(Mover):
     name = "unit"
@@ -252,6 +268,10 @@ class UnitMover(Mover):
     def keep_back(self):
         self.wires[""].keep_back(lambda data: b"ABSOLUTE.DEG" in data)
         return self.wires[""].release
+
+    @staticmethod
+    def corrupted(data):
+        return re.sub(rb"(ABSOLUTE.DEG\*-?)", rb"\g<1>9", data, count=1)
 
     async def _say(self, text):
         """Send a unit as another client."""
@@ -369,6 +389,11 @@ class UrMover(Mover):
     def keep_back(self):
         self.wires["scripts"].keep_back()
         return self.wires["scripts"].release
+
+    @staticmethod
+    def corrupted(data):
+        # A package of data: size, "U", recipe, time; the exponent of a double.
+        return data[:12] + b"\x40\xe2" + data[14:] if data[2:3] == b"U" else data
 
     async def start_foreign(self):
         self.arm.programs.play(time.monotonic())
@@ -493,6 +518,11 @@ class HsesMover(Mover):
         self.wires[""].keep_back(lambda data: data[24] == 0x8B)
         return self.wires[""].release
 
+    @staticmethod
+    def corrupted(data):
+        # Pulses of eight axes, after the type, form, tool and two frames.
+        return data[:55] + b"\x40" + data[56:] if len(data) == 84 and data[32:36] == bytes(4) else data
+
     async def lose_reply(self):
         # The network loses the answer to the motion; its command is none of the answer's bytes.
         self.wires[""].answers = lambda data: [] if data[24] == 0x82 else [data]
@@ -585,6 +615,12 @@ class RmiMover(Mover):
     def keep_back(self):
         self.wires["rmi_session"].keep_back(lambda data: b"FRC_JointMotionJRep" in data)
         return self.wires["rmi_session"].release
+
+    @staticmethod
+    def corrupted(data):
+        # The block of the position; axes follow the Cartesian position of 52 bytes.
+        is_position = data[4:6] == b"\x68\0" and data[31:32] == b"\x94"
+        return data[:110] + b"\x0f\x4a" + data[112:] if is_position else data
 
     async def lose_reply(self):
         await until(lambda: self.server.session)

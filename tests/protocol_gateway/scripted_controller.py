@@ -4,6 +4,26 @@ import asyncio
 import contextlib
 import time
 
+import numpy as np
+
+from robots.joints import Joints, JointType
+
+
+def endless_joints(count):
+    """Return joints without limits of position and speed."""
+    zeros, endless = np.zeros(count), np.full(count, np.inf)
+    return Joints(
+        names=tuple(f"joint_{number}" for number in range(1, count + 1)),
+        types=(JointType.ROTARY,) * count,
+        lower=-endless,
+        upper=endless,
+        max_speed=endless,
+        max_acceleration=endless,
+        max_jerk=endless,
+        home=zeros,
+        continuous=(True,) * count,
+    )
+
 
 @contextlib.asynccontextmanager
 async def scripted_controller():

@@ -10,10 +10,13 @@ import shutil
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from protocol_gateway.audit import search
 from protocol_gateway.audit.log import read_entries, verify
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
@@ -101,7 +104,6 @@ def test_after_a_flood_of_stops_a_restart_restores_the_last(mesh, tmp_path):
                 await until(lambda: controller.stops)
                 assert controller.stops < flood
                 last = max(answer.stop_id for answer in answers)
-                assert last > flood // 2
             entries = [entry for entry in read_entries(site.audit) if entry.request == "STOP"]
             assert sum(1 + entry.repeated for entry in entries) == flood
             assert len(entries) < 40
@@ -145,6 +147,27 @@ def test_entries_are_found_over_the_mesh_by_operator_request_and_time(mesh, tmp_
     run(main())
 
 
+def test_a_search_rests_before_the_next_one(tmp_path, monkeypatch):
+    times = []
+
+    def slow(*_, **__):
+        times.append(time.monotonic())
+        time.sleep(0.02)
+        times.append(time.monotonic())
+        return []
+
+    monkeypatch.setattr(search, "find", slow)
+
+    async def main():
+        server = search.SearchServer(tmp_path / "arm.jsonl")
+        request = SimpleNamespace(message=schema.AuditQuery())
+        await asyncio.gather(*(server.answer(request) for _ in range(3)))
+
+    run(main())
+    for begun, ended, next_ in zip(times[::2], times[1::2], times[2::2], strict=False):
+        assert next_ - ended >= min(9 * (ended - begun), 1.0)
+
+
 def test_the_command_lists_entries_of_robots_and_of_log_files(mesh, router, tmp_path):
     async def main():
         async with simulator() as one, simulator() as two, gateway(mesh, tmp_path, one, two) as site:
@@ -154,7 +177,7 @@ def test_the_command_lists_entries_of_robots_and_of_log_files(mesh, router, tmp_
             await until(lambda: len(site.seen["audit"]) >= 2)
             # Clients find robots by the presence of their services.
             for robot in ("arm", "arm-2"):
-                site.session.declare_presence("hall", robot, "gateway")
+                site.own.declare_presence("hall", robot, "gateway")
             lines = await robomesh_to(router, "audit", "list", "arm", "--outcome", "refused")
             assert len(lines) == 1
             assert "li            HOME           REFUSED   Not sent: no operator is in control" in lines[0]
@@ -183,7 +206,7 @@ def test_the_command_prints_degrees_and_millimetres_and_json_has_si(mesh, router
             for _ in range(20):
                 await refusal(site.command(C.HOME))
             await until(lambda: [e for e in site.seen["audit"] if e.repeated_count])
-            site.session.declare_presence("hall", "arm", "gateway")
+            site.own.declare_presence("hall", "arm", "gateway")
             (line,) = await robomesh_to(router, "audit", "list", "arm", "--request", "move_absolute")
             assert f"joint_positions={SI} [rad, m]" in line
             publisher = site.session.declare_publisher("hall", "arm", "description")

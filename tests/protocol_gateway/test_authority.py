@@ -26,7 +26,7 @@ C = CommandRequest.Command
 
 
 def at(seconds):
-    return Now(1000.0 + seconds, round((5000.0 + seconds) * 1e9))
+    return Now(1000.0 + seconds, round((5000.0 + seconds) * 1e9), round((7000.0 + seconds) * 1e9))
 
 
 def ask(authority, action, operator="li", *, time_s=0.0, secret="fresh", **fields):
@@ -293,11 +293,27 @@ def test_an_answer_is_not_kept_under_another_operators_lease():
 
 def test_a_command_after_its_deadline_is_refused():
     late = command(C.HOME)
-    late.not_after.FromNanoseconds(at(1).wall_ns)
+    late.not_after.FromNanoseconds(at(1).gateway_ns)
     assert admit(held(), late, operator="li", now=at(1)).answer.accepted
     refused = admit(held(), late, operator="li", now=at(1.5))
     assert "0.50 s after its not_after" in refused.answer.text
     assert refused.id_used
+
+
+@pytest.mark.parametrize(
+    ("kind", "longest_s"),
+    [(C.MOVE_ABSOLUTE, 5), (C.JOG, 5), (C.RESET, 5), (C.RECOVER, 5), (C.RUN_PROGRAM, 65), (C.HOLD, 1e6)],
+)
+def test_a_deadline_further_ahead_than_the_command_may_wait_is_refused(kind, longest_s):
+    far = command(kind)
+    far.not_after.FromNanoseconds(at(0).gateway_ns + round(longest_s * 1e9))
+    assert admit(held(), far, operator="li", now=at(0)).answer.accepted
+    refused = admit(held(), far, operator="li", now=at(-1)).answer
+    if kind == C.HOLD:  # it only ends motion
+        assert refused.accepted
+    else:
+        assert refused.reason.code == "command.deadline_far"
+        assert f"{longest_s + 1} s ahead of the gateway's time" in refused.text
 
 
 def test_a_command_that_waited_over_a_second_is_not_sent():

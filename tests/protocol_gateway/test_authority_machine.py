@@ -44,7 +44,7 @@ class Machine(RuleBasedStateMachine):
 
     @property
     def now(self):
-        return Now(self.now_s, round(self.now_s * 1e9))
+        return Now(self.now_s, round(self.now_s * 1e9), round(self.now_s * 1e9))
 
     @property
     def motion_may_run(self):

@@ -45,7 +45,7 @@ def test_a_driver_sends_only_what_it_declares_whatever_is_asked_for(mesh, tmp_pa
         bare = {} if subject.reads else {"stop_proven": False}
         async with driven(mesh, tmp_path, subject, controller={"demo": True}, **bare) as (site, wires):
             await site.units(20)
-            assert len(set(positions(site))) > 1
+            await until(lambda: len(set(positions(site))) > 1)
             assert site.controller.read_only
             assert site.controller.capabilities.stops == schema.Capabilities.NONE
             assert not site.controller.capabilities.commands

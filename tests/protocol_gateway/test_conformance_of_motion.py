@@ -7,7 +7,9 @@ import asyncio
 import contextlib
 import itertools
 import re
+import signal
 import time
+from pathlib import Path
 
 import pytest
 
@@ -24,7 +26,7 @@ from tests.protocol_gateway.gateway_site import (
     until,
     watching,
 )
-from tests.protocol_gateway.movers import ANY, MOVERS, NOT_NOW, every_mover
+from tests.protocol_gateway.movers import ANY, MOVERS, NOT_NOW, UnitMover, every_mover
 
 pytestmark = pytest.mark.slow
 QUICK = {"stale_after_s": 0.5, "reconnect_after_s": 1.5}
@@ -234,6 +236,24 @@ def test_a_tool_changed_by_others_leaves_motions_unchecked_and_ends_one(mesh, tm
             await is_stopped(arm, "tool")
             await rests_for_good(arm)
             assert abs(arm.positions()[0] - target[0]) > 0.3
+
+    run(main())
+
+
+@every_mover("corrupted")
+def test_one_corrupted_position_stops_the_motion_and_is_never_published(mesh, tmp_path, monkeypatch, mover):
+    async def main():
+        async with mover.started(mesh, tmp_path, monkeypatch) as arm:
+            target = await arm.begin()
+            arm.corrupt()
+            await until(lambda: arm.site.controller.HasField("stop"))
+            event = await arm.site.event("controller.joint_values", 0)
+            assert codes_of(event.reason) & {"joints.far", "joints.leap"}
+            await rests_for_good(arm)
+            assert abs(arm.positions()[0] - target[0]) > 0.3
+            assert len(arm.site.events("controller.joint_values")) == 1
+            furthest = max(abs(each.joints[0].position) for each in arm.site.seen["joints"])
+            assert furthest < 4.0
 
     run(main())
 
@@ -526,3 +546,82 @@ def test_a_killed_gateway_leaves_its_motions_as_declared_and_the_next_one_ends_t
                 assert arm.words().count("stop") or arm.dies_with_link
 
     run(main(), timeout_s=180.0)
+
+
+@contextlib.contextmanager
+def frozen(process):
+    """Freeze a process, with all its threads, while the block runs."""
+    process.send_signal(signal.SIGSTOP)
+    threads = Path(f"/proc/{process.pid}/task")
+    try:
+        while any(") T" not in each.read_text() for each in threads.glob("*/stat")):
+            time.sleep(0.001)
+        yield
+    finally:
+        process.send_signal(signal.SIGCONT)
+
+
+# The lease of 5 s lives on, or ends meanwhile.
+@pytest.mark.processes
+@pytest.mark.parametrize("seconds", [2.0, 6.0])
+def test_the_motions_of_a_gateway_that_was_frozen_end_when_it_goes_on(mesh, tmp_path, monkeypatch, seconds):
+    async def main():
+        async with contextlib.AsyncExitStack() as stack:
+            arms, robots = [], []
+            for mover in MOVERS:
+                server, wires = await stack.enter_async_context(mover.wired(monkeypatch))
+                site = await stack.enter_async_context(watching(mesh, mover.name))
+                arms.append(mover(site, wires, server))
+                robots.append(arms[-1].settings())
+            async with gateway_process(mesh, tmp_path, robots) as process:
+                for arm in arms:
+                    await until(lambda arm=arm: arm.site.joints, timeout_s=60.0)
+                    await arm.in_control()
+                async with kept_control(*(each.site for each in arms)):
+                    await asyncio.gather(*(each.crawl() for each in arms))
+                    while resting := [each for each in arms if not each.moves()]:
+                        await asyncio.gather(*(each.crawl() for each in resting))
+                for arm in arms:
+                    await arm.site.lease(A.RENEW, ttl_s=5)
+                sent = [each.motions for each in arms]
+                with frozen(process):
+                    late = [asyncio.create_task(refusal(each.move(-0.1))) for each in arms]
+                    for arm in arms:
+                        if arm.dies_with_link:
+                            rest_s, late_s = await time_to_rest(arm)
+                            print(f"{arm.name}: at rest {rest_s:.3f} s after the gateway was frozen")
+                            assert rest_s < 0.2 + 2 * late_s
+                    await asyncio.sleep(seconds)
+                    assert all(each.moves() is not bool(each.dies_with_link) for each in arms)
+                for arm in arms:
+                    rest_s, _ = await time_to_rest(arm)
+                    print(f"{arm.name}: at rest {rest_s:.3f} s after it went on")
+                for arm, task, number in zip(arms, late, sent, strict=True):
+                    assert "Not sent" in await task
+                    if seconds > 5.0:
+                        await until(lambda arm=arm: arm.site.seen["lease"][-1].holder == "")
+                    await until(lambda arm=arm: arm.site.controller.HasField("stop"))
+                    await rests_for_good(arm, motions=number)
+
+    run(main(), timeout_s=180.0)
+
+
+@pytest.mark.processes
+def test_a_command_that_waited_for_a_frozen_gateway_is_not_sent(mesh, tmp_path, monkeypatch):
+    async def main():
+        async with UnitMover.wired(monkeypatch) as (server, wires), watching(mesh, "unit") as site:
+            arm = UnitMover(site, wires, server)
+            async with gateway_process(mesh, tmp_path, [arm.settings()]) as process:
+                await until(lambda: site.joints, timeout_s=60.0)
+                await arm.in_control()
+                with frozen(process):
+                    late = asyncio.create_task(refusal(arm.move(0.1)))
+                    await asyncio.sleep(1.5)
+                assert "Not sent" in await late
+                assert not site.controller.HasField("stop")
+                judge(arm, motions=0)
+                target = await arm.moved(0.1)
+                async with kept_control(site):
+                    await until(lambda: near(arm.positions(), target))
+
+    run(main(), timeout_s=90.0)

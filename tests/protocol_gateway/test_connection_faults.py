@@ -58,7 +58,7 @@ def test_a_controller_that_drops_connections_is_reconnected(mesh, tmp_path):
 def test_a_controller_that_restarts_comes_back_and_is_not_taken_for_homed(mesh, tmp_path):
     async def main():
         async with faulty_site(mesh, tmp_path) as (site, fault):
-            assert site.controller.homed == STATE.YES
+            await until(lambda: site.controller.homed == STATE.YES)
             await fault("restart")
             await until(lambda: site.events("link.down"))
             await until(lambda: site.controller.link == STATE.UP and site.controller.homed == STATE.NO)

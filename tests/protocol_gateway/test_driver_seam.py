@@ -22,7 +22,9 @@ from protocol_gateway.drivers.driver import (
 from protocol_gateway.errors import LinkDownError, NotReadyError
 from protocol_gateway.link.link import ControllerLink, LinkSettings, LinkState
 from robomesh import reason_codes as codes
+from robomesh.loop_turns import LONG_S, MeasuredLoop, turns_of
 from tests.conftest import free_port, run
+from tests.protocol_gateway.scripted_controller import endless_joints
 from tests.protocol_gateway.test_link import Seen, controller, end, until
 
 READ = Channel(name="read", carries=Carries.READING)
@@ -102,6 +104,7 @@ async def link(driver, port, **settings):
     arm_link = ControllerLink(
         LinkSettings(host="127.0.0.1", port=port, **settings),
         driver,
+        endless_joints(2),
         on_event=seen.event,
         on_status=seen.statuses.append,
         on_fate_unknown=seen.fates.append,
@@ -138,6 +141,21 @@ def test_a_driver_asks_over_udp_by_its_timer():
         assert driver.told[1] == ("opened", "polled")
 
     run(main())
+
+
+def test_link_whose_driver_takes_long_is_what_ran_in_a_long_turn():
+    def blocked(*received):
+        time.sleep(4 * LONG_S)
+        return (STATE,)
+
+    async def main():
+        causes = []
+        turns_of(asyncio.get_running_loop()).on_long = lambda took_s, what: causes.append(what)
+        async with peer() as arm, link(polling(received=blocked), arm.port) as (arm_link, _):
+            await until(lambda: arm_link in causes)
+
+    with asyncio.Runner(loop_factory=MeasuredLoop) as runner:
+        runner.run(main())
 
 
 def test_datagrams_of_another_sender_are_not_read():
@@ -316,7 +334,7 @@ def test_a_command_before_the_link_runs_is_refused_and_makes_it_connect_without_
     async def main():
         driver = Driver(started=(Open(READ),), command=(Send(READ, b"stop"),))
         settings = LinkSettings(host="127.0.0.1", port=free_port())
-        arm_link = ControllerLink(settings, driver, on_event=Seen().event)
+        arm_link = ControllerLink(settings, driver, endless_joints(2), on_event=Seen().event)
         with pytest.raises(LinkDownError):
             arm_link.send(b"stop")
         task = asyncio.create_task(arm_link.run())
@@ -353,7 +371,9 @@ def test_an_exception_at_a_timer_ends_the_link():
 
         async with peer() as arm:
             settings = LinkSettings(host="127.0.0.1", port=arm.port)
-            arm_link = ControllerLink(settings, polling(timer_ended=broken), on_event=Seen().event)
+            arm_link = ControllerLink(
+                settings, polling(timer_ended=broken), endless_joints(2), on_event=Seen().event
+            )
             with pytest.raises(ZeroDivisionError):
                 await arm_link.run()
 

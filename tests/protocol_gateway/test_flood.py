@@ -283,8 +283,8 @@ def test_of_undated_delayed_units_only_the_newest_is_published(mesh, tmp_path):
                 await asyncio.sleep(0.5)
                 skipped = site.controller.counters.units_skipped + 198
                 for begin in (10, 110):  # in two pieces, as networks do
-                    say("".join(UNIT % (begin + number) for number in range(100)))
-                await until(lambda: site.joints[0] == pytest.approx(math.radians(209.0)))
+                    say("".join(UNIT % (0.05 * (begin + number)) for number in range(100)))
+                await until(lambda: site.joints[0] == pytest.approx(math.radians(10.45)))
                 assert len(site.seen["joints"]) - before <= 2
                 await until(lambda skipped=skipped: site.controller.counters.units_skipped >= skipped)
 

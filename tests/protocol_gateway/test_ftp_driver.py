@@ -362,6 +362,20 @@ def test_port_that_is_not_open_and_files_without_end_end_the_connection():
     assert it.closed[0] == "a file of more than 1 MiB"
 
 
+def test_line_that_is_too_long_costs_its_file_only_and_is_not_matched():
+    """An expression backtracked for seconds over an alarm with 30,000 blanks."""
+    it = Stepped().log_in()
+    while it.connect() != "ERRACT.LS":
+        it.perform(it.driver.closed(FILE, it.now_s))
+        it.say("226 Transfer complete.")
+    it.perform(it.driver.received(FILE, b'ERRACT.LS \n1"a"b"c"' + b" " * 30_000 + b"x\n", it.now_s))
+    it.perform(it.driver.closed(FILE, it.now_s))
+    it.say("226 Transfer complete.")
+    (malformed,) = it.reports[-1].events
+    assert malformed.reason == "ERRACT.LS: a line of more than 2048 bytes"
+    assert not it.closed
+
+
 def test_nothing_is_ever_commanded():
     driver = Stepped().driver
     assert not driver.capabilities.commands

@@ -9,6 +9,7 @@ import pytest
 from protocol_gateway.audit.log import read_entries, verify
 from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.gateway import RobotSettings, Settings, check
+from robomesh.loop_turns import LONG_S, MeasuredLoop
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import last_value, run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, simulator, until
@@ -32,6 +33,21 @@ def test_a_controllers_units_are_published_as_joint_states(mesh, tmp_path):
             assert last.timestamp.ToNanoseconds() <= time.time_ns()
 
     run(main())
+
+
+def test_long_turn_of_the_gateways_loop_is_an_event(mesh, tmp_path):
+    def occupied(event):
+        return (
+            float(event.values["seconds"]) >= 4 * LONG_S and "occupied the gateway's event loop" in event.text
+        )
+
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+            asyncio.get_running_loop().call_soon(time.sleep, 4 * LONG_S)
+            await until(lambda: any(map(occupied, site.events("gateway.occupied"))))
+
+    with asyncio.Runner(loop_factory=MeasuredLoop) as runner:
+        runner.run(main())
 
 
 def test_home_and_move_reach_their_targets(mesh, tmp_path):

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+from itertools import groupby
 
 from tests.protocol_gateway.gateway_site import STATE, A, gateway, refusal, simulator, until
 from tests.protocol_gateway.old_client import ME, in_loop, legacy, legacy_site, program
@@ -27,12 +28,14 @@ async def test_old_programs_read_the_same_states_as_the_mesh(mesh, tmp_path):
             tuple(round(joint.position * 57.29577951308232, 6) for joint in message.joints)
             for message in site.seen["joints"]
         ]
-        # On a busy machine either reader may leave some out.
+        # On a busy machine either reader may leave some out, also of the equal ones of an arm at rest.
         both = {*published} & {*one.positions}
         assert len(both) > 50
-        assert [each for each in one.positions if each in both] == [
-            each for each in published if each in both
-        ]
+
+        def changes(positions):
+            return [each for each, _ in groupby(each for each in positions if each in both)]
+
+        assert changes(one.positions) == changes(published)
         assert set(one.bytes[:2000].split(b"@")[1:-1]) & set(two.bytes.split(b"@"))
         await until(lambda: site.controller.legacy_clients.attached == 2)
 

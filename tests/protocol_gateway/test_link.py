@@ -12,6 +12,7 @@ from protocol_gateway.errors import LinkCloggedError, LinkDownError
 from protocol_gateway.link.link import ControllerLink, LinkSettings, LinkState
 from robots.joints import JointType
 from tests.conftest import free_port, run
+from tests.protocol_gateway.scripted_controller import endless_joints
 
 STATE = b"1#ABSOLUTE.DEG*10.00;20.00@"
 STOP = b"1#COMMAND*stop@"
@@ -69,6 +70,7 @@ async def link(port, **settings):
     arm_link = ControllerLink(
         LinkSettings(host="127.0.0.1", port=port, **settings),
         UnitDriver((JointType.ROTARY, JointType.ROTARY)),
+        endless_joints(2),
         on_event=seen.event,
         on_status=seen.statuses.append,
     )
@@ -347,7 +349,8 @@ def test_an_exception_in_a_callback_ends_the_link():
 
         async with controller() as arm:
             driver = UnitDriver((JointType.ROTARY, JointType.ROTARY))
-            arm_link = ControllerLink(LinkSettings(host="127.0.0.1", port=arm.port), driver, on_event=broken)
+            settings = LinkSettings(host="127.0.0.1", port=arm.port)
+            arm_link = ControllerLink(settings, driver, endless_joints(2), on_event=broken)
             task = asyncio.create_task(arm_link.run())
             _, writer = await arm.next()
             writer.write(STATE)

@@ -24,7 +24,7 @@ HERE, THERE, ELSEWHERE = (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)
 
 
 def at(seconds):
-    return Now(1000.0 + seconds, round((5000.0 + seconds) * 1e9))
+    return Now(1000.0 + seconds, round((5000.0 + seconds) * 1e9), round((7000.0 + seconds) * 1e9))
 
 
 def ask(authority, action, operator="li", **fields):

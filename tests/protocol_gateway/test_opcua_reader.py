@@ -291,6 +291,7 @@ def test_reader_names_nothing_that_writes_or_calls():
         )
 
 
+@pytest.mark.slow
 def test_gateway_does_not_import_the_library():
     code = "import sys, protocol_gateway.gateway; sys.exit('asyncua' in sys.modules)"
     assert os.spawnv(os.P_WAIT, sys.executable, [sys.executable, "-c", code]) == 0

@@ -17,7 +17,7 @@ FAR = [2.4, 1.0, 0.5, -1.0, 2.0]
 @contextlib.asynccontextmanager
 async def homing(site, mesh):
     """Run `robomesh send arm home` in a separate process, and wait until the arm homes."""
-    site.session.declare_presence("hall", "arm", "gateway")  # the service does the same at its start
+    site.own.declare_presence("hall", "arm", "gateway")  # the service does the same at its start
     process = await asyncio.create_subprocess_exec(
         *[sys.executable, "-m", "services.command_line.main", "send", "arm", "home"],
         *["--connect", mesh.connect[0], "--operator", "wang"],

@@ -12,6 +12,7 @@ import psutil
 import pytest
 from google.protobuf.timestamp_pb2 import Timestamp
 
+from protocol_gateway.authority.lease_rules import Now
 from protocol_gateway.checking.checker import Checker
 from protocol_gateway.control.deadlines import set_deadline
 from protocol_gateway.errors import CheckError
@@ -371,12 +372,13 @@ def test_a_program_is_not_run_after_its_senders_timeout(mesh, tmp_path, has_time
 
 def test_the_earlier_deadline_counts():
     second = 10**9
+    now = Now(7.5, 0, 100 * second + second // 2)
 
     def dated(not_after_s=None, within_s=None, kind=C.RUN_PROGRAM):
         command = schema.CommandRequest(command=kind)
         if not_after_s is not None:
             command.not_after.FromNanoseconds(round(not_after_s * second))
-        set_deadline(command, Request(None, command, "li", received_ns=100 * second, within_s=within_s))
+        set_deadline(command, Request(None, command, "li", received_s=7.0, within_s=within_s), now)
         return command.not_after.ToNanoseconds() / second if command.HasField("not_after") else None
 
     assert dated() == 102.0
@@ -385,7 +387,12 @@ def test_the_earlier_deadline_counts():
     assert dated(within_s=60.0, not_after_s=130.0) == 130.0
     assert dated(within_s=3.0, not_after_s=130.0) == 103.0
     assert dated(not_after_s=130.0) == 130.0
-    assert dated(within_s=1e300) > 1e6
+    # A `not_after` that is refused stays; the sender's timeout needs no clock of another machine.
+    assert dated(within_s=3.0, not_after_s=200.0) == 200.0
+    assert dated(within_s=3.0, not_after_s=99.0) == 99.0
+    assert dated(within_s=1e300) == 165.5
+    assert dated(within_s=1e300, kind=C.HOME) == 105.5
+    assert dated(within_s=1e300, kind=C.HOLD) > 1e6
 
 
 def test_a_hold_cancels_a_program_during_its_check(mesh, tmp_path):

@@ -23,6 +23,7 @@ from services.simulator.yaskawa.service import with_factors
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, gateway, until
 from tests.protocol_gateway.test_hses_driver import YASKAWA, controller
+from tests.protocol_gateway.wire import wire
 
 ARM = load("puma560")
 READS = Capabilities(commands=frozenset(), reports_pose=True, joint_mapping="J3 + J2")
@@ -190,5 +191,36 @@ def test_unproven_joints_are_shown_and_count_for_no_check(mesh, tmp_path):
             async with gateway(mesh, tmp_path, port, verified=older, **YASKAWA) as site:
                 await until(lambda: "SIM0.99" in site.controller.link_text and site.controller.software)
                 assert site.controller.joints_unproven
+
+    run(main())
+
+
+def test_unproven_joints_that_cannot_be_are_published_and_marked(mesh, tmp_path):
+    """As with a wrong factor in the site file: `robot verify` shows which joint is wrong."""
+
+    def elsewhere(data):
+        # Pulses of eight axes, after the type, form, tool and two frames.
+        positions = len(data) == 84 and data[32:36] == bytes(4)
+        return [data[:55] + b"\x40" + data[56:] if positions else data]
+
+    async def main():
+        async with (
+            controller() as port,
+            wire(port, datagrams=True) as relay,
+            gateway(mesh, tmp_path, relay.port, **YASKAWA) as site,
+        ):
+            await until(lambda: site.controller.joints_unproven and site.joints)
+            assert "cannot be right" not in site.controller.link_text
+            relay.answers = elsewhere
+            await until(lambda: abs(site.joints[0]) > 1000.0)
+            await until(lambda: "its joints cannot be right (joint waist at" in site.controller.link_text)
+            assert site.controller.link == STATE.UP
+            assert site.controller.joints_unproven
+            assert [each.code for each in site.controller.link_reasons][1:3] == [
+                "joints.not_verified",
+                "joints.invalid",
+            ]
+            relay.answers = lambda data: [data]
+            await until(lambda: "cannot be right" not in site.controller.link_text)
 
     run(main())

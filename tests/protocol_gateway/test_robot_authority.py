@@ -18,13 +18,14 @@ from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from robots.description import load
 from robots.joints import joints_of
+from tests.protocol_gateway.conftest import later
 from tests.protocol_gateway.control_bench import control_bench
 
 A, C = LeaseRequest.Action, CommandRequest.Command
 JOINTS = joints_of(load("pt600"))
 THERE = (0.4, 0.1, 0.0, 0.0, 0.0)
 BROKEN = codes.OTHER(detail="the cable is cut")
-NOW = Now(100.0, 1_700_000_000_000_000_000)
+NOW = Now(100.0, 1_700_000_000_000_000_000, 1_600_000_000_000_000_000)
 SEEN = Seen(
     now=NOW,
     controller=Controller(
@@ -249,7 +250,7 @@ def test_a_release_waits_for_no_disk_and_stops_motion():
 
 def test_expired_control_ends_before_a_command_is_evaluated():
     bench = Bench().moving()
-    bench.seen = replace(SEEN, now=Now(NOW.monotonic_s + 6.0, NOW.wall_ns + 6_000_000_000))
+    bench.seen = replace(SEEN, now=later(NOW, 6.0))
     assert bench.command(C.HOME, 2).reason.code == "lease.none"
     assert bench.performed[: len(STOPPED) + len(APPLIED)] == [*STOPPED, *APPLIED]
 
@@ -259,7 +260,7 @@ def test_a_request_for_control_expires_after_the_lease():
     bench.lease(A.ASK, "wang")
     bench.lease(A.RELEASE)
     bench.performed.clear()
-    bench.seen = replace(SEEN, now=Now(NOW.monotonic_s + 31.0, NOW.wall_ns + 31_000_000_000))
+    bench.seen = replace(SEEN, now=later(NOW, 31.0))
     bench.give(events.TimePassed())
     assert bench.performed == ["SetTimer", "Publish"]
     assert bench.robot_authority.authority.asked_by == ()
@@ -308,8 +309,7 @@ def test_nothing_is_sent_again_to_a_robot_that_has_become_read_only():
     bench = Bench()
     bench.give(STOP)
     other = codes.STOP_OTHER_SOFTWARE(before="5.12", now="5.21")
-    later = Now(NOW.monotonic_s + 10.0, NOW.wall_ns + 10_000_000_000)
-    bench.seen = replace(SEEN, now=later, controller=replace(SEEN.controller, read_only=other))
+    bench.seen = replace(SEEN, now=later(NOW, 10.0), controller=replace(SEEN.controller, read_only=other))
     bench.performed.clear()
     bench.give(events.MotionObserved(True))
     bench.give(events.LinkRestored())

@@ -10,6 +10,7 @@ import zenoh
 from protocol_gateway.audit.log import Outcome, read_entries
 from protocol_gateway.audit.persisted_state import authority_after
 from protocol_gateway.control.events import FateUnknown, LinkRestored, MotionObserved, TimePassed
+from protocol_gateway.control.robot_authority import NEW_STOPS_BURST
 from protocol_gateway.drivers.driver import Mode
 from robomesh import reason_codes as codes
 from robomesh.errors import NoAnswerError
@@ -41,9 +42,47 @@ def test_a_flood_of_one_operators_stops_is_one_counted_stop(tmp_path, clock):
             assert bench.socket == [STOP]
             assert (event_codes(bench), bench.changes) == (["stop.latched"], 1)
             clock.advance(0.11)
-            assert press(bench).stop_id == 2
+            assert press(bench) == answers[0]
             assert bench.socket == [STOP, STOP]
-        assert sum(1 + entry.repeated for entry in read_entries(bench.log.path)) == 51
+            assert bench.changes == 1
+        assert [entry.repeated for entry in read_entries(bench.log.path)] == [0, 49]
+
+    run(main())
+
+
+def test_a_flood_under_many_names_latches_few_stops_and_is_counted(tmp_path, clock):
+    async def main():
+        async with control_bench(tmp_path) as bench:
+            numbers = []
+            for number in range(1000):
+                numbers.append(press(bench, by=f"name-{number}").stop_id)
+                clock.advance(0.0025)
+            assert numbers[-1] == len(set(numbers)) == bench.changes == 1 + NEW_STOPS_BURST + 2
+            assert bench.socket == [STOP] * 25
+        entries = list(read_entries(bench.log.path))
+        assert sum(1 + entry.repeated for entry in entries) == 1000
+        assert len(entries) == numbers[-1] + 1
+        assert authority_after(entries).stop.id == numbers[-1]
+
+    run(main())
+
+
+def test_a_stop_while_a_reset_is_being_written_is_not_cleared_by_it(tmp_path):
+    async def main():
+        async with control_bench(tmp_path) as bench:
+            await bench.lease(A.ACQUIRE)
+            press(bench)
+            append = bench.log.append
+
+            async def append_beside_a_stop(entry):
+                if entry.request == "RESET":
+                    assert press(bench).stop_id == 2
+                return await append(entry)
+
+            bench.log.append = append_beside_a_stop
+            with refused(codes.STOP_OTHER):
+                await bench.commands((C.RESET, {"stop_id": 1}))
+            assert bench.control.authority.stop.id == 2
 
     run(main())
 

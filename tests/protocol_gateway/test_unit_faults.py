@@ -1,12 +1,23 @@
 """Controllers that send too much, too little, in pieces, or garbage: state, event, recovery."""
 
 import asyncio
+import math
 import time
 
 from robomesh.keys import robot_key
 from tests.conftest import run
 from tests.protocol_gateway.faulty_site import faulty_site
-from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, none_left_out, refusal, simulator, until
+from tests.protocol_gateway.gateway_site import (
+    STATE,
+    A,
+    C,
+    gateway,
+    kept_control,
+    none_left_out,
+    refusal,
+    simulator,
+    until,
+)
 from tests.protocol_gateway.old_client import legacy, program
 from tests.protocol_gateway.scripted_controller import repeated, scripted_controller
 
@@ -106,6 +117,104 @@ def test_a_changed_joint_count_stops_a_motion(mesh, tmp_path):
             reason = site.controller.stop.reason
             assert reason.startswith("the link was lost during a motion of li: 127.0.0.1:")
             assert reason.endswith("sends 6 joint values, the description has 5")
+
+    run(main())
+
+
+def test_an_arm_that_is_elsewhere_for_good_ends_control_and_is_shown_there(mesh, tmp_path):
+    async def main():
+        waist = 0.0
+        async with (
+            scripted_controller() as (port, say, heard),
+            gateway(mesh, tmp_path, port, up=False) as site,
+            repeated(say, lambda: STATE_5.format(waist, "idle")),
+        ):
+            await until(lambda: site.controller.activity == STATE.IDLE)
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            await asyncio.sleep(1.0)  # its activity counts only after a while
+            waist = 60.0
+            await until(lambda: site.controller.link == STATE.SILENT)
+            assert "joint waist at 60.00° only" in site.controller.link_text
+            async with kept_control(site):
+                await until(lambda: site.events("motion.foreign"))
+            await until(lambda: site.seen["lease"][-1].holder == "")
+            assert site.controller.link == STATE.UP
+            assert len(site.events("controller.joint_values")) == 1
+            await until(lambda: abs(site.joints[0] - math.radians(60.0)) < 1e-6)
+            # No motion ran: nothing is stopped, and nothing was shown between.
+            assert heard == b""
+            assert {each.joints[0].position for each in site.seen["joints"]} == {0.0, math.radians(60.0)}
+
+    run(main())
+
+
+def test_one_impossible_unit_ends_no_control_and_is_not_shown(mesh, tmp_path):
+    async def main():
+        settings = legacy(commanders={})
+        async with (
+            scripted_controller() as (port, say, heard),
+            gateway(mesh, tmp_path, port, up=False, legacy_clients=settings) as site,
+            repeated(say, lambda: STATE_5.format(0, "idle")),
+        ):
+            await until(lambda: site.controller.link == STATE.UP)
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            async with kept_control(site), program(settings) as old:
+                await until(lambda: old.positions)
+                say(STATE_5.format(2_143_263, "idle"))
+                await until(lambda: site.controller.link == STATE.SILENT)
+                assert "joint waist at 2143263.00°, far beyond its limits" in site.controller.link_text
+                assert "far beyond" in await refusal(
+                    site.command(C.MOVE_ABSOLUTE, joint_positions=[0.3, 0, 0, 0, 0])
+                )
+                await until(lambda: site.controller.link == STATE.UP)
+                await site.units(100)
+                assert site.seen["lease"][-1].holder == "li"
+            assert not site.events("motion.foreign")
+            assert site.controller.counters.units_malformed == 1
+            assert {each.joints[0].position for each in site.seen["joints"]} == {0.0}
+            assert set(old.positions) == {(0.0,) * 5}
+            assert heard == b""
+
+    run(main())
+
+
+def test_an_arm_a_little_outside_its_soft_limits_is_shown(mesh, tmp_path):
+    async def main():
+        async with (
+            scripted_controller() as (port, say, _),
+            gateway(mesh, tmp_path, port, up=False) as site,
+            repeated(say, lambda: STATE_5.format(150.5, "idle")),
+        ):
+            await until(lambda: site.controller.link == STATE.UP)
+            await site.units(20)
+            assert abs(site.joints[0] - math.radians(150.5)) < 1e-6
+
+    run(main())
+
+
+def test_a_far_arm_is_silent_without_a_message_for_each_unit(mesh, tmp_path):
+    async def main():
+        waist = 180.0
+
+        def state():
+            nonlocal waist
+            waist += 0.1
+            return STATE_5.format(waist, "idle")
+
+        async with (
+            scripted_controller() as (port, say, _),
+            gateway(mesh, tmp_path, port, up=False) as site,
+            repeated(say, state),
+        ):
+            await until(
+                lambda: site.controller.link == STATE.SILENT and "far beyond" in site.controller.link_text
+            )
+            before, units = len(site.seen["controller"]), site.controller.counters.units_received
+            await until(lambda: site.controller.counters.units_received > units + 300)
+            assert len(site.seen["controller"]) - before < 30
+            assert len(site.events("controller.joint_values")) == 1
+            assert not site.seen["joints"]
+            assert site.controller.counters.connections == 1
 
     run(main())
 

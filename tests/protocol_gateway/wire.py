@@ -12,8 +12,8 @@ class Wire:
         port: The gateway connects here.
         sent: Bytes that the gateway sent, in the parts in which they arrived; datagrams are whole.
         swallows: Connections stay open, but nothing arrives at either side.
-        commands, answers: Functions that return the datagrams to send in place of one of the gateway, or
-            of the controller.
+        commands: Function that returns the datagrams to send in place of one of the gateway.
+        answers: The same for a datagram of the controller, or for what of its bytes arrives together.
         delays: Endless delays of the datagrams, one after the other [s], so that they overtake each other.
     """
 
@@ -89,7 +89,7 @@ class Wire:
             self._ends.add(back.transport)
             await asyncio.gather(
                 self._forward(reader, back, self.sent, lambda data: self.pass_on(data, back.write)),
-                self._forward(there, writer, [], writer.write),
+                self._forward(there, writer, [], lambda data: writer.writelines(self.answers(data))),
             )
 
     async def _forward(self, reader, writer, seen, send):

@@ -68,6 +68,20 @@ def robot(folder):
         mesh.close()
 
 
+def test_a_router_that_has_just_started_may_show_nothing_at_first(folder, router, monkeypatch):
+    shown = []
+    present = Session.present
+
+    async def nothing_at_first(session, **settings):
+        shown.append(len(shown) and await present(session, **settings))
+        return shown[-1]
+
+    monkeypatch.setattr(Session, "present", nothing_at_first)
+    with robomesh.connect(router, keys=folder.person("mo"), timeout_s=20.0):
+        assert len(shown) == 2
+        assert shown[1]
+
+
 def test_an_operators_program_controls_in_the_name_of_its_certificate(robot):
     arm_robot = robot("li")
     assert len(next(arm_robot.joints()).positions) == 5

@@ -52,6 +52,7 @@ def test_a_plot_without_matplotlib_is_rejected_with_the_command(monkeypatch, tmp
         plot_check(None, None, tmp_path / "check.svg", title="")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "package"), [("foxglove", "foxglove"), ("ros2", "rosbags")])
 def test_a_bridge_without_its_package_ends_with_the_command(command, package):
     # In a process of its own: here, an earlier test may have imported the bridge.

@@ -90,3 +90,35 @@ def test_request_that_arrives_during_close_is_not_handled(mesh, plain):
             assert not done
 
     run(main())
+
+
+def test_request_longer_than_its_row_permits_is_not_decoded_but_a_stop_stops(mesh, plain):
+    """One message of JSON, as anybody may send, would else occupy the owner's event loop for seconds."""
+    seen = []
+
+    async def stop(request):
+        seen.append(request.message)
+        return schema.StopAnswer(stop_id=1)
+
+    async def move(request):
+        raise AssertionError("a command that is too long was decoded")
+
+    def text(key, payload):
+        (reply,) = plain.get(key, payload=payload, encoding="application/json", timeout=20.0)
+        answer = reply.ok or reply.err
+        return answer.payload.to_string()
+
+    async def main():
+        async with open_session(mesh) as gateway:
+            gateway.answer("site", "arm", "stop", stop)
+            gateway.answer("site", "arm", "command/*", move)
+            while not await ask_all(plain, STOP.format("arm"), b"", timeout_s=20.0):
+                pass
+            for longest, why in ((4 << 20, "at most 524288 are permitted"), (500_000, "at most 10000")):
+                payload = b'{"joint_positions":[' + b"0," * (longest // 2) + b"0]}"
+                key = "robomesh/site/arm/command/li"
+                assert why in await asyncio.to_thread(text, key, payload)
+            await asyncio.to_thread(text, STOP.format("arm"), b'{"by":"' + b"x" * 300_000 + b'"}')
+            assert seen[-1] == schema.StopRequest()
+
+    run(main())

@@ -8,7 +8,7 @@ import pytest
 
 from robomesh.errors import BusyError
 from robomesh.messages import PROTOBUF
-from robomesh.request_queue import RateLimit, begin_now
+from robomesh.request_queue import RateLimit, begin_now, paced
 from robomesh.requests import ask_all
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
@@ -28,7 +28,8 @@ class Owner:
         self.commands = session.answer("site", "arm", "command/*", self._wait)
         self.commands_of_other = session.answer("site", "other", "command/*", self._of_other)
         session.answer("site", "arm", "video/*/keyframe/*", self._key_frame)
-        self.stops = session.answer("site", "arm", "stop", self._stop)
+        self.remembered, self.stopped = None, 0
+        self.stops = session.answer("site", "arm", "stop", self._stop, recall=lambda: self.remembered)
 
     async def _wait(self, request: Request):
         if request.chunk != "ready":
@@ -47,6 +48,7 @@ class Owner:
 
     async def _stop(self, request: Request):
         self.begun_before_stop = len(self.begun)
+        self.stopped += 1
         return schema.StopAnswer(stop_id=1, sent=True)
 
 
@@ -100,6 +102,43 @@ def test_flooding_caller_fills_only_its_own_share(mesh):
             await asyncio.gather(*asked)
             assert sum(map(is_busy, asked)) + owner.begun.count("eve") == 500
             assert owner.begun.count("eve") == 16
+
+    run(main())
+
+
+def stops(session, number):
+    """Send stops without waiting, and return their answers' queues; keep them alive."""
+    payload = schema.StopRequest(by="eve").SerializeToString()
+    key = "robomesh/site/arm/stop"
+    return [session.zenoh_session.get(key, payload=payload, encoding=PROTOBUF) for _ in range(number)]
+
+
+def test_repeated_stops_are_answered_while_the_loop_is_blocked_and_counted(mesh):
+    async def main():
+        async with site(mesh) as (owner, eve, li):
+            owner.remembered = schema.StopAnswer(stop_id=7, sent=True)
+            asked = stops(eve, 500)
+            # The first one waits for the loop.
+            answers = [schema.StopAnswer.FromString(each.recv().ok.payload.to_bytes()) for each in asked[1:]]
+            assert answers == [owner.remembered] * 499
+            count, newest, answer = owner.stops.take_repeated()
+            assert (count, newest.by, answer.stop_id, owner.stopped) == (499, "eve", 7, 0)
+            assert owner.stops.take_repeated() is None
+            await until(lambda: owner.stopped == 1)
+            # The owner handles a stop that repeats nothing in flight: it decides whether it is a new one.
+            assert (await li.ask("robomesh/site/arm/stop", schema.StopRequest())).stop_id == 1
+            assert owner.stopped == 2
+
+    run(main())
+
+
+def test_stops_that_wait_for_the_loop_are_limited(mesh):
+    async def main():
+        async with site(mesh) as (owner, eve, _):
+            asked = stops(eve, 600)
+            block_until(lambda: owner.stops.turned_away == 600 - 256)
+            await until(lambda: owner.stopped == 256)
+            assert (len(asked), owner.stops.take_repeated()) == (600, None)
 
     run(main())
 
@@ -217,3 +256,13 @@ def test_begin_now_runs_to_the_first_wait_and_continues_in_a_task():
         assert seen == ["begun", "done", "begun", "cancelled"]
 
     run(main())
+
+
+def test_a_flood_in_the_background_waits_longer_at_its_sender():
+    taken = []
+    take = paced(taken.append, in_background=True)
+    began_s = time.monotonic()
+    for _ in range(100):
+        take(None)
+    assert len(taken) == 100
+    assert time.monotonic() - began_s >= 0.02

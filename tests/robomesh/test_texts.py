@@ -24,8 +24,23 @@ def test_right_to_left_text_is_unchanged():
         assert one_line(text) == show_direction(text) == for_terminal(text) == text
 
 
-def test_terminal_gets_no_escape_sequence():
-    assert for_terminal("a\x1b[2Jb\x9b31m\r\n\tc") == "a�[2Jb�31m \n\tc"
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("a\x1b[2J\x00\x07\x7f", "a<U+001B>[2J<U+0000><U+0007><U+007F>"),
+        ("\x9b31m\x85", "<U+009B>31m<U+0085>"),  # C1: one character instead of escape and bracket
+        ("a\r\n\tb\x0b\x0c", "a<U+000D>\n\tb<U+000B><U+000C>"),
+        ("\u200b\u2060\ufeff\u2028\U000e0041", "<U+200B><U+2060><U+FEFF><U+2028><U+E0041>"),
+        ("\ud800\udcff", "<U+D800><U+DCFF>"),
+        ("1\u00a0000\u3000m", "1 000 m"),
+    ],
+)
+def test_a_terminal_gets_no_character_that_it_interprets_or_hides(text, shown):
+    assert for_terminal(text) == shown
+
+
+def test_a_value_on_one_line_begins_no_line():
+    assert for_terminal("on\n\tforged", keep="") == "on<U+000A><U+0009>forged"
 
 
 def test_truncated_text_keeps_the_length_limit():

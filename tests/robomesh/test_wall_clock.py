@@ -2,7 +2,7 @@ import time
 
 import pytest
 
-from robomesh.wall_clock import WallClock
+from robomesh.wall_clock import ForwardClock, WallClock
 
 S = 1_000_000_000
 
@@ -41,3 +41,18 @@ def test_suspended_reading_is_not_taken_for_a_set_clock(monkeypatch):
     for _ in range(5):
         assert not clock.was_set()
     assert waited_ns
+
+
+def test_a_clock_that_only_goes_forward_passes_no_date_twice(monkeypatch):
+    real, hour_s = time.time, 3600.0
+    clock = ForwardClock()
+    begun_s, monotonic_s = clock.now_s(), time.monotonic()
+    for set_by_s in (-hour_s, 0.0):
+        monkeypatch.setattr(time, "time", lambda set_by_s=set_by_s: real() + set_by_s)
+        passed_s = time.monotonic() - monotonic_s
+        assert clock.now_s() - begun_s - passed_s < 10.0
+        assert clock.now_s() - begun_s >= passed_s
+    monkeypatch.setattr(time, "time", lambda: real() + hour_s)
+    assert clock.now_s() >= begun_s + hour_s
+    monkeypatch.setattr(time, "time", real)
+    assert clock.now_s() >= begun_s + hour_s

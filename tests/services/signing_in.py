@@ -70,11 +70,11 @@ class Client:
             self.cookie = headers["set-cookie"].split(";")[0]
 
     @asynccontextmanager
-    async def browse(self, **headers):
+    async def browse(self, path="/mesh", **headers):
         own = {"Cookie": self.cookie} if self.cookie else {}
         origin = headers.pop("origin", f"http://{self.address}")
         async with connect(
-            f"ws://{self.address}/mesh", origin=origin, additional_headers=own | headers, compression=None
+            f"ws://{self.address}{path}", origin=origin, additional_headers=own | headers, compression=None
         ) as socket:
             yield Page(socket)
 

@@ -316,7 +316,7 @@ def test_an_event_with_an_invalid_time_is_an_alarm():
     behind = Event(severity=Event.ERROR, code="behind")
     behind.timestamp.FromSeconds(1001)
     events.handle(key, event, 1000.0)
-    events.handle_history(key, [event, behind], 1002.0)
+    events.handle_history(key, [event, behind], 1002.0, wall_s=1002.0)
     assert {"arm:live", "arm:behind"} == events.alarms.by_id.keys()
 
 
@@ -332,12 +332,12 @@ def test_an_event_dated_in_the_future_hides_and_repeats_none():
     before, ahead, away = event("before", 900), event("ahead", 5000), event("while.away", 1010)
     events.handle(key, before, now)
     events.handle(key, ahead, now)
-    events.handle_history(key, [before, ahead, away], now + 20.0)
+    events.handle_history(key, [before, ahead, away], now + 20.0, wall_s=now + 20.0)
     counts = {each.code: each.count for each in events.alarms.by_id.values()}
     assert counts == {"before": 1, "ahead": 1, "while.away": 1}
     # Nor when the list no longer contains it.
     events.handle(key, ahead, now + 30.0)
-    events.handle_history(key, [event("later", 1040)], now + 50.0)
+    events.handle_history(key, [event("later", 1040)], now + 50.0, wall_s=now + 50.0)
     assert "arm:later" in events.alarms.by_id
 
 
@@ -351,3 +351,4 @@ def test_active_alarms_are_counted_by_priority_without_shelved_and_ended_ones():
     alarms.shelve(["shelved"], "li", 2.0, for_s=60.0, reason="tested")
     alarms.clear("ended", 2.0)
     assert alarms.active_by_priority() == {"low": 0, "medium": 0, "high": 2, "critical": 1}
+    assert alarms.active() == {("arm", "link.down", each): 1.0 for each in ("high", "critical")}

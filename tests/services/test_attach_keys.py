@@ -61,7 +61,7 @@ def test_a_monitors_certificate_reads_everything_and_commands_nothing(secured):
                 answer = await client.call(f"{ARM}/home")
                 assert not answer["accepted"]
                 assert answer["code"] == "request.no_right"
-            who = await robot.present()
+            who, _ = await robot.present_sessions()
             assert ("hall", MONITOR) in {(each.site, each.service) for each in who}
 
     run(main())

@@ -92,6 +92,7 @@ def imported_by(*words: str) -> set[str]:
     return set(done.stderr.split())
 
 
+@pytest.mark.slow
 def test_help_imports_no_command_and_nothing_heavy() -> None:
     imported = imported_by("--help")
     rows = {f"services.command_line.{row.module}" for row in COMMANDS.values()}
@@ -99,6 +100,7 @@ def test_help_imports_no_command_and_nothing_heavy() -> None:
     assert not imported & {*rows, "zenoh", "numpy", "pydantic", "google"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["robot", "mesh", "program", "recordings", "audit", "keys"])
 def test_help_of_a_group_imports_only_that_group(name: str) -> None:
     imported = imported_by(name, "--help")

@@ -9,7 +9,6 @@ import pytest
 from typer import Context
 
 from services.command_line.commands import COMMANDS, root
-from services.command_line.site.up import _console_url
 from services.site_file.console import Console
 from services.site_file.site import Site
 
@@ -110,4 +109,4 @@ def test_list_watch_writes_to_a_pipe_and_ends_quietly_with_its_reader(router):
     [("0.0.0.0:8443", "127.0.0.1:8443"), ("[::1]:8080", "[::1]:8080"), ("10.0.0.7:80", "10.0.0.7:80")],
 )
 def test_up_prints_the_url_of_the_page(listen, address):
-    assert _console_url(Site(site="hall", console=Console(listen=listen))) == f"http://{address}/"
+    assert Site(site="hall", console=Console(listen=listen)).console.url == f"http://{address}/"

@@ -31,7 +31,7 @@ def owner(other):
 async def until_present(session, *ids, timeout_s=30.0):
     """Wait until exactly these operators are present."""
     async with asyncio.timeout(timeout_s):
-        while [who.id for who in await session.present() if who.service == "operator"] != [*ids]:
+        while [who.id for who in (await session.present_sessions())[0]] != [*ids]:
             await asyncio.sleep(0.01)
 
 

@@ -1,8 +1,12 @@
 """A console's TLS: requirements beyond loopback, cookies, renewed and invalid certificates."""
 
 import asyncio
+import gc
 import json
+import socket
 import ssl
+import warnings
+from contextlib import AsyncExitStack
 
 import pytest
 
@@ -15,6 +19,8 @@ from tests.services.test_console import console, page
 from tests.services.test_console_attacks import ENDS_S, connected, ended, http, status_of
 
 __all__ = ["page"]  # a fixture
+
+CLOSE = b"\x88\x80\x00\x00\x00\x00"  # a client's WebSocket frame
 
 
 def test_over_tls_the_cookie_is_for_this_host_alone_and_browsers_come_back_by_tls(mesh, page, tmp_path):
@@ -99,6 +105,32 @@ def test_a_renewed_certificate_is_taken_up_without_a_restart_and_half_a_one_is_n
                     await asyncio.sleep(0.02)
 
     run(main())
+
+
+def test_a_page_that_closes_and_ends_at_once_leaves_no_socket_open(mesh, page, tmp_path):
+    certificate, key = self_signed(tmp_path)
+    trusted = ssl.create_default_context(cafile=certificate)
+
+    async def main():
+        async with console(mesh, page, certificate=certificate, key=key) as (address, _):
+            here = address.removeprefix("https://")
+            headers = [("Origin", address), ("Connection", "Upgrade"), ("Upgrade", "websocket")]
+            headers += [("Sec-WebSocket-Version", 13), ("Sec-WebSocket-Key", "AAAAAAAAAAAAAAAAAAAAAA==")]
+            async with AsyncExitStack() as stack:
+                pages = [await stack.enter_async_context(connected(here, ssl=trusted)) for _ in range(10)]
+                for reader, writer in pages:
+                    writer.write(http("GET", "/mesh", here, headers))
+                    assert b" 101 " in await reader.readline()
+                # The ends come before the console has read all of the close frames.
+                for _, writer in pages:
+                    writer.write(CLOSE)
+                    writer.get_extra_info("socket").shutdown(socket.SHUT_WR)
+
+    run(main())
+    with warnings.catch_warnings(record=True) as unclosed:
+        warnings.simplefilter("always", ResourceWarning)
+        gc.collect()
+    assert not unclosed
 
 
 def test_an_invalid_certificate_is_named(mesh, page, tmp_path):

@@ -23,6 +23,9 @@ class Full:
     def write(self, frames):
         self.ready = False
 
+    def spend(self, cost):
+        pass
+
 
 @dataclass
 class Deaf:

@@ -41,6 +41,7 @@ def converted(page, name, content, **others):
 
 @pytest.mark.parametrize("ending", ["stl", "obj", "ply", "glb", "dae"])
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:Setting the shape:DeprecationWarning")  # of pycollada, which writes it
 def test_a_box_of_any_format_is_converted(page, ending):
     content = trimesh.creation.box((2.0, 4.0, 6.0)).export(file_type=ending)
     answer = converted(page, f"box.{ending}", content.encode() if isinstance(content, str) else content)

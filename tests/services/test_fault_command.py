@@ -71,6 +71,7 @@ def test_fault_that_a_controller_cannot_show_is_refused(mesh, router):
     run(main())
 
 
+@pytest.mark.slow
 def test_a_simulator_for_a_robot_without_a_site_is_refused_in_one_line():
     done = robomesh("simulate", "--for", "arm", "--listen", "127.0.0.1:0")
     assert (done.returncode, done.stderr) == (

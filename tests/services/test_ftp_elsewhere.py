@@ -18,6 +18,7 @@ from robots.joints import JointType
 from tests.conftest import run
 from tests.protocol_gateway import ftp_site
 from tests.protocol_gateway.gateway_site import until
+from tests.protocol_gateway.scripted_controller import endless_joints
 
 # pyftpdlib uses a module that later versions of Python do not have.
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::DeprecationWarning")]
@@ -68,14 +69,15 @@ class Server:
         self._thread.join()
 
 
-async def reported(port, enough, **settings):
+async def reported(port, enough, *, joints=6, **settings):
     """Run a link to a server until it is enough; return what was reported."""
     events = []
-    driver = fanuc_ftp_driver(
-        (JointType.ROTARY,) * settings.pop("joints", 6), {}, options=FanucSettings(**settings)
-    )
+    driver = fanuc_ftp_driver((JointType.ROTARY,) * joints, {}, options=FanucSettings(**settings))
     link = ControllerLink(
-        LinkSettings(host="127.0.0.1", port=port), driver, on_event=lambda event, _: events.append(event)
+        LinkSettings(host="127.0.0.1", port=port),
+        driver,
+        endless_joints(joints),
+        on_event=lambda event, _: events.append(event),
     )
     task = asyncio.create_task(link.run())
     try:

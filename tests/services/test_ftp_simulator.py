@@ -15,6 +15,7 @@ from services.simulator.errors import FaultError
 from services.simulator.fanuc.service import FtpSettings, serve_ftp
 from tests.conftest import run
 from tests.protocol_gateway.ftp_site import controller
+from tests.protocol_gateway.ftp_site import read as parsed
 
 pytestmark = pytest.mark.slow
 
@@ -31,7 +32,7 @@ def read(port, *names):
         for name in names:
             content = io.BytesIO()
             client.retrbinary(f"RETR {name}", content.write)
-            found.append(files.lines_of(content.getvalue()))
+            found.append(content.getvalue())
     return found
 
 
@@ -41,13 +42,13 @@ def test_pythons_client_lists_and_reads_every_file():
             names = [each.value for each in File]
             found = await asyncio.to_thread(read, port, *names)
         content = dict(zip(names, found, strict=True))
-        assert files.position(content["CURPOS.DG"], 1).count == 6
-        assert files.inputs_and_outputs(content["IOSTATE.DG"])["UO", 6] is True
-        assert files.safety(content["SFTYSIG.DG"])["SOP Estop"] is True
-        (alarm,) = files.active_alarms(content["ERRACT.LS"])
+        assert parsed(files.position(1), content["CURPOS.DG"]).count == 6
+        assert parsed(files.inputs_and_outputs(), content["IOSTATE.DG"])["UO", 6] is True
+        assert parsed(files.safety(), content["SFTYSIG.DG"])["SOP Estop"] is True
+        (alarm,) = parsed(files.active_alarms(), content["ERRACT.LS"])
         assert (alarm.message, alarm.severity) == ("SRVO-001 Operator panel E-stop", "SERVO")
-        assert files.registers(content["NUMREG.VA"])[1] == 12.5
-        assert files.tools(content["SYSFRAME.VA"], 1).active == 1
+        assert parsed(files.registers(), content["NUMREG.VA"])[1] == 12.5
+        assert parsed(files.tools(1), content["SYSFRAME.VA"]).active == 1
 
     run(main())
 
@@ -81,7 +82,7 @@ def test_curl_reads_a_position():
         async with controller() as port:
             command = (CURL, "-sS", "--max-time", "20", f"ftp://127.0.0.1:{port}/md:/CURPOS.DG")
             result = await asyncio.to_thread(subprocess.run, command, capture_output=True, check=True)
-        assert files.position(files.lines_of(result.stdout), 1).place is not None
+        assert parsed(files.position(1), result.stdout).place is not None
 
     run(main())
 

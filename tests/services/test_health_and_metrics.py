@@ -3,6 +3,7 @@
 import asyncio
 import os
 import re
+import time
 import urllib.request
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from robomesh.clock import Clock, Reading, hops_of, read_clock, reading_of
 from robomesh.errors import NoAnswerError, SessionError
 from robomesh.health import Served, own_version, present
 from robomesh.latencies import Latencies
+from robomesh.loop_turns import LONG_S, MeasuredLoop
 from robomesh.metrics import SessionMetrics, serve_metrics
 from robomesh.schemas.robomesh_pb2 import ServiceHealth
 from robomesh.session import open_session
@@ -258,3 +260,16 @@ def test_metrics_stay_on_this_machine_unless_the_site_says_otherwise(given, expe
     assert result.returncode == 2
     assert expected in result.stderr
     assert len(result.stderr.splitlines()) == 1
+
+
+def test_longest_turn_of_the_event_loop_is_in_the_health(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor, present(gateway, GATEWAY):
+            asyncio.get_running_loop().call_soon(time.sleep, 4 * LONG_S)
+            async for sample in monitor.subscribe("robomesh/s/-/health/*", newest=10):
+                values = sample.message().values
+                if values["longest_turn_seconds"] >= 4 * LONG_S and values["long_turns_total"] >= 1:
+                    return
+
+    with asyncio.Runner(loop_factory=MeasuredLoop) as runner:
+        runner.run(main())

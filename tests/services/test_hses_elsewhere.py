@@ -20,6 +20,7 @@ from robots.joints import joints_of, violations
 from services.simulator.yaskawa.service import with_factors
 from tests.conftest import free_port, run
 from tests.protocol_gateway.gateway_site import until
+from tests.protocol_gateway.scripted_controller import endless_joints
 from tests.services.test_hses_simulator import simulator
 
 pytestmark = pytest.mark.slow
@@ -177,7 +178,10 @@ def test_moto_hses_mock_is_read():
         mock = await asyncio.create_subprocess_exec(MOCK, "127.0.0.1", str(port), str(free_port()))
         driver = HsesDriver(PUMA.types, {}, options=with_factors(YaskawaSettings(), 6))
         link = ControllerLink(
-            LinkSettings(host="127.0.0.1", port=port), driver, on_event=lambda event, _: events.append(event)
+            LinkSettings(host="127.0.0.1", port=port),
+            driver,
+            endless_joints(6),
+            on_event=lambda event, _: events.append(event),
         )
         task = asyncio.create_task(link.run())
         try:

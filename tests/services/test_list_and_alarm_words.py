@@ -3,6 +3,7 @@
 import asyncio
 
 import pytest
+from rich.console import Console
 
 from robomesh.client.mesh import RobotNotFoundError
 from robomesh.keys import PresenceKey
@@ -71,6 +72,28 @@ def test_a_robots_row_has_what_its_driver_can_do(mesh):
     assert [arm[key] for key in keys] == ["ours", [], True, False, ["power_on", "brake_release"]]
     assert [other[key] for key in keys] == [None, [], None, None, []]
     assert "a motion goes on without the gateway" in listing_text._state(arm)
+
+
+def test_a_list_that_leaves_out_sessions_says_that_it_is_partial(mesh, capsys):
+    async def main():
+        async with open_session(mesh) as eve, open_session(mesh) as monitor:
+            eve.declare_presence("hall", "arm", "gateway")
+            names = [f"eve.{number}" for number in range(100)]
+            tokens = [eve.declare_presence_of("hall", "arm", "operator", name) for name in names]
+            while True:
+                found = await listing._collect(monitor, listing._Clocks())
+                if len(found["services"]) == 1 + 64:
+                    break
+            for token in tokens:
+                token.undeclare()
+            return found
+
+    found = run(main())
+    assert (found["partial"], [row["robot"] for row in found["robots"]]) == (True, ["arm"])
+    Console(width=200).print(listing_text.listing_text(found, 200))
+    assert "This list is partial" in capsys.readouterr().out
+    Console(width=200).print(listing_text.listing_text(found | {"partial": False}, 200))
+    assert "partial" not in capsys.readouterr().out
 
 
 def test_the_error_for_an_unknown_robot_names_gone_sites(mesh):

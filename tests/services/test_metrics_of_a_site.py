@@ -103,6 +103,8 @@ def test_the_scrape_configuration_names_every_service_with_its_site():
         ("[::1]:9101", "demo", "router"),
         ("[::1]:9102", "demo", "gateway"),
     ]
+    watch = scrape_config(site_file.DEMO, ["watch"], ("::1", 9101))
+    assert 'service: "watch", page: "http://127.0.0.1:8080/#/events" }' in watch
     with pytest.raises(ListenError, match="choose a port"):
         scrape_config(site_file.DEMO, ["router"], ("127.0.0.1", 0))
 

@@ -20,6 +20,7 @@ from robots.joints import JointType
 from services.pki.opcua import make
 from tests.conftest import free_port, run
 from tests.protocol_gateway.gateway_site import until
+from tests.protocol_gateway.scripted_controller import endless_joints
 from tests.protocol_gateway.test_opcua_driver import controller
 
 NODE_OPCUA = os.environ.get("NODE_OPCUA", "")
@@ -77,6 +78,7 @@ def test_driver_reads_a_server_of_node_opcua_encrypted_and_only_reads(tmp_path):
             link = ControllerLink(
                 LinkSettings(host="127.0.0.1", port=port),
                 OpcUaDriver((JointType.ROTARY,) * 6, {}, options=settings),
+                endless_joints(6),
                 on_event=lambda event, received: events.append(event),
             )
             task = asyncio.create_task(link.run())

@@ -13,12 +13,13 @@ from pathlib import Path
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
+from robomesh.topics import Role
 from services.command_line.site.metrics_ports import ports, scrape_config
 from services.command_line.site.services import SERVICES
 from services.pki import Folder, authority
 from services.site_file import site as site_file
 from tests.conftest import free_port
-from tests.site import ONE_ARM, kill, running_site, wait_until
+from tests.site import ONE_ARM, kill, robomesh, running_site, wait_until
 
 DEPLOY = Path(__file__).resolve().parents[2] / "deploy"
 RULES = DEPLOY / "prometheus" / "robomesh.rules.yml"
@@ -108,6 +109,7 @@ def test_a_panel_of_the_present_never_shows_the_past_and_never_turns_a_missing_v
 
 
 @needs_promtool
+@pytest.mark.slow
 def test_promtool_accepts_the_rules_their_tests_and_the_printed_configuration(tmp_path):
     shutil.copy(RULES, tmp_path)
     config = tmp_path / "prometheus.yml"
@@ -151,10 +153,16 @@ def test_dashboard_and_rules_ask_for_metrics_and_labels_that_the_services_have(s
                 for family in text_string_to_metric_families(answer.read().decode()):
                     for sample in family.samples:
                         labels.setdefault(sample.name, set()).update(sample.labels)
-        return "robomesh_pictures_total" in labels
+        return {"robomesh_pictures_total", "robomesh_alarm"} <= labels.keys()
 
+    # An alarm has a series only while it is active.
+    authority.issue(Folder(site.folder / "keys"), "li", Role.OPERATOR)
+    person = str(site.folder / "keys" / "people" / "li.pem")
+    freeze = ("fault", "arm", "freeze", "--connect", site.router.replace("tcp/", "tls/"), "--keys", person)
+    wait_until(lambda: robomesh(*freeze).returncode == 0)  # the routers learn the name
     # A service serves metrics before it has registered all of them; the renderer is the last.
     wait_until(read)
+    assert robomesh(*freeze, "--off").returncode == 0
     for text in (*(query for panel in PANELS for query in queries(panel)), expressions_of_rules()):
         asked = {*METRIC.findall(text)}
         assert asked

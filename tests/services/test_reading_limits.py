@@ -33,7 +33,7 @@ def test_a_command_that_takes_too_much_memory_ends_with_one_line() -> None:
         "from services.command_line import main\n"
         "from robots.meshes import read\n"
         "read.read_mesh = lambda *_, **__: bytearray(2 << 30)\n"
-        "main.limit = lambda command, given=main.limit: given(command, most_bytes=1 << 30)\n"
+        "main.limit = lambda *words, given=main.limit: given(*words, most_bytes=1 << 30)\n"
         "sys.argv = ['robomesh', 'mesh', 'info', 'x.stl']\n"
         "main.main()\n"
     )
@@ -42,11 +42,13 @@ def test_a_command_that_takes_too_much_memory_ends_with_one_line() -> None:
     assert "memory" in error
 
 
-def test_other_commands_are_not_limited() -> None:
+def test_other_commands_and_those_that_wait_for_a_person_have_no_clock() -> None:
     script = (
         "import resource, threading; from services.command_line.reading_limits import limit\n"
         "before = resource.getrlimit(resource.RLIMIT_DATA)\n"
-        "limit('up'); limit('')\n"
-        "assert resource.getrlimit(resource.RLIMIT_DATA) == before and threading.active_count() == 1\n"
+        "limit('up'); limit()\n"
+        "assert resource.getrlimit(resource.RLIMIT_DATA) == before\n"
+        "limit('robot', 'verify', 'hall/arm')\n"
+        "assert threading.active_count() == 1\n"
     )
     assert ended(script) == (0, "")

@@ -117,8 +117,12 @@ def test_video_is_subscribed_only_while_it_is_recorded(mesh, tmp_path):
             view = schema.View(name="front")
             description = schema.Description(name="arm", views=[view])
             session.declare_publisher("site", "arm", "description").put(description)
-            with refused(codes.VIEW_UNKNOWN_OF, view="side", robot="arm", views="front"):
+            views = "front, free, close, far"
+            with refused(codes.VIEW_UNKNOWN_OF, view="side", robot="arm", views=views):
                 await trace_until_refused(session, views=["side"])
+            for view in ("free", "close", "far", "free-1920x1080"):
+                await trace_on(session, views=[view])
+                await trace_off(session)
 
     run(main())
 

@@ -251,6 +251,7 @@ def test_a_file_can_be_fetched_whole_in_ranges_and_resumed(http, folder):
     assert (reason.code, reason.values["bytes"]) == ("recording.range", str(len(whole)))
 
 
+@pytest.mark.slow
 def test_several_recordings_are_one_zip_that_other_programs_read(http, folder, tmp_path):
     paths = [folder / "arm" / "trial.mcap", write_recording(folder / "arm" / "other.mcap")]
     change = schema.RecordingChange(number=1, change=1, name="renamed", author="li")
@@ -279,6 +280,8 @@ def test_several_recordings_are_one_zip_that_other_programs_read(http, folder, t
         ("recording=site/trial.mcap&recording=site/gone.mcap", 404, "recording.unknown"),
         ("recording=**/trial.mcap", 400, None),
         ("recording=trial.mcap", 400, None),
+        ("recording=site/../../trial.mcap", 400, None),
+        ("recording=site/.profile", 400, None),
     ],
 )
 def test_a_zip_of_no_recordings_is_refused(query, status, code, http):

@@ -150,7 +150,11 @@ def test_check_reads_every_mesh_and_prints_file_and_problem(
     found = json.loads(capsys.readouterr().out)
     assert found["ok"] is False
     assert found["problems"] == [
-        {"file": str(robot), "path": [], "text": "mesh 'package://two/none.stl': no such file"}
+        {
+            "file": str(robot),
+            "path": [],
+            "text": "mesh 'package://two/none.stl': no such file; did you mean 'packages/two/one.stl'?",
+        }
     ]
     (tmp_path / "packages" / "two" / "none.stl").write_bytes(b"solid a\nendsolid a\n")
     assert run(["robot", "check", str(robot)]) == 1

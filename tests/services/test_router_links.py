@@ -3,6 +3,7 @@
 import asyncio
 import json
 from datetime import timedelta
+from itertools import product
 
 import pytest
 import zenoh
@@ -64,6 +65,62 @@ def test_two_sites_meet_and_each_speaks_for_itself_alone(tmp_path):
 
     def command():
         return CommandRequest(command=CommandRequest.HOME)
+
+    run(main(), timeout_s=60.0)
+
+
+def test_a_gateway_of_another_site_neither_answers_nor_shows_itself_for_our_robot(tmp_path):
+    async def main():
+        (here, at_here), (there, at_there), link = await linked_sites(tmp_path)
+        authority.issue(here, "li", Role.OPERATOR)
+        own, foreign = [], []
+        keys = [f"robomesh/here/arm/{each}" for each in ("command/li.here", "lease/request/li.here", "stop")]
+
+        def queryables(session, queries):
+            def answer(query):
+                queries.append(str(query.key_expr))
+                query.reply(str(query.key_expr), b"")
+
+            return [session.declare_queryable(each, answer) for each in keys]
+
+        async with routing(settings_of(here, at_here), settings_of(there, at_there, link)):
+            with (
+                zenoh.open(one_link(at_here, here.service("gateway"))) as ours,
+                zenoh.open(one_link(at_here, here.person("li"))) as li,
+                # The other site's gateway, and its router itself, which its own rules do not bind.
+                zenoh.open(one_link(at_there, there.service("gateway"))) as its_gateway,
+                zenoh.open(one_link(at_there, there.service("router"))) as its_router,
+            ):
+                kept, heard, token = [], set(), "robomesh/here/arm/alive/gateway/"
+                kept += queryables(ours, own)
+                kept.append(ours.liveliness().declare_token(f"{token}own"))
+                for state in ("lease", "controller", "joints"):
+                    kept.append(
+                        li.declare_subscriber(
+                            f"robomesh/*/arm/{state}",
+                            lambda sample: heard.add((str(sample.key_expr), bytes(sample.payload))),
+                        )
+                    )
+                for session in (its_gateway, its_router):
+                    kept += queryables(session, foreign)
+                    kept.append(session.liveliness().declare_token(f"{token}foreign"))
+
+                async def crossed():
+                    for site, state in product(("here", "there"), ("lease", "controller", "joints")):
+                        for session in (its_gateway, its_router):
+                            session.put(f"robomesh/{site}/arm/{state}", b"foreign")
+                    return {
+                        (f"robomesh/there/arm/{state}", b"foreign") for state in ("lease", "joints")
+                    } <= heard
+
+                await until(crossed)
+                for key in keys:
+                    answers = [each.ok for each in li.get(key, target=zenoh.QueryTarget.ALL, timeout=5.0)]
+                    assert len(answers) == 1
+                assert (own, foreign) == (keys, [])
+                assert not [key for key, _ in heard if key.startswith("robomesh/here/")]
+                tokens = li.liveliness().get(f"{token}*", timeout=5.0)
+                assert [str(each.ok.key_expr) for each in tokens] == [f"{token}own"]
 
     run(main(), timeout_s=60.0)
 

@@ -24,6 +24,7 @@ from robots.joints import joints_of, violations
 from robots.model import build_model, tool_placement
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import until
+from tests.protocol_gateway.scripted_controller import endless_joints
 from tests.protocol_gateway.test_snpx_driver import controller
 
 pytestmark = pytest.mark.slow
@@ -133,7 +134,10 @@ def test_a_server_with_fanuc_ucl_reads_every_packet_of_the_driver():
         settings = FanucSettings(assignments="own", j23=1, registers=(5, 7))
         driver = SnpxDriver(PUMA.types, {}, options=settings)
         link = ControllerLink(
-            LinkSettings(host="127.0.0.1", port=port), driver, on_event=lambda event, _: events.append(event)
+            LinkSettings(host="127.0.0.1", port=port),
+            driver,
+            endless_joints(6),
+            on_event=lambda event, _: events.append(event),
         )
         task = asyncio.create_task(link.run())
         try:

@@ -32,7 +32,7 @@ def site_of(port: int) -> Site:
 
 def test_another_programs_answer_does_not_make_a_site_ready(foreign):
     site = site_of(foreign)
-    assert up._answers(up._console_url(site))
+    assert up._answers(site.console.url)
     assert not up._own_console_answers(site)
 
 

@@ -77,6 +77,7 @@ def test_version_of_everything_names_packages_and_the_services_on_the_mesh(gatew
     assert services == [("a", "gateway", own_version()), ("b", "gateway", own_version())]
 
 
+@pytest.mark.slow
 def test_version_of_everything_without_a_mesh_says_so(capsys):
     nowhere = f"tcp/127.0.0.1:{free_port()}"
     assert run(["version", "--all", "--connect", nowhere]) == 0

@@ -5,6 +5,7 @@ import json
 import logging
 import re
 import stat
+import time
 from contextlib import asynccontextmanager
 from datetime import UTC, datetime, timedelta
 from unittest.mock import create_autospec
@@ -196,14 +197,14 @@ def test_a_token_opens_no_other_address(mesh, page, tmp_path, path, status):
     run(main())
 
 
+def set_clock(monkeypatch, by):
+    real = time.time
+    monkeypatch.setattr("robomesh.wall_clock.time.time", lambda: real() + by.total_seconds())
+
+
 @pytest.mark.parametrize("path", ["/video/s/r/front.mjpeg", "/video/s/r/front.mp4", "/view/s/r/front/live"])
 @pytest.mark.parametrize("how", ["revoked", "added again", "clock", "no file"])
 def test_what_a_token_shows_ends_with_it(mesh, page, tmp_path, monkeypatch, path, how):
-    class Later(datetime):
-        @classmethod
-        def now(cls, tz=None):
-            return datetime.now(tz) + timedelta(days=2)
-
     async def main():
         async with shown(mesh, page, tmp_path) as (client, renderer, _, file):
             token = allow(file, lasts=timedelta(days=1))
@@ -219,7 +220,7 @@ def test_what_a_token_shows_ends_with_it(mesh, page, tmp_path, monkeypatch, path
                     revoke_token(file, "wall")
                     allow(file)
                 case "clock":
-                    monkeypatch.setattr(view_access, "datetime", Later)
+                    set_clock(monkeypatch, timedelta(days=2))
                 case "no file":
                     file.unlink()
             async with asyncio.timeout(40.0):
@@ -228,6 +229,8 @@ def test_what_a_token_shows_ends_with_it(mesh, page, tmp_path, monkeypatch, path
             writer.close()
             if how != "no file":
                 assert await others.read(1)  # it goes on
+            if how == "clock":
+                set_clock(monkeypatch, timedelta(days=-2))  # it stays expired
             assert await opens(client, f"{path}?token={token}") == 401
             kept.close()
             await unwatched([*renderer.images, *renderer.videos])

@@ -40,7 +40,7 @@ STATE = schema.ControllerState
 STATES_HZ = 50
 READY_S = 60.0
 # A command in 0.1 degree steps of two joints: every one is another.
-STEPS = 1000
+STEPS = 100
 
 SITE = """
 site = "kills"

@@ -109,7 +109,7 @@ class Trial:
         return str(answer.get("refused", ""))
 
     async def move(self) -> str:
-        return await self.command("MOVE_ABSOLUTE", joint_positions=[radians(self.id % 40), 0, 0, 0, 0])
+        return await self.command("MOVE_ABSOLUTE", joint_positions=[radians(self.id % 15), 0, 0, 0, 0])
 
     async def state(self) -> STATE:
         """Return the gateway's state, as soon as its link is up."""

@@ -34,7 +34,7 @@ from protocol_gateway.drivers.fanuc import file_signals, files, ftp, signals
 from protocol_gateway.drivers.fanuc.axes import Axes, FanucSettings, signal_bits
 from protocol_gateway.drivers.fanuc.data import Alarm
 from protocol_gateway.drivers.fanuc.driver import alarm_of
-from protocol_gateway.drivers.fanuc.files import ListedAlarm
+from protocol_gateway.drivers.fanuc.files import FilePosition, ListedAlarm, Reading, Steps
 from protocol_gateway.drivers.fanuc.ftp import File, Reply, ReplyStream
 from protocol_gateway.drivers.only_reads import OnlyReads
 from protocol_gateway.drivers.polling import Polling, Regular
@@ -60,7 +60,6 @@ _PERIODS_S: Mapping[File, float] = {
 """Time from one reading of a file to the next; CURPOS.DG has the site file's `rate`."""
 # A value is known for this many periods.
 _PERIODS_KNOWN = 3.0
-_LONGEST_FILE = 2**20
 _AGAIN_S, _LOG_IN_AGAIN_S = 5.0, 30.0
 _MOST_ALARMS = 100
 
@@ -160,7 +159,7 @@ class FtpDriver(OnlyReads):
         self._begin_file(0.0)
 
     def _begin_file(self, now_s: float) -> None:
-        self._data = bytearray()
+        self._reading: Reading[list[ControllerEvent]] | None = None
         self._read_s = now_s
         self._whole = self._ended = False
 
@@ -181,15 +180,13 @@ class FtpDriver(OnlyReads):
             return (Close(FILE),)
         self._step = _Step.READING
         self._begin_file(now_s)
+        self._reading = Reading(self._events(asked.read))
         return (Send(FTP, ftp.read(asked.read)),)
 
     def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
         """Read replies, or the bytes of a file."""
         if channel != FTP:
-            self._data += data
-            if len(self._data) > _LONGEST_FILE:
-                return self._leave(f"a file of more than {_LONGEST_FILE >> 20} MiB", now_s)
-            return ()
+            return self._receive_file(data, now_s)
         effects: list[Effect] = []
         try:
             for reply in self._replies.receive(data):
@@ -197,6 +194,14 @@ class FtpDriver(OnlyReads):
         except ValueError as error:
             return (*effects, *self._leave(str(error), now_s))
         return effects
+
+    def _receive_file(self, data: bytes, now_s: float) -> Effects:
+        if self._reading is not None:
+            try:
+                self._reading.receive(data)
+            except ValueError as error:
+                return self._leave(str(error), now_s)
+        return ()
 
     def skipped(self, channel: Channel, now_s: float) -> Effects:
         """Connect again: neither a file nor the replies can be read from their middle."""
@@ -283,11 +288,14 @@ class FtpDriver(OnlyReads):
     def _finish(self, now_s: float) -> Effects:
         """Report the file once its connection has ended and the controller has confirmed it."""
         asked = self._polling.asked
-        if self._step is not _Step.READING or not (self._whole and self._ended) or asked is None:
+        reading = self._reading
+        if self._step is not _Step.READING or asked is None or reading is None:
+            return ()
+        if not (self._whole and self._ended):
             return ()
         self._polling.asked = None
         self._step = _Step.IDLE
-        return (self._report(asked.read, bytes(self._data)), *self._go_on(now_s))
+        return (self._report(asked.read, reading), *self._go_on(now_s))
 
     def _refusal(self, reply: Reply, now_s: float) -> Effects:
         """Report once for each connection that the controller does not give a file."""
@@ -308,36 +316,37 @@ class FtpDriver(OnlyReads):
 
     # ------------------------------------------------------------------------- files
 
-    def _report(self, file: File, data: bytes) -> Report:
+    def _report(self, file: File, reading: Reading[list[ControllerEvent]]) -> Report:
         try:
-            events = self._events(file, files.lines_of(data))
+            return Report(reading.result(), 1, asked_s=self._read_s)
         except ValueError as error:
-            return Report([_malformed(data, f"{file.value}: {error}")], 0)
-        return Report(events, 1, asked_s=self._read_s)
+            return Report([_malformed(reading.head, f"{file.value}: {error}")], 0)
 
-    def _events(self, file: File, text: str) -> list[ControllerEvent]:
+    def _events(self, file: File) -> Steps[list[ControllerEvent]]:
         known_s = _PERIODS_KNOWN * self._periods[file]
         match file:
             case File.POSITION:
-                return self._on_position(text, known_s)
+                position = yield from files.position(self._settings.group)
+                return self._on_position(position, known_s)
             case File.SIGNALS:
-                known = files.inputs_and_outputs(text)
+                known = yield from files.inputs_and_outputs()
                 reported = file_signals.of_inputs_and_outputs(known, self._io, known_s)
                 return [file_signals.status_of(known), reported]
             case File.SAFETY:
-                return [file_signals.of_safety(files.safety(text), known_s)]
+                stops = yield from files.safety()
+                return [file_signals.of_safety(stops, known_s)]
             case File.ALARMS:
-                return self._on_alarms(files.active_alarms(text))
+                alarms = yield from files.active_alarms()
+                return self._on_alarms(alarms)
             case File.REGISTERS:
-                registers = self._settings.registers
-                return [file_signals.of_registers(files.registers(text), registers, known_s)]
+                registers = yield from files.registers()
+                return [file_signals.of_registers(registers, self._settings.registers, known_s)]
             case File.FRAMES:
-                tools = files.tools(text, self._settings.group)
+                tools = yield from files.tools(self._settings.group)
                 self._tool = tools.active
                 return [file_signals.of_tools(tools, self._settings.tools, known_s)]
 
-    def _on_position(self, text: str, known_s: float) -> list[ControllerEvent]:
-        position = files.position(text, self._settings.group)
+    def _on_position(self, position: FilePosition, known_s: float) -> list[ControllerEvent]:
         missing = [each + 1 for each in self._axes.used if each >= position.count]
         if missing and self._settings.j23 is not None:
             raise ValueError(
@@ -345,7 +354,11 @@ class FtpDriver(OnlyReads):
             )
         events: list[ControllerEvent] = []
         if position.axes is None and not self._invalid:
-            events.append(_malformed(text.encode("latin-1"), "a joint's position does not fit its field"))
+            events.append(
+                _malformed(
+                    self._reading.head if self._reading else b"", "a joint's position does not fit its field"
+                )
+            )
         self._invalid = position.axes is None
         if position.axes is not None and self._settings.j23 is not None:
             events.append(JointsReceived(self._axes.positions(position.axes)))
@@ -357,10 +370,9 @@ class FtpDriver(OnlyReads):
             events.append(file_signals.unknown_tool())
             if File.FRAMES not in self._refused:
                 self._polling.ask_once(File.FRAMES)
-        software = files.software(text)
-        if software and software != self._software:
-            self._software = software
-            events.append(SoftwareReceived(software))
+        if position.software and position.software != self._software:
+            self._software = position.software
+            events.append(SoftwareReceived(self._software))
         return events
 
     def _look_for_axes(self, count: int) -> list[ControllerEvent]:
@@ -383,4 +395,4 @@ class FtpDriver(OnlyReads):
 
 
 def _malformed(data: bytes, reason: str) -> MalformedReceived:
-    return MalformedReceived(0, one_line(data[:200].decode("latin-1")), one_line(reason))
+    return MalformedReceived(0, one_line(data.decode("latin-1")), one_line(reason))

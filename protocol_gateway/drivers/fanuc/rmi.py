@@ -13,6 +13,7 @@ from typing import Any
 
 from protocol_gateway.drivers.fanuc.data import AXES
 from protocol_gateway.errors import CommandError
+from robomesh import bounded_json
 
 PORT = 16001
 """Port of `FRC_Connect`; its answer names the port of the session."""
@@ -160,7 +161,9 @@ def read(line: bytes) -> Answer:
         ValueError: If it is not a message that the driver knows.
     """
     try:
-        found = json.loads(line.decode("ascii"), object_pairs_hook=_pairs, parse_constant=_no_constant)
+        found = bounded_json.loads(
+            line.decode("ascii"), object_pairs_hook=_pairs, parse_constant=_no_constant
+        )
     except RecursionError:
         raise ValueError("the text is nested too deeply") from None
     if not isinstance(found, dict):

@@ -49,10 +49,11 @@ OPCUA = Channel(
 _ALL_SIGNALS_EACH_S = 1.0
 # Joints that did not change are repeated this often while other values change.
 _JOINTS_EACH_S = 0.2
-_LONGEST_LINE = 1 << 20
+_LONGEST_LINE = 1 << 19
 # Of rad or m, beyond noise at rest; the arm counts as moving for this long after it.
 _MOVED, _MOVES_FOR_S = 1e-3, 0.5
 _STOPS = frozenset({"emergency_stop", "protective_stop"})
+_IDENTITY = frozenset({"software", "manufacturer", "model", "serial"})
 _MODES = {
     1.0: Mode.LOCAL,  # manual, reduced speed
     2.0: Mode.LOCAL,  # manual, high speed
@@ -92,7 +93,7 @@ class OpcUaDriver(OnlyReads):
         self._begin()
 
     def _begin(self) -> None:
-        self._line = b""
+        self._line = bytearray()
         self._state: _State | None = None
 
     # -------------------------------------------------------------------------- seam
@@ -108,24 +109,27 @@ class OpcUaDriver(OnlyReads):
 
     def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
         """Report the facts of whole lines."""
-        *lines, self._line = (self._line + data).split(b"\n")
+        *ends, rest = data.split(b"\n")
         events: list[ControllerEvent] = []
         units = 0
-        for line in lines:
+        for end in ends:
+            line = bytes(self._line) + end
+            self._line.clear()
             try:
                 events += self._events(line, now_s)
             except ValueError as error:
                 events.append(_malformed(line, str(error)))
             else:
                 units += 1
+        self._line += rest
         if len(self._line) > _LONGEST_LINE:
-            events.append(_malformed(self._line, "a line without an end"))
-            self._line = b""
+            events.append(_malformed(bytes(self._line[:200]), "a line without an end"))
+            self._line.clear()
         return (Report(events, units),) if events or units else ()
 
     def skipped(self, channel: Channel, now_s: float) -> Effects:
         """Go on at the next line."""
-        self._line = b""
+        self._line.clear()
         return ()
 
     def closed(self, channel: Channel, now_s: float) -> Effects:
@@ -199,6 +203,9 @@ class _State:
 
     def __init__(self, found: Found, settings: OpcUaSettings, joint_types: Sequence[JointType]) -> None:
         self._items = found.items
+        self._numbers: dict[str, list[int]] = {}
+        for number, item in enumerate(found.items):
+            self._numbers.setdefault(item.kind, []).append(number)
         self._known: dict[int, Reading] = {}
         self._joiner: Joiner | None = None
         self.not_shown = ""
@@ -269,7 +276,10 @@ class _State:
         return reading.value if reading is not None and reading.good else None
 
     def _values(self, kind: str) -> list[Value]:
-        return [self._good(number) for number, item in enumerate(self._items) if item.kind == kind]
+        return [self._good(number) for number in self._numbers.get(kind, ())]
+
+    def _of_kinds(self, kinds: frozenset[str]) -> list[int]:
+        return sorted(number for kind in kinds for number in self._numbers.get(kind, ()))
 
     def _activity(self) -> Activity | None:
         """Return what the arm does.
@@ -289,9 +299,9 @@ class _State:
 
     def stops(self) -> Iterator[tuple[str, Value]]:
         """Yield the name and value of each signal of a stop."""
-        for number, source in self._signals.items():
-            if self._items[number].kind in _STOPS:
-                yield source.signal.name, self._good(number)
+        for number in self._of_kinds(_STOPS):
+            if number in self._signals:
+                yield self._signals[number].signal.name, self._good(number)
 
     def _mode(self) -> Mode | None:
         modes = self._values("mode")
@@ -302,12 +312,11 @@ class _State:
     def identity(self) -> str:
         """Software, manufacturer, model and serial number, in a line; empty: not all are reported yet."""
         parts: list[str] = []
-        for number, item in enumerate(self._items):
-            if item.kind in ("software", "manufacturer", "model", "serial"):
-                if number not in self._known:
-                    return ""
-                if value := self._good(number):
-                    parts.append(f"{item.kind} {value}")
+        for number in self._of_kinds(_IDENTITY):
+            if number not in self._known:
+                return ""
+            if value := self._good(number):
+                parts.append(f"{self._items[number].kind} {value}")
         return one_line(", ".join(parts))
 
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from protocol_gateway.drivers.opcua.units import NO_UNIT, Unit
+from robomesh import bounded_json
 
 LONGEST_TEXT = 200
 MOST_ITEMS = 512
@@ -117,7 +118,7 @@ def decode(line: bytes) -> Fact:
         ValueError: If it is invalid; the text says why.
     """
     try:
-        data = json.loads(line)
+        data = bounded_json.loads(line)
     except RecursionError:
         raise ValueError("nested too deeply") from None
     match data:

@@ -34,22 +34,22 @@ class Kind(Enum):
     END = "end of the file"
 
 
-# Possessive quantifiers (*+) prevent backtracking into blanks.
-_BLANKS = r"(?:[\s,]++|\#[^\n\r]*+)*+"
-_DIGITS = r"(?:0[xX][0-9a-fA-F]++|(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]++)?)"
-_NUMBER = rf"""(?:[+-][ \t]*+)?{_DIGITS}(?=[\s,\[\]{{}}"\#]|$)"""
+# Each character has one place in an expression, so matching takes linear time without possessive quantifiers,
+# which Python 3.11.2 matches wrongly. Comments and the parts of a string are matched one by one.
+_DIGITS = r"(?:0[xX][0-9a-fA-F]+|(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
+_NUMBER = rf"""(?:[+-][ \t]*)?{_DIGITS}(?=[\s,\[\]{{}}"\#]|$)"""
 _TOKEN = re.compile(
-    rf"""{_BLANKS}
-    (?: (?P<MARK>[\[\]{{}}])
-      | (?P<NUMBERS>{_NUMBER}(?:[\s,]++{_NUMBER})*+)
-      | (?P<WORD>[^\s,\[\]{{}}"\#]++)
-      | "(?P<STRING>(?:[^"\\]++|\\.)*+)"
-      | (?P<OPEN>")
-      | (?P<END>$) )""",
-    re.VERBOSE | re.DOTALL,
+    rf"""(?P<MARK>[\[\]{{}}])
+      | (?P<NUMBERS>{_NUMBER}(?:[\s,]+{_NUMBER}){{0,15}})
+      | (?P<WORD>[^\s,\[\]{{}}"\#]+)
+      | (?P<STRING>")
+      | (?P<END>$)""",
+    re.VERBOSE,
 )
 _KINDS = {kind.name: kind for kind in Kind}
-_LIST_OF_NUMBERS = re.compile(rf"{_BLANKS}(?=[-+.0-9\]])", re.VERBOSE)
+_BLANKS = re.compile(r"[\s,]*(?:#[^\n\r]*)?")
+_STRING_PART = re.compile(r'\\.|"', re.DOTALL)
+_FIRST_OF_NUMBERS = frozenset("-+.0123456789]")
 _BLANK = re.compile(r"[\s,]")
 _SPLIT_SIGN = re.compile(r"([+-])[ \t]+(?=[0-9.])")
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
@@ -85,18 +85,26 @@ class Lexer:
         Raises:
             MeshError: If a string does not end.
         """
-        match = _TOKEN.match(self._all, self._end)
+        match = _TOKEN.match(self._all, self._after_blanks(self._end))
         name = match.lastgroup if match is not None else None
         if match is None or name is None:  # unreachable: any character begins a token
             raise self.source.error(self._end, "this text is not VRML")
-        self.start, self._end = match.start(name), match.end()
-        if name == "OPEN":
-            raise self.source.error(self.start, "this string does not end: a '\"' is missing")
-        self.kind, self.text = _KINDS[name], match[name]
-        if name == "STRING":
-            self.start -= 1
+        self.start, self._end = match.span()
+        self.kind, self.text = _KINDS[name], match[0]
+        if self.kind is Kind.STRING:
+            parts = _STRING_PART.finditer(self._all, self._end)
+            end = next((part for part in parts if part[0] == '"'), None)
+            if end is None:
+                raise self.source.error(self.start, "this string does not end: a '\"' is missing")
+            self.text, self._end = self._all[self._end : end.start()], end.end()
             if "\\" in self.text:
                 self.text = _ESCAPE.sub(r"\1", self.text)
+
+    def _after_blanks(self, position: int) -> int:
+        """Return the position after blanks and comments."""
+        while (found := _BLANKS.match(self._all, position)) is not None and found.end() > position:
+            position = found.end()
+        return position
 
     def is_mark(self, mark: str) -> bool:
         """Return whether the current token is this one of { } [ ]."""
@@ -149,10 +157,9 @@ class Lexer:
 
         Return None and stay if the list does not begin with a number.
         """
-        first = _LIST_OF_NUMBERS.match(self._all, self._end)
-        if first is None:
+        start = self._after_blanks(self._end)
+        if self._all[start : start + 1] not in _FIRST_OF_NUMBERS:
             return None
-        start = first.end()
         end = self._all.find("]", start)
         pieces = self._fast_pieces(start, end) if end >= 0 else None
         if pieces is None:

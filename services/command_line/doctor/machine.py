@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import typer
 
 from robomesh.extras import ADDED_IN_CHECKOUT, install_command, is_missing
+from services.command_line.output import print_json, print_line
 from services.command_line.site.services import SERVICES
 
 # Extra -> packages that it installs.
@@ -49,11 +50,11 @@ def run(as_json: bool = False) -> None:
     ]
     if as_json:
         rows = [{"what": each.what, "ok": each.ok, "text": each.text, "mend": each.fix} for each in findings]
-        print(json.dumps({"ok": all(each.ok for each in findings), "findings": rows}))
+        print_json({"ok": all(each.ok for each in findings), "findings": rows})
     for finding in () if as_json else findings:
-        print(f"{'ok     ' if finding.ok else 'MISSING'}  {finding.what}: {finding.text}")
+        print_line(f"{'ok     ' if finding.ok else 'MISSING'}  {finding.what}: {finding.text}")
         if not finding.ok:
-            print(f"         {finding.fix}")
+            print_line(f"         {finding.fix}")
     if not all(finding.ok for finding in findings):
         raise typer.Exit(1)
 

@@ -8,7 +8,6 @@ requests, reading and answering on real robots), nothing is tried, and the file 
 principals.toml. The topic table gives the expected result.
 """
 
-import json
 import time
 from collections.abc import Iterable
 from contextlib import ExitStack
@@ -32,6 +31,7 @@ from services.command_line.doctor.security_sessions import (
     with_files,
 )
 from services.command_line.doctor.security_table import ROBOTS, ROWS, names, should, tried, tried_on_real
+from services.command_line.output import print_json, print_line
 from services.pki import Folder, authority
 from services.pki.errors import KeysError
 
@@ -77,30 +77,30 @@ def run(keys: Folder, connect: tuple[str, ...], as_json: bool) -> int:
     if as_json:
         for trial in sorted(done | allowed, key=lambda trial: (trial.who, trial.act, trial.key)):
             row = {"who": trial.who, "act": _WORDS[trial.act], "key": trial.key}
-            print(json.dumps(row | {"should": trial in allowed, "does": trial in done}))
+            print_json(row | {"should": trial in allowed, "does": trial in done})
         for problem in rules:
-            print(json.dumps({"rules": problem}))
+            print_json({"rules": problem})
         for robot in probed.left_out:
-            print(json.dumps({"not_running": robot}))
+            print_json({"not_running": robot})
         return 1 if wrong or rules else 0
     _print([*roles.values()], principals.site, done)
     for trial in wrong:
         does, should_ = ("can", "should not") if trial in done else ("cannot", "should")
-        print(f"WRONG: {trial.who} {does} {_WORDS[trial.act]} {trial.key}, and {should_}")
+        print_line(f"WRONG: {trial.who} {does} {_WORDS[trial.act]} {trial.key}, and {should_}")
     for problem in rules:
-        print(f"WRONG: {keys.access}: {problem}")
-    print(
+        print_line(f"WRONG: {keys.access}: {problem}")
+    print_line(
         f"{len(trials)} operations of {len(people)} certificates tried: "
         + (f"{len(wrong)} wrong" if wrong else "all as the table says")
     )
     absent = sorted({role.value for role in Role} - {each.role.value for each in roles.values()})
     if absent:
-        print(f"not tried, without a certificate here: {', '.join(absent)}")
+        print_line(f"not tried, without a certificate here: {', '.join(absent)}")
     if probed.left_out:
-        print(
+        print_line(
             f"leases, commands and tokens not tried, without a running gateway: {', '.join(probed.left_out)}"
         )
-    print(
+    print_line(
         "not tried, compared in the rules only: presence of services; of real robots what is read and "
         "answered, stops, and requests other than leases and commands: "
         + (f"{len(rules)} wrong" if rules else "the rules are what principals.toml gives")
@@ -211,8 +211,9 @@ def _print(people: list[Principal], site: str, done: set[Trial]) -> None:
     heads = [each.name.rpartition(".")[0] for each in people]
     width = max(len(row.name) for row in ROWS) + 2
     columns = [max(len(name), 2) + 1 for name in heads]
-    print("p: publishes, r: reads, o: answers as owner, a: requests\n")
-    print(" " * width + "".join(f"{name:<{size}}" for name, size in zip(heads, columns, strict=True)))
+    print_line("p: publishes, r: reads, o: answers as owner, a: requests")
+    print_line("")
+    print_line(" " * width + "".join(f"{name:<{size}}" for name, size in zip(heads, columns, strict=True)))
     for row in ROWS:
         letters: dict[Act, str] = (
             {"put": "p", "declare_subscriber": "r"}
@@ -229,5 +230,5 @@ def _print(people: list[Principal], site: str, done: set[Trial]) -> None:
                 )
             )
         line = "".join(f"{cell:<{size}}" for cell, size in zip(cells, columns, strict=True))
-        print(f"{row.name:<{width}}{line}")
-    print()
+        print_line(f"{row.name:<{width}}{line}")
+    print_line("")

@@ -8,6 +8,7 @@ from robomesh.keys import PresenceKey
 from robomesh.schemas.robomesh_pb2 import ClockRequest
 from robomesh.session import Session
 from services.command_line import discovery
+from services.command_line.output import print_line
 
 _ROUTER = "router"
 # Per answer: a service that takes longer is not usable.
@@ -17,7 +18,7 @@ _WITHIN_S = 2.0
 def run(service: str, connect: str) -> int:
     """Return 0 if every present process of the service answers; 1 if one does not, or not present."""
     problem = asyncio.run(_problem_of(service, connect))
-    print(f"{service}: {problem or 'alive'}")
+    print_line(f"{service}: {problem or 'alive'}")
     return 0 if problem is None else 1
 
 
@@ -36,7 +37,7 @@ async def _problem_of(text: str, connect: str) -> str | None:
 
 async def _silent_processes(session: Session, tokens: str) -> str | None:
     """Ask every present process: Zenoh's threads keep a hung service present, but its own loop answers."""
-    found = {who.id: who for who in await presence.present(session.zenoh_session, tokens)}
+    found = {who.id: who for who in await presence.present(session.zenoh_session, (tokens,))}
     answers = await asyncio.gather(*(_answers(session, who) for who in found.values()))
     silent = [identity for identity, answered in zip(found, answers, strict=True) if not answered]
     if silent:

@@ -3,6 +3,7 @@
 from robomesh.keys import robot_key
 from robomesh.schemas.robomesh_pb2 import FaultAnswer, FaultRequest
 from services.command_line import discovery
+from services.command_line.output import print_json, print_line
 from services.simulator.fault_table import FAULTS
 
 
@@ -10,13 +11,13 @@ def run(robot: str, name: str, off: bool, router: str, as_json: bool) -> None:
     """Begin or end a fault; without a name, list all faults."""
     answer = discovery.run(_request(robot, FaultRequest(fault=name, off=off), router))
     if as_json:
-        discovery.print_json({"active": list(answer.active), "known": list(answer.known)})
+        print_json({"active": list(answer.active), "known": list(answer.known)})
     elif name:
-        print(f"faults now: {', '.join(answer.active) or 'none'}")
+        print_line(f"faults now: {', '.join(answer.active) or 'none'}")
     else:
         for known in answer.known:
             mark = "*" if known in answer.active else " "
-            print(f"{mark} {known:<8} {FAULTS[known].effect if known in FAULTS else ''}".rstrip())
+            print_line(f"{mark} {known:<8} {FAULTS[known].effect if known in FAULTS else ''}".rstrip())
 
 
 async def _request(name: str, request: FaultRequest, router: str) -> FaultAnswer:

@@ -9,6 +9,7 @@ from typing import Any
 
 from robomesh.activity import activity_words
 from robomesh.clock import Clock, Reading, read_clock
+from robomesh.enum_names import enum_name, enum_word
 from robomesh.errors import NoAnswerError
 from robomesh.keys import ROOT, WHOLE_SITE, PresenceKey, is_replay, robot_key
 from robomesh.last_values import last_values
@@ -19,6 +20,7 @@ from services.command_line import discovery
 from services.command_line.alarm_lists import gone_sites, lists
 from services.command_line.live.listing_text import listing_text
 from services.command_line.live.monitor_text import replay_record
+from services.command_line.output import console, print_json, print_line
 
 _State = schema.ControllerState
 _Stops, _Command = schema.Capabilities.Stops, schema.CommandRequest.Command
@@ -47,39 +49,38 @@ async def _once(router: str, as_json: bool) -> None:
     async with discovery.attached(router) as session:
         found = await _collect(session, _Clocks())
     if as_json:
-        discovery.print_json(found)
+        print_json(found)
         return
     if not found["services"]:
-        print("no service is on the mesh")
+        print_line("no service is on the mesh")
         return
-    from rich.console import Console
-
-    console = Console()
-    console.print(listing_text(found, console.width))
+    screen = console()
+    screen.print(listing_text(found, screen.width))
 
 
 async def _watch(router: str, as_json: bool) -> None:
-    from rich.console import Console
     from rich.live import Live
 
     async with discovery.attached(router) as session:
         clocks = _Clocks()
         if as_json:
             while True:
-                discovery.print_json(await _collect(session, clocks))
+                print_json(await _collect(session, clocks))
                 await asyncio.sleep(_AGAIN_S)
-        console = Console()
-        while not console.is_terminal:  # Live needs a screen
-            console.print(listing_text(await _collect(session, clocks), console.width))
+        screen = console()
+        while not screen.is_terminal:  # Live needs a screen
+            screen.print(listing_text(await _collect(session, clocks), screen.width))
             await asyncio.sleep(_AGAIN_S)
-        with Live(console=console, screen=False, auto_refresh=False, vertical_overflow="crop") as live:
+        with Live(console=screen, screen=False, auto_refresh=False, vertical_overflow="crop") as live:
             while True:
-                live.update(listing_text(await _collect(session, clocks), console.width), refresh=True)
+                live.update(listing_text(await _collect(session, clocks), screen.width), refresh=True)
                 await asyncio.sleep(_AGAIN_S)
 
 
 async def _collect(session: Session, clocks: _Clocks) -> dict[str, Any]:
-    alive = await session.present()
+    services = await session.present()
+    sessions, complete = await session.present_sessions()
+    alive = sorted(services + sessions)
     robots = sorted({(key.site, key.robot) for key in alive if key.robot != WHOLE_SITE})
     rows, health, listed = await asyncio.gather(
         asyncio.gather(*(_row(session, site, robot) for site, robot in robots)),
@@ -93,6 +94,7 @@ async def _collect(session: Session, clocks: _Clocks) -> dict[str, Any]:
         "robots": list(rows),
         "services": [_service(key, by_process.get(key.id), clocks.by_id.get(key.id)) for key in alive],
         "sites": _sites(alive, listed),
+        "partial": not complete,
     }
 
 
@@ -148,7 +150,7 @@ def _sites(alive: list[PresenceKey], listed: list[schema.AlarmList]) -> list[dic
     for site in sorted(present | gone.keys()):
         # The alarms of a site that is gone are unknown.
         held = found[site].alarms if site in found and site in present else None
-        states = None if held is None else Counter(_Alarm.State.Name(each.state).lower() for each in held)
+        states = None if held is None else Counter(enum_word(_Alarm.State, each.state) for each in held)
         unseen = [each for each in held or () if each.state == _Alarm.UNACKNOWLEDGED]
         rows.append(
             {
@@ -175,9 +177,9 @@ async def _row(session: Session, site: str, robot: str) -> dict[str, Any]:
     return {
         "site": site,
         "robot": robot,
-        "link": _State.Link.Name(state.link).lower(),
-        "mode": _State.Mode.Name(state.mode).lower().removeprefix("mode_"),
-        "activity": _State.Activity.Name(state.activity).lower().removeprefix("activity_"),
+        "link": enum_word(_State.Link, state.link),
+        "mode": enum_word(_State.Mode, state.mode),
+        "activity": enum_word(_State.Activity, state.activity),
         "state": activity_words(state),
         "stop_id": state.stop.id if state.HasField("stop") else None,
         "read_only": state.read_only,
@@ -194,12 +196,12 @@ async def _row(session: Session, site: str, robot: str) -> dict[str, Any]:
 def _capabilities(found: schema.Capabilities | None) -> dict[str, Any]:
     """Return what the driver can do with its controller; None: not reported."""
     return {
-        "stops": None if found is None else _Stops.Name(found.stops).lower(),
-        "commands": [] if found is None else [_Command.Name(each) for each in found.commands],
+        "stops": None if found is None else enum_word(_Stops, found.stops),
+        "commands": [] if found is None else [enum_name(_Command, each) for each in found.commands],
         "absolute": None if found is None else found.absolute,
         "dies_with_link": None if found is None else _KNOWN.get(found.dies_with_link),
         "slow_hz": found.slow_hz if found is not None and found.HasField("slow_hz") else None,
-        "recoveries": [] if found is None else [_Recovery.Name(each).lower() for each in found.recoveries],
+        "recoveries": [] if found is None else [enum_word(_Recovery, each) for each in found.recoveries],
     }
 
 

@@ -5,6 +5,8 @@ from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 from robomesh.keys import WHOLE_SITE
+from services.command_line.local_time import local_time, time_text
+from services.command_line.output import styled
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -25,16 +27,18 @@ def listing_text(found: dict[str, Any], width: int) -> "Group":
         width: Width of the terminal, in characters.
     """
     from rich.console import Group
-    from rich.text import Text
 
     parts: list[Any] = [_robots(found, width)] if any(not row["replay"] for row in found["robots"]) else []
     parts += [
-        Text(f" {row['site']}/{row['robot']}   replay {_replay(row['replay'])}", style="magenta")
+        styled(f" {row['site']}/{row['robot']}   replay {_replay(row['replay'])}", "magenta")
         for row in found["robots"]
         if row["replay"] is not None
     ]
     parts.append(_services(found["services"], width))
-    parts += [Text(f" {_site(row)}", style=_alarm_style(row)) for row in found["sites"]]
+    parts += [styled(f" {_site(row)}", _alarm_style(row)) for row in found["sites"]]
+    if found["partial"]:
+        text = " This list is partial: it leaves out sessions of operators and monitors, which are too many."
+        parts.append(styled(text, "yellow"))
     return Group(*parts)
 
 
@@ -134,9 +138,9 @@ def _site(row: dict[str, Any]) -> str:
 
 def since(at_s: float) -> str:
     """Format a time of today as a time, an earlier one with its date."""
-    at = datetime.fromtimestamp(at_s).astimezone()
+    at = local_time(at_s)
     today = at.date() == datetime.now().astimezone().date()
-    return f"{at:%H:%M:%S}" if today else f"{at:%Y-%m-%d %H:%M}"
+    return time_text(at).partition(" ")[2] if today else time_text(at, "minutes")
 
 
 def _alarm_style(row: dict[str, Any]) -> str:

@@ -5,14 +5,14 @@ import contextlib
 import math
 import sys
 import time
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Iterable, Iterator
 from contextlib import asynccontextmanager
-from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from robomesh.activity import activity_words
+from robomesh.enum_names import enum_word
 from robomesh.keys import WHOLE_SITE, is_replay, robot_key
 from robomesh.presence import MONITOR
 from robomesh.schemas import robomesh_pb2 as schema
@@ -32,12 +32,18 @@ from services.command_line.live.monitor_text import (
     replay_record,
     replay_words,
 )
+from services.command_line.local_time import local_time
+from services.command_line.output import console, print_json, styled_line
 
 if TYPE_CHECKING:
     from rich.console import Group
 
 _State = schema.ControllerState
-_ROTARY = schema.Description.Joint.ROTARY
+# Factor and unit of a joint's position.
+_UNITS = {
+    schema.Description.Joint.ROTARY: (180 / math.pi, "°"),
+    schema.Description.Joint.PRISMATIC: (1000.0, " mm"),
+}
 _REDRAW_HZ = 10
 _BAR_CELLS, _LEAST_BAR_CELLS, _OTHER_CELLS = 40, 5, 42
 # Topics that a line of JSON adds to the joints.
@@ -67,7 +73,7 @@ async def _json(name: str, router: str, count: int | None) -> None:
             async for sample in states:
                 if count is not None and not sample.live:
                     continue
-                discovery.print_json(_record(sample, states) | newest.record())
+                print_json(_record(sample, states) | newest.record())
                 printed += 1
                 if printed == count:
                     return
@@ -79,7 +85,7 @@ def _record(sample: Sample, states: Subscription) -> dict[str, Any]:
     return {
         "key": sample.key,
         "sequence": sample.header.sequence,
-        "time": datetime.fromtimestamp(sample.header.source_time_ns * 1e-9).astimezone().isoformat(),
+        "time": local_time(sample.header.source_time_ns * 1e-9).isoformat(),
         "live": sample.live and not is_replay(sample.parsed.robot),
         "lost": states.lost(sample.key),
         "joints": {joint.name: joint.position for joint in message.joints},
@@ -96,7 +102,7 @@ async def _live(name: str, router: str, count: int | None) -> None:
         topics = _TOPICS_OF_REPLAY if is_replay(robot.name) else _TOPICS
         newest = _Newest(session, robot, {"joints", "description", "controller", *topics})
         # On the alternate screen, redrawn whole, so that a resized window keeps no old text.
-        live = Live(screen=True, auto_refresh=False)
+        live = Live(console=console(), screen=True, auto_refresh=False)
         width = live.console.width
         try:
             with live:
@@ -172,38 +178,36 @@ class _Newest:
             width: Width of the terminal, in characters.
         """
         from rich.console import Group
-        from rich.text import Text
 
         age, stale = self.age_s("joints"), self._stale("joints")
-        head = Text(str(self.robot), style="bold")
-        head.append("   ")
+        head: list[Words] = [(str(self.robot), "bold")]
         if stale:
             words = "no live data yet" if age is None else f"STALE {age:.0f} s"
-            head.append(f" {words} ", style="black on yellow")
+            head.append((f" {words} ", "black on yellow"))
         elif not self.replayed:
-            head.append("live", style="green")
+            head.append(("live", "green"))
         if self.replayed:
-            head.append(f"   {replay_words(self._values.get('replay'))}", style="magenta")
-            return Group(
-                head, self._table(stale, width), *self._surroundings(), *self._alarm_lines(), self._foot()
-            )
+            head.append((replay_words(self._values.get("replay")), "magenta"))
+        else:
+            head += self._of_gateway()
+        lines = [head, *self._surroundings(), *self._alarm_lines(), *self._foot()]
+        first, *rest = (styled_line(line) for line in lines if line)
+        return Group(first, self._table(stale, width), *rest)
+
+    def _of_gateway(self) -> Iterator[Words]:
+        """Yield the state of the controller, and who is in control."""
         state, lease = self._values.get("controller"), self._values.get("lease")
         if state is not None:
-            head.append(f"   link {_word(_State.Link, state.link)}")
+            yield f"link {enum_word(_State.Link, state.link)}", ""
             if state.capabilities.HasField("slow_hz"):
-                head.append(f"   slow, joints at {state.capabilities.slow_hz:g} Hz", style="yellow")
-            head.append(
-                f"   {activity_words(state)}   mode {_word(_State.Mode, state.mode)}"
-                f"   homed {_word(_State.Known, state.homed)}",
-                style="" if state.link == _State.UP else "dim strike",
-            )
+                yield f"slow, joints at {state.capabilities.slow_hz:g} Hz", "yellow"
+            mode, homed = enum_word(_State.Mode, state.mode), enum_word(_State.Known, state.homed)
+            old = "" if state.link == _State.UP else OLD
+            yield f"{activity_words(state)}   mode {mode}   homed {homed}", old
             if state.HasField("stop"):
-                head.append(f"   STOP REQUESTED by {state.stop.by}", style="bold red")
+                yield f"STOP REQUESTED by {state.stop.by}", "bold red"
         if lease is not None:
-            head.append(f"   control: {lease.holder or 'nobody'}")
-        return Group(
-            head, self._table(stale, width), *self._surroundings(), *self._alarm_lines(), self._foot()
-        )
+            yield f"control: {lease.holder or 'nobody'}", ""
 
     def _table(self, stale: bool, width: int) -> Any:
         from rich import box
@@ -218,10 +222,10 @@ class _Newest:
         limits = {joint.name: joint for joint in description.joints} if description is not None else {}
         for joint in states.joints if states is not None else ():
             row = limits.get(joint.name)
-            if row is None:
+            if row is None or row.type not in _UNITS:
                 table.add_row(joint.name, f"{joint.position:.4f}", "", "", style=OLD if stale else None)
                 continue
-            factor, unit = (180 / math.pi, "°") if row.type == _ROTARY else (1000.0, " mm")
+            factor, unit = _UNITS[row.type]
             table.add_row(
                 joint.name,
                 f"{joint.position * factor:.2f}{unit}",
@@ -231,10 +235,8 @@ class _Newest:
             )
         return table
 
-    def _surroundings(self) -> list[Any]:
+    def _surroundings(self) -> list[list[Words]]:
         """Return a line with clearances, and one with the check mode and the program."""
-        from rich.text import Text
-
         state, kinematics, program = (
             self._values.get(name) for name in ("controller", "kinematics", "program")
         )
@@ -251,36 +253,30 @@ class _Newest:
         ran = None if program is None else program_words(program, stale=self._stale("program"))
         # The program ran when this was recorded.
         runs.append((f"then: {ran[0]}", OLD) if ran is not None and self.replayed else ran)
-        lines = [near, [words for words in runs if words is not None]]
-        return [Text("   ").join(Text(*each) for each in line) for line in lines if line]
+        return [near, [words for words in runs if words is not None]]
 
-    def _alarm_lines(self) -> list[Any]:
+    def _alarm_lines(self) -> list[list[Words]]:
         """Return a line for each of the first alarms of the robot and its site that are not shelved."""
-        from rich.text import Text
-
         listed = self._values.get("alarms")
-        lines = alarm_words(listed.alarms if listed is not None else (), self.robot.name)
-        return [Text(*each) for each in lines]
+        return [[each] for each in alarm_words(listed.alarms if listed is not None else (), self.robot.name)]
 
     def _stale(self, name: str) -> bool:
         age = self.age_s(name)
         limit_s = stale_after_s(name, self._values.get("description"))
         return age is None or (limit_s is not None and age > limit_s)
 
-    def _foot(self) -> Any:
-        from rich.text import Text
-
+    def _foot(self) -> list[list[Words]]:
         kinematics, state = self._values.get("kinematics"), self._values.get("controller")
         joints = self.subscriptions["joints"]
         key = robot_key(*self.robot, "joints")
-        values = []
-        if kinematics is not None:
+        values: list[Words] = []
+        if kinematics is not None and len(kinematics.tool_to_base) == 16:
             x, y, z = (kinematics.tool_to_base[index] * 1000 for index in (3, 7, 11))
-            values.append(f"tool {x:.1f} {y:.1f} {z:.1f} mm")
+            values.append((f"tool {x:.1f} {y:.1f} {z:.1f} mm", "dim"))
         if state is not None and not self.replayed:
-            values.append(f"controller: {link_words(state)}")
+            values.append((f"controller: {link_words(state)}", "dim"))
         own = f"missed here: {joints.lost(key)}   {time.strftime('%H:%M:%S')}   Ctrl-C ends"
-        return Text("\n".join(["   ".join(values), own] if values else [own]), style="dim")
+        return [values, [(own, "dim")]]
 
 
 def link_words(state: schema.ControllerState) -> str:
@@ -304,14 +300,10 @@ def link_words(state: schema.ControllerState) -> str:
 
 
 def _bar(position: float, lower: float, upper: float, cells: int) -> str:
-    """Draw a position within its limits; empty if the terminal is too narrow."""
-    if cells < _LEAST_BAR_CELLS:
+    """Draw a position within its limits; empty if the terminal is too narrow, or a number is not finite."""
+    if cells < _LEAST_BAR_CELLS or not all(map(math.isfinite, (position, lower, upper))):
         return ""
     span = upper - lower
-    share = (position - lower) / span if span > 0 else 0.5
-    cell = min(max(round(share * (cells - 1)), 0), cells - 1)
+    share = min(max((position - lower) / span, 0.0), 1.0) if span > 0 else 0.5
+    cell = round(share * (cells - 1))
     return "─" * cell + "●" + "─" * (cells - 1 - cell)
-
-
-def _word(enum: Any, value: int) -> str:
-    return str(enum.Name(value)).rsplit("_", 1)[-1].lower()

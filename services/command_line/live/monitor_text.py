@@ -5,8 +5,10 @@ from collections.abc import Iterable
 from datetime import datetime
 from typing import Any
 
+from robomesh.enum_names import enum_name, enum_word
 from robomesh.keys import WHOLE_SITE
 from robomesh.schemas import robomesh_pb2 as schema
+from services.command_line.local_time import local_time, time_text
 
 _State = schema.ControllerState
 _Program = schema.ProgramState
@@ -31,7 +33,7 @@ def replay_words(state: schema.ReplayState | None) -> str:
         return "REPLAY"
     how = f"{state.speed:g} x" if state.playing else "paused"
     return (
-        f"REPLAY of {state.of_site}/{state.of_robot}   recorded {_recorded(state):%Y-%m-%d %H:%M:%S}, "
+        f"REPLAY of {state.of_site}/{state.of_robot}   recorded {time_text(_recorded(state))}, "
         f"{state.position_s:.0f} of {state.duration_s:.0f} s, {how}"
     )
 
@@ -53,7 +55,7 @@ def replay_record(state: schema.ReplayState | None) -> dict[str, Any]:
 
 def _recorded(state: schema.ReplayState) -> datetime:
     """Return when the current position was recorded, in local time."""
-    return datetime.fromtimestamp(state.start.ToNanoseconds() * 1e-9 + state.position_s).astimezone()
+    return local_time(state.start.ToNanoseconds() * 1e-9 + state.position_s)
 
 
 def near_words(
@@ -89,8 +91,8 @@ def alarm_words(alarms: Iterable[schema.Alarm], robot: str) -> list[Words]:
     for alarm in own[:_MOST_ALARMS]:
         level = 2 if alarm.priority >= _Alarm.HIGH else 1
         quiet = alarm.state != _Alarm.UNACKNOWLEDGED
-        state = f", {_Alarm.State.Name(alarm.state).lower()}" if quiet else ""
-        priority = _Alarm.Priority.Name(alarm.priority)
+        state = f", {enum_word(_Alarm.State, alarm.state)}" if quiet else ""
+        priority = enum_name(_Alarm.Priority, alarm.priority)
         words.append((f"ALARM {priority}{state}: {alarm.text}", "" if quiet else _STYLES[level]))
     if len(own) > _MOST_ALARMS:
         words.append((f"and {len(own) - _MOST_ALARMS} more alarms: robomesh alarms list", ""))
@@ -99,12 +101,12 @@ def alarm_words(alarms: Iterable[schema.Alarm], robot: str) -> list[Words]:
 
 def check_words(state: schema.ControllerState) -> Words | None:
     """Describe the check of motions; None: the gateway does not report it."""
-    if state.check not in _CHECKS:
+    if state.check == _State.CHECK_UNSPECIFIED:
         return None
     if state.check_text:
         refused = "refused" if state.check == _State.REQUIRE else "not checked"
         return f"motions: {refused} now: {state.check_text}", _STYLES[1]
-    return f"motions: {_CHECKS[state.check]}", ""
+    return f"motions: {_CHECKS.get(state.check) or f'check {state.check}'}", ""
 
 
 def program_words(state: schema.ProgramState, *, stale: bool = False) -> Words | None:
@@ -113,7 +115,7 @@ def program_words(state: schema.ProgramState, *, stale: bool = False) -> Words |
     match state.outcome:
         case _Program.RUNNING:
             elapsed_s = (state.timestamp.ToNanoseconds() - state.since.ToNanoseconds()) * 1e-9
-            left = f", {clock(math.ceil(state.left_s))} left" if state.HasField("left_s") else ""
+            left = f", {clock(-(-state.left_s // 1))} left" if state.HasField("left_s") else ""
             return (
                 f"program {state.name}: step {state.step} of {state.steps}, {where}; "
                 f"by {state.operator}, for {clock(elapsed_s)}{left}"
@@ -122,7 +124,10 @@ def program_words(state: schema.ProgramState, *, stale: bool = False) -> Words |
             return f"program {state.name}: done, by {state.operator}", ""
         case _Program.ENDED:
             return f"program {state.name}, by {state.operator}: ended at {where}: {state.text}", _STYLES[1]
-    return None
+        case _Program.OUTCOME_UNSPECIFIED:
+            return None
+    outcome = enum_word(_Program.Outcome, state.outcome)
+    return f"program {state.name}, by {state.operator}: {outcome} at {where}: {state.text}", _STYLES[1]
 
 
 def clearance_record(state: schema.KinematicState | None, robot: str) -> dict[str, Any] | None:
@@ -143,7 +148,7 @@ def program_record(state: schema.ProgramState | None) -> dict[str, Any] | None:
     """Return the running or last program as JSON values; None: no program ran, or unknown."""
     if state is None or state.outcome == _Program.OUTCOME_UNSPECIFIED:
         return None
-    outcome = _Program.Outcome.Name(state.outcome).lower()
+    outcome = enum_word(_Program.Outcome, state.outcome)
     values = {name: getattr(state, name) for name in ("name", "operator", "line", "step", "steps", "text")}
     return {"outcome": outcome, **values}
 
@@ -160,4 +165,6 @@ def _distance(clearance: schema.Clearance, robot: str) -> str:
 
 def clock(seconds: float) -> str:
     """Format a duration as minutes and seconds: 00:12."""
+    if not math.isfinite(seconds):
+        return f"{seconds} s"
     return f"{int(seconds) // 60:02d}:{int(seconds) % 60:02d}"

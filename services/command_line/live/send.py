@@ -2,7 +2,6 @@
 
 import asyncio
 import signal
-import sys
 from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -18,7 +17,7 @@ from robomesh.keys import check_chunk
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 from services.command_line import discovery
-from services.command_line.output import print_or_discard
+from services.command_line.output import json_line, print_line
 from services.errors import ServiceError
 
 T = TypeVar("T")
@@ -75,7 +74,7 @@ def run(
     else:
         command = None if words == _STOP else _parse(words)
     sent = discovery.run(_send(robot, words, command, router, check_chunk(operator or discovery.own_name())))
-    print_or_discard(discovery.json_line(sent._asdict()) if as_json else sent.text, sys.stdout)
+    print_line(json_line(sent._asdict()) if as_json else sent.text, lasting=True)
     if not sent.accepted:
         raise typer.Exit(1)
 
@@ -99,7 +98,7 @@ async def send_and_wait(session: Session, robot: discovery.Robot, operator: str,
     def on_accepted(answer: CommandResult) -> None:
         started.append(answer)
         if answer.warning:
-            print_or_discard(f"warning: {answer.warning}", sys.stderr)
+            print_line(f"warning: {answer.warning}", err=True)
 
     arm = AsyncRobot(session, *robot).control(operator)
     arm.progress = Progress(on_accepted, _print_step, stop_reason="Ctrl-C in robomesh send")
@@ -140,7 +139,7 @@ async def _interruptible(waiting: Coroutine[Any, Any, T]) -> T:
 
 def _print_step(program: schema.ProgramState) -> None:
     step = f"step {program.step} of {program.steps}"
-    print_or_discard(f"{step}, line {program.line}: {program.statement}", sys.stderr)
+    print_line(f"{step}, line {program.line}: {program.statement}", err=True)
 
 
 async def joined(session: Session, robot: discovery.Robot) -> str:

@@ -10,8 +10,8 @@ from robomesh.client.samples import utc
 from robomesh.keys import is_replay, robot_key
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.subscription import Sample
-from robomesh.texts import for_terminal
 from services.command_line import discovery
+from services.command_line.output import print_json, print_line
 from services.errors import ServiceError
 
 # Signals that do not change are published once a second.
@@ -49,9 +49,10 @@ async def _print(name: str, patterns: Sequence[str], router: str, as_json: bool,
                     "robomesh signals without a name lists all"
                 )
             if as_json:
-                discovery.print_json(record)
+                print_json(record)
             else:
-                print(for_terminal(_text(record)), flush=True)
+                for line in _lines(record):
+                    print_line(line)
             if not follow:
                 return
             limit_s = None
@@ -88,7 +89,7 @@ def _record(sample: Sample, patterns: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def _text(record: dict[str, Any]) -> str:
+def _lines(record: dict[str, Any]) -> list[str]:
     signals = record["signals"]
     width = max(map(len, signals))
     lines = [] if record["live"] else ["recorded:"]
@@ -100,4 +101,4 @@ def _text(record: dict[str, Any]) -> str:
             shown = f"{value:.6g}" if isinstance(value, float) else value
         age = f"  ({signal['age_s']:.1f} s old)" if signal["age_s"] >= 1.0 else ""
         lines.append(f"{name:<{width}}  {shown}{f' {unit}' if unit else ''}{age}")
-    return "\n".join(lines)
+    return lines

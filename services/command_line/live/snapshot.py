@@ -6,6 +6,7 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 
 from services.command_line import discovery
 from services.command_line.live.views import view_of
+from services.command_line.output import print_line
 from services.errors import ServiceError
 
 # On a busy machine the first picture of a robot with many parts takes seconds.
@@ -43,7 +44,7 @@ def run(robot: str, view: str, out: Path, size: tuple[int, int], router: str) ->
         out.write_bytes(data)
     except OSError as error:
         raise NoPictureError(f"{out}: cannot be written: {error.strerror}") from None
-    print(out)
+    print_line(out)
 
 
 async def _picture(name: str, view: str, size: tuple[int, int], router: str) -> bytes:

@@ -17,6 +17,7 @@ from robomesh.h264 import is_key_frame
 from robomesh.subscription import Subscription
 from services.command_line import discovery
 from services.command_line.live.views import view_of
+from services.command_line.output import print_json, print_line
 from services.errors import ServiceError
 
 # The renderer sends a view without motion twice a second.
@@ -52,7 +53,7 @@ def run(robot: str, view: str, out: Path, wanted: Wanted, router: str, as_json: 
     finally:
         file.close()
     if as_json:
-        discovery.print_json(
+        print_json(
             {
                 "file": str(out),
                 "pictures": file.mp4.pictures,
@@ -63,7 +64,7 @@ def run(robot: str, view: str, out: Path, wanted: Wanted, router: str, as_json: 
             }
         )
     else:
-        print(file.words)
+        print_line(file.words)
 
 
 class _File:

@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 from robomesh.client.recorder import RecorderFile
 from robomesh.keys import check_chunk
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.texts import for_terminal
 from services.command_line import discovery
+from services.command_line.output import print_line
 from services.command_line.recordings.listing import found, show
 
 _Request = schema.RecordingRequest
@@ -74,4 +74,4 @@ def _print(recording: schema.Recording, words: str, as_json: bool) -> None:
     if as_json:
         show(recording, as_json)
     else:
-        print(for_terminal(words))
+        print_line(words)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robomesh.recordings.reading import RecordingFile
-from services.command_line import discovery
+from services.command_line.output import print_json, print_line
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.fetch import local_file
 from services.command_line.recordings.output import atomic_file
@@ -54,9 +54,9 @@ def run(source: str, out: Path, wanted: Wanted, router: str, as_json: bool) -> N
         with atomic_file(out) as partial:
             words, values = _write(file, span, partial, kind, wanted)
     if as_json:
-        discovery.print_json({"file": str(out), "bytes": out.stat().st_size, **values})
+        print_json({"file": str(out), "bytes": out.stat().st_size, **values})
     else:
-        print(f"{out}: {words}, {out.stat().st_size / 1e6:.2f} MB")
+        print_line(f"{out}: {words}, {out.stat().st_size / 1e6:.2f} MB")
 
 
 def _write(

@@ -1,7 +1,6 @@
 """`robomesh recordings fetch`: a recording from its site's recorder over the mesh, with resume."""
 
 import contextlib
-import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,9 +8,9 @@ from pathlib import Path
 from robomesh.client.recorder import Fetched, RecorderFile
 from robomesh.errors import QuotaError
 from services.command_line import discovery
+from services.command_line.output import print_json, print_line, progress
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.listing import attached_for, found
-from services.command_line.recordings.output import progress
 
 
 def run(what: str, out: Path, router: str, as_json: bool) -> None:
@@ -23,10 +22,10 @@ def run(what: str, out: Path, router: str, as_json: bool) -> None:
     """
     done = _run(what, out, router)
     if as_json:
-        discovery.print_json({"file": str(done.file), "bytes": done.total, "resumed_at": done.resumed_at})
+        print_json({"file": str(done.file), "bytes": done.total, "resumed_at": done.resumed_at})
     else:
         begun = f", from byte {done.resumed_at} on" if done.resumed_at else ""
-        print(f"{done.file}: {done.total / 1e6:.2f} MB{begun}")
+        print_line(f"{done.file}: {done.total / 1e6:.2f} MB{begun}")
 
 
 @contextlib.contextmanager
@@ -56,7 +55,7 @@ async def _fetch(what: str, out: Path, router: str) -> Fetched:
 
         def report_quota(error: QuotaError) -> None:
             # Standard error, so that it appears above the progress bar.
-            print(f"{recording.file} waits: {error}", file=sys.stderr)
+            print_line(f"{recording.file} waits: {error}", err=True)
 
         file = RecorderFile(
             session,

@@ -1,7 +1,6 @@
 """`robomesh recordings list` and `info`: the recordings of all sites, and the content of one."""
 
 import json
-import sys
 from collections.abc import AsyncIterator, Collection
 from contextlib import asynccontextmanager
 from datetime import datetime
@@ -16,6 +15,7 @@ from robomesh.client.recording_list import (
     find_recording,
     list_recordings,
 )
+from robomesh.enum_names import enum_word
 from robomesh.errors import RobomeshError, SessionError
 from robomesh.messages import to_json
 from robomesh.recordings.errors import RecordingError
@@ -23,6 +23,8 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 from robomesh.texts import for_terminal
 from services.command_line import discovery
+from services.command_line.local_time import local_time, time_text
+from services.command_line.output import print_json, print_line
 from services.command_line.recordings.errors import ExportError
 
 _Change = schema.RecordingChange
@@ -47,13 +49,13 @@ def list_all(router: str, *, deleted: bool, tags: Collection[str], as_json: bool
 
 def _print_table(recordings: list[schema.Recording]) -> None:
     if not recordings:
-        print("no recordings")
+        print_line("no recordings")
         return
     rows = [("recorded", "length", "size", "robot", "name", "")]
     for each in recordings:
         rows.append(
             (
-                f"{_start(each):%Y-%m-%d %H:%M:%S}" if each.HasField("start") else "-",
+                time_text(each.start) if each.HasField("start") else "-",
                 f"{each.duration.ToNanoseconds() * 1e-9:.1f} s",
                 f"{each.bytes / 1e6:.1f} MB",
                 _robot(each),
@@ -71,8 +73,8 @@ def _print_table(recordings: list[schema.Recording]) -> None:
             row[4].ljust(name),
             row[5],
         )
-        print("  ".join(columns).rstrip())
-    print("robomesh recordings info NAME shows the content of one")
+        print_line("  ".join(columns).rstrip())
+    print_line("robomesh recordings info NAME shows the content of one")
 
 
 async def found(session: Session, what: str, *, closed: bool = False, only: bool = False) -> RecordingInfo:
@@ -97,7 +99,7 @@ async def found(session: Session, what: str, *, closed: bool = False, only: bool
 
 
 def _report_silent(site: str, error: RobomeshError) -> None:
-    print(f"robomesh: without the recordings of {site}: {error}", file=sys.stderr)
+    print_line(f"robomesh: without the recordings of {site}: {error}", err=True)
 
 
 @asynccontextmanager
@@ -131,38 +133,37 @@ def show(recording: schema.Recording, as_json: bool) -> None:
     """Print one recording: a line, then its content."""
     values = _values(recording)
     if as_json:
-        discovery.print_json(values)
+        print_json(values)
         return
     state = _state(recording)
     part = f" part {recording.part}" if recording.part else ""
-    print(
+    print_line(
         for_terminal(f"{recording.name or recording.file}{part}  ") + f"{_robot(recording)}  "
-        f"{_start(recording):%Y-%m-%d %H:%M:%S}, {values['duration_s']:.1f} s, {recording.bytes / 1e6:.2f} MB"
+        f"{time_text(recording.start)}, {values['duration_s']:.1f} s, {recording.bytes / 1e6:.2f} MB"
         + (f"  ({state})" if state else "")
     )
-    print(f"    file: {recording.file}")
+    print_line(f"    file: {recording.file}")
     if recording.tags:
-        print(for_terminal(f"    tags: {', '.join(recording.tags)}"))
+        print_line(f"    tags: {', '.join(recording.tags)}")
     for line in recording.note.splitlines():
-        print(for_terminal(f"    note: {line}"))
+        print_line(f"    note: {line}")
     for change in recording.history:
-        print(for_terminal(f"    {_change_line(change)}"))
+        print_line(f"    {_change_line(change)}")
     if recording.HasField("audit_head"):
-        print(f"    audit log: entry {values['audit_head']['number']}, {values['audit_head']['hash']}")
+        print_line(f"    audit log: entry {values['audit_head']['number']}, {values['audit_head']['hash']}")
     for each in recording.merged_from:
-        print(f"    from {_source(each)}")
+        print_line(f"    from {_source(each)}")
     if recording.cause:
-        print(f"    saved because of: {recording.cause}")
+        print_line(f"    saved because of: {recording.cause}")
     if recording.attachments:
-        print(f"    attached: {', '.join(recording.attachments)}")
+        print_line(f"    attached: {', '.join(recording.attachments)}")
     for topic in recording.topics:
         lost = f", {topic.lost} lost" if topic.lost else ""
-        print(f"    {topic.topic}: {topic.messages}{_rate(topic, values['duration_s'])}{lost}")
+        print_line(f"    {topic.topic}: {topic.messages}{_rate(topic, values['duration_s'])}{lost}")
 
 
 def _change_line(change: schema.RecordingChange) -> str:
-    at = datetime.fromtimestamp(change.timestamp.ToNanoseconds() * 1e-9).astimezone()
-    words = f"{at:%Y-%m-%d %H:%M:%S}  {change.author} "
+    words = f"{time_text(change.timestamp)}  {change.author} "
     match change.change:
         case _Change.RENAMED:
             return f"{words}renamed it to {change.name}"
@@ -170,8 +171,10 @@ def _change_line(change: schema.RecordingChange) -> str:
             return f"{words}changed the note"
         case _Change.TAGGED:
             return f"{words}changed the tags: {', '.join(change.tags) or 'none'}"
-        case _:
+        case _Change.DELETED:
             return f"{words}deleted it: {change.reason} ({change.bytes} bytes, SHA-256 {change.sha256})"
+        case _:
+            return f"{words}changed it: {enum_word(_Change.Change, change.change)}"
 
 
 def _state(recording: schema.Recording) -> str:
@@ -199,7 +202,7 @@ def _source(recording: schema.Recording) -> str:
     if recording.part:
         words += f" part {recording.part}"
     if recording.HasField("start"):
-        words += f", {_start(recording):%Y-%m-%d %H:%M:%S}"
+        words += f", {time_text(recording.start)}"
     if recording.HasField("duration"):
         words += f", {recording.duration.ToNanoseconds() * 1e-9:.1f} s"
     if lost := sum(topic.lost for topic in recording.topics):
@@ -215,7 +218,7 @@ def _rate(topic: schema.Recording.TopicCount, duration_s: float) -> str:
 
 
 def _start(recording: schema.Recording) -> datetime:
-    return datetime.fromtimestamp(recording.start.ToNanoseconds() * 1e-9).astimezone()
+    return local_time(recording.start)
 
 
 def summary(recording: schema.Recording) -> str:

@@ -14,9 +14,9 @@ from robomesh.presence import OPERATOR, session_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 from services.command_line import discovery
+from services.command_line.output import print_line, progress
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.listing import attached_for, found
-from services.command_line.recordings.output import progress
 
 _OPEN_WITHIN_S = 20.0
 # A player publishes its position five times a second, also when paused.
@@ -32,10 +32,9 @@ async def _play(what: str, path: Path | None, request: schema.PlayRequest, route
     async with attached_for(what, router) as session:
         opened = _of_file(session, path, request) if path is not None else _of_site(session, what, request)
         async with opened as (site, state):
-            print(f"playing {state.file} as {site}/{state.robot}; Ctrl-C ends it", flush=True)
-            print(
-                f"watch it: robomesh monitor {site}/{state.robot}, or the page, #/{site}/{state.robot}",
-                flush=True,
+            print_line(f"playing {state.file} as {site}/{state.robot}; Ctrl-C ends it")
+            print_line(
+                f"watch it: robomesh monitor {site}/{state.robot}, or the page, #/{site}/{state.robot}"
             )
             await _until_ended(session, robot_key(site, state.robot, "replay"))
 

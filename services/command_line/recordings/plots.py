@@ -1,6 +1,5 @@
 """Plots of a recording: joints, tool and clearance over time, with events marked."""
 
-from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,8 +11,9 @@ from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.series import MOST_VALUES, Series, SeriesReader, known_values
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.topics import topic
+from services.command_line.local_time import time_text
+from services.command_line.output import progress
 from services.command_line.recordings.errors import ExportError
-from services.command_line.recordings.output import progress
 from services.command_line.recordings.span import Span, decoded, topics_of
 
 COLORS = ("#1462a8", "#8a6a1f", "#2b7a4b", "#93456f", "#5a51a8", "#5b6369", "#9a5426")
@@ -162,10 +162,9 @@ def _shown(unit: str) -> tuple[str, float]:
 def _title(file: RecordingFile) -> str:
     """Return the title: robot, name and start of the recording."""
     about = file.layout.about
-    begin = datetime.fromtimestamp(file.layout.start_ns * 1e-9).astimezone()
     robot = "/".join(about[name] for name in ("site", "robot") if about.get(name))
     return "   ".join(
-        filter(None, (robot, about.get("name") or file.path.stem, f"{begin:%Y-%m-%d %H:%M:%S}"))
+        filter(None, (robot, about.get("name") or file.path.stem, time_text(file.layout.start_ns * 1e-9)))
     )
 
 

@@ -3,10 +3,8 @@
 import asyncio
 import contextlib
 import signal
-import sys
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
-from datetime import datetime
 from typing import NamedTuple
 
 import typer
@@ -17,6 +15,8 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 from robomesh.subscription import Subscription
 from services.command_line import discovery
+from services.command_line.local_time import time_text
+from services.command_line.output import print_line
 from services.command_line.recordings.listing import show, summary
 
 _Request = schema.RecorderRequest
@@ -43,9 +43,9 @@ def record(robot: str, name: str, views: Sequence[str], router: str, as_json: bo
     if as_json:
         show(done.recording, as_json)
     else:
-        print(summary(done.recording), flush=True)
+        print_line(summary(done.recording))
     if done.problem:
-        print(f"robomesh: {done.problem}", file=sys.stderr)
+        print_line(f"robomesh: {done.problem}", err=True)
         raise typer.Exit(1)
 
 
@@ -55,7 +55,7 @@ def stop(robot: str, router: str, as_json: bool) -> None:
     if as_json:
         show(ended, as_json)
     else:
-        print(summary(ended), flush=True)
+        print_line(summary(ended))
 
 
 async def _stop(text: str, router: str) -> schema.Recording:
@@ -82,7 +82,7 @@ async def _record(text: str, name: str, views: Sequence[str], router: str) -> _D
         pressed = asyncio.create_task(interrupted.wait())
         await asyncio.wait((ending, pressed), timeout=_EARLY_END_S, return_when=asyncio.FIRST_COMPLETED)
         if not ending.done():
-            print(f"recording {robot} as {started.name}; Ctrl-C ends it", file=sys.stderr, flush=True)
+            print_line(f"recording {robot} as {started.name}; Ctrl-C ends it", err=True)
             await asyncio.wait((ending, pressed), return_when=asyncio.FIRST_COMPLETED)
         pressed.cancel()
         if not ending.done():
@@ -126,10 +126,9 @@ async def _ended(
 
 def _gone(newest: schema.Recording) -> str:
     until_s = (newest.start.ToNanoseconds() + newest.duration.ToNanoseconds()) * 1e-9
-    until = datetime.fromtimestamp(until_s).astimezone()
     return (
         f"the recorder of {newest.site}/{newest.robot} ended while it recorded {newest.name}, which is kept "
-        f"until about {until:%H:%M:%S}; begin again for what follows"
+        f"until about {time_text(until_s)}; begin again for what follows"
     )
 
 

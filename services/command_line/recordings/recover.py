@@ -5,9 +5,8 @@ from pathlib import Path
 from robomesh.recordings import recover as files
 from robomesh.recordings.capture import is_being_written
 from robomesh.recordings.files import describe_file
-from services.command_line import discovery
+from services.command_line.output import print_json, print_line, progress
 from services.command_line.recordings.errors import ExportError
-from services.command_line.recordings.output import progress
 
 
 def run(file: Path, as_json: bool) -> None:
@@ -31,7 +30,7 @@ def run(file: Path, as_json: bool) -> None:
             raise ExportError(f"{file}: not recovered, and unchanged: {error.strerror or error}") from None
         words, messages, cut, damaged = "recovered", found.messages, found.cut, found.damaged
     if as_json:
-        discovery.print_json(
+        print_json(
             {
                 "file": str(file),
                 "messages": messages,
@@ -41,7 +40,7 @@ def run(file: Path, as_json: bool) -> None:
             }
         )
     else:
-        print(
+        print_line(
             f"{file}: {words}, {messages} messages"
             + (f" without those of {damaged} damaged chunks" if damaged else "")
             + (", up to where its writer was killed" if cut else "")

@@ -20,9 +20,9 @@ from renderer.studio import Studio
 from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.schemas import robomesh_pb2 as schema
+from services.command_line.output import progress
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.meshes import recorded_mesh
-from services.command_line.recordings.output import progress
 from services.command_line.recordings.span import Span, decoded, needed, topics_of
 from services.command_line.recordings.tables import description_of
 

@@ -6,7 +6,6 @@ Entities are below `/<site>/<robot>`: `links`, `fixtures`, `frames`, `named_fram
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -18,18 +17,18 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from renderer.appearance import Appearance, appearance_of, frame_placements, placements_at
 from renderer.glb import glb_to_z_up, read_glb
-from renderer.views import FREE, camera_of
+from renderer.views import camera_of
 from robomesh.extras import missing
 from robomesh.h264 import is_key_frame
-from robomesh.keys import parse_key
+from robomesh.keys import FREE, parse_key
 from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.series import known_values, units_of
 from robomesh.recordings.values import values_of
 from robomesh.schemas import robomesh_pb2 as schema
+from services.command_line.output import print_line, progress
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.meshes import recorded_mesh
-from services.command_line.recordings.output import progress
 from services.command_line.recordings.plots import COLORS, panels_of
 from services.command_line.recordings.recorded_video import recorded_pictures
 from services.command_line.recordings.rerun_layout import PUBLISHER_TIME, RECEIVE_TIME, blueprint
@@ -185,7 +184,7 @@ class _Export:
         try:
             glb = recorded_mesh(self._file, body)
         except ExportError as error:
-            print(f"robomesh: without a body: {error}", file=sys.stderr)
+            print_line(f"robomesh: without a body: {error}", err=True)
             return
         # Rerun draws the file's own axes, which glTF defines as y up.
         mesh_to_parent = body_to_parent @ glb_to_z_up(glb)

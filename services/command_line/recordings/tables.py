@@ -11,8 +11,8 @@ from google.protobuf.message import Message
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.table import Table, is_due, table_of
 from robomesh.schemas import robomesh_pb2 as schema
+from services.command_line.output import progress
 from services.command_line.recordings.errors import ExportError
-from services.command_line.recordings.output import progress
 from services.command_line.recordings.span import Span, decoded, needed, topics_of
 
 _REPORT_EACH = 5000

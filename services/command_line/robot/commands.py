@@ -3,7 +3,6 @@
 A command imports the robot model when it runs: numpy and Pinocchio take a second.
 """
 
-import sys
 from math import degrees
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +11,7 @@ import typer
 
 from robomesh.endpoints import DEFAULT_ROUTER
 from services.command_line.options import Connect, Json, Robot, command_group
+from services.command_line.output import print_json, print_line
 from services.errors import ServiceError
 
 app = command_group("robot", "Robot descriptions: check, show, import, export, verify.")
@@ -29,7 +29,6 @@ def check(robot: _Robot, as_json: Json = False) -> None:
     from robots.description import load
     from robots.errors import DescriptionError
     from robots.mesh_inspection import mesh_findings
-    from services.command_line.discovery import print_json
 
     name = robot
     problems: list[dict[str, Any]] = []
@@ -56,19 +55,21 @@ def check(robot: _Robot, as_json: Json = False) -> None:
         print_json({"ok": not problems, "problems": problems, "warnings": warnings, **report})
     else:
         for problem in problems:
-            print(f"{problem['file']}: {problem['text']}")
+            print_line(f"{problem['file']}: {problem['text']}")
         for warning in warnings:
-            print(f"{warning['file']}: warning: {warning['text']}")
+            print_line(f"{warning['file']}: warning: {warning['text']}")
         for link, way in report.get("stands_out", {}).items():
-            print(f"{name}: {link}: visual geometry extends beyond checked geometry by {way * 1000:.1f} mm")
+            print_line(
+                f"{name}: {link}: visual geometry extends beyond checked geometry by {way * 1000:.1f} mm"
+            )
         for each in report.get("not_checked", []):
-            print(f"{name}: {' and '.join(each['links'])} are not checked: {each['reason']}")
+            print_line(f"{name}: {' and '.join(each['links'])} are not checked: {each['reason']}")
         for each in report.get("touch_at_home", []):
-            print(f"{name}: {' and '.join(each['links'])} touch at home as hulls: {each['reason']}")
+            print_line(f"{name}: {' and '.join(each['links'])} touch at home as hulls: {each['reason']}")
         for each in report.get("touch_elsewhere", []):
-            print(f"{name}: {' and '.join(each['links'])} are apart at home; {each['reason']}")
+            print_line(f"{name}: {' and '.join(each['links'])} are apart at home; {each['reason']}")
         if not problems:
-            print(f"{name}: the description is valid")
+            print_line(f"{name}: the description is valid")
     if problems:
         raise typer.Exit(1)
 
@@ -85,7 +86,6 @@ def show(
     from robots.description import load
     from robots.model import build_model, tool_placement
     from robots.summary import description_summary
-    from services.command_line.discovery import print_json
 
     description = load(robot)
     model = build_model(description)
@@ -100,20 +100,20 @@ def show(
         return
     _print_summary(summary, tool[:3, 3].tolist())
     if png is not None:
-        print(png)
+        print_line(png)
 
 
 def _print_summary(summary: dict[str, Any], tool: list[float]) -> None:
     joints = summary["joints"]
-    print(
+    print_line(
         f"{summary['title'] or summary['name']}: {len(joints)} joints, "
         f"reach {summary['reach_m'] * 1000:.0f} mm"
     )
     if summary["provenance"]:
-        print(summary["provenance"])
+        print_line(summary["provenance"])
     wide = max(len(joint["name"]) for joint in joints)
     if summary["dh"] is not None:
-        print(f"  {'D-H rows':<{wide}} {'a mm':>10} {'alpha °':>10} {'d mm':>10} {'theta °':>10}  link")
+        print_line(f"  {'D-H rows':<{wide}} {'a mm':>10} {'alpha °':>10} {'d mm':>10} {'theta °':>10}  link")
         for row in summary["dh"]["rows"]:
             variable = "theta" if row["type"] == "rotary" else "d"
             cells = {
@@ -126,27 +126,27 @@ def _print_summary(summary: dict[str, Any], tool: list[float]) -> None:
             text = " ".join(
                 f"{_cell(value)}{'*' if key == variable else ' '}" for key, value in cells.items()
             )
-            print(f"  {row['joint']:<{wide}} {text}  {row['link']}")
+            print_line(f"  {row['joint']:<{wide}} {text}  {row['link']}")
         start = summary["dh"]["start"]
         if any(start["xyz"] + start["rpy"]):
             xyz = ", ".join(f"{1000 * value:.6g}" for value in start["xyz"])
             rpy = ", ".join(f"{degrees(angle):.6g}" for angle in start["rpy"])
-            print(f"  the first row begins at xyz [{xyz}] mm, rpy [{rpy}]° in the base frame")
+            print_line(f"  the first row begins at xyz [{xyz}] mm, rpy [{rpy}]° in the base frame")
         for note in summary["dh"]["notes"]:
-            print(f"  note: {note}")
-    print(f"  {'joints':<{wide}} {'type':<10} {'limits':>20} {'home':>9}  most: speed, /s, /s")
+            print_line(f"  note: {note}")
+    print_line(f"  {'joints':<{wide}} {'type':<10} {'limits':>20} {'home':>9}  most: speed, /s, /s")
     for joint in joints:
         factor, unit = (degrees(1.0), "°") if joint["type"] == "rotary" else (1000.0, " mm")
         limits = f"{joint['lower'] * factor:.1f} .. {joint['upper'] * factor:.1f}{unit}"
         rates = [joint[key] * factor for key in ("max_speed", "max_acceleration", "max_jerk")]
-        print(
+        print_line(
             f"  {joint['name']:<{wide}} {joint['type']:<10} {limits:>20} {joint['home'] * factor:8.1f}{unit}"
             f"  {', '.join(f'{rate:.0f}' for rate in rates)}{unit}"
         )
     for frame in summary["frames"]:
         place = [1000 * row[3] for row in frame["frame_to_link"][:3]]
-        print(f"  {frame['name']} on {frame['link']} at {' '.join(f'{x:.1f}' for x in place)} mm")
-    print(f"  tool at home: {' '.join(f'{1000 * x:.1f}' for x in tool)} mm")
+        print_line(f"  {frame['name']} on {frame['link']} at {' '.join(f'{x:.1f}' for x in place)} mm")
+    print_line(f"  tool at home: {' '.join(f'{1000 * x:.1f}' for x in tool)} mm")
 
 
 def _cell(value: float) -> str:
@@ -179,7 +179,7 @@ def export(robot: _Robot, folder: Annotated[Path, typer.Argument(metavar="FOLDER
         urdf.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ExportFolderError(f"{folder}: cannot be written: {error.strerror}") from None
-    print(urdf)
+    print_line(urdf)
 
 
 @app.command("import")
@@ -200,10 +200,10 @@ def import_(
 
     robot = import_robot(source, packages=package or [], as_dh=dh)
     for note in robot.notes:
-        print(f"note: {note}", file=sys.stderr)
+        print_line(f"note: {note}", err=True)
     for name in robot.missing:
-        print(f"missing: {name}: that shape is left out", file=sys.stderr)
-    print(write_folder(robot.values, robot.files, folder.absolute()).path)
+        print_line(f"missing: {name}: that shape is left out", err=True)
+    print_line(write_folder(robot.values, robot.files, folder.absolute()).path)
     if robot.missing:
         raise typer.Exit(1)
 
@@ -226,7 +226,8 @@ def verify(
 ) -> None:
     """Compare a running robot's model with the controller's Cartesian position; exit status 1: they differ.
 
-    Move the arm from its own panel; poses are taken while it rests. Ctrl-C ends it.
+    Move the arm from its own panel; poses are taken while it rests. Ctrl-C ends it; with --out, the same
+    command goes on with its poses.
     """
     from services.command_line.robot.verify import verify as verified
 

@@ -1,6 +1,5 @@
 """`robomesh ik`: joint positions that bring the tool to a pose."""
 
-import json
 from collections.abc import Sequence
 from math import degrees, isfinite, radians
 from typing import Any
@@ -8,12 +7,13 @@ from typing import Any
 import numpy as np
 import typer
 
+from robomesh import bounded_json
 from robots.description import load
 from robots.errors import RobotError
 from robots.inverse import InverseResult, InverseSolver, Task, build_solver, natural_task, solve
 from robots.joints import JointType
 from robots.poses import rpy_rotation
-from services.command_line.discovery import print_json
+from services.command_line.output import print_json, print_line
 from services.command_line.robot.kinematics import RequestError, request_lines
 
 _KEYS = {"pose", "task", "near", "all", "seed"}
@@ -69,20 +69,20 @@ def _task(word: Any) -> Task:
 def _print_result(solver: InverseSolver, result: InverseResult) -> None:
     missed = f"{result.residual_m * 1000:.4f} mm and {degrees(result.residual_rad):.4f}°"
     if not len(result.solutions):
-        print(f"no solution: {result.reason}")
+        print_line(f"no solution: {result.reason}")
         return
     how = "in closed form" if result.analytic else "found by search"
     count = len(result.solutions)
-    print(f"{count} solution{'s' if count > 1 else ''} {how}, the tool within {missed}")
+    print_line(f"{count} solution{'s' if count > 1 else ''} {how}, the tool within {missed}")
     joints = solver.chain.joints
     wide = [max(9, len(name)) for name in joints.names]
-    print("  ".join(f"{name:>{width}}" for name, width in zip(joints.names, wide, strict=True)))
+    print_line("  ".join(f"{name:>{width}}" for name, width in zip(joints.names, wide, strict=True)))
     for positions in result.solutions.tolist():
         cells = [
             f"{degrees(value):.2f}°" if kind is JointType.ROTARY else f"{value * 1000:.2f} mm"
             for value, kind in zip(positions, joints.types, strict=True)
         ]
-        print("  ".join(f"{cell:>{width}}" for cell, width in zip(cells, wide, strict=True)))
+        print_line("  ".join(f"{cell:>{width}}" for cell, width in zip(cells, wide, strict=True)))
 
 
 def _answer_lines(solver: InverseSolver, task: Task | None, all_solutions: bool) -> None:
@@ -116,7 +116,7 @@ def _is_number(value: object) -> bool:
 
 def _answer(solver: InverseSolver, line: str, task: Task | None, all_solutions: bool) -> InverseResult:
     try:
-        request: dict[str, Any] = json.loads(line)
+        request: dict[str, Any] = bounded_json.loads(line)
         unknown = sorted(set(request) - _KEYS) if isinstance(request, dict) else None
     except (ValueError, RecursionError):
         unknown = None

@@ -3,7 +3,6 @@
 A command imports the robot model when it runs: numpy and Pinocchio take a second.
 """
 
-import json
 import sys
 from collections.abc import Iterator
 from math import isfinite
@@ -11,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from robomesh import bounded_json
 from services.command_line.options import Json, command_group
 from services.errors import ServiceError
 
@@ -34,7 +34,7 @@ def fk(
     from robots.description import load
     from robots.errors import RobotError
     from robots.model import build_model, link_placements, tool_placement
-    from services.command_line.discovery import print_json
+    from services.command_line.output import print_json
 
     if requests != "-":
         raise RequestError(f"{requests!r}: '-' is right, and one JSON request a line on standard input")
@@ -84,7 +84,7 @@ def request_lines() -> Iterator[str]:
 
 def _joint_positions(line: str) -> list[float]:
     try:
-        positions = json.loads(line, parse_constant=_reject)["joints"]
+        positions = bounded_json.loads(line, parse_constant=_reject)["joints"]
         found = [float(position) for position in positions]
         if not all(map(isfinite, found)):
             raise ValueError

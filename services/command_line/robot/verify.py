@@ -1,18 +1,19 @@
 """`robomesh robot verify`: a controller's joints, compared with the Cartesian position that it computes."""
 
 import asyncio
-import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from datetime import UTC, datetime
 from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from robomesh import reason_codes as codes
 from robomesh.atomic_write import write_atomically
 from robomesh.client.robot import AsyncRobot
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line import discovery
+from services.command_line.output import print_json, print_line
 from services.errors import ServiceError
 
 if TYPE_CHECKING:
@@ -24,6 +25,12 @@ _REST_S = 1.0
 _STILL = 2e-4  # of a joint at rest [rad] or [m]: more than the noise of encoders
 _SIGNALS_WITHIN_S = 10.0
 _TOO_MANY_POSES = 40
+# Poses are comparable while these are the same.
+_VALID_FOR = {
+    "robot": "another robot",
+    "joints_sha256": "another model or mapping of the joints",
+    "software": "another version of the controller's software",
+}
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
@@ -35,21 +42,29 @@ def verify(robot: str, connect: str, out: Path | None, *, base: str, flange: str
     """Take poses of an arm that a person moves; print, and keep, whether model and controller agree.
 
     Args:
+        out: File of the result. Until there is one, poses are kept beside it, and the next call goes on.
         base, flange: Links at the controller's base frame and flange; empty: "base" and "tool0", as in the
             URDFs of ROS-Industrial, else the model's base and the link of its tool.
 
     Raises:
         VerificationError: If the robot cannot be verified.
     """
-    record = discovery.run(_verify(robot, connect, base, flange))
-    text = record.model_dump_json()
-    if out is not None:
-        write_atomically(out, (text + "\n").encode())
-    print(text if as_json else "\n".join(_lines(record, out)), flush=True)
+    poses = None if out is None else out.with_name(f"{out.name}.unfinished")
+    record = discovery.run(_verify(robot, connect, base, flange, poses))
+    if out is not None and poses is not None:
+        _write(out, record)
+        poses.unlink(missing_ok=True)
+    if as_json:
+        print_json(record.model_dump(mode="json"))
+    else:
+        for line in _lines(record, out):
+            print_line(line)
     return record.agrees
 
 
-async def _verify(name: str, connect: str, base: str, flange: str) -> "VerificationRecord":
+async def _verify(
+    name: str, connect: str, base: str, flange: str, poses: Path | None
+) -> "VerificationRecord":
     from robots.verification import verify
 
     async with discovery.attached(connect) as session:
@@ -58,11 +73,82 @@ async def _verify(name: str, connect: str, base: str, flange: str) -> "Verificat
         state = await _state(robot)
         description = await robot.description()
         joints, placement = _model(description, base, flange)
-        samples = await _samples(robot, joints, _tool(description))
-        after = await _state(robot)
-        if (after.joints_sha256, after.software) != (state.joints_sha256, state.software):
+
+        samples: list[Sample] = []
+
+        def record() -> "VerificationRecord":
+            return _record(str(place), description, state, joints, verify(placement, joints, samples))
+
+        async def keep() -> None:
+            """Keep the poses, of which the newest was taken with the model and software of all others."""
+            nonlocal state
+            state = _of_same(place, state, await _state(robot))
+            if poses is not None:
+                _write(poses, record())
+
+        samples += [] if poses is None else _kept(poses, record())
+        await _take(samples, robot, joints, _tool(description), keep)
+        for each in state.link_reasons:
+            if each.code == codes.JOINTS_INVALID.name:
+                _say(f"{place}: {each.text}")
+        return record()
+
+
+def _of_same(
+    place: discovery.Robot, before: schema.ControllerState, now: schema.ControllerState
+) -> schema.ControllerState:
+    """Return the present state; while a link is down, the software is not known.
+
+    Raises:
+        VerificationError: If the model or the software is another one than before.
+    """
+    for key in ("joints_sha256", "software"):
+        one, other = getattr(before, key), getattr(now, key)
+        if one and other and one != other:
             raise VerificationError(f"{place}: its model or its controller's software has changed meanwhile")
-        return _record(str(place), description, state, joints, verify(placement, joints, samples))
+        setattr(now, key, other or one)
+    return now
+
+
+def _write(file: Path, record: "VerificationRecord") -> None:
+    try:
+        write_atomically(file, (record.model_dump_json() + "\n").encode())
+    except OSError as error:
+        raise VerificationError(f"{file}: cannot be written: {error.strerror}") from None
+
+
+def _kept(file: Path, now: "VerificationRecord") -> list["Sample"]:
+    """Return the poses that an interrupted comparison left; empty without one.
+
+    Raises:
+        RobotError: If the file cannot be read.
+        VerificationError: If it is damaged, or its poses are of something else.
+    """
+    import numpy as np
+
+    from robots.verification import Sample
+    from robots.verification_record import read_record
+
+    if not file.exists():
+        return []
+    kept = read_record(file)
+    for what, words in _VALID_FOR.items():
+        one, other = getattr(kept, what), getattr(now, what)
+        if one and other and one != other:
+            raise VerificationError(f"{file}: its poses are of {words}: delete it, or give another --out")
+    try:
+        samples = [
+            Sample(
+                positions=np.reshape(each.positions, len(kept.joints)),
+                tool_to_base=np.reshape(each.tool_to_base, (4, 4)),
+                tool_to_flange=np.reshape(each.tool_to_flange, (4, 4)),
+            )
+            for each in kept.poses
+        ]
+    except ValueError:
+        raise VerificationError(f"{file}: is damaged: delete it, and take the poses again") from None
+    _say(f"{file}: {len(samples)} poses are there, from {kept.time}")
+    return samples
 
 
 async def _state(robot: AsyncRobot) -> schema.ControllerState:
@@ -107,11 +193,18 @@ def _tool(description: schema.Description) -> "FloatArray":
     return np.array(tool.frame_to_link).reshape(4, 4)
 
 
-async def _samples(robot: AsyncRobot, joints: "Joints", tool: "FloatArray") -> list["Sample"]:
-    """Return a sample of each pose in which the arm rested, until they are enough."""
+async def _take(
+    samples: list["Sample"],
+    robot: AsyncRobot,
+    joints: "Joints",
+    tool: "FloatArray",
+    keep: Callable[[], Awaitable[None]],
+) -> None:
+    """Add a sample of each pose in which the arm rests, until they are enough; `keep` each."""
     from robots.verification import POSES, unlike, unmoved
 
-    samples: list[Sample] = []
+    if len(samples) >= POSES and not unmoved(joints, samples):
+        return
     signals = _Signals(robot, tool)
     following = asyncio.create_task(signals.follow())
     try:
@@ -121,8 +214,15 @@ async def _samples(robot: AsyncRobot, joints: "Joints", tool: "FloatArray") -> l
             "let it rest in each"
         )
         rest = _Rest()
-        async with robot.joints() as states:
+        silent = False
+        async with robot.joints(on_stale="yield") as states:
             async for state in states:
+                if state.stale != silent:
+                    silent = state.stale
+                    _say(f"{robot} sends no joints: waiting" if silent else f"{robot} sends joints again")
+                if silent:
+                    rest = _Rest()
+                    continue
                 positions = _in_order(joints, state.names, state.positions)
                 if not rest.lasts(positions, state.time_ns) or not unlike(joints, positions, samples):
                     continue
@@ -130,12 +230,13 @@ async def _samples(robot: AsyncRobot, joints: "Joints", tool: "FloatArray") -> l
                 if sample is None:
                     continue
                 samples.append(sample)
+                await keep()
                 lacking = unmoved(joints, samples)
                 if len(samples) >= POSES and (not lacking or len(samples) >= _TOO_MANY_POSES):
-                    return samples
+                    return
                 more = f" ({'; '.join(lacking)})" if len(samples) >= POSES else ""
                 _say(f"pose {len(samples)} of {max(POSES, len(samples) + 1)} taken: move on{more}")
-        raise VerificationError(f"{robot} sends no joints any more")
+        raise VerificationError(f"{robot} sends no joints any more")  # the session was closed
     finally:
         following.cancel()
         await asyncio.gather(following, return_exceptions=True)
@@ -255,6 +356,8 @@ def _record(
                 positions=tuple(each.sample.positions.tolist()),
                 distance_m=each.distance_m,
                 angle_rad=each.angle_rad,
+                tool_to_base=tuple(each.sample.tool_to_base.ravel().tolist()),
+                tool_to_flange=tuple(each.sample.tool_to_flange.ravel().tolist()),
             )
             for each in found.deviations
         ),
@@ -283,4 +386,4 @@ def _lines(record: "VerificationRecord", out: Path | None = None) -> list[str]:
 
 
 def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
+    print_line(text, err=True)

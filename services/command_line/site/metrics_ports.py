@@ -5,12 +5,17 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from services.command_line.output import print_text
 from services.command_line.site.services import SERVICES
 from services.errors import ListenError
 from services.site_file.listen_address import check_reach, split_address
 from services.site_file.router import RoutedSite
 from services.supervisor import ExtraPrograms, Program
+
+if TYPE_CHECKING:  # the router imports this module, and starts quickly
+    from services.site_file.site import Site
 
 logger = logging.getLogger(__name__)
 
@@ -114,7 +119,7 @@ def print_scrape_config(path: Path | None, metrics: str) -> None:
     Raises:
         ListenError: If neither gives an address with a fixed port.
     """
-    from services.site_file import site as site_file  # the router imports this module, and starts quickly
+    from services.site_file import site as site_file
 
     site = site_file.load(path)
     listen = first_address(site, metrics)
@@ -123,14 +128,14 @@ def print_scrape_config(path: Path | None, metrics: str) -> None:
             f"{path or 'the built-in site'} has no address of metrics: write [metrics] with "
             'listen = "127.0.0.1:9101" into the site file, or give --metrics'
         )
-    print(
+    print_text(
         scrape_config(
             site, [name for name, row in SERVICES.items() if site.robot or not row.of_robots], listen
         )
     )
 
 
-def scrape_config(site: RoutedSite, services: Sequence[str], listen: tuple[str, int]) -> str:
+def scrape_config(site: "Site", services: Sequence[str], listen: tuple[str, int]) -> str:
     """Return a Prometheus configuration with the services as targets.
 
     Args:
@@ -143,9 +148,12 @@ def scrape_config(site: RoutedSite, services: Sequence[str], listen: tuple[str, 
     if not first:
         raise ListenError(f"metrics {host}:0 are on free ports, which differ at each start: choose a port")
     shown, port_of = _shown({"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)), ports(listen)
+    # For the alert of an alarm; of a page on all addresses, the one that people use is not known.
+    on_all = split_address(site.console.listen)[0] in ("0.0.0.0", "::")
+    page = "" if on_all else f', page: "{site.console.url}#/events"'
     targets = "\n".join(
         f'      - targets: ["{shown}:{port_of[name]}"]\n'
-        f'        labels: {{ site: "{site.site}", service: "{name}" }}'
+        f'        labels: {{ site: "{site.site}", service: "{name}"{page if name == "watch" else ""} }}'
         for name in services
     )
     return f"{_SCRAPE_CONFIG}{targets}"

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from robomesh import service
 from services import router
+from services.command_line.output import print_line
 from services.command_line.site.metrics_ports import own_address
 from services.pki import Folder
 from services.site_file.router import RoutedSite, read_routed
@@ -18,7 +19,7 @@ def run(path: Path | None, config_out: Path | None = None, metrics: str = "") ->
     site = _read(path if path is None or config_out is None else path.absolute())
     settings = _settings(site, own_address(site, metrics, "router"))
     if config_out is not None:
-        print(router.write_config(settings, config_out))
+        print_line(router.write_config(settings, config_out))
         return
     service.run_until_signalled(router.serve(settings, ready=print))
 

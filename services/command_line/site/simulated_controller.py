@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, TypeVar
 
 from robomesh import service
 from robomesh.keys import check_name
+from services.command_line.output import print_line
 from services.command_line.site.controllers import ControllerError
 from services.command_line.site.launch import session_settings
 from services.site_file import site as site_file
@@ -80,7 +81,7 @@ def run(
         mesh=mesh,
     )
     serve = row.prepare(common, options)
-    service.run_until_signalled(serve(lambda line: print(line, flush=True)))
+    service.run_until_signalled(serve(print_line))
 
 
 def faults_mesh(faults_for: str, site: Path | None, connect: str) -> "Mesh | None":

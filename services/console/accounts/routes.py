@@ -3,7 +3,6 @@
 JSON in both directions. A refusal also has a word (`error`), for programs that do not read its code.
 """
 
-import json
 import math
 import time
 from typing import Any
@@ -13,6 +12,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 from starlette.types import Scope
 
+from robomesh import bounded_json
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from services.console.accounts.auth_service import AuthService
@@ -267,7 +267,7 @@ async def _json(request: Request, *texts: str) -> Json:
         if len(body) > MOST_BODY:
             raise refused(413, codes.TOO_LARGE(bytes=MOST_BODY))
     try:
-        asked = json.loads(body)
+        asked = bounded_json.loads(body)
     except (ValueError, RecursionError) as error:
         # Names the place, never the password.
         raise refused(400, codes.NOT_JSON(detail=error)) from None

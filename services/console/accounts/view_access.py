@@ -17,6 +17,7 @@ from typing import Any
 
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import Event
+from robomesh.wall_clock import ForwardClock
 from services.console.accounts.file import changing, now, read_accounts
 from services.console.accounts.refusal_events import PublishEvent, RefusalEvents
 from services.console.accounts.sign_in_attempts import Attempts, network
@@ -77,6 +78,11 @@ class ViewTokens:
         self._attempts = Attempts(free=10, longest_s=900.0)
         self._readers: OrderedDict[tuple[str, str], None] = OrderedDict()
         self._refusals = RefusalEvents(publish_event, "token.refused")
+        # A clock that is set back must not make an expired token valid again.
+        self._clock = ForwardClock()
+
+    def _now(self) -> datetime:
+        return datetime.fromtimestamp(self._clock.now_s(), UTC)
 
     def check(self, token: str, robot: str, view: str, *, address: str) -> TokenRequest:
         """Check the token of a request for a view of a robot (`<site>/<robot>`).
@@ -93,7 +99,7 @@ class ViewTokens:
             if wait_s > 0:
                 raise SignInError(codes.ACCOUNT_WAIT(seconds=math.ceil(wait_s)), wait_s)
             raise SignInError(codes.TOKEN_UNKNOWN())
-        if (ended := found.ended(datetime.now(UTC))) is not None:
+        if (ended := found.ended(self._now())) is not None:
             raise SignInError(ended)
         if (found.robot, found.view) != (robot, view):
             raise SignInError(codes.TOKEN_OTHER_VIEW(token=found.name, robot=found.robot, view=found.view))
@@ -109,7 +115,7 @@ class ViewTokens:
 
     def expire(self) -> None:
         """End the requests whose token is no longer valid; call it about once a second."""
-        at = datetime.now(UTC)
+        at = self._now()
         for request in tuple(self._running):
             if self._tokens.get(request.token.name) != request.token or request.token.ended(at):
                 request.end()

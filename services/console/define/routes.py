@@ -4,7 +4,6 @@ A refused description also has `problems`, each with its place.
 """
 
 import asyncio
-import json
 import logging
 import sys
 from collections import OrderedDict
@@ -17,6 +16,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Mount, Route
 
+from robomesh import bounded_json
 from robomesh import reason_codes as codes
 from robots.description import library_names
 from robots.errors import RobotError, RobotExistsError
@@ -284,7 +284,7 @@ class Define:
             if len(body) > most:
                 raise RefusedRequest(413, codes.TOO_LARGE(bytes=most))
         try:
-            asked = json.loads(body, parse_int=_whole_number)
+            asked = bounded_json.loads(body, parse_int=_whole_number)
         except (ValueError, RecursionError) as error:
             raise RefusedRequest(400, codes.NOT_JSON(detail=error)) from None
         if not isinstance(asked, dict):

@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
-_NEVER = ("socket.connect", "socket.bind", "os.system", "os.exec", "os.posix_spawn")
+_NEVER = ("socket.connect", "socket.bind", "os.system", "os.exec")
+# Python 3.13 begins a process by both, earlier versions by the first.
+_BEGINS = ("subprocess.Popen", "os.posix_spawn")
 
 
 def confine(folder: Path) -> None:
@@ -31,7 +33,7 @@ def confine(folder: Path) -> None:
             path, _, flags = arguments
             if not isinstance(path, int) and not _allowed(os.fsdecode(path), flags or 0, own, code):
                 raise PermissionError(1, "is outside of the robot's folder", os.fsdecode(path))
-        elif event in _NEVER or (event == "subprocess.Popen" and arguments[0] != sys.executable):
+        elif event in _NEVER or (event in _BEGINS and os.fsdecode(arguments[0]) != sys.executable):
             raise PermissionError(1, f"{event} is not allowed in this process")
 
     sys.addaudithook(hook)

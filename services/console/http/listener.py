@@ -24,23 +24,34 @@ class Listener(socket.socket):
     Attributes:
         most: Maximum number of connections.
         most_of_one: Maximum number of connections from one address.
+        most_in_turn: Connections that a turn of the event loop accepts.
     """
 
     most = 768
     most_of_one = 256
+    most_in_turn = 8
 
     def __init__(self, *values: Any, **named: Any) -> None:
         super().__init__(*values, **named)
         self._open: Counter[str] = Counter()
+        self._in_turn = 0
 
     def accept(self) -> tuple[socket.socket, Any]:
         """Return the next connection within the limits, like `socket.accept`.
 
         Raises:
-            BlockingIOError: If there is none.
+            BlockingIOError: If there is none, or the next turn of the event loop is due.
         """
+        self._in_turn += 1
+        if self._in_turn > self.most_in_turn:
+            self._in_turn = 0
+            raise BlockingIOError(errno.EAGAIN, "more in the next turn")
         for _ in range(self.most):
-            connection, peer = super().accept()
+            try:
+                connection, peer = super().accept()
+            except BlockingIOError:
+                self._in_turn = 0
+                raise
             address = str(peer[0])
             if self._open.total() < self.most and self._open[address] < self.most_of_one:
                 self._open[address] += 1

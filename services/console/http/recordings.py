@@ -76,7 +76,7 @@ class Recordings:
         """Send the file, or a range of it."""
         file = self._file(request)
         first, name = await file.piece(), file.name
-        total, tag = first.total, f'"{first.version}"'
+        total, tag = first.total, _tag(first)
         headers = {
             "ETag": tag,
             "Accept-Ranges": "bytes",
@@ -115,10 +115,11 @@ class Recordings:
         for each in names:
             site, _, name = each.partition("/")
             file = RecorderFile(self._session, site, name, asker=asker)
+            saved = file.saved_name
             info = await file.describe()
             if info.open:
                 raise RefusedRequest(409, codes.RECORDING_WRITTEN(name=info.name))
-            entries.append(ZipEntry(site, file, info, await file.piece()))
+            entries.append(ZipEntry(site, saved, file, info, await file.piece()))
         headers = {
             "Cache-Control": "no-store",
             # Not application/zip, which would be compressed again.
@@ -131,7 +132,7 @@ class Recordings:
         """Send a picture from the recording."""
         piece = await self._file(request).piece(attachment="thumbnail.jpg", length=4 << 20)
         # A recording's open part may be replaced, so browsers must revalidate; the body is seldom sent.
-        headers = {"ETag": f'"{piece.version}"', "Cache-Control": "no-cache"}
+        headers = {"ETag": _tag(piece), "Cache-Control": "no-cache"}
         if request.headers.get("if-none-match") == headers["ETag"]:
             return Response(status_code=304, headers=headers)
         return Response(piece.data, media_type="image/jpeg", headers=headers)
@@ -237,3 +238,8 @@ def _decoded(kind: type[AnyMessage], data: bytes) -> AnyMessage | None:
 
 def _answered(handler: Handler) -> Handler:
     return with_error_responses(handler, as_text, refused_error)
+
+
+def _tag(piece: schema.Piece) -> str:
+    """Return the entity tag of a file's version, which its recorder chose."""
+    return f'"{quote(piece.version)}"'

@@ -15,9 +15,10 @@ _FIRST_YEAR, _LAST_YEAR = 1980, 2107  # of a ZIP's time
 
 
 class ZipEntry(NamedTuple):
-    """A recording in the ZIP; `first` has its size and version."""
+    """A recording in the ZIP; `saved` is its file's checked name, `first` has its size and version."""
 
     site: str
+    saved: str
     file: RecorderFile
     info: schema.Recording
     first: schema.Piece
@@ -52,8 +53,8 @@ async def zip_of(entries: Sequence[ZipEntry]) -> AsyncIterator[bytes]:
     """
     out, is_one_site = _Sent(), len({each.site for each in entries}) == 1
     with zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as archive:
-        for site, file, info, first in entries:
-            name = file.name if is_one_site else f"{site}/{file.name}"
+        for site, saved, file, info, first in entries:
+            name = saved if is_one_site else f"{site}/{saved}"
             entry = zipfile.ZipInfo(name, _time(info))
             entry.file_size = first.total  # decides whether the entry needs ZIP64
             with archive.open(entry, "w") as content:

@@ -12,6 +12,7 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from services.console.http.request_timeout import Connection
+from services.console.read_scheduler import READS, InTurn, ReadScheduler
 from services.console.websocket.websocket_transport import WebSocketTransport
 from services.errors import ListenError
 
@@ -29,7 +30,7 @@ def server_of(app: ASGIApp, tls: ssl.SSLContext | None) -> "Server":
     """Return a server for an application."""
     return Server(
         uvicorn.Config(
-            app,
+            InTurn(app),
             ws=WebSocketTransport,
             ws_per_message_deflate=False,
             ws_max_size=_MOST_MESSAGE,
@@ -59,9 +60,10 @@ class Server(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Listen, with a time limit for TLS handshakes."""
         context: ssl.SSLContext | None = self.config.ssl
+        state = {READS: ReadScheduler()}
         self.servers = [
             await asyncio.get_running_loop().create_server(
-                lambda: Connection(config=self.config, server_state=self.server_state, app_state={}),
+                lambda: Connection(config=self.config, server_state=self.server_state, app_state=state),
                 sock=listener,
                 ssl=context,
                 ssl_handshake_timeout=None if context is None else _HANDSHAKE_WITHIN_S,

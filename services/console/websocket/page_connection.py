@@ -46,6 +46,9 @@ _MOST_WATCHES = 1024
 _MOST_ASKS = 64
 _MOST_STOPS = 1024
 _LONGEST_KEY = 200
+# Costs, compared with a message: a request on the mesh, a new subscription, and held samples for a watch.
+_ASK_COST = 3.0
+_SUBSCRIPTION_COST, _SAMPLES_OF_COST, _MOST_COST = 10.0, 32.0, 200.0
 _CLOSED_WITHIN_S = 1.0
 _LONGEST_ASK_S = 30.0  # a collision check of a program
 _KEY_FRAME_EACH_S = 1.0
@@ -62,6 +65,7 @@ class Browser:
         site: The console's own site.
         who: The signed-in session; None: the console has no accounts.
         own_name: The operator that the page acts as; empty if it may use any name, without certificates.
+        stops_only: Accept nothing but requests for a stop; without a greeting.
 
     Attributes:
         operator: Presence of the operator who has control through this page.
@@ -77,12 +81,13 @@ class Browser:
         site: str,
         user: SignedIn | None = None,
         own_name: str = "",
+        stops_only: bool = False,
     ) -> None:
         self.operator = OperatorPresence(session, own_name)
         self.user, self.own_name = user, own_name
         # Anonymous pages use the connection's id.
         self._asker = own_name or self.operator.id
-        self._greet, self._site = greet, site
+        self._greet, self._site, self.stops_only = greet, site, stops_only
         self._session = session
         self._subscriptions = subscriptions
         self._views = views
@@ -96,7 +101,8 @@ class Browser:
         self._soon: asyncio.Handle | None = None
         # Number of samples for this browser; newer ones replaced those that were not sent.
         self.offered = 0
-        self.greet()
+        if not stops_only:
+            self.greet()
 
     @property
     def in_control(self) -> bool:
@@ -157,6 +163,8 @@ class Browser:
             message = FromPage.FromString(await _bytes(websocket))
             if self._order.overflowed:
                 raise WatchError(codes.PAGE_READS_TOO_SLOWLY(bytes=MOST_UNREAD))
+            if self.stops_only and not message.ask.key.endswith("/stop"):
+                raise WatchError(codes.PAGE_STOPS_ONLY())
             match message.WhichOneof("message"):
                 case "watch":
                     self._watch(message.watch.key)
@@ -172,6 +180,8 @@ class Browser:
             raise WatchError(codes.KEY_TOO_LONG(count=len(expression), most=_LONGEST_KEY))
         if len(self._watches) >= _MOST_WATCHES:
             raise WatchError(codes.PAGE_TOO_MANY_KEYS(count=_MOST_WATCHES))
+        if expression not in self._subscriptions:
+            self._spend(_SUBSCRIPTION_COST)
         if check_expression(expression).history is History.KEY_FRAME:
             self._video[expression] = AdaptiveVideo(
                 expression,
@@ -183,7 +193,9 @@ class Browser:
             )
             self._queue_frame(expression)
         else:
+            offered = self.offered
             self._subscriptions.join(expression, self._offer)
+            self._spend((self.offered - offered) / _SAMPLES_OF_COST)
         self._watches.add(expression)
 
     def _unwatch(self, expression: str) -> None:
@@ -197,6 +209,10 @@ class Browser:
         else:
             self._subscriptions.leave(expression, self._offer)
         self._order.remove(expression)
+
+    def _spend(self, cost: float) -> None:
+        if self._line is not None:
+            self._line.spend(min(cost, _MOST_COST))
 
     def _offer(self, batch: SampleBatch) -> None:
         self.offered += len(batch.samples) + batch.overtaken
@@ -253,6 +269,7 @@ class Browser:
             reason = codes.PAGE_TOO_MANY(count=most)
             self.send_message(refusal(ask.id, reason.text, reason))
         else:
+            self._spend(_ASK_COST)
             self._keep(self._answer(ask))
 
     async def _answer(self, ask: FromPage.Ask) -> None:

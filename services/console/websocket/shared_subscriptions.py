@@ -21,6 +21,9 @@ log = logging.getLogger(__name__)
 _NEWEST = {History.KEY_FRAME: 75, History.LAST_100: 400}
 _NEWEST_STATE = 1024
 _ASK_AGAIN_S = 3.0
+# An unwatched subscription ends within this time: a page that watches and unwatches in turn does not
+# subscribe at its own pace, and an unwatched view is drawn for no longer.
+_LINGER_S = 2.0
 
 Sink = Callable[[SampleBatch], None]
 
@@ -45,9 +48,13 @@ class SharedSubscription:
             sink(batch)
         self._sinks.add(sink)
 
-    def leave(self, sink: Sink) -> bool:
-        """Remove a sink; return whether none is left."""
+    def leave(self, sink: Sink) -> None:
+        """Remove a sink."""
         self._sinks.discard(sink)
+
+    @property
+    def unwatched(self) -> bool:
+        """True if it has no sink."""
         return not self._sinks
 
     def close(self) -> None:
@@ -108,6 +115,10 @@ class SharedSubscriptions:
         self.scheduler = WriteScheduler()
         self._session = session
         self._subscriptions: dict[str, SharedSubscription] = {}
+        self._ends: dict[str, asyncio.TimerHandle] = {}
+
+    def __contains__(self, expression: str) -> bool:
+        return expression in self._subscriptions
 
     def join(self, expression: str, sink: Sink) -> None:
         """Subscribe a sink to a key expression.
@@ -123,16 +134,27 @@ class SharedSubscriptions:
         shared.join(sink)
 
     def leave(self, expression: str, sink: Sink) -> None:
-        """Unsubscribe a sink. The last one ends the subscription, so that unwatched views are not drawn."""
+        """Unsubscribe a sink. Without one a subscription soon ends, so that unwatched views are not drawn."""
         shared = self._subscriptions.get(expression)
-        if shared is not None and shared.leave(sink):
-            del self._subscriptions[expression]
-            shared.close()
+        if shared is not None:
+            shared.leave(sink)
+            if shared.unwatched and expression not in self._ends:
+                loop = asyncio.get_running_loop()
+                self._ends[expression] = loop.call_later(_LINGER_S, self._end, expression)
+
+    def _end(self, expression: str) -> None:
+        """End a subscription, or let it last if it is watched again."""
+        del self._ends[expression]
+        if self._subscriptions[expression].unwatched:
+            self._subscriptions.pop(expression).close()
 
     def close(self) -> None:
         """End all subscriptions."""
+        for timer in self._ends.values():
+            timer.cancel()
         for shared in self._subscriptions.values():
             shared.close()
+        self._ends.clear()
         self._subscriptions.clear()
 
 

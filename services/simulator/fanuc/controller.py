@@ -19,7 +19,7 @@ from robots.poses import rotation_rpy
 from services.simulator.demo import DemoProgram
 from services.simulator.fanuc.rmi_program import NAME as RMI_MOVE
 from services.simulator.fanuc.rmi_program import ProgramStatus, RmiProgram
-from services.simulator.fault_table import LEAP
+from services.simulator.fault_table import displacement
 
 PROGRAM = "DEMO"
 SOFTWARE = "V0.00P/00 simulated"
@@ -167,11 +167,10 @@ class SnpxController:
         """Return the current position in the world frame, with the tool.
 
         Args:
-            active: Of the faults: `jump`, `joints`.
+            active: Of the faults: `jump`, `corrupt`, `joints`.
         """
         positions = self.positions(now_s).copy()
-        if "jump" in active and int(now_s) % 2:
-            positions[0] += np.radians(LEAP)
+        positions[0] += np.radians(displacement(active, now_s))
         axes = [*self._axes.values(positions)]
         if "joints" in active:
             axes[next(each for each in range(AXES) if each not in self._axes.used)] = _MOVED_DEGREES

@@ -22,7 +22,7 @@ from services.simulator.faults import Faults
 logger = logging.getLogger(__name__)
 
 SNPX_FAULTS = (
-    *("freeze", "garbage", "split", "flood", "deluge", "drop", "jump", "local", "fault", "mute"),
+    *("freeze", "garbage", "split", "flood", "deluge", "drop", "jump", "corrupt", "local", "fault", "mute"),
     *("joints", "restart", "refuse", "burst", "busy", "loss"),
 )
 """Faults that this controller can show; the others concern commands."""

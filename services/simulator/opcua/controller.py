@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping
 from robots.description import RobotDescription
 from robots.joints import FloatArray, JointType, joints_of
 from services.simulator.demo import DemoProgram
-from services.simulator.fault_table import LEAP
+from services.simulator.fault_table import displacement
 
 PROGRAM = "DEMO"
 MANUAL, EXTERNAL = 1, 4
@@ -54,7 +54,7 @@ class OpcUaController:
         state = self._program.state(now_s)
         values: dict[str, float] = {}
         for number, factor in enumerate(self._factors):
-            leap = LEAP if number == 0 and "jump" in active and int(now_s) % 2 else 0.0
+            leap = 0.0 if number else displacement(active, now_s)
             values[f"position.{number}"] = float(state.positions[number]) * factor + leap
             values[f"speed.{number}"] = float(state.velocities[number]) * factor
         return values

@@ -25,7 +25,7 @@ from services.site_file.listen_address import check_reach, split_address
 logger = logging.getLogger(__name__)
 
 OPCUA_FAULTS = (
-    *("freeze", "garbage", "drop", "jump", "local", "fault", "mute"),
+    *("freeze", "garbage", "drop", "jump", "corrupt", "local", "fault", "mute"),
     *("restart", "refuse"),
 )
 """Faults that this controller can show; the others concern other protocols."""

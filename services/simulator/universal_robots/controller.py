@@ -36,7 +36,6 @@ from robots.joints import FloatArray, joints_of
 from robots.model import build_model, link_placements, tool_jacobian, tool_placement
 from robots.poses import rotation_vector
 from services.simulator.errors import SimulatorError
-from services.simulator.fault_table import LEAP
 from services.simulator.universal_robots.fields import OFFERED
 from services.simulator.universal_robots.programs import Programs
 from services.simulator.universal_robots.registers import Registers
@@ -280,15 +279,15 @@ class UrController:
         """Position of the speed slider, 0 to 1."""
         return self._slider
 
-    def values(self, names: Collection[str], now_s: float, *, leap: bool = False) -> dict[str, Value]:
+    def values(self, names: Collection[str], now_s: float, *, leap_deg: float = 0.0) -> dict[str, Value]:
         """Return the values of offered fields.
 
         Args:
-            leap: The first joint is reported LEAP degrees too high.
+            leap_deg: The first joint is reported too high by this angle.
         """
         state = self.programs.arm(now_s)
         positions = state.positions.copy()
-        positions[0] += math.radians(LEAP) if leap else 0.0
+        positions[0] += math.radians(leap_deg)
         found = self._modes() | self._measured(state.positions, state.velocities, state.accelerations, now_s)
         found |= {
             "timestamp": self.uptime_s(now_s),

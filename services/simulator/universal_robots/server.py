@@ -26,7 +26,7 @@ from protocol_gateway.drivers.universal_robots.rtde_messages import (
     Recipe,
 )
 from services.simulator import faults as effects
-from services.simulator.fault_table import FAULTS
+from services.simulator.fault_table import FAULTS, displacement
 from services.simulator.faults import Faults
 from services.simulator.universal_robots import dashboard, messages
 from services.simulator.universal_robots.controller import UrController
@@ -37,7 +37,7 @@ logger = logging.getLogger(__name__)
 
 UR_FAULTS = (
     *("freeze", "garbage", "split", "flood", "deluge", "drop"),
-    *("jump", "local", "fault", "restart", "refuse", "burst"),
+    *("jump", "corrupt", "local", "fault", "restart", "refuse", "burst"),
 )
 """Faults that this controller can show; the others concern units or commands."""
 
@@ -531,8 +531,8 @@ class RtdeClient(Connection):
 
     def _data(self, now_s: float, number: int, active: frozenset[str]) -> bytes:
         assert self._recipe is not None
-        leap = "jump" in active and bool(int(now_s) % 2)
-        values = self._server.controller.values(self._recipe.names, now_s, leap=leap)
+        leap = displacement(active, now_s)
+        values = self._server.controller.values(self._recipe.names, now_s, leap_deg=leap)
         data = rtde.package(PackageType.DATA, self._recipe.write(values))
         index, rest = divmod(number, _GARBAGE_EACH)
         return _GARBAGE[index % len(_GARBAGE)] + data if "garbage" in active and not rest else data

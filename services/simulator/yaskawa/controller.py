@@ -28,7 +28,7 @@ from robots.model import build_model, tool_placement
 from robots.motion import ArmState, Motion
 from robots.poses import rotation_rpy
 from services.simulator.demo import DemoProgram
-from services.simulator.fault_table import LEAP
+from services.simulator.fault_table import displacement
 
 JOB = "DEMO"
 AXIS_NAMES = ("S", "L", "U", "R", "B", "T", "E", "W")
@@ -230,11 +230,10 @@ class HsesController:
         """Return the position in pulses.
 
         Args:
-            active: Of the faults: `jump`, `joints`.
+            active: Of the faults: `jump`, `corrupt`, `joints`.
         """
         positions = self.positions(now_s).copy()
-        if "jump" in active and int(now_s) % 2:
-            positions[0] += np.radians(LEAP)
+        positions[0] += np.radians(displacement(active, now_s))
         pulses = [*self._axes.pulses(positions)[: self._axis_count]]
         if "joints" in active:
             pulses[self._extra_axis] = _MOVED_AXIS

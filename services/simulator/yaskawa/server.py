@@ -18,7 +18,7 @@ from services.simulator.yaskawa.messages import Question
 logger = logging.getLogger(__name__)
 
 HSES_FAULTS = (
-    *("freeze", "garbage", "flood", "deluge", "jump", "local", "fault", "mute", "joints"),
+    *("freeze", "garbage", "flood", "deluge", "jump", "corrupt", "local", "fault", "mute", "joints"),
     *("restart", "refuse", "burst", "busy", "loss"),
 )
 """Faults that this controller can show; the others concern connections or commands."""

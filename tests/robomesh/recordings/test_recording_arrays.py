@@ -22,7 +22,9 @@ import robomesh
 from robomesh import reason_codes as codes
 from robomesh.header import Header
 from robomesh.recordings.capture import Capture
+from robomesh.recordings.errors import CaptureError
 from robomesh.recordings.reading import RecordingFile
+from robomesh.recordings.recover import recover
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.topics import topic
 from services.command_line.recordings.span import Span
@@ -381,6 +383,37 @@ def test_a_small_file_whose_chunks_unpack_to_much_is_refused(tmp_path, monkeypat
         (tmp_path / "cut.mcap").write_bytes(path.read_bytes()[:keep])
         with pytest.raises(robomesh.RecordingError, match="unpack to"):
             robomesh.open_recording(tmp_path / "cut.mcap")
+        with pytest.raises(CaptureError, match="unpack to"):
+            recover(tmp_path / "cut.mcap")
+
+
+def test_many_messages_of_a_small_chunk_do_not_wait_in_memory(tmp_path, monkeypatch):
+    monkeypatch.setattr("robomesh.recordings.reading._MOST_WAITING_BYTES", 1 << 20)
+    path = _file(tmp_path / "many.mcap", lambda writer, channel: _put(writer, channel, [b""] * 100_000))
+    with path.open("rb") as stream:  # by the format's own reader it is valid
+        assert make_reader(stream).get_summary().statistics.message_count == 100_000
+    with RecordingFile(path) as file:
+        tracemalloc.start()
+        try:
+            times = [message.received_ns for message in file.messages()]
+            assert tracemalloc.get_traced_memory()[1] < 16 << 20
+        finally:
+            tracemalloc.stop()
+    assert times == sorted(times)
+    assert len(times) == 100_000
+
+
+def test_long_metadata_of_another_program_is_not_kept(tmp_path):
+    def fill(writer, channel):
+        writer.add_metadata("other", {"text": "x" * (2 << 20)})
+        writer.add_metadata("robomesh", {"name": "ours"})
+        _put(writer, channel, [joints(waist=1)])
+
+    path = _file(tmp_path / "long.mcap", fill)
+    for keep in (None, -100):  # with and without a summary
+        (tmp_path / "cut.mcap").write_bytes(path.read_bytes()[:keep])
+        with RecordingFile(tmp_path / "cut.mcap") as file:
+            assert [each.name for each in file.layout.metadata] == ["robomesh"]
 
 
 def test_messages_without_bytes_count_too(tmp_path, monkeypatch):

@@ -9,6 +9,7 @@ const CHINESE: Record<string, readonly [title: string, advice: string]> = {
   "link.silent": ["控制器无数据", "检查控制器电源、网线和站点文件中的地址。"],
   "link.deluge": ["数据不像来自控制器", "那里发送数据的可能不是控制器，或控制器已损坏。"],
   "controller.joint_count": ["关节数不符", "站点文件中的型号与控制器不一致。"],
+  "controller.joint_values": ["关节值不可能正确", "线路损坏了数据，或站点文件中的型号不符：请看控制器自身的显示。"],
   "link.channel_lost": ["控制器的一个接口未连接", "请检查控制器的服务、站点文件和防火墙中的此端口。"],
   "link.flooding": ["控制器数据过载", "降低控制器的发送频率；目前仅发布最新数据。"],
   "controller.fault": ["控制器故障", "在控制器上排除故障，然后复位。"],

@@ -33,9 +33,15 @@ export interface JointUnit {
 }
 
 export function jointUnit(joint: Description_Joint): JointUnit {
-  return joint.type === Description_Joint_Type.PRISMATIC
-    ? { unit: "mm", decimals: 1, factor: 1000 }
-    : { unit: "°", decimals: 2, factor: DEGREES };
+  switch (joint.type) {
+    case Description_Joint_Type.PRISMATIC:
+      return { unit: "mm", decimals: 1, factor: 1000 };
+    case Description_Joint_Type.ROTARY:
+    case Description_Joint_Type.TYPE_UNSPECIFIED:
+      return { unit: "°", decimals: 2, factor: DEGREES };
+    default: // of a newer program: as it was sent
+      return { unit: "", decimals: 4, factor: 1 };
+  }
 }
 
 /** Return a joint's title in the page's language; its name is the identifier. */

@@ -222,6 +222,14 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ["more than {bytes} bytes are waiting for a page that does not read", "超过 {bytes} 字节等待一个不读取的页面"],
   ],
   [
+    "page.asks_too_much",
+    [
+      "this page has sent more than the console reads from one page for more than {seconds} s: send less",
+      "本页发送的请求超过控制台对一个页面的读取限度已逾 {seconds} 秒：请减少请求",
+    ],
+  ],
+  ["page.stops_only", ["this connection takes requests for a stop only", "此连接只接受停止请求"]],
+  [
     "page.too_many_keys",
     ["this page already watches {count} keys: unwatch one first", "本页已在监视 {count} 个键：请先取消一个"],
   ],
@@ -438,6 +446,13 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ],
   ],
   [
+    "command.deadline_far",
+    [
+      "its not_after is {seconds} s ahead of the gateway's time; {command} may wait {most} s: use the gateway's time (`now` in each lease answer)",
+      "其 not_after 比网关时间晚 {seconds} 秒；{command} 最多可等待 {most} 秒：请使用网关时间（见每次控制权应答中的 now）",
+    ],
+  ],
+  [
     "command.waited",
     [
       "it waited {waited} s in the gateway (for the audit log, or for earlier requests); after {seconds} s its sender may have given up: send it again",
@@ -554,6 +569,13 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "其编码器为绝对式，始终已回零：请将其移到原位",
     ],
   ],
+  [
+    "gateway.twice",
+    [
+      "another gateway ({id}) also serves robot {robot}, so nobody knows which of them grants control: stop one of the two",
+      "另有网关（{id}）也在服务机器人 {robot}，无法确定由哪一个授予控制权：请停止其中之一",
+    ],
+  ],
   ["robot.read_only", ["this robot is read-only: {cause}", "此机器人只读：{cause}"]],
   ["robot.is_read_only", ["read-only: {cause}", "只读：{cause}"]],
   [
@@ -656,11 +678,33 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ["link.no_data", ["{where} sends nothing", "{where} 无数据"]],
   ["link.reconnects", ["{where} sends nothing; connecting again", "{where} 无数据，正在重连"]],
   [
+    "gateway.occupied",
+    [
+      "{work} occupied the gateway's event loop for {seconds} s: everything else waited, also stops",
+      "{work} 占用网关事件循环 {seconds} 秒：其间其他一切（包括停止）都在等待",
+    ],
+  ],
+  [
     "link.deluge",
     ["{where} sends far too much data: all of it is discarded", "{where} 发送的数据远超上限：全部未采用"],
   ],
   ["link.other_joints", ["{where} sends {cause}", "{where} 发送的关节数不符：{cause}"]],
   ["joints.values", ["{count} joint values, the description has {joints}", "{count} 个关节值，而描述中有 {joints} 个"]],
+  ["joints.no_number", ["no finite number for joint {name}", "关节 {name} 的值不是有限数"]],
+  [
+    "joints.far",
+    [
+      "joint {name} at {value}, far beyond its limits {lower} to {upper}",
+      "关节 {name} 位于 {value}，远超其限位 {lower} 至 {upper}",
+    ],
+  ],
+  [
+    "joints.leap",
+    [
+      "joint {name} at {after} only {seconds} s after {before}: no drive is that fast",
+      "关节 {name} 从 {before} 到 {after} 仅用 {seconds} 秒：任何驱动都达不到",
+    ],
+  ],
   ["link.just_ended", ["the connection has just ended", "连接刚刚断开"]],
   ["link.broke", ["the connection broke while it was written", "写入时连接中断"]],
   ["link.clogged", ["the controller does not read; connecting again", "控制器不读取数据；正在重连"]],
@@ -946,6 +990,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "其关节未经核对：控制器软件现为 {now}，而比较时为 {before}：请重新运行 robomesh robot verify",
     ],
   ],
+  ["joints.invalid", ["its joints cannot be right ({cause})", "其关节值不可能正确（{cause}）"]],
   ["positions.unknown", ["the robot's position is unknown ({cause})", "机器人当前位置未知（{cause}）"]],
   ["positions.none", ["the controller has not reported joint positions", "控制器未告知关节位置"]],
   ["speed.missing", ["SPEED needs speed_percent, from 1 to 100", "SPEED 须带 speed_percent，1 至 100"]],

@@ -1,4 +1,4 @@
-// The page's one WebSocket to the console: subscriptions and requests.
+// The page's WebSocket to the console: subscriptions and requests; and another one for its stops.
 
 import type { DescMessage, MessageInitShape, MessageShape } from "@bufbuild/protobuf";
 import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
@@ -49,6 +49,9 @@ const SILENT_MS = 800;
 const ANSWER_TIMEOUT_MS = 15_000;
 const CHECK_INTERVAL_MS = 200;
 const PRESENCE_INTERVAL_MS = 20;
+/** A stop without an answer for so long is sent over the page's own connection, too. */
+const STOP_AGAIN_MS = 500;
+const STOPS_REOPEN_MS = 2000;
 /** The console ended this page's session; the reason says why. */
 const SIGNED_OUT = 4401;
 
@@ -67,6 +70,8 @@ const newest = new Map<string, Sample>();
 const changes = new Map<string, boolean>();
 const pending = new Map<bigint, { resolve: (payload: Uint8Array) => void; reject: (error: AskError) => void }>();
 let socket: WebSocket | null = null;
+/** Nothing precedes a stop on this connection: the console reads it before the page's other requests. */
+let stopSocket: WebSocket | null = null;
 let lastAsk = 0n;
 let retryMs = 250;
 /** When the last message arrived [ms], and a function that closes an idle connection. */
@@ -121,6 +126,7 @@ function connect(reconnect: () => void, ended: (why: string) => void): void {
     giveUp = () => undefined;
     opened.onopen = opened.onmessage = opened.onclose = null;
     socket = null;
+    stopSocket?.close();
     if (lostAt.value === null) lostAt.value = Date.now();
     for (const { reject } of pending.values()) reject(new AskError(t("not_connected"), true));
     pending.clear();
@@ -147,6 +153,7 @@ function connect(reconnect: () => void, ended: (why: string) => void): void {
   opened.onopen = () => {
     received();
     socket = opened;
+    openStopSocket(opened);
     retryMs = 250;
     changes.clear();
     presence.value = new Set();
@@ -157,6 +164,15 @@ function connect(reconnect: () => void, ended: (why: string) => void): void {
     receive(new Uint8Array(event.data));
   };
   opened.onclose = ({ code, reason }) => end(code, reason);
+}
+
+/** Keep the connection for stops open, for as long as the page's own connection is the same. */
+function openStopSocket(own: WebSocket): void {
+  if (socket !== own) return;
+  stopSocket = new WebSocket(`${meshAddress()}/stop`);
+  stopSocket.binaryType = "arraybuffer";
+  stopSocket.onmessage = (event: MessageEvent<ArrayBuffer>) => receive(new Uint8Array(event.data));
+  stopSocket.onclose = () => setTimeout(openStopSocket, STOPS_REOPEN_MS, own);
 }
 
 /** Reconnect if nothing was received since a time of `performance.now`. */
@@ -201,8 +217,11 @@ export async function ask<Q extends DescMessage, A extends DescMessage>(
 ): Promise<MessageShape<A>> {
   const id = ++lastAsk;
   const payload = toBinary(requestSchema, create(requestSchema, request));
+  const message = { case: "ask", value: { id, key, payload, timeoutS } } as const;
   const answer = new Promise<Uint8Array>((resolve, reject) => {
-    if (!send({ case: "ask", value: { id, key, payload, timeoutS } })) {
+    if (key.endsWith("/stop") && send(message, stopSocket)) {
+      setTimeout(() => pending.has(id) && send(message), STOP_AGAIN_MS);
+    } else if (!send(message)) {
       reject(new AskError(t("not_connected"), true));
       return;
     }
@@ -239,9 +258,9 @@ function takePending(id: bigint) {
   return waiting;
 }
 
-function send(message: NonNullable<MessageInitShape<typeof FromPageSchema>["message"]>): boolean {
-  if (socket?.readyState !== WebSocket.OPEN) return false;
-  socket.send(toBinary(FromPageSchema, create(FromPageSchema, { message })));
+function send(message: NonNullable<MessageInitShape<typeof FromPageSchema>["message"]>, over = socket): boolean {
+  if (over?.readyState !== WebSocket.OPEN) return false;
+  over.send(toBinary(FromPageSchema, create(FromPageSchema, { message })));
   return true;
 }
 

@@ -13,7 +13,7 @@ import { Command, command, newestCommand } from "./command";
 import { AskError, ask } from "./connection";
 import type { Notice } from "./control";
 import { heldLease, reasonOf } from "./control";
-import { whyFrozen } from "./sight";
+import { frozenCause } from "./sight";
 
 export { Axis as JogAxis, Frame as JogFrame };
 export type Jog = MessageInitShape<typeof JogSchema>;
@@ -22,15 +22,20 @@ const EVERY_MS = 40;
 const ANSWERED_S = 0.5;
 const MOST_UNANSWERED = 4;
 const WATCH_MS = 20;
+const LATE_MS = 75; // a shorter delay ends no jog
+/** Ends of which this page may know more than the gateway. */
+const RELEASED = "jog.released";
+const NOT_ALIVE = "jog.not_alive";
 
 /** A jog that was pressed. */
 export interface Pressed {
-  release: () => void;
+  /** End it; `why` in words, empty: the operator let go. */
+  release: (why: string) => void;
   /** Settles when the arm rests, or nothing was started. */
   over: Promise<void>;
 }
 
-/** Jog when an earlier jog is over, until `release`, a frozen picture, a dialog, or the gateway ends it; tell how far it is and why it ended. */
+/** Jog when an earlier jog is over, until `release`, a frozen picture, or the gateway ends it; show how far it is and why it ended. */
 export function startJog(
   robotKey: string,
   jog: Jog,
@@ -39,8 +44,10 @@ export function startJog(
   earlier?: Pressed | null,
 ): Pressed {
   let released = false;
+  let ended = ""; // why, as far as this page knows
   let wake = () => {};
-  const release = () => {
+  const release = (why: string) => {
+    if (!released) ended = why;
     released = true;
     wake();
   };
@@ -51,6 +58,7 @@ export function startJog(
       wake = () => (clearTimeout(timer), resolve());
     });
 
+  const delays = new Delays();
   const run = async () => {
     await earlier?.over;
     if (released) return;
@@ -79,12 +87,15 @@ export function startJog(
     let unanswered = 0;
     for (;;) {
       const sentAt = performance.now();
-      released ||= mine?.lease !== heldLease.value?.lease || whyFrozen(robotKey) !== "" || dialogIsOpen();
+      const why = mine?.lease === heldLease.value?.lease ? frozenCause(robotKey) : t("jog_no_control");
+      if (why) release(why);
       try {
-        const answer = await send();
+        const answer = await send().finally(() => delays.answered(sentAt));
+        if (answer.reason?.code === NOT_ALIVE) release(delays.text());
         const distance = `${answer.rotary ? fixed(toDegrees(answer.moved), 1) : fixed(answer.moved * 1000, 1)}${answer.rotary ? "°" : "\u202fmm"}`;
         if (!answer.running) {
-          const why = reasonText(answer.reason, answer.text);
+          const known = [RELEASED, NOT_ALIVE].includes(answer.reason?.code ?? "") ? ended : "";
+          const why = known || reasonText(answer.reason, answer.text);
           tell({ kind: "done", text: t("jog_ended", { what, distance, why }), ...(warning && { warning }) });
           return;
         }
@@ -92,14 +103,46 @@ export function startJog(
       } catch (error) {
         released = true;
         if (!(error instanceof AskError && error.noAnswer) || ++unanswered > MOST_UNANSWERED) {
-          tell({ kind: "refused", text: t("jog_lost", { what, why: reasonOf(error) }) });
+          tell({ kind: "refused", text: t("jog_lost", { what, why: ended || reasonOf(error) }) });
           return;
         }
       }
       await pause(Math.max(0, sentAt + EVERY_MS - performance.now()));
     }
   };
-  return { release, over: run() };
+  return { release, over: run().finally(() => delays.stop()) };
 }
 
-const dialogIsOpen = () => document.querySelector("dialog[open]") !== null;
+/** Delays of the newest keep-alives: of their answers, and of this browser's own timers. */
+class Delays {
+  private waitsMs = [0, 0];
+  private stallsMs = [0, 0];
+  private stallMs = 0;
+  private tickedAt = performance.now();
+  private readonly timer = setInterval(() => this.tick(), WATCH_MS);
+
+  answered(sentAt: number): void {
+    this.tick();
+    this.waitsMs = [performance.now() - sentAt, this.waitsMs[0] ?? 0];
+    this.stallsMs = [this.stallMs, this.stallsMs[0] ?? 0];
+    this.stallMs = 0;
+  }
+
+  /** Return which of both was late, and by how much; empty: neither. */
+  text(): string {
+    const [lateMs, busyMs] = [Math.max(...this.waitsMs) - EVERY_MS, Math.max(...this.stallsMs) - WATCH_MS];
+    const worstMs = Math.max(lateMs, busyMs);
+    if (worstMs < LATE_MS) return "";
+    return t(busyMs > worstMs / 2 ? "jog_busy" : "jog_late", { seconds: fixed(worstMs / 1000, 1) });
+  }
+
+  stop(): void {
+    clearInterval(this.timer);
+  }
+
+  private tick(): void {
+    const now = performance.now();
+    this.stallMs = Math.max(this.stallMs, now - this.tickedAt);
+    this.tickedAt = now;
+  }
+}

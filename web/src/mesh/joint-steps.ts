@@ -2,7 +2,7 @@
 
 import { useEffect } from "preact/hooks";
 import type { Description_Joint } from "../gen/robomesh_pb";
-import { jointText, jointTitle } from "../i18n/format";
+import { DASH, jointText, jointTitle } from "../i18n/format";
 import { t } from "../i18n/texts";
 import { Command, command } from "./command";
 import type { Notice } from "./control";
@@ -24,6 +24,21 @@ interface Sent {
   warning: string | undefined;
 }
 
+type JointSteps = StepQueue<JointStep, Sent>;
+
+/** Return where the step that waits will end, in words: after the step that is going, if that is of the same joint. */
+export function stepEnd(
+  joints: readonly Description_Joint[],
+  current: readonly (number | undefined)[],
+  { waiting, going }: Pick<JointSteps, "waiting" | "going">,
+): string {
+  const joint = waiting && joints[waiting.index];
+  if (!joint) return DASH;
+  const at = current[waiting.index] ?? NaN;
+  const start = going?.step.index !== waiting.index ? at : (going.sent?.target ?? at + going.step.offset);
+  return jointText(joint, start + waiting.offset);
+}
+
 export function useJointSteps(props: {
   robotKey: string;
   joints: readonly Description_Joint[];
@@ -32,7 +47,7 @@ export function useJointSteps(props: {
   /** The controller does not report whether it moves. */
   resting: boolean;
   tell: (notice: Notice) => void;
-}): StepQueue<JointStep, Sent> {
+}): JointSteps {
   const { joints, current, enabled, resting, tell } = props;
   const send = async ({ index, offset }: JointStep, told: (notice: Notice) => void): Promise<Sent | null> => {
     const at = current[index];

@@ -59,6 +59,7 @@ const UNPROVEN = new Set([
   "joints.disagree",
   "joints.other_model",
   "joints.other_software",
+  "joints.invalid",
 ]);
 const READS_ONLY = "robot.reads_only";
 const ONLY_WATCHED = new Set([READS_ONLY, "robot.motion_off"]);
@@ -103,7 +104,8 @@ export function stateWord(controller: Latest<ControllerState> | undefined, event
   if (link === Link.DOWN) return { word: "state_no_link", level: "alarm" };
   if (link === Link.SILENT) return { word: "state_silent", level: "warning" };
   if (program && !NEEDS_RESUME_OR_RESET.has(activity)) return programWord(program, activity);
-  return ACTIVITIES[activity] ?? { word: "state_unknown", level: "warning" };
+  // A newer program's value has no word.
+  return ACTIVITIES[activity] ?? { word: "state_unknown", level: "warning", detail: String(activity) };
 }
 
 /** Return the state of an arm whose program runs: even at rest it can move without a new command. */
@@ -141,8 +143,8 @@ export function stoppedByItself(state: ControllerState | undefined): boolean {
 /** Explain why the joints that the controller sends may not be the model's; empty: they are. */
 export function whyUnproven(state: ControllerState | undefined): string {
   if (!state?.jointsUnproven) return "";
-  const why = state.linkReasons.find(({ code }) => UNPROVEN.has(code));
-  const text = why ? reasonText(why, why.text) : t("joints_unproven");
+  const why = state.linkReasons.filter(({ code }) => UNPROVEN.has(code));
+  const text = reasonsText(why, t("joints_unproven"));
   return t("sentence", { text: text.charAt(0).toUpperCase() + text.slice(1) });
 }
 

@@ -64,6 +64,12 @@ export function useShownView(
 
 /** Return why no new motion may start: the state, or a picture on the screen, is old; empty: none is. */
 export function whyFrozen(robotKey: string, at = ageClock()): string {
+  const why = frozenCause(robotKey, at);
+  return why && t("frozen", { why });
+}
+
+/** Return which part of the picture is old, and how old; empty: none. */
+export function frozenCause(robotKey: string, at = ageClock()): string {
   const state = states.get(robotKey)?.(at);
   if (state !== undefined && isStale("joints", state)) return frozenText(t("frozen_state"), state);
   for (const shown of views.get(robotKey) ?? []) {
@@ -78,6 +84,9 @@ export function whyFrozen(robotKey: string, at = ageClock()): string {
 function frozenText(what: string, age: number | null): string {
   return age === null ? t("frozen_not_live", { what }) : t("frozen_old", { what, age: ageText(age) });
 }
+
+/** Return whether a dialog is before the page. */
+export const dialogIsOpen = () => document.querySelector("dialog[open]") !== null;
 
 /** Return what the page shows of a robot now, for the audit log; undefined: nothing. */
 export function pageReport(robotKey: string): MessageInitShape<typeof PageReportSchema> | undefined {

@@ -2,8 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import type { Description, KinematicState } from "../gen/robomesh_pb";
-import { Description_Joint_Type } from "../gen/robomesh_pb";
-import { fixed, jointTitle, toDegrees } from "../i18n/format";
+import { fixed, jointTitle, jointUnit, toDegrees } from "../i18n/format";
 import { t } from "../i18n/texts";
 import { distanceText, ownLevel, pairText, useClearanceLevel } from "../mesh/clearance";
 import type { Level } from "../mesh/robot-state";
@@ -126,12 +125,12 @@ function nearestLimit(state: KinematicState | undefined, description: Descriptio
     const share = margin / Math.max(1e-9, lower + upper);
     if (nearest && nearest.share <= share) continue;
     const joint = description?.joints.find((each) => each.name === name);
-    const slides = joint?.type === Description_Joint_Type.PRISMATIC;
+    const { unit, factor } = joint ? jointUnit(joint) : { unit: "°", factor: toDegrees(1) };
     nearest = {
       name: joint ? jointTitle(joint) : name,
       share,
-      value: slides ? margin * 1000 : toDegrees(margin),
-      unit: slides ? "mm" : "°",
+      value: margin * factor,
+      unit,
     };
   }
   return nearest;

@@ -1,9 +1,10 @@
-// A button that acts while it is held: by one finger, the main mouse button, or Enter. Space requests a stop.
+// A button that acts while it is held: by one finger, pen, the main mouse button, or Enter. Space requests a stop.
 //
-// Everything but an uninterrupted hold is a release: letting go, a second touch, lost capture or focus, another window,
-// a hidden tab, a dialog (which takes the focus), a button that disappears or is disabled.
+// Everything but an uninterrupted hold is a release; hold-pointer.ts has the table.
 
 import { useEffect, useRef } from "preact/hooks";
+import { followPress, isEnter, lock } from "./hold";
+import type { HoldEnd } from "./hold-pointer";
 import "./step-button.css";
 
 export function HoldButton(props: {
@@ -11,62 +12,46 @@ export function HoldButton(props: {
   sign: 1 | -1;
   enabled: boolean;
   /** Begin; returns what ends it. */
-  hold: () => () => void;
+  hold: () => (why: HoldEnd) => void;
 }) {
-  const held = useRef<{ end: () => void } | null>(null);
-  const release = () => held.current?.end();
-  useEffect(() => release, []);
+  const button = useRef<HTMLButtonElement>(null);
+  /** The touch has begun to hold: until it is lifted it must not scroll the button away. */
+  const hasHeld = useRef(false);
   useEffect(() => {
-    if (!props.enabled) release();
+    const keepInPlace = (event: TouchEvent) => hasHeld.current && event.cancelable && event.preventDefault();
+    const element = button.current;
+    element?.addEventListener("touchmove", keepInPlace, { passive: false });
+    return () => {
+      element?.removeEventListener("touchmove", keepInPlace);
+      lock(element);
+    };
+  }, []);
+  useEffect(() => {
+    if (!props.enabled) lock(button.current);
   }, [props.enabled]);
 
-  const begin = (button: HTMLButtonElement, pointer: number | null) => {
-    if (held.current || !document.hasFocus()) return;
-    button.focus();
-    const listening = new AbortController();
-    const { signal } = listening;
-    const letGo = props.hold();
-    const end = () => {
-      if (held.current?.end !== end) return;
-      held.current = null;
-      listening.abort();
-      letGo();
+  const press = (event: PointerEvent | KeyboardEvent) => {
+    let release: (why: HoldEnd) => void = () => {};
+    hasHeld.current = false;
+    const begin = () => {
+      hasHeld.current = true;
+      release = props.hold();
     };
-    held.current = { end };
-    const isOther = (event: PointerEvent) => pointer === null || event.pointerId !== pointer;
-    addEventListener("blur", end, { signal });
-    addEventListener("pagehide", end, { signal });
-    addEventListener("pointerdown", (event) => isOther(event) && end(), { signal, capture: true });
-    addEventListener("keydown", (event) => (pointer !== null || !isEnter(event)) && end(), {
-      signal,
-      capture: true,
-    });
-    document.addEventListener("visibilitychange", end, { signal });
-    button.addEventListener("blur", end, { signal });
-    button.addEventListener("keyup", end, { signal });
-    for (const kind of ["pointerup", "pointercancel", "lostpointercapture"] as const)
-      button.addEventListener(kind, end, { signal });
-    if (pointer === null) return;
-    try {
-      button.setPointerCapture(pointer);
-    } catch {
-      end(); // the pointer is already gone
-    }
+    if (button.current) followPress(button.current, event, { begin, end: (why) => release(why) });
   };
   return (
     <button
+      ref={button}
       class="step hold"
       data-moves
       aria-label={props.name}
       title={props.name}
       disabled={!props.enabled}
-      onPointerDown={(event) => {
-        if (event.button === 0 && event.isPrimary) begin(event.currentTarget, event.pointerId);
-      }}
+      onPointerDown={press}
       onKeyDown={(event) => {
         if (!isEnter(event)) return;
         event.preventDefault();
-        if (!event.repeat) begin(event.currentTarget, null);
+        if (!event.repeat) press(event);
       }}
       onContextMenu={(event) => event.preventDefault()}
     >
@@ -74,5 +59,3 @@ export function HoldButton(props: {
     </button>
   );
 }
-
-const isEnter = (event: KeyboardEvent) => event.code === "Enter" || event.code === "NumpadEnter";

@@ -1,10 +1,12 @@
 // A joint's range with its position, and a handle for its target.
 //
-// Only dragging the handle sets a target, and only releasing it sends the target; a tap on the track does
-// nothing. Keys: arrows set, Enter sends, Escape resets.
+// Only dragging the handle sets a target, and only releasing it sends the target; any other end of the drag resets it,
+// and a tap on the track does nothing. Keys: arrows set, Enter sends, Escape resets.
 
 import { useRef, useState } from "preact/hooks";
 import { t } from "../i18n/texts";
+import { followPress } from "./hold";
+import type { HoldEnd } from "./hold-pointer";
 
 export interface TrackProps {
   label: string;
@@ -46,11 +48,20 @@ export function JointTrack(props: TrackProps) {
     if (value === undefined) props.preview(undefined);
     else props.send(value);
   };
+  const newest = useRef(take);
+  newest.current = take;
   const onDown = (event: PointerEvent & { currentTarget: HTMLElement }) => {
-    if (!enabled || shown === undefined || event.button !== 0) return;
-    event.currentTarget.setPointerCapture(event.pointerId);
-    drag.current = { pointer: event.pointerId, offset: valueAt(event.clientX) - shown };
-    setTyped(undefined);
+    if (shown === undefined) return;
+    const element = event.currentTarget;
+    const begun = { pointer: event.pointerId, offset: valueAt(event.clientX) - shown };
+    const begin = () => {
+      drag.current = begun;
+      setTyped(undefined);
+    };
+    // A handle that was removed sends nothing.
+    const end = (why: HoldEnd) =>
+      newest.current(why === "released" && element.isConnected ? drag.current?.value : undefined);
+    followPress(element, event, { begin, end, isDrag: true });
   };
   const onMove = (event: PointerEvent) => {
     if (drag.current?.pointer !== event.pointerId) return;
@@ -58,10 +69,6 @@ export function JointTrack(props: TrackProps) {
     drag.current.value = value;
     setDragged(value);
     props.preview(value);
-  };
-  const onUp = (event: PointerEvent) => {
-    if (drag.current?.pointer !== event.pointerId) return;
-    take(enabled ? drag.current.value : undefined);
   };
   const onKey = (event: KeyboardEvent) => {
     if (!enabled || shown === undefined) return;
@@ -103,9 +110,6 @@ export function JointTrack(props: TrackProps) {
           aria-valuetext={props.text(shown)}
           onPointerDown={onDown}
           onPointerMove={onMove}
-          onPointerUp={onUp}
-          onPointerCancel={() => take(undefined)}
-          onLostPointerCapture={() => drag.current && take(undefined)}
           onKeyDown={onKey}
           onBlur={() => typed !== undefined && take(undefined)}
         />

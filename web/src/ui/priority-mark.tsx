@@ -5,7 +5,7 @@ import type { EventsTextName } from "../i18n/events";
 import { e } from "../i18n/events";
 import "./priority-mark.css";
 
-const WORDS: Record<Priority, [EventsTextName, string]> = {
+const WORDS: Partial<Record<Priority, [EventsTextName, string]>> = {
   [Priority.PRIORITY_UNSPECIFIED]: ["priority_low", "low"],
   [Priority.LOW]: ["priority_low", "low"],
   [Priority.MEDIUM]: ["priority_medium", "medium"],
@@ -13,17 +13,19 @@ const WORDS: Record<Priority, [EventsTextName, string]> = {
   [Priority.CRITICAL]: ["priority_critical", "critical"],
 };
 
+/** Return the word; of a newer program's priority, its number. */
 export function priorityWord(priority: Priority): string {
-  return e((WORDS[priority] ?? WORDS[Priority.LOW])[0]);
+  const [word] = WORDS[priority] ?? [];
+  return word ? e(word) : String(priority);
 }
 
 /** `children` replace the word. */
 export function PriorityMark({ of: priority, children }: { of: Priority; children?: string | number }) {
-  const [word, name] = WORDS[priority] ?? WORDS[Priority.LOW];
+  const [, name] = WORDS[priority] ?? [null, "high"];
   return (
     <span class={`priority ${name}`}>
       <span class="priority-shape" aria-hidden="true" />
-      {children ?? e(word)}
+      {children ?? priorityWord(priority)}
     </span>
   );
 }

@@ -2,7 +2,7 @@
 
 import "./step-button.css";
 
-export function StepButton(props: { name: string; sign: 1 | -1; enabled: boolean; press: () => void }) {
+export function StepButton(props: { name: string; sign: 1 | -1; enabled: boolean; press: (button: Element) => void }) {
   return (
     <button
       class="step"
@@ -10,7 +10,7 @@ export function StepButton(props: { name: string; sign: 1 | -1; enabled: boolean
       aria-label={props.name}
       title={props.name}
       disabled={!props.enabled}
-      onClick={props.press}
+      onClick={(event) => props.press(event.currentTarget)}
       onKeyDown={(event) => event.repeat && event.preventDefault()}
     >
       {props.sign > 0 ? "+" : "−"}

@@ -95,10 +95,12 @@ export function useLiveVideo(robotKey: string, wanted: RequestedView | null, lab
 
   const at = now.value; // triggers drawing
   const age = drawn.newAt === null ? null : Math.max(0, (at - drawn.newAt) / 1000);
+  // Until a picture of this view comes, the last one of another view is not shown.
+  const style = any ? "" : "visibility: hidden";
   const picture = video ? (
-    <canvas ref={canvas} data-drawn={any} role="img" aria-label={label} />
+    <canvas ref={canvas} data-drawn={any} role="img" aria-label={label} style={style} />
   ) : (
-    still && <img ref={image} src={still} alt={label} />
+    still && <img ref={image} src={still} alt={label} style={style} />
   );
   return {
     picture: picture || null,

@@ -10,12 +10,19 @@ import { isUnacknowledged, nameOf, State } from "../../mesh/alarms";
 import { PriorityMark } from "../../ui/priority-mark";
 import { robotLink } from "../../ui/route";
 
-const STATE_WORDS = new Map<State, EventsTextName>([
-  [State.UNACKNOWLEDGED, "state_unacknowledged"],
-  [State.ACKNOWLEDGED, "state_acknowledged"],
-  [State.RETURNED, "state_returned"],
-  [State.SHELVED, "state_shelved"],
-]);
+const STATE_WORDS: Partial<Record<State, EventsTextName>> = {
+  [State.STATE_UNSPECIFIED]: "state_unacknowledged",
+  [State.UNACKNOWLEDGED]: "state_unacknowledged",
+  [State.ACKNOWLEDGED]: "state_acknowledged",
+  [State.RETURNED]: "state_returned",
+  [State.SHELVED]: "state_shelved",
+};
+
+/** Return an alarm's state; of a newer program's state, its number. */
+function stateText(state: State): string {
+  const word = STATE_WORDS[state];
+  return word ? e(word) : String(state);
+}
 
 export function AlarmLine(props: {
   alarm: Alarm;
@@ -42,7 +49,7 @@ export function AlarmLine(props: {
         />
       </label>
       <PriorityMark of={alarm.priority} />
-      <span class="alarm-state">{e(STATE_WORDS.get(state) ?? "state_unacknowledged")}</span>
+      <span class="alarm-state">{stateText(state)}</span>
       <time title={stampFull(when)}>{stampTime(when)}</time>
       <span class="alarm-of">
         {robot === "-" || !robot ? (

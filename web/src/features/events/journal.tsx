@@ -9,14 +9,13 @@ import { eventText } from "../../i18n/event-text";
 import { e } from "../../i18n/events";
 import { count, stampFull } from "../../i18n/format";
 import { n } from "../../i18n/notes";
-import { t } from "../../i18n/texts";
 import type { Notice } from "../../mesh/control";
 import { reasonOf } from "../../mesh/control";
 import { fleetRobots } from "../../mesh/known-robots";
 import { mayWithdraw, readNotes, WRITTEN, withdrawNote, withdrawnIds } from "../../mesh/notes";
 import { Withdrawable } from "../../panels/note-form";
 import { Choice, Toggle } from "../../ui/choice";
-import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
+import { Mark, outcomeMark, severityMark } from "../../ui/event-mark";
 import { NoticeLine } from "../../ui/notice-line";
 import { programLink } from "../../ui/route";
 import { Select } from "../../ui/select";
@@ -226,7 +225,7 @@ function keysOf<T extends object>(table: T): (keyof T & string)[] {
 }
 
 function outcomeText(name: keyof typeof WHAT): string {
-  return name === "any_outcome" ? e(name) : t((OUTCOMES[WHAT[name] ?? Outcome.REFUSED] ?? ["state_unknown", ""])[0]);
+  return name === "any_outcome" ? e(name) : outcomeMark(WHAT[name] ?? Outcome.REFUSED).text;
 }
 
 function wordsOf(entry: Entry): string {
@@ -255,24 +254,24 @@ function Line(props: { entry: Entry; open: boolean; withdrawn: boolean; choose: 
 }
 
 function EventWords({ entry: { event } }: { entry: EventEntry }) {
-  const [word, level] = SEVERITIES[event.severity] ?? ["severity_info", "normal"];
+  const mark = severityMark(event.severity);
   const [title, text] = [alarmTitle(event.code), eventText(event)];
   // A translated text needs no title; the end of an alarm has that alarm's code.
   const titled = title && text === event.text && event.severity > Severity.INFO;
   return (
     <>
-      {level !== "normal" && <Mark word={word} level={level} />} {titled && <strong>{title}</strong>}{" "}
+      {mark.level !== "normal" && <Mark {...mark} />} {titled && <strong>{title}</strong>}{" "}
       <span lang={text === event.text ? "en" : undefined}>{text}</span>
     </>
   );
 }
 
 function AuditWords({ entry: { audit } }: { entry: AuditLine }) {
-  const [word, level] = OUTCOMES[audit.outcome] ?? ["state_unknown", "normal"];
+  const mark = outcomeMark(audit.outcome);
   const repeated = audit.repeatedCount > 0n ? ` × ${count(audit.repeatedCount)}` : "";
   return (
     <>
-      {level !== "normal" && <Mark word={word} level={level} />} {entrySentence(audit)}
+      {mark.level !== "normal" && <Mark {...mark} />} {entrySentence(audit)}
       {repeated}
     </>
   );

@@ -195,6 +195,7 @@ export function RunText({ content }: { content: ProgramContent }) {
 
 function changeText({ change, name, basedOn, reason }: ProgramVersion): string {
   const known = change >= Change.SAVED && change <= Change.RUN;
-  const key = `change_${known ? change : Change.SAVED}` as `change_${1 | 2 | 3 | 4 | 5 | 6}`;
+  if (!known) return [String(change), name, reason].filter(Boolean).join(" ");
+  const key = `change_${change}` as `change_${1 | 2 | 3 | 4 | 5 | 6}`;
   return s(key, { name, based_on: basedOn, reason });
 }

@@ -68,10 +68,16 @@ function whyNotRun(robotKey: string, controller: ControllerState | undefined, ru
   return whyNoNewMotion(controller) || whyFrozen(robotKey, now.value);
 }
 
+const OUTCOMES: { [outcome: number]: ["is_running" | "is_done" | "is_ended", string] | undefined } = {
+  [Outcome.RUNNING]: ["is_running", "motion"],
+  [Outcome.DONE]: ["is_done", "normal"],
+  [Outcome.ENDED]: ["is_ended", "alarm"],
+};
+
 function Progress({ state }: { state: ProgramState }) {
   const { outcome, name, operator, line, statement, step, steps, durationS, leftS, text } = state;
-  const level = { [Outcome.ENDED]: "alarm", [Outcome.RUNNING]: "motion" }[outcome as number] ?? "normal";
-  const word = p(outcome === Outcome.RUNNING ? "is_running" : outcome === Outcome.DONE ? "is_done" : "is_ended");
+  const [kept, level] = OUTCOMES[outcome] ?? [undefined, "warning"];
+  const word = kept ? p(kept) : String(outcome);
   return (
     <div class="progress" role="group" aria-label={p("progress")} data-outcome={Outcome[outcome]}>
       {/* Only this is announced: the rest changes each second. */}

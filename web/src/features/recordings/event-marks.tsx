@@ -13,7 +13,7 @@ import { t } from "../../i18n/texts";
 import { WRITTEN } from "../../mesh/notes";
 import { NoteForm, Withdrawable } from "../../panels/note-form";
 import { Choice } from "../../ui/choice";
-import { SEVERITIES } from "../../ui/event-mark";
+import { severityMark } from "../../ui/event-mark";
 import { Panel } from "../../ui/panel";
 import { foldSteps } from "./fold-steps";
 import type { RecordedEvent, RequestState } from "./recorder-requests";
@@ -23,8 +23,8 @@ const NONE: readonly RecordedEvent[] = [];
 const MOST_MARKS = 200; // more are indistinguishable; the gravest are shown
 
 function severityOf({ event }: RecordedEvent): [string, string] {
-  const [word, level] = SEVERITIES[event.severity] ?? ["severity_info", "normal"];
-  return [t(word), level];
+  const { text, level } = severityMark(event.severity);
+  return [text, level];
 }
 
 /** Return an event's sentence; a note's row has the time that it is on. */

@@ -184,7 +184,9 @@ function useRecordedEvents(
 function auditAsEvent(entry: AuditEntry): Event {
   const { timestamp, operator, source, request, outcome, text } = entry;
   const words = outcome === Outcome.REFUSED ? "asked_refused" : outcome === Outcome.FAILED ? "asked_failed" : "asked";
-  const summary = r(words, { who: operator || source, what: request.toLowerCase().replaceAll("_", " ") });
+  const unknown = Outcome[outcome] === undefined ? ` (${outcome})` : "";
+  const what = request.toLowerCase().replaceAll("_", " ") + unknown;
+  const summary = r(words, { who: operator || source, what });
   const severity = words === "asked" ? Severity.INFO : Severity.WARNING;
   const event = create(EventSchema, {
     severity,

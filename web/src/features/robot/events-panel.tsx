@@ -14,7 +14,7 @@ import type { Latest } from "../../mesh/topics";
 import { useAudit, useTopic } from "../../mesh/topics";
 import { Withdrawable } from "../../panels/note-form";
 import { Choice } from "../../ui/choice";
-import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
+import { Mark, outcomeMark, severityMark } from "../../ui/event-mark";
 import { Panel } from "../../ui/panel";
 import { SeenPicture } from "../../video/seen-picture";
 import { LinkFacts } from "./link-facts";
@@ -72,13 +72,13 @@ export function EventsPanel(props: {
 }
 
 function EventLine({ event, withdrawn }: { event: Event; withdrawn: boolean }) {
-  const [word, level] = SEVERITIES[event.severity] ?? ["severity_info", "normal"];
+  const mark = severityMark(event.severity);
   const text = eventText(event);
   return (
     <li title={`${stampFull(event.timestamp)} · ${event.source} · ${event.code}`}>
       <time>{stampTime(event.timestamp)}</time>
       <span class="event-text">
-        {level !== "normal" && <Mark word={word} level={level} />}
+        {mark.level !== "normal" && <Mark {...mark} />}
         <span lang={text === event.text ? "en" : undefined}>
           <Withdrawable withdrawn={withdrawn && event.code === WRITTEN}>{text}</Withdrawable>
         </span>
@@ -96,12 +96,12 @@ function AuditLine(props: {
 }) {
   const { entry } = props;
   const [, site = "", robot = ""] = props.robotKey.split("/");
-  const [word, level] = OUTCOMES[entry.outcome] ?? ["state_unknown", "normal"];
+  const mark = outcomeMark(entry.outcome);
   return (
     <li title={`${stampFull(entry.timestamp)} · ${entry.source} · ${entry.request}`}>
       <time>{stampTime(entry.timestamp)}</time>
       <span class="event-text">
-        {level !== "normal" && <Mark word={word} level={level} />}
+        {mark.level !== "normal" && <Mark {...mark} />}
         {entrySentence(entry, props.joints, props.took)}
         {entry.repeatedCount > 0n && (
           <strong class="repeated" title={t("repeated", { count: count(entry.repeatedCount) })}>

@@ -11,7 +11,7 @@ import { Command, command } from "../../mesh/command";
 import { reachable } from "../../mesh/connection";
 import type { Notice } from "../../mesh/control";
 import { controlNotice, holds } from "../../mesh/control";
-import { useJointSteps } from "../../mesh/joint-steps";
+import { stepEnd, useJointSteps } from "../../mesh/joint-steps";
 import type { Motion } from "../../mesh/notice-expiry";
 import { useNoticeExpiry } from "../../mesh/notice-expiry";
 import { isOnlyWatched, whyNoNewMotion, whyNoTarget, whyUnproven } from "../../mesh/robot-state";
@@ -129,15 +129,13 @@ export function JointsPanel(props: {
   const unsent = set && t("target_unsent", { joint: jointTitle(set), value: jointText(set, preview.value) });
   const idle = unsent
     ? unsent
-    : steps.waiting
-      ? t("steps_wait", { count: steps.waiting })
-      : enabled
-        ? t("joint_hint")
-        : mine || !reachable.value
-          ? why
-          : watching || props.controller?.readOnly
-            ? whyUnproven(props.controller)
-            : t("joint_hint_take");
+    : enabled
+      ? t("joint_hint")
+      : mine || !reachable.value
+        ? why
+        : watching || props.controller?.readOnly
+          ? whyUnproven(props.controller)
+          : t("joint_hint_take");
   return (
     <Panel
       name={`joints ${enabled ? "can-move" : ""}`}
@@ -179,7 +177,7 @@ export function JointsPanel(props: {
                 })}
                 sign={sign}
                 enabled={canStep}
-                press={() => steps.press({ index, offset: (sign * Number(size)) / factor })}
+                press={(button) => steps.press({ index, offset: (sign * Number(size)) / factor }, button)}
               />
             );
           return (
@@ -230,8 +228,8 @@ export function JointsPanel(props: {
             ? targetProblem.value
               ? { kind: "refused", text: `${t("sentence", { text: unsent })} ${targetProblem.value}` }
               : null
-            : steps.waiting && notice?.kind !== "refused"
-              ? null
+            : steps.waiting
+              ? { kind: "busy", text: steps.waitingText(stepEnd(rows, current, steps)) }
               : (notice ?? lost)
         }
         idle={idle}

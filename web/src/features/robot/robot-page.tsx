@@ -167,11 +167,29 @@ function useLostAt(stale: boolean, any: boolean): number | null {
   return at;
 }
 
+const MODES: Partial<Record<Mode, TextName>> = {
+  [Mode.MODE_UNSPECIFIED]: "mode_unknown",
+  [Mode.MODE_UNKNOWN]: "mode_unknown",
+  [Mode.REMOTE]: "mode_remote",
+  [Mode.LOCAL]: "mode_local",
+};
+const HOMED: Partial<Record<Known, TextName>> = {
+  [Known.KNOWN_UNSPECIFIED]: "homed_unknown",
+  [Known.UNKNOWN]: "homed_unknown",
+  [Known.YES]: "homed",
+  [Known.NO]: "not_homed",
+};
 const CHECKS: Partial<Record<Check, TextName>> = {
   [Check.OFF]: "check_off",
   [Check.WARN]: "check_warn",
   [Check.REQUIRE]: "check_require",
 };
+
+/** Return a fact's text; of a newer program's value, what it is of and its number. */
+function factText<Value extends number>(words: Partial<Record<Value, TextName>>, value: Value, of: TextName): string {
+  const word = words[value];
+  return word ? t(word) : `${t(of)}: ${value}`;
+}
 
 function Headline(props: {
   site: string;
@@ -188,12 +206,8 @@ function Headline(props: {
   const facts: string[] = [];
   // Do not show stale state as current.
   if (message && !isStale("controller", ageOf(controller))) {
-    facts.push(
-      t(message.mode === Mode.LOCAL ? "mode_local" : message.mode === Mode.REMOTE ? "mode_remote" : "mode_unknown"),
-    );
-    facts.push(t(message.homed === Known.YES ? "homed" : message.homed === Known.NO ? "not_homed" : "homed_unknown"));
-    const check = CHECKS[message.check];
-    if (check) facts.push(t(check));
+    facts.push(factText(MODES, message.mode, "mode_unknown"), factText(HOMED, message.homed, "homed_unknown"));
+    if (message.check !== Check.CHECK_UNSPECIFIED) facts.push(factText(CHECKS, message.check, "check_unknown"));
     // The others are in the Link panel: this line is cut short.
     if (message.capabilities?.diesWithLink === Known.NO) facts.push(t("lives_without_link"));
     if (message.legacyClients?.attached) facts.push(t("legacy_some", { count: message.legacyClients.attached }));

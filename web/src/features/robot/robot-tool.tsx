@@ -25,10 +25,12 @@ import type { Axis } from "../../panels/tool-panel";
 import { POSE_AXES, ToolPanel } from "../../panels/tool-panel";
 import { Choice } from "../../ui/choice";
 import { HoldButton } from "../../ui/hold-button";
+import type { HoldEnd } from "../../ui/hold-pointer";
 import { NoticeLine } from "../../ui/notice-line";
 import { StepButton } from "../../ui/step-button";
+import type { ToolStep } from "./tool-step";
+import { endText, FRAMES, isTurn } from "./tool-step";
 
-const FRAMES = ["tool", "base", "site"] as const;
 const STEPS = ["1", "5", "20"] as const; // mm or degrees
 const WAYS = ["step", "hold"] as const;
 const JOG_SPEEDS = { slow: [10, 2], medium: [50, 10], fast: [250, 30] } as const; // mm/s, degrees/s
@@ -38,11 +40,6 @@ const MOST_SPEED_PERCENT = 25;
 const MOST_TOOL_SPEED = 250; // mm/s
 const NOT_STARTED_MS = 5000;
 
-interface ToolStep {
-  axis: Axis;
-  frame: (typeof FRAMES)[number];
-  amount: number; // mm or degrees
-}
 interface Sent {
   what: string;
   /** When the program before it started. */
@@ -67,12 +64,15 @@ export function RobotTool(props: {
   const [notice, setNotice] = useState<Notice | null>(null);
   const mine = holds(robotKey);
   const whyNone = reachable.value ? whyNoTarget(controller) || whyFrozen(robotKey, now.value) : t("no_connection");
+  /** The tool's pose when the step that is going was sent. */
+  const start = useRef<readonly number[] | undefined>(undefined);
   const queue = useStepQueue<ToolStep, Sent>({
     enabled: mine && !whyNone,
     followed: mine, // also while a picture is frozen, and up to the reason of a stop
     tell: setNotice,
     send: async (step, tell) => {
       const what = nameOf(step);
+      start.current = props.kinematics?.message.toolToBase;
       const before = ms(program?.since);
       let warning: string | undefined;
       const values = { program: programOf(step, controller?.speedPercent), programName: what };
@@ -107,7 +107,7 @@ export function RobotTool(props: {
 
   const jogs = useRef(0);
   const lastJog = useRef<Pressed | null>(null);
-  const hold = (axis: Axis, sign: 1 | -1): (() => void) => {
+  const hold = (axis: Axis, sign: 1 | -1): ((why: HoldEnd) => void) => {
     const [along, about] = JOG_SPEEDS[jogSpeed];
     const speed = sign * (isTurn(axis) ? toRadians(about) : along / 1000);
     const jog = { frame: FRAME_OF[frame], axis: JogAxis[axis.toUpperCase() as keyof typeof JogAxis], speed };
@@ -125,23 +125,28 @@ export function RobotTool(props: {
       setJogging(false);
       setNotice((shown) => (shown === starting ? null : shown));
     });
-    return pressed.release;
+    return (why) => pressed.release(why === "released" ? "" : t(`hold_${why}`));
   };
   const why = whyNone || (queue.going || jogging ? "" : whyNoNewMotion(controller));
   const enabled = mine && !why;
-  const idle = queue.waiting
-    ? t("steps_wait", { count: queue.waiting })
-    : why ||
-      (way === "hold"
-        ? t("jog_hint", { speed: JOG_SPEEDS[jogSpeed][0], turn: JOG_SPEEDS[jogSpeed][1] })
-        : t("tool_step_hint", { percent: MOST_SPEED_PERCENT, speed: MOST_TOOL_SPEED }));
+  const idle =
+    why ||
+    (way === "hold"
+      ? t("jog_hint", { speed: JOG_SPEEDS[jogSpeed][0], turn: JOG_SPEEDS[jogSpeed][1] })
+      : t("tool_step_hint", { percent: MOST_SPEED_PERCENT, speed: MOST_TOOL_SPEED }));
+  const waits = queue.going && queue.waiting && [queue.going.step, queue.waiting];
+  const shown = waits
+    ? ({ kind: "busy", text: queue.waitingText(endText(start.current, waits, props.description)) } as const)
+    : notice;
   const step = (axis: Axis, sign: 1 | -1) => {
     if (way === "hold") {
       const name = jogName(axis, frame, sign);
       return <HoldButton name={name} sign={sign} enabled={enabled && !queue.going} hold={() => hold(axis, sign)} />;
     }
     const wanted = { axis, frame, amount: sign * Number(size) };
-    return <StepButton name={nameOf(wanted)} sign={sign} enabled={enabled} press={() => queue.press(wanted)} />;
+    return (
+      <StepButton name={nameOf(wanted)} sign={sign} enabled={enabled} press={(button) => queue.press(wanted, button)} />
+    );
   };
   const steps = {
     choices: (
@@ -168,7 +173,7 @@ export function RobotTool(props: {
       </>
     ),
     button: step,
-    notice: <NoticeLine notice={queue.waiting && notice?.kind !== "refused" ? null : notice} idle={idle} />,
+    notice: <NoticeLine notice={shown} idle={idle} />,
   };
   return (
     <ToolPanel
@@ -181,11 +186,7 @@ export function RobotTool(props: {
 }
 
 function axisText(axis: ToolStep["axis"]): string {
-  return isTurn(axis) ? t(axis) : axis.toUpperCase();
-}
-
-function isTurn(axis: ToolStep["axis"]): axis is "roll" | "pitch" | "yaw" {
-  return axis !== "x" && axis !== "y" && axis !== "z";
+  return axis.length > 1 ? t(axis as "roll" | "pitch" | "yaw") : axis.toUpperCase();
 }
 
 /** Return the direction in words: "Tool X +". */
