@@ -2,8 +2,10 @@
 
 import asyncio
 import logging
+import os
 import secrets
 import threading
+import time
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
@@ -12,7 +14,7 @@ from functools import partial
 import zenoh
 from google.protobuf.message import Message
 
-from robomesh import access_rights, connect_errors, keys, presence, requests, server, topics
+from robomesh import access_rights, connect_errors, forked, keys, presence, requests, server, topics
 from robomesh import reason_codes as codes
 from robomesh.counters import Counters, Measure
 from robomesh.endpoints import DEFAULT_ROUTER, Tls, client_config, first_line
@@ -27,6 +29,8 @@ from robomesh.subscription import Subscription
 log = logging.getLogger(__name__)
 
 _RETRY_S = 0.25
+# A router reopens for new rules in milliseconds, and restarts in seconds.
+_ROUTER_RETURNS_S = 10.0
 # Messages that `last` keeps while it waits for a list.
 _AFTER_LIST = 1000
 # Name of a measure: remaining validity of the certificate, if there is one [s].
@@ -52,7 +56,7 @@ class SessionSettings:
 class Session:
     """An open session. Closing it closes everything declared on it."""
 
-    zenoh_session: zenoh.Session
+    _opened: zenoh.Session
     # Of the additional connections.
     extra_config: zenoh.Config
     # From the certificate; None: no certificate, or one without identity lines.
@@ -76,6 +80,17 @@ class Session:
     # Additional connections by their names in the topic table.
     _extra: dict[str, zenoh.Session] = field(default_factory=dict)
     _extra_lock: threading.Lock = field(default_factory=threading.Lock)
+    _pid: int = field(default_factory=os.getpid)
+
+    @property
+    def zenoh_session(self) -> zenoh.Session:
+        """The main connection.
+
+        Raises:
+            ForkedError: In a process that was forked from the session's.
+        """
+        forked.check_owner(self._pid)
+        return self._opened
 
     @property
     def connected(self) -> bool:
@@ -195,18 +210,20 @@ class Session:
         handler: server.Handler,
         *,
         on_refused: server.OnRefused = lambda chunk, reason: None,
+        recall: server.Recall = lambda: None,
     ) -> server.Answerer:
         """Answer a request of the table: `stop`, `command/*`.
 
         Args:
             on_refused: Called for an invalid request, which the handler does not see.
+            recall: For stops: returns what answers a repeated one, which the handler does not see.
 
         Raises:
             NoRightError: If the certificate does not allow it.
-            SessionError: If the request needs an additional connection and the router has just gone.
+            SessionError: If the request needs an additional connection and the router stays away.
         """
         self._check("declare_queryable", keys.robot_key(site, robot, name))
-        connection = self.connection(topics.request(name).own_link)
+        connection = self.connection(topics.request(name).own_link, wait_s=_ROUTER_RETURNS_S)
         if self._scheduler is None:
             self._scheduler = RoundRobin()
         answerer = server.Answerer(
@@ -217,6 +234,7 @@ class Session:
             handler,
             scheduler=self._scheduler,
             on_refused=on_refused,
+            recall=recall,
             ignored=self.ignored,
         )
         self._keep(answerer)
@@ -241,18 +259,29 @@ class Session:
         return watch
 
     async def present(self) -> list[keys.PresenceKey]:
-        """Return all presence keys of the mesh, sorted.
+        """Return the presence keys of all services of the mesh, sorted.
 
         Raises:
             NoAnswerError: If the router did not list all tokens in time.
         """
         # If the session also watches presence, Zenoh omits tokens in 1 % to 5 % of the replies.
         watches = any(isinstance(each, presence.PresenceWatch) for each in self._declared)
+        client = await self._presence_client() if watches else self.zenoh_session
+        return await presence.present(client, ignored=self.ignored)
+
+    async def present_sessions(self) -> tuple[list[keys.PresenceKey], bool]:
+        """Return the presence keys of operators and monitors, and whether there are no others.
+
+        Raises:
+            NoAnswerError: If the router has just gone.
+        """
+        return await presence.present_sessions(await self._presence_client(), self.ignored)
+
+    async def _presence_client(self) -> zenoh.Session:
         try:
-            client = await asyncio.to_thread(self.connection, "presence" if watches else "")
+            return await asyncio.to_thread(self.connection, "presence")
         except SessionError as error:
             raise NoAnswerError(str(error)) from None
-        return await presence.present(client, ignored=self.ignored)
 
     def _check(self, act: access_rights.Act, key: str) -> None:
         """Raise an error with the reason if the router would silently reject the act."""
@@ -291,22 +320,29 @@ class Session:
                     self._closed_counters.add(each)
             self._declared = [each for each in self._declared if not each.closed] + [declared]
 
-    def connection(self, name: str) -> zenoh.Session:
+    def connection(self, name: str, *, wait_s: float = 0.0) -> zenoh.Session:
         """Return the connection with a name (`own_link` in the table); empty: the main one. On any thread.
 
         A flood on one connection does not delay messages on another.
 
+        Args:
+            wait_s: How long to wait, blocking, for a router that has just gone [s].
+
         Raises:
-            SessionError: If the connection must be opened and the router has just gone.
+            SessionError: If the connection must be opened and the router has gone.
         """
+        main = self.zenoh_session
         if not name:
-            return self.zenoh_session
+            return main
         with self._extra_lock:
-            if name not in self._extra:
+            deadline = time.monotonic() + wait_s
+            while name not in self._extra:
                 try:
-                    self._extra[name] = zenoh.open(self.extra_config)
+                    self._extra[name] = forked.open_unshared(self.extra_config)
                 except zenoh.ZError as error:
-                    raise SessionError(f"the router has gone: {first_line(error)}") from None
+                    if time.monotonic() >= deadline:
+                        raise SessionError(f"the router has gone: {first_line(error)}") from None
+                    time.sleep(_RETRY_S)
             return self._extra[name]
 
     async def _refresh(self) -> None:
@@ -316,7 +352,9 @@ class Session:
                     subscription.refresh(who.site, who.robot)
 
     async def close(self) -> None:
-        """Close everything declared, then the session."""
+        """Close everything declared, then the session; in a forked process, nothing."""
+        if os.getpid() != self._pid:
+            return
         if self._refresher is not None:
             self._refresher.cancel()
         for token in self._tokens:
@@ -324,9 +362,9 @@ class Session:
         for declared in self._declared:
             declared.close()
         # Closing waits for Zenoh's threads, which may wait for the event loop.
-        await asyncio.to_thread(self.zenoh_session.close)
+        await asyncio.to_thread(forked.close_unshared, self._opened)
         for connection in self._extra.values():
-            await asyncio.to_thread(connection.close)
+            await asyncio.to_thread(forked.close_unshared, connection)
         # An interrupted exit does not wait for threads, and would end Python inside Zenoh's code.
         await asyncio.to_thread(self._join)
 
@@ -353,17 +391,17 @@ async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
     loop = asyncio.get_running_loop()
     deadline = None if settings.wait_s is None else loop.time() + settings.wait_s
     routers = ", ".join(settings.connect)
-    logged = False
+    logged, refused = False, connect_errors.refusal_of_routers
     while True:
         try:
-            session = Session(await asyncio.to_thread(zenoh.open, config), extra_config, principal)
+            session = Session(await asyncio.to_thread(forked.open_unshared, config), extra_config, principal)
             break
         except zenoh.ZError:
             timed_out = deadline is not None and loop.time() >= deadline
             # With a deadline the error gives the reason; a script would print it twice.
             to_log = deadline is None and not logged
             diagnose = timed_out or (settings.tls is not None and to_log)
-            reason = await asyncio.to_thread(_refusal, settings) if diagnose else None
+            reason = await asyncio.to_thread(refused, settings.connect, settings.tls) if diagnose else None
             if timed_out:
                 raise SessionError(
                     reason
@@ -383,15 +421,3 @@ async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
         yield session
     finally:
         await session.close()
-
-
-def _refusal(settings: SessionSettings) -> str | None:
-    """Return why the first reachable router refuses the connection; None: unknown."""
-    return next(
-        (
-            reason
-            for each in settings.connect
-            if (reason := connect_errors.refusal_of_router(each, settings.tls))
-        ),
-        None,
-    )

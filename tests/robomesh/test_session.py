@@ -5,6 +5,8 @@ import signal
 import struct
 import subprocess
 import sys
+import time
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -16,6 +18,7 @@ from robomesh import subscription as subscription_module
 from robomesh.endpoints import client_config, router_config
 from robomesh.errors import NoAnswerError, RefusedError, SessionError
 from robomesh.header import pack
+from robomesh.presence import MOST_OF_ONE, name_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
 from robomesh.session import SessionSettings, open_session
@@ -578,6 +581,37 @@ def test_presence_appears_and_disappears(mesh):
     run(main())
 
 
+def test_many_sessions_of_one_name_hide_neither_services_nor_other_names(mesh):
+    async def main():
+        async with open_session(mesh) as monitor, open_session(mesh) as eve, open_session(mesh) as li:
+            watch = monitor.watch_presence()
+            tokens = [
+                eve.declare_presence_of("site", "arm", "operator", f"eve.{number:016x}")
+                for number in range(300)
+            ]
+            tokens.append(li.declare_presence_of("site", "arm", "operator", "li.0"))
+            li.declare_presence("site", "arm", "gateway")
+            reported = set()
+            while len(reported) < MOST_OF_ONE + 2:
+                reported.add((await anext(watch))[0])
+            assert Counter(map(name_of, reported)) == {"eve": MOST_OF_ONE, "li": 1, li.identity: 1}
+            assert [who.service for who in await monitor.present()] == ["gateway"]
+            sessions, complete = await monitor.present_sessions()
+            assert not complete
+            assert Counter(map(name_of, sessions)) == {"eve": MOST_OF_ONE, "li": 1}
+            for token in tokens:
+                token.undeclare()
+            while len(reported) > 1:
+                key, alive = await anext(watch)
+                assert not alive
+                reported.remove(key)
+            assert {who.service for who in reported} == {"gateway"}
+            while await monitor.present_sessions() != ([], True):
+                await asyncio.sleep(0.01)
+
+    run(main())
+
+
 def test_session_waits_for_its_router_and_survives_its_restart():
     async def main():
         endpoint = f"tcp/127.0.0.1:{free_port()}"
@@ -613,6 +647,25 @@ def test_session_waits_for_its_router_and_survives_its_restart():
             opened.set()
             await task
         await asyncio.to_thread(router.close)
+
+    run(main())
+
+
+def test_a_service_that_starts_while_its_router_reopens_answers_stops():
+    async def main():
+        endpoint = f"tcp/127.0.0.1:{free_port()}"
+        router = zenoh.open(router_config((endpoint,)))
+        async with open_session(SessionSettings(connect=(endpoint,), wait_s=10.0)) as gateway:
+            await asyncio.to_thread(router.close)
+            reopened = asyncio.ensure_future(asyncio.to_thread(reopen_after, 0.5, endpoint))
+            await asyncio.sleep(0.1)
+            gateway.answer("site", "arm", "stop", answer_lease)
+            router = await reopened
+        await asyncio.to_thread(router.close)
+
+    def reopen_after(pause_s: float, endpoint: str) -> zenoh.Session:
+        time.sleep(pause_s)
+        return zenoh.open(router_config((endpoint,)))
 
     run(main())
 

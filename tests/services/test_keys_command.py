@@ -139,8 +139,10 @@ def test_the_first_start_of_a_saved_robot_does_not_change_the_rules(site, tmp_pa
         (saved.parent.parent / other / "robot.toml").write_text("")
     assert may_start(load(site)) == tuple(sorted(("mine", *library_names())))
     started = up._Started(load(site), site, load(site).listened[0])
-    started.wanted()
+    started.entitle_ahead()
     rules = Folder(tmp_path / "keys").access.stat()
+    started.wanted()
+    assert Folder(tmp_path / "keys").access.stat() == rules, "the router would reopen during the site's start"
     for name in ("mine", library_names()[0]):
         (tmp_path / "robots" / "started.toml").write_text(
             'site = "hall"' + ONE_ARM.replace('"arm"', f'"{name}"')
@@ -468,6 +470,7 @@ def test_a_site_with_keys_runs_over_tls(tmp_path, monkeypatch):
 
         def services():
             listed = robomesh("list", "--json", "--connect", router, "--keys", mo)
+            assert listed.returncode == 0, listed.stderr
             return {row["service"] for row in json.loads(listed.stdout)["services"]}
 
         # The page is served before the router has given a new monitor all that is known.

@@ -7,6 +7,7 @@ import ssl
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Hashable
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,6 +16,7 @@ from robomesh import service
 from robomesh.keys import robot_key
 from robomesh.session import SessionSettings, open_session
 from services.command_line import main
+from services.command_line.output import print_line
 from services.command_line.site.metrics_ports import extra_with_metrics, first_address, with_metrics
 from services.command_line.site.services import SERVICES
 from services.errors import SiteFileError
@@ -44,6 +46,9 @@ def run(path: Path | None, metrics: str = "") -> None:
     endpoint = reachable(site.listened[0])
     metered = first_address(site, metrics)
     _check_ports_free(site)
+    started = _Started(site, path, endpoint)
+    # Otherwise the router would reopen while the services connect.
+    started.entitle_ahead()
     every = with_metrics(programs(site, path, endpoint), metered)
     # Before the thread that writes the log, and before these levels, which are not for the services.
     forked = fork(every, main.main)
@@ -53,14 +58,14 @@ def run(path: Path | None, metrics: str = "") -> None:
 
     async def ready() -> None:
         await _until_page_shows_robots(site, endpoint)
-        print(f"console {_console_url(site)}", flush=True)
+        print_line(f"console {site.console.url}")
 
     service.run_until_signalled(
         supervise(
             every,
             ready=ready,
             write=_write,
-            extra=extra_with_metrics(_Started(site, path, endpoint).wanted, metered),
+            extra=extra_with_metrics(started.wanted, metered),
             forked=forked,
         ),
         ends_within_s=ENDS_WITHIN_S,
@@ -177,6 +182,12 @@ class _Started:
             for robot in self._robots
         }
 
+    def entitle_ahead(self) -> None:
+        """Add robots to the routers' rules before the router starts; `wanted` says what is wrong."""
+        with suppress(SiteFileError, KeysError):
+            self._entitle([robot.name for robot in read_started(self._site)])
+        self._entitled = None
+
     def _entitle(self, names: list[str]) -> None:
         """Add robots to the routers' rules before their gateways publish.
 
@@ -234,16 +245,10 @@ async def _until_page_shows_robots(site: Site, endpoint: str) -> None:
         await asyncio.sleep(_CONSOLE_POLL_S)
 
 
-def _console_url(site: Site) -> str:
-    host, port = split_address(site.console.listen)
-    host = "127.0.0.1" if host in ("0.0.0.0", "::") else host
-    return f"{site.console.scheme}://{f'[{host}]' if ':' in host else host}:{port}/"
-
-
 def _own_console_answers(site: Site) -> bool:
     """Return whether this site's console serves; another program may have taken its port since the check."""
     _, port = split_address(site.console.listen)
-    return _answers(_console_url(site)) and is_used_by_child(port)
+    return _answers(site.console.url) and is_used_by_child(port)
 
 
 def _answers(url: str) -> bool:
