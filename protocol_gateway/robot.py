@@ -197,6 +197,7 @@ class Robot:
             joints=joints,
             robot_authority=robot_authority,
             controller=self._controller,
+            within_s=settings.check_within_s,
         )
         self._control = Control(robot_authority, ports, self._checks)
         self._programs = Programs(

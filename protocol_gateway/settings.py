@@ -51,6 +51,7 @@ class RobotSettings:
         legacy_clients: Where old client programs attach; None: they cannot.
         jog_speed: Greatest speed of the tool while an operator jogs [m/s]; 0: no jogs.
         check: Policy of the collision check before a motion: "require", "warn", "off".
+        check_within_s: Longest check of a motion; None: by what the last ones took.
         cell: Fixtures and other robots around the robot; None: there are none.
     """
 
@@ -73,6 +74,7 @@ class RobotSettings:
     legacy_clients: LegacySettings | None = None
     jog_speed: float = MOST_M_S
     check: str = "off"
+    check_within_s: float | None = None
     cell: CellDescription | None = None
 
     @property

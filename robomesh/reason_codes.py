@@ -1041,9 +1041,13 @@ CHECK_FAILED = Code("check.failed", "the check failed: {cause}")
 CHECK_IMPOSSIBLE = Code("check.impossible", "{cause}")
 CHECK_NOTHING = Code("check.nothing", "its description has no link with a shape, so nothing can be checked")
 CHECK_QUEUED_TOO_LONG = Code(
-    "check.queued_too_long", "the check waited longer than {seconds:g} s for other checks"
+    "check.queued_too_long", "the check waited longer than {seconds:.1f} s for other checks"
 )
-CHECK_TOO_SLOW = Code("check.too_slow", "the check took longer than {seconds:g} s")
+CHECK_TOO_SLOW = Code(
+    "check.too_slow",
+    "the check takes longer than {seconds:.1f} s (the slowest of the last ones took {slowest:.1f} s)",
+    "try again with a later not_after, or when the gateway's machine is less busy",
+)
 CHECK_NO_POSITION = Code("check.no_position", "its controller does not report the robot's position")
 CHECK_HELD_WAY_UNKNOWN = Code(
     "check.held_way_unknown",

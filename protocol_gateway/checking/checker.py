@@ -4,7 +4,9 @@ import asyncio
 import contextlib
 import logging
 import time
+from collections import deque
 from collections.abc import Collection, Mapping
+from functools import partial
 from typing import Any
 
 from protocol_gateway.checking.worker_messages import (
@@ -26,8 +28,11 @@ from robots.errors import RobotError, reason_of
 
 log = logging.getLogger(__name__)
 
-# Below 1 s, after which a waiting command is no longer sent.
-MOTION_TIMEOUT_S = 0.8
+# Share of the time until a command's deadline that its check may take: it still has to be sent and answered.
+SHARE_OF_DEADLINE = 0.8
+# The longest check of a motion, where the site file sets none: a multiple of the slowest of the last ones.
+_TIMES_SLOWEST, _TIMES_REMEMBERED = 10.0, 20
+_LEAST_TIMEOUT_S, _MOST_TIMEOUT_S = 2.0, 5.0
 PROGRAM_TIMEOUT_S = 25.0
 # A process that takes longer hangs, and is killed.
 _HANG_TIMEOUT_S = 10.0
@@ -63,6 +68,7 @@ class Checker:
         self._lock = asyncio.Lock()
         self._failed: Reason | None = None
         self._process: int | None = None
+        self._took_s: deque[float] = deque([0.0], maxlen=_TIMES_REMEMBERED)
         self._pending: tuple[str, ...] = ()
         self._replaced = asyncio.Event()
 
@@ -166,23 +172,28 @@ class Checker:
             if (problem := self._problems[robot]) is not None:
                 raise CheckError(problem)
 
-    async def motion(self, question: CheckMotion) -> Checked:
+    @property
+    def longest_s(self) -> float:
+        """Longest time that the check of a motion should take, by the last ones on this machine [s]."""
+        return min(max(_TIMES_SLOWEST * max(self._took_s), _LEAST_TIMEOUT_S), _MOST_TIMEOUT_S)
+
+    async def motion(self, question: CheckMotion, *, timeout_s: float) -> Checked:
         """Check a motion.
 
         Raises:
             CheckError: If it could not be checked, or not in time; the text says why.
         """
-        checked: Checked = await self._ask(question, timeout_s=MOTION_TIMEOUT_S)
+        checked: Checked = await self._ask(question, timeout_s=timeout_s)
         return checked
 
-    async def jog(self, question: ExtendJog) -> Extended:
+    async def jog(self, question: ExtendJog, *, timeout_s: float) -> Extended:
         """Plan and check the next part of a jog.
 
         Raises:
             CheckError: If it could not be checked, or not in time; the text says why.
         """
         self._start_requested.set()
-        extended: Extended = await self._ask(question, timeout_s=MOTION_TIMEOUT_S)
+        extended: Extended = await self._ask(question, timeout_s=timeout_s)
         return extended
 
     async def program(self, question: CheckProgram) -> Checked:
@@ -210,12 +221,12 @@ class Checker:
         except TimeoutError:
             raise CheckError(codes.CHECK_QUEUED_TOO_LONG(seconds=timeout_s)) from None
         asked = asyncio.ensure_future(self._answer(question, max(_HANG_TIMEOUT_S, timeout_s)))
-        asked.add_done_callback(self._on_done)
+        asked.add_done_callback(partial(self._on_done, time.monotonic()))
         # A late query goes on, because a restart of the process would make the next one late, too.
         done, _ = await asyncio.wait([asked], timeout=max(timeout_s - (time.monotonic() - start_s), 0.0))
         if not done:
             asked.add_done_callback(_log_late_failure)
-            raise CheckError(codes.CHECK_TOO_SLOW(seconds=timeout_s))
+            raise CheckError(codes.CHECK_TOO_SLOW(seconds=timeout_s, slowest=max(self._took_s)))
         return asked.result()
 
     async def _answer(self, question: CheckMotion | CheckProgram | ExtendJog, hang_timeout_s: float) -> Any:
@@ -224,8 +235,9 @@ class Checker:
         except Exception as error:
             raise CheckError(codes.CHECK_FAILED(_reason_of(error))) from error
 
-    def _on_done(self, asked: asyncio.Future[Any]) -> None:
+    def _on_done(self, began_s: float, asked: asyncio.Future[Any]) -> None:
         self._lock.release()
+        self._took_s.append(time.monotonic() - began_s)
         if not asked.cancelled():
             asked.exception()  # retrieved, because the caller may have timed out
 

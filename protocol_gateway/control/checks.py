@@ -15,10 +15,11 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
 from dataclasses import replace
 
+from protocol_gateway.authority.admission import LONGEST_WAIT_S, time_left_s
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, not_sent, refused
 from protocol_gateway.authority.preconditions import Controller, predicted, target_of
 from protocol_gateway.checking.cell_occupancy import CellOccupancy, Occupancy
-from protocol_gateway.checking.checker import Checker
+from protocol_gateway.checking.checker import SHARE_OF_DEADLINE, Checker
 from protocol_gateway.checking.policy import Policy
 from protocol_gateway.checking.worker_messages import (
     Checked,
@@ -28,6 +29,7 @@ from protocol_gateway.checking.worker_messages import (
     ExtendJog,
     Positions,
 )
+from protocol_gateway.clocks import read_clocks
 from protocol_gateway.control.effects import Finding
 from protocol_gateway.control.robot_authority import RobotAuthority
 from protocol_gateway.drivers.driver import Activity
@@ -50,6 +52,7 @@ class Checks:
 
     Args:
         cell: Names of the robots of its cell, including its own.
+        within_s: Longest check of a motion; None: by what the last ones took.
         checker: Worker process for motions.
         planner: Worker process for programs.
     """
@@ -66,8 +69,9 @@ class Checks:
         joints: Joints,
         robot_authority: RobotAuthority,
         controller: Callable[[], Controller],
+        within_s: float | None = None,
     ) -> None:
-        self.policy = policy
+        self.policy, self._within_s = policy, within_s
         self._name, self._cell = name, tuple(cell)
         self._checker, self._planner, self._cell_occupancy = checker, planner, cell_occupancy
         self._joints, self._robot_authority, self._controller = joints, robot_authority, controller
@@ -106,7 +110,8 @@ class Checks:
             start = self._start(must_rest=self.policy is Policy.REQUIRE)
             others, left_out = self._others()
             checked = await self._checker.motion(
-                CheckMotion(robot=self._name, start=start, targets=self._targets(requests), others=others)
+                CheckMotion(robot=self._name, start=start, targets=self._targets(requests), others=others),
+                timeout_s=self._timeout_s(requests),
             )
         except CheckError as error:
             return self._not_checked(error.reason)
@@ -138,6 +143,7 @@ class Checks:
         last: Positions | None = None,
         commanded: float = 0.0,
         more: bool = True,
+        request: CommandRequest | None = None,
     ) -> tuple[Positions, Extended, Finding]:
         """Plan and check the next part of a jog; return also the robot's positions from which it was checked.
 
@@ -148,6 +154,7 @@ class Checks:
             last: Newest commanded target; None: none yet.
             commanded: Its distance from the origin [m] or [rad].
             more: False: return only how far the robot is.
+            request: The command that begins the jog; None: it runs.
 
         Raises:
             CheckError: If it could not be checked, or not in time.
@@ -166,7 +173,8 @@ class Checks:
                 others=others,
                 collisions=self.policy is not Policy.OFF,
                 more=more,
-            )
+            ),
+            timeout_s=self._timeout_s(() if request is None else (request,)),
         )
         if more and extended.uncovered and self.policy is Policy.REQUIRE:
             raise CheckError(codes.CHECK_REQUIRED(*_first_few(extended.uncovered)))
@@ -212,6 +220,16 @@ class Checks:
         controller = self._controller()
         resting = not _moves(controller, self._robot_authority.authority.moving)
         return resting and has_arrived(start, controller.positions, self._joints.types)
+
+    def _timeout_s(self, requests: Sequence[CommandRequest]) -> float:
+        """Return how long a check may take: within the earliest deadline, so that the commands can be sent.
+
+        Stops, HOLD and the end of a jog do not wait for it.
+        """
+        now = read_clocks()
+        left_s = [time_left_s(each, now) for each in requests if each.HasField("not_after")]
+        share_s = SHARE_OF_DEADLINE * min(left_s, default=LONGEST_WAIT_S)
+        return max(0.0, min(share_s, self._within_s or self._checker.longest_s))
 
     def _start(self, *, must_rest: bool) -> Positions:
         """Return the robot's positions, from which a motion is checked.

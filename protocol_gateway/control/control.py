@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from protocol_gateway.authority.admission import Verdict, admit_all, wait_refusal
-from protocol_gateway.authority.lease_rules import Answer, Authority, Now
+from protocol_gateway.authority.lease_rules import Answer, Authority
 from protocol_gateway.authority.preconditions import Controller
 from protocol_gateway.clocks import read_clocks
 from protocol_gateway.control import effects, entries, events
@@ -162,13 +162,16 @@ class Control:
             program: Program to start instead of sending a unit.
             refused: A refusal that is already known, to be audited and returned.
         """
+        now = read_clocks()
+        arrived_s = self.arrivals.arrived_s(now.monotonic_s)
         event = events.CommandsRequested(
             requests=tuple(requests),
             operator=operator,
             source=source,
-            arrived=self._arrived(),
+            arrived=now._replace(monotonic_s=arrived_s),
             program=program,
             refused=refused,
+            held_up=arrived_s < now.monotonic_s,
         )
         answer: Answer = await self._handle_in_turn(event)
         return answer
@@ -185,13 +188,9 @@ class Control:
         """Evaluate whether a command is the holder's, in time and new, and no stop forbids it."""
         self.handle(events.TimePassed())
         now = read_clocks()
-        if (late := wait_refusal(self._arrived().monotonic_s, now)) is not None:
+        if (late := wait_refusal(self.arrivals.arrived_s(now.monotonic_s), now)) is not None:
             return Verdict(late)
         return admit_all(self.authority, (request,), operator=operator, now=now)
-
-    def _arrived(self) -> Now:
-        now = read_clocks()
-        return now._replace(monotonic_s=self.arrivals.arrived_s(now.monotonic_s))
 
     @contextlib.contextmanager
     def preparing_program(self) -> Iterator[asyncio.Future[Reason]]:

@@ -80,7 +80,9 @@ def refusal_of(
     Args:
         program: Program that runs.
     """
-    controller, refusal = seen.controller, wait_refusal(command.arrived.monotonic_s, seen.now)
+    controller, refusal = seen.controller, None
+    if command.held_up or not all(each.HasField("not_after") for each in command.requests):
+        refusal = wait_refusal(command.arrived.monotonic_s, seen.now)
     motions = [each.command for each in command.requests if each.command in MOTION_COMMANDS]
     if len(motions) > 1 and _C.RESUME in motions:
         # Some controllers resume the held motion first, others drop it, so the path would be unknown.

@@ -78,6 +78,7 @@ class CommandsRequested:
         program: Checked program to start, for RUN_PROGRAM.
         refused: A refusal that is already known, to be audited and returned.
         step: The command is the next step of the program that runs, so it has no id.
+        held_up: It may have arrived while the gateway did not run.
     """
 
     requests: tuple[CommandRequest, ...]
@@ -87,6 +88,7 @@ class CommandsRequested:
     program: Program | None = None
     refused: Answer | None = None
     step: bool = False
+    held_up: bool = False
 
     @property
     def is_immediate(self) -> bool:

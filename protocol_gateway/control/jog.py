@@ -48,8 +48,6 @@ KEEP_ALIVE_S = 0.15
 # The first keep-alive may arrive this late: before it, nothing moves.
 FIRST_KEEP_ALIVE_S = 1.0
 _POLL_S = 0.01
-# Timeout of planning and checking the first part, below the default timeout of a client.
-_PREPARE_TIMEOUT_S = 1.5
 # A robot that does not move for this long after a command has ignored it.
 _START_TIMEOUT_S = 2.0
 # A robot that still moves this long after its hold has ignored it.
@@ -240,15 +238,11 @@ class Jogs:
         authority = self._control.authority
         with self._control.preparing_program() as cancelled:
             self._preparing = request.id, cancelled
-            part = asyncio.ensure_future(self._checks.jog_part(jog))
+            part = asyncio.ensure_future(self._checks.jog_part(jog, request=request))
             try:
-                await asyncio.wait(
-                    (part, cancelled), timeout=_PREPARE_TIMEOUT_S, return_when=asyncio.FIRST_COMPLETED
-                )
+                await asyncio.wait((part, cancelled), return_when=asyncio.FIRST_COMPLETED)
                 if cancelled.done():
                     raise CheckError(cancelled.result())
-                if not part.done():
-                    raise CheckError(codes.CHECK_TOO_SLOW(seconds=_PREPARE_TIMEOUT_S))
                 start, extended, finding = part.result()
             finally:
                 self._preparing = None

@@ -79,6 +79,8 @@ class Robot(BaseModel):
             unknown.
         check: The check of each motion for collisions: `require` refuses a motion that fails it or cannot
             be checked, `warn` reports it, `off` checks nothing.
+        check_within_s: Longest check of a motion [s]; at most 80 % of the time until the command's deadline,
+            or 0.8 s without one. Absent: ten times the slowest of the last checks, between 2 and 5 s.
         jog_speed: The tool's greatest speed [mm/s] while an operator holds a button to jog it; 0: no jogs.
         clearance: Distances to fixtures and other robots.
         floor: The floor of its cell: its height [mm], a table, or `false` for none. In a cell of several
@@ -118,6 +120,7 @@ class Robot(BaseModel):
     codes: dict[int, str] = Field(default_factory=dict)
     accept_unknown: tuple[Literal["mode", "homed"], ...] = ()
     check: Literal["require", "warn", "off"] = "warn"
+    check_within_s: Annotated[float, Field(gt=0, le=5)] | None = None
     jog_speed: Annotated[float, Field(ge=0, le=250)] = 250.0
     clearance: Clearance = Clearance()
     floor: Floor | None = Floor()

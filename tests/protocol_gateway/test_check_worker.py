@@ -88,14 +88,12 @@ def test_a_query_is_not_started_after_its_timeout(tmp_path, monkeypatch):
             await ready(checker, "arm")
             begun.clear()
             os.kill(checker.pid, signal.SIGSTOP)
-            monkeypatch.setattr("protocol_gateway.checking.checker.MOTION_TIMEOUT_S", 0.2)
             late = await asyncio.gather(
-                *(checker.motion(motion("arm")) for _ in range(20)), return_exceptions=True
+                *(checker.motion(motion("arm"), timeout_s=0.2) for _ in range(20)), return_exceptions=True
             )
             assert all(isinstance(each, CheckError) and "longer than" in str(each) for each in late)
             os.kill(checker.pid, signal.SIGCONT)
-            monkeypatch.setattr("protocol_gateway.checking.checker.MOTION_TIMEOUT_S", 30.0)
-            assert isinstance(await checker.motion(motion("arm")), Checked)
+            assert isinstance(await checker.motion(motion("arm"), timeout_s=30.0), Checked)
             # The query that hung, and the one that waited.
             assert len(begun) == 2
 
@@ -114,7 +112,7 @@ def test_a_worker_that_is_killed_while_idle_is_prepared_again_before_the_next_mo
                 while checker.pid in (first, None):
                     await asyncio.sleep(0.02)
             await ready(checker, "arm")
-            assert isinstance(await checker.motion(motion("arm")), Checked)
+            assert isinstance(await checker.motion(motion("arm"), timeout_s=30.0), Checked)
 
     run(main(), timeout_s=90)
 
@@ -136,10 +134,10 @@ def test_an_unexpected_error_is_reported_and_the_worker_goes_on(tmp_path):
             await ready(checker, "good")
             assert "LinAlgError" in checker.problem("bad").text
             with pytest.raises(CheckError, match="LinAlgError"):
-                await checker.motion(motion("bad"))
+                await checker.motion(motion("bad"), timeout_s=30.0)
             # A robot that is not in the cell: a bug of the caller.
             with pytest.raises(CheckError, match="the check failed: KeyError: 'nobody'"):
-                await checker.motion(motion("good", others={"nobody": (STANDING,)}))
+                await checker.motion(motion("good", others={"nobody": (STANDING,)}), timeout_s=30.0)
             assert not task.done()
 
     run(main(), timeout_s=90)

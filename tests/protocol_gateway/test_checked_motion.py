@@ -4,13 +4,16 @@ import asyncio
 import contextlib
 import os
 import signal
+import time
 from math import radians
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from protocol_gateway.clocks import read_clocks
 from robomesh.errors import RefusedError
+from robomesh.messages import PROTOBUF
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.cells import CellDescription, CellRobot, Fixture
 from robots.poses import pose_matrix
@@ -69,7 +72,7 @@ async def move(site, target):
             try:
                 return await site.command(C.MOVE_ABSOLUTE, joint_positions=target)
             except RefusedError as error:
-                if "took longer" not in str(error) and "waited" not in str(error):
+                if "takes longer" not in str(error) and "waited" not in str(error):
                     raise
             await site.lease(A.RENEW, ttl_s=5)
 
@@ -119,9 +122,6 @@ def test_required_a_motion_below_the_floor_is_refused(mesh, tmp_path):
 
 
 def test_warned_a_collision_is_sent_with_a_warning(mesh, tmp_path, monkeypatch):
-    # On a busy machine the motion would be sent without the check's result.
-    monkeypatch.setattr("protocol_gateway.checking.checker.MOTION_TIMEOUT_S", 8.0)
-
     async def main():
         async with (
             simulator() as port,
@@ -159,6 +159,59 @@ def test_required_motion_waits_for_a_killed_worker(mesh, tmp_path):
                     await asyncio.sleep(0.1)
 
     run(main(), timeout_s=120)
+
+
+def test_required_motion_waits_for_a_busy_check_until_its_deadline_and_stops_do_not(mesh, tmp_path):
+    async def main():
+        async with (
+            simulator() as port,
+            gateway(mesh, tmp_path, port, check="require", cell=one_robot_cell(), check_within_s=4.0) as site,
+        ):
+            await checked(site)
+            worker = worker_of(os.getpid())
+            async with kept_control(site):
+                os.kill(worker, signal.SIGSTOP)
+                first = asyncio.create_task(site.command(C.MOVE_ABSOLUTE, joint_positions=AWAY))
+                await asyncio.sleep(1.3)
+                assert not first.done()
+                os.kill(worker, signal.SIGCONT)
+                assert (await first).accepted
+                await standing(site, AWAY)
+
+                os.kill(worker, signal.SIGSTOP)
+                text = await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=OUT, not_after=after(1.5)))
+                assert "takes longer than 1." in text
+                # Without a deadline.
+                site.id += 1
+                request = schema.CommandRequest(
+                    command=C.MOVE_ABSOLUTE, joint_positions=OUT, lease=site.secret, id=site.id
+                )
+                begun_s = time.monotonic()
+                (reply,) = await asyncio.to_thread(raw, site, request)
+                assert "longer than 0.8 s" in str(reply.err.payload)
+                assert time.monotonic() - begun_s < 3.5, "it would have waited for 4 s with a deadline"
+
+                held = asyncio.create_task(site.command(C.MOVE_ABSOLUTE, joint_positions=OUT))
+                await asyncio.sleep(0.1)
+                await site.command(C.HOLD)
+                await site.stop(reason="look")
+                assert not held.done()
+                os.kill(worker, signal.SIGCONT)
+                await refusal(held)
+            assert np.allclose(site.joints, AWAY, atol=1e-3)
+
+    run(main(), timeout_s=120)
+
+
+def after(seconds):
+    not_after = schema.CommandRequest().not_after
+    not_after.FromNanoseconds(read_clocks().gateway_ns + round(seconds * 1e9))
+    return not_after
+
+
+def raw(site, request):
+    key = site.key("command/li")
+    return [*site.session.zenoh_session.get(key, payload=request.SerializeToString(), encoding=PROTOBUF)]
 
 
 def worker_of(parent):

@@ -79,10 +79,10 @@ async def ended(site, outcome, timeout_s=60):
 def test_a_step_with_a_late_check_is_checked_again(mesh, tmp_path, monkeypatch):
     late, motion = iter([True, True]), Checker.motion
 
-    async def slow(self, question):
+    async def slow(self, question, *, timeout_s):
         if next(late, False):
-            raise CheckError(codes.CHECK_TOO_SLOW(seconds=0.8))
-        return await motion(self, question)
+            raise CheckError(codes.CHECK_TOO_SLOW(seconds=0.8, slowest=0.9))
+        return await motion(self, question, timeout_s=timeout_s)
 
     async def main():
         async with (

@@ -82,6 +82,7 @@ def _gateway(site: "Site", options: Options) -> Any:
             reconnect_after_s=max(4.0, 2.0 * robot.stale_time_s),
             legacy_clients=legacy_settings(robot),
             check=robot.check,
+            check_within_s=robot.check_within_s,
             cell=cells[robot.name],
         )
         for robot in site.robot

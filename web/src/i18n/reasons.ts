@@ -1654,7 +1654,13 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     "check.queued_too_long",
     ["the check waited longer than {seconds} s for other checks", "检查超过 {seconds} 秒：正在检查其他请求"],
   ],
-  ["check.too_slow", ["the check took longer than {seconds} s", "检查超过 {seconds} 秒"]],
+  [
+    "check.too_slow",
+    [
+      "the check takes longer than {seconds} s (the slowest of the last ones took {slowest} s): try again with a later not_after, or when the gateway's machine is less busy",
+      "检查超过 {seconds} 秒（最近最慢的一次用了 {slowest} 秒）：请以更晚的 not_after 重试，或待网关所在的计算机不忙时重试",
+    ],
+  ],
   ["check.no_position", ["its controller does not report the robot's position", "其控制器未告知机器人位置"]],
   [
     "check.held_way_unknown",
