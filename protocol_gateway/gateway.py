@@ -57,7 +57,6 @@ async def serve(session: Session, settings: Settings) -> None:
             )
             stack.push_async_callback(robot.close)
             robots.append(robot)
-            await robot.listen()
             log.info("%s: controller at %s:%d", each.name, each.host, each.port)
         by_name = {robot.name: each for robot, each in zip(settings.robots, robots, strict=True)}
         measure_links(session, {name: each.link for name, each in by_name.items()})

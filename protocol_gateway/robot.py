@@ -240,7 +240,7 @@ class Robot:
         session.answer(site, settings.name, "audit/find", SearchServer(audit_path).answer)
         self._operators = session.watch_presence(presence_key(site, settings.name, Role.OPERATOR.value, "*"))
         self._gateways = session.watch_presence(presence_key(site, settings.name, Role.GATEWAY.value, "*"))
-        self._identity = session.identity
+        self._session, self._identity = session, session.identity
         # Ids of other gateways that serve this robot.
         self._others: set[str] = set()
         self._report_startup()
@@ -316,19 +316,6 @@ class Robot:
         """Reporter of the robot's events."""
         return self._journal
 
-    async def listen(self) -> None:
-        """Listen for old client programs, if the site file allows them.
-
-        Raises:
-            GatewaySettingsError: If the address cannot be used.
-        """
-        if self._legacy is None:
-            return
-        try:
-            await self._legacy.listen()
-        except GatewaySettingsError as error:
-            raise GatewaySettingsError(f"robot {self._settings.name}: {error}") from None
-
     async def run(self) -> None:
         """Keep the link and the heartbeats until cancelled; then stop motion under a lease."""
         self._control.handle(
@@ -336,6 +323,8 @@ class Robot:
         )  # no link yet, but the failed send makes it connect without pauses
         works = (self._link.run, self._watch_sessions, self._watch_gateways, self._keep_set_up)
         tasks = [asyncio.create_task(self._keep_running(work)) for work in works]
+        if self._legacy is not None:
+            tasks.append(asyncio.create_task(self._legacy.listen(self._session, self._settings.name)))
         try:
             await self._keep_running(self._poll)
         finally:

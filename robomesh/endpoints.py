@@ -114,17 +114,21 @@ def router_config(
     tls: Tls | None = None,
     access: Mapping[str, Any] = MappingProxyType({}),
     line_bps: float | None = None,
+    *,
+    may_come_late: bool = False,
 ) -> zenoh.Config:
     """Return the configuration of a router that listens and links to other sites' routers.
 
     Args:
         access: Sections of Zenoh's configuration with the access rules (`robomesh/access_rights.py`).
         line_bps: Rate of the lines to other sites [bit/s]; None: unknown.
+        may_come_late: Open although it cannot listen on an address, and try that again.
 
     Raises:
         SessionError: If Zenoh rejects an endpoint.
     """
-    return _config(router_values(listen, connect, tls, access, line_bps))
+    late = {"listen/exit_on_failure": False, "listen/timeout_ms": -1} if may_come_late else {}
+    return _config(router_values(listen, connect, tls, access, line_bps) | late)
 
 
 def router_values(

@@ -3,23 +3,30 @@
 import asyncio
 import functools
 import logging
+import os
 import socket
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
+from typing import TypeVar
 
 import psutil
 
+from robomesh import reason_codes as codes
 from robomesh.clock import answer_clock
 from robomesh.keys import WHOLE_SITE
 from robomesh.loop_turns import MeasuredLoop
+from robomesh.messages import reason_message
 from robomesh.publisher import Publisher
 from robomesh.schemas.robomesh_pb2 import ServiceHealth
 from robomesh.session import Session
 
 log = logging.getLogger(__name__)
+
+_Listener = TypeVar("_Listener")
+_LISTEN_AGAIN_S = 5.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,31 +53,62 @@ async def present(
     Args:
         zenoh_id: Returns the Zenoh id to report; a router's process reports its router. By default the
             session's id.
-
-    Raises:
-        SessionError: If the metrics cannot be served at their address.
     """
     health = _Health(session, served, zenoh_id)
     if isinstance(loop := asyncio.get_running_loop(), MeasuredLoop):
         turns = loop.turns
         session.measure("longest_turn_seconds", "Longest turn of the event loop, lately", turns.longest_s)
         session.measure("long_turns_total", "Turns of the event loop above 50 ms", lambda: turns.long_turns)
+    tasks = []
     if served.metrics is not None:
-        from robomesh.metrics import serve_metrics  # Prometheus's client takes 0.1 s to import
-
-        log.info("metrics %s", serve_metrics(session, *served.metrics, health.about))
+        tasks.append(asyncio.create_task(_serve_metrics(session, *served.metrics, health.about)))
     for site, robot in served.present_for:
         session.declare_presence(site, robot, served.service)
     sites = {site for site, _ in served.present_for}
     for site in sites:
         answer_clock(session, site)
-    tasks = [asyncio.create_task(health.publish(site)) for site in sites]
+    tasks += [asyncio.create_task(health.publish(site)) for site in sites]
     try:
         yield
     finally:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def listen_when_possible(
+    session: Session, what: str, host: str, port: int, listen: Callable[[], Awaitable[_Listener]]
+) -> _Listener:
+    """Listen on an address that the service can do without; return what `listen` returns.
+
+    While it cannot, the process's health says so.
+
+    Args:
+        what: For the text: "metrics".
+        listen: Listens; raises an OSError if it cannot.
+    """
+    while True:
+        try:
+            listener = await listen()
+        except OSError as error:
+            detail = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
+            problem = codes.CANNOT_LISTEN(what=what, address=f"{host}:{port}", detail=detail)
+            if session.problems.get(what) != problem:
+                log.warning("%s", problem)
+            session.problems[what] = problem
+            await asyncio.sleep(_LISTEN_AGAIN_S)
+        else:
+            session.problems.pop(what, None)
+            return listener
+
+
+async def _serve_metrics(session: Session, host: str, port: int, about: Mapping[str, str]) -> None:
+    from robomesh.metrics import serve_metrics  # Prometheus's client takes 0.1 s to import
+
+    async def serve() -> str:
+        return serve_metrics(session, host, port, about)
+
+    log.info("metrics %s", await listen_when_possible(session, "metrics", host, port, serve))
 
 
 def health_of(session: Session, served: Served) -> Callable[[], ServiceHealth]:
@@ -149,6 +187,7 @@ class _Health:
             zenoh_id=self._zenoh_id(),
             ignored=self._session.ignored.count,
             ignored_examples=tuple(self._session.ignored.examples),
+            problems=map(reason_message, self._session.problems.values()),
         )
         health.timestamp.GetCurrentTime()
         health.started.FromNanoseconds(round(started_s * 1e9))

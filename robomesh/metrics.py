@@ -19,7 +19,6 @@ from prometheus_client.process_collector import ProcessCollector
 from prometheus_client.registry import Collector
 
 from robomesh.counters import Measure
-from robomesh.errors import SessionError
 from robomesh.keys import parse_key
 from robomesh.latencies import STEPS_S, Latencies
 from robomesh.session import Session
@@ -122,18 +121,12 @@ def serve_metrics(session: Session, host: str, port: int, about: Mapping[str, st
     Call it in the event loop whose heartbeat the metrics report.
 
     Raises:
-        SessionError: If it cannot listen at that address.
+        OSError: If it cannot listen at that address.
     """
     registry = CollectorRegistry()
     registry.register(SessionMetrics(session, about, _heartbeat(asyncio.get_running_loop())))
     ProcessCollector(registry=registry)
-    try:
-        server, _ = start_http_server(port, addr=host, registry=registry)
-    except OSError as error:
-        raise SessionError(
-            f"metrics {host}:{port}: cannot listen there: {error.strerror or error}; "
-            "choose another port, or 0"
-        ) from None
+    server, _ = start_http_server(port, addr=host, registry=registry)
     shown = f"[{host}]" if ":" in host else host
     return f"http://{shown}:{server.server_port}/metrics"
 

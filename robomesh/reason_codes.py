@@ -1158,7 +1158,19 @@ STOP_LATCHED_BY = Code("stop.latched_by", "stop {id} is latched by {by}: no reas
 STOP_LATCHED_WHY = Code("stop.latched_why", 'stop {id} is latched by {by}: reason "{reason}"')
 SITE_TWICE = Code("mesh.site_twice", "the name of site {site} is used twice: {names}")
 SERVICE_TWICE = Code("mesh.service_twice", "robot {robot} has {count} {service} services: {names}")
+CANNOT_LISTEN = Code(
+    "service.cannot_listen",
+    "{what} cannot listen on {address}: {detail}",
+    "it is tried again; end the program that uses the port, or choose another address",
+)
+ADDRESS_ABSENT = Code(
+    "service.address_absent",
+    "{what} does not listen on {address} yet: this machine has no such address now",
+    "it is tried again; bring its network up",
+)
+SERVICE_PROBLEM = Code("service.problem", "{name}: {cause}")
 SERVICE_GONE = Code("service.gone", "{name} is gone")
+SERVICE_MISSING = Code("service.missing", "{name} has not started")
 SERVICE_SILENT = Code(
     "service.silent", "{name} is present but has reported nothing for more than {seconds:g} s"
 )

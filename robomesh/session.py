@@ -23,6 +23,7 @@ from robomesh.ignored import REPLY, Ignored
 from robomesh.late_joiners import AnsweringThread
 from robomesh.outbox import Outbox
 from robomesh.publisher import OnGet, Publisher
+from robomesh.reasons import Reason
 from robomesh.request_queue import RoundRobin
 from robomesh.subscription import Subscription
 
@@ -65,6 +66,8 @@ class Session:
     identity: str = field(default_factory=lambda: secrets.token_hex(4))
     # Metrics that the service defines.
     measures: list[Measure] = field(default_factory=list)
+    # What the service does without, by name, and tries again.
+    problems: dict[str, Reason] = field(default_factory=dict)
     # Messages on invalid keys.
     ignored: Ignored = field(default_factory=Ignored)
     _declared: list[_Declared] = field(default_factory=list)

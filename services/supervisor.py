@@ -39,6 +39,8 @@ _LAST_S = 0.3
 ENDS_WITHIN_S = 13.0
 _SHORTEST_WAIT_S = 0.1
 _LONGEST_WAIT_S = 10.0
+# A program that the site can do without, and that could not start.
+_COULD_NOT_START_S = 60.0
 # A process that ran this long counts as healthy: its next restart is immediate.
 _HEALTHY_AFTER_S = 20.0
 _CANNOT_START = 2  # exit status
@@ -62,7 +64,7 @@ class Program:
     """A process to keep running.
 
     Attributes:
-        required: If it cannot start, the whole site does not start.
+        required: If it cannot start as it is configured (exit status 2), the whole site does not start.
         standby: A second process waits, loaded, to replace it (`wait_as_standby`): on a busy machine loading
             a service takes seconds.
         finishes: Description of the work that it must finish before it ends; empty for none.
@@ -279,8 +281,11 @@ async def _keep_running(
         if status == _CANNOT_START and not was_healthy and ran_s < _HEALTHY_AFTER_S:
             if program.required:
                 raise CouldNotStartError(f"{program.name} could not start, so the site does not start")
-            write("could not start; everything else runs without it")
-            return
+            write(
+                f"could not start; everything else runs without it; trying again in {_COULD_NOT_START_S:g} s"
+            )
+            await asyncio.sleep(_COULD_NOT_START_S)
+            continue
         if ran_s > _HEALTHY_AFTER_S:
             was_healthy, wait_s = True, 0.0
         write(f"{outcome}; restarting {f'in {wait_s:.1f} s' if wait_s else 'now'}")

@@ -7,7 +7,7 @@ from pathlib import PurePath
 
 import psutil
 
-from services.errors import ListenError
+from services.errors import UnavailableError
 
 _OWN_MODULE = "services.command_line.main"
 
@@ -20,7 +20,7 @@ def check_free(what: str, host: str, port: int, remedy: str) -> None:
         remedy: What to do besides ending the other program.
 
     Raises:
-        ListenError: If the address is in use.
+        UnavailableError: If the address is in use.
     """
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
@@ -34,10 +34,21 @@ def check_free(what: str, host: str, port: int, remedy: str) -> None:
             raise in_use(what, host, port, remedy) from None
 
 
-def in_use(what: str, host: str, port: int, remedy: str) -> ListenError:
+def is_absent(host: str) -> bool:
+    """Return whether an address is not this machine's now: its network is down, or its name is unknown."""
+    try:
+        family, _, _, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, socket.SOCK_STREAM) as probe:
+            probe.bind(address)
+    except OSError as error:
+        return isinstance(error, socket.gaierror) or error.errno == errno.EADDRNOTAVAIL
+    return False
+
+
+def in_use(what: str, host: str, port: int, remedy: str) -> UnavailableError:
     """Return the error for an address in use, with the program that uses it if that is known."""
     shown = f"[{host}]" if ":" in host else host
-    return ListenError(
+    return UnavailableError(
         f"{what} cannot listen on {shown}:{port}: {_user(port)} uses the port. End it, or {remedy}"
     )
 

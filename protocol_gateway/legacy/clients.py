@@ -11,7 +11,6 @@ Source: Chen, Zhang, Xue 2001, section 5, figures 7 and 8.
 """
 
 import asyncio
-import os
 import time
 from collections.abc import Callable
 
@@ -21,7 +20,6 @@ from protocol_gateway.control.entries import entry_of
 from protocol_gateway.core.codes import CodeTable
 from protocol_gateway.core.records import Error, write_unit
 from protocol_gateway.core.stream import Malformed, StreamEvent, Unit, printable
-from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.journal import Journal
 from protocol_gateway.legacy.commander import Commander
 from protocol_gateway.legacy.requests import (
@@ -35,7 +33,9 @@ from protocol_gateway.legacy.requests import (
 from protocol_gateway.legacy.settings import LegacySettings, plain_address
 from protocol_gateway.serving.client import Client
 from robomesh import reason_codes as codes
+from robomesh.health import listen_when_possible
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
 from robots.joints import Joints
 
 _S = schema.Event.Severity
@@ -76,23 +76,15 @@ class LegacyClients:
         self._closing = False
         self._counts = schema.LegacyClients()
 
-    async def listen(self) -> int:
-        """Start to listen; return the port.
-
-        Raises:
-            GatewaySettingsError: If the address cannot be used.
-        """
+    async def listen(self, session: Session, robot: str) -> None:
+        """Start to listen, as soon as the address can be used."""
         host, port = self._settings.host, self._settings.port
-        loop = asyncio.get_running_loop()
-        try:
+
+        async def listen() -> None:
+            loop = asyncio.get_running_loop()
             self._listener = await loop.create_server(self._new_client, host, port)
-        except OSError as error:
-            reason = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
-            raise GatewaySettingsError(
-                f"legacy_clients cannot listen on {host}:{port}: {reason.lower()}"
-            ) from None
-        bound: int = self._listener.sockets[0].getsockname()[1]
-        return bound
+
+        await listen_when_possible(session, f"legacy_clients of {robot}", host, port, listen)
 
     @property
     def counts(self) -> schema.LegacyClients:

@@ -1619,7 +1619,7 @@ class ReplayState(_message.Message):
     def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., robot: _Optional[str] = ..., file: _Optional[str] = ..., of_site: _Optional[str] = ..., of_robot: _Optional[str] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., duration_s: _Optional[float] = ..., position_s: _Optional[float] = ..., speed: _Optional[float] = ..., playing: _Optional[bool] = ..., loop: _Optional[bool] = ..., text: _Optional[str] = ..., reason: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
 
 class ServiceHealth(_message.Message):
-    __slots__ = ("timestamp", "service", "id", "version", "host", "pid", "started", "cpu", "memory_bytes", "open_files", "published", "received", "lost", "turned_away", "values", "robots", "zenoh_id", "ignored", "ignored_examples")
+    __slots__ = ("timestamp", "service", "id", "version", "host", "pid", "started", "cpu", "memory_bytes", "open_files", "published", "received", "lost", "turned_away", "values", "robots", "zenoh_id", "ignored", "ignored_examples", "problems")
     class ValuesEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -1646,6 +1646,7 @@ class ServiceHealth(_message.Message):
     ZENOH_ID_FIELD_NUMBER: _ClassVar[int]
     IGNORED_FIELD_NUMBER: _ClassVar[int]
     IGNORED_EXAMPLES_FIELD_NUMBER: _ClassVar[int]
+    PROBLEMS_FIELD_NUMBER: _ClassVar[int]
     timestamp: _timestamp_pb2.Timestamp
     service: str
     id: str
@@ -1665,7 +1666,8 @@ class ServiceHealth(_message.Message):
     zenoh_id: str
     ignored: int
     ignored_examples: _containers.RepeatedScalarFieldContainer[str]
-    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., service: _Optional[str] = ..., id: _Optional[str] = ..., version: _Optional[str] = ..., host: _Optional[str] = ..., pid: _Optional[int] = ..., started: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., cpu: _Optional[float] = ..., memory_bytes: _Optional[int] = ..., open_files: _Optional[int] = ..., published: _Optional[int] = ..., received: _Optional[int] = ..., lost: _Optional[int] = ..., turned_away: _Optional[int] = ..., values: _Optional[_Mapping[str, float]] = ..., robots: _Optional[_Iterable[str]] = ..., zenoh_id: _Optional[str] = ..., ignored: _Optional[int] = ..., ignored_examples: _Optional[_Iterable[str]] = ...) -> None: ...
+    problems: _containers.RepeatedCompositeFieldContainer[Reason]
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., service: _Optional[str] = ..., id: _Optional[str] = ..., version: _Optional[str] = ..., host: _Optional[str] = ..., pid: _Optional[int] = ..., started: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., cpu: _Optional[float] = ..., memory_bytes: _Optional[int] = ..., open_files: _Optional[int] = ..., published: _Optional[int] = ..., received: _Optional[int] = ..., lost: _Optional[int] = ..., turned_away: _Optional[int] = ..., values: _Optional[_Mapping[str, float]] = ..., robots: _Optional[_Iterable[str]] = ..., zenoh_id: _Optional[str] = ..., ignored: _Optional[int] = ..., ignored_examples: _Optional[_Iterable[str]] = ..., problems: _Optional[_Iterable[_Union[Reason, _Mapping]]] = ...) -> None: ...
 
 class ClockRequest(_message.Message):
     __slots__ = ("asked",)

@@ -1,6 +1,7 @@
 """The program `robomesh`: run one command, and end as it does.
 
-Exit status 0: done; 1: done, and the answer is no; 2: not possible, and one line says why.
+Exit status 0: done; 1: done, and the answer is no; 2: not possible, and one line says why; 75 (EX_TEMPFAIL):
+not possible now, because an address is in use or not there yet.
 """
 
 import os
@@ -14,6 +15,7 @@ from robomesh.extras import EXTRAS, missing
 from services.command_line.commands import root
 from services.command_line.output import discard, print_line, print_text, protect
 from services.command_line.reading_limits import limit
+from services.errors import TRY_AGAIN, UnavailableError
 
 
 def main() -> None:
@@ -61,7 +63,7 @@ def run(arguments: list[str]) -> int:
             discard(sys.stdout)
             return 0
         if isinstance(error, _known_errors()):
-            return _failed(str(error))
+            return _failed(str(error), TRY_AGAIN if isinstance(error, UnavailableError) else 2)
         return _failed_ourselves(error)
 
 
@@ -88,9 +90,9 @@ def _failed_ourselves(error: Exception) -> int:
     return _failed(f"a fault of robomesh itself: {error!r} (ROBOMESH_DEBUG=1 shows where)")
 
 
-def _failed(text: str) -> int:
+def _failed(text: str, status: int = 2) -> int:
     print_line(f"robomesh: {text}", err=True)
-    return 2
+    return status
 
 
 def _known_errors() -> tuple[type[Exception], ...]:

@@ -17,7 +17,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from urllib.parse import urlsplit
 
-from services.errors import ListenError
+from services.errors import UnavailableError
 from services.foxglove.settings import ORIGINS
 from services.site_file.listen_address import is_loopback
 
@@ -71,7 +71,7 @@ class Listener:
         """Listen during the block and yield the port; end all connections at its end.
 
         Raises:
-            ListenError: If it cannot listen on the address.
+            UnavailableError: If it cannot listen on the address.
         """
         try:
             listener = await asyncio.start_server(
@@ -84,7 +84,7 @@ class Listener:
             )
         except OSError as error:
             reason = os.strerror(error.errno) if error.errno else str(error)
-            raise ListenError(
+            raise UnavailableError(
                 f"foxglove cannot listen on {host}:{port}: {reason}; choose another address with --listen"
             ) from None
         try:

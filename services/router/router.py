@@ -18,17 +18,18 @@ from typing import Any
 
 import zenoh
 
+from robomesh import reason_codes as codes
 from robomesh.certificate_identity import read_identity
 from robomesh.endpoints import Link, Tls, first_line, router_config, router_values
 from robomesh.errors import RobomeshError
 from robomesh.schemas.robomesh_pb2 import Event
 from robomesh.session import SessionSettings
-from services.errors import ListenError, ServiceError
+from services.errors import ListenError, ServiceError, UnavailableError
 from services.router.peer_audit import find_impostors, to_other_sites, without_rights
 from services.router.rolling_restart import neighbours, wait_for_turn
 from services.router.status import StatusPublisher
-from services.site_file.listen_address import check_reach, reachable, split_address
-from services.used_ports import check_free
+from services.site_file.listen_address import check_reach, own_addresses, split_address
+from services.used_ports import check_free, is_absent
 
 log = logging.getLogger(__name__)
 
@@ -67,7 +68,8 @@ async def serve(settings: Settings, *, ready: Callable[[str], None] | None = Non
     """Route until cancelled, by the current rules and keys in their files.
 
     Raises:
-        ListenError: If an address is in use, or other machines can reach it without TLS and `insecure`.
+        ListenError: If other machines can reach an address without TLS and `insecure`.
+        UnavailableError: If an address is in use.
         SessionError: If an endpoint is invalid.
         AccessError: If the rules cannot be read.
     """
@@ -76,9 +78,12 @@ async def serve(settings: Settings, *, ready: Callable[[str], None] | None = Non
     rules, site = read_access(settings.access), _own_site(settings)
     router = await _open(settings, rules)
     status = StatusPublisher()
+    for endpoint in filter(_is_absent, settings.listen):
+        status.problems[endpoint] = codes.ADDRESS_ABSENT(what="the router", address=endpoint)
+        log.warning("%s", status.problems[endpoint])
     tasks = []
     if settings.site:
-        mesh = SessionSettings(connect=tuple(map(reachable, settings.listen)), tls=settings.tls)
+        mesh = SessionSettings(connect=own_addresses(settings.listen), tls=settings.tls)
         tasks.append(
             asyncio.create_task(
                 status.run(
@@ -96,6 +101,9 @@ async def serve(settings: Settings, *, ready: Callable[[str], None] | None = Non
             ready("routing on " + ", ".join(settings.listen))
         while True:
             await asyncio.sleep(_CHECK_EVERY_S)
+            for endpoint in [endpoint for endpoint in status.problems if not _is_absent(endpoint)]:
+                del status.problems[endpoint]
+                log.info("the router listens on %s", endpoint)
             unknown = await asyncio.to_thread(without_rights, router, rules)
             for name in sorted(unknown - reported):
                 status.publish_event(
@@ -261,15 +269,27 @@ def check_ports_free(endpoints: Iterable[str]) -> None:
 
 
 async def _open(settings: Settings, rules: Mapping[str, Any]) -> zenoh.Session:
-    config = router_config(settings.listen, settings.connect, settings.tls, rules, settings.line_bps)
+    config = router_config(
+        settings.listen,
+        settings.connect,
+        settings.tls,
+        rules,
+        settings.line_bps,
+        may_come_late=any(map(_is_absent, settings.listen)),
+    )
     try:
         return await asyncio.to_thread(zenoh.open, config)
     except zenoh.ZError as error:
         await asyncio.to_thread(check_ports_free, settings.listen)
-        raise ListenError(
+        raise UnavailableError(
             f"the router cannot listen on {', '.join(settings.listen)}: {first_line(error)}; "
             "choose another address under [router] listen"
         ) from None
+
+
+def _is_absent(endpoint: str) -> bool:
+    host, _ = split_address(endpoint.partition("/")[2].partition("?")[0])
+    return is_absent(host)
 
 
 async def _reopen(

@@ -9,6 +9,7 @@ import zenoh
 from robomesh.errors import RobomeshError
 from robomesh.health import Served, present
 from robomesh.keys import WHOLE_SITE
+from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import SessionSettings, open_session
 
@@ -31,6 +32,8 @@ class StatusPublisher:
     """
 
     def __init__(self) -> None:
+        # Addresses that it cannot listen on yet.
+        self.problems: dict[str, Reason] = {}
         self._queue: asyncio.Queue[schema.Event] = asyncio.Queue(_MAX_QUEUED)
 
     def publish_event(self, severity: Severity, code: str, text: str) -> None:
@@ -63,6 +66,7 @@ class StatusPublisher:
         served = Served(service=SERVICE, present_for=((site, WHOLE_SITE),), metrics=metrics)
         try:
             async with open_session(mesh) as session, present(session, served, zenoh_id=zenoh_id):
+                session.problems = self.problems
                 session.measure("links", "Other routers that it reaches", lambda: _links(router()))
                 session.measure("links_wanted", "Routers that it is to link to", lambda: links)
                 publisher = session.declare_publisher(site, WHOLE_SITE, f"events/{SERVICE}")

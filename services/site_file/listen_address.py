@@ -1,6 +1,7 @@
 """Listening addresses, HOST:PORT, and whether other machines can reach them."""
 
 import ipaddress
+from collections.abc import Iterable
 
 from services.errors import ListenError
 
@@ -60,6 +61,15 @@ def reachable(endpoint: str) -> str:
     host, port = split_address(address)
     host = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, host)
     return f"{protocol}/{host}:{port}{question}{options}"
+
+
+def own_addresses(endpoints: Iterable[str]) -> tuple[str, ...]:
+    """Return listening endpoints as `reachable` does, those of loopback first: others may come late."""
+
+    def is_elsewhere(endpoint: str) -> bool:
+        return not is_loopback(split_address(endpoint.partition("/")[2].partition("?")[0])[0])
+
+    return tuple(sorted(map(reachable, endpoints), key=is_elsewhere))
 
 
 _IN_THE_SITE_FILE = "give it tls = { ca, certificate, key }, listen on 127.0.0.1, or write insecure = true"

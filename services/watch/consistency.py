@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 
 from robomesh import reason_codes as codes
 from robomesh.keys import WHOLE_SITE, PresenceKey, is_replay
+from robomesh.messages import received_reason
 from robomesh.session import CERTIFICATE
 from services.watch.conditions import Condition, condition_of
 from services.watch.mesh import Mesh, Process
@@ -25,6 +26,8 @@ _CLOCK_S, _CLOCK_OVER_S = 0.5, 0.4
 _LOSS, _LOSS_OVER, _LOSS_LEAST = 5e-3, 1e-3, 20
 _SILENT_S = 10.0
 _UNLINKED_AFTER_S = 20.0
+# On a busy machine a site takes this long to start.
+_STARTED_S = 60.0
 _DAY_S = 86_400.0
 _EXPIRES_S = 10 * _DAY_S
 
@@ -34,7 +37,8 @@ class Expected:
     """Services and sites that were present once, and are expected to be present.
 
     Attributes:
-        services: Names of the own site's processes, by service and robot (`-`: the whole site).
+        services: Names of the own site's processes, by service and robot (`-`: the whole site); empty: never
+            seen.
         sites: Other sites.
         without_gateway: Robots without a gateway, by the id of its alarm.
     """
@@ -87,7 +91,7 @@ def mesh_conditions(
         *_missing(mesh, tokens, site, expected),
         *_versions(mesh),
     ):
-        yield replace(condition, after_s=settled_s)
+        yield replace(condition, after_s=max(settled_s, condition.after_s))
     yield from _clocks(mesh, here, begun)
     for process in mesh.processes.values():
         if process.site == site:
@@ -133,11 +137,16 @@ def _missing(mesh: Mesh, tokens: list[PresenceKey], site: str, expected: Expecte
     for (service, name), robots in gone.items():
         first = sorted(robots)[0]
         condition = condition_of(
-            codes.SERVICE_GONE(name=name),
+            codes.SERVICE_GONE(name=name) if name else codes.SERVICE_MISSING(name=service),
             code="service.gone",
+            after_s=0.0 if name else _STARTED_S,
             over=f"{service} is there again",
             each=service if first == WHOLE_SITE else f"{service}.{first}",
-            values=(("service", service), ("name", name), ("robots", " ".join(sorted(robots)[:20]))),
+            values=(
+                ("service", service),
+                ("name", name or service),
+                ("robots", " ".join(sorted(robots)[:20])),
+            ),
             latching=True,
         )
         if service == "gateway":
@@ -216,6 +225,14 @@ def _of_process(process: Process, begun: frozenset[str], now: float, now_s: floa
         )
     received, lost = process.lost_lately
     each = f"{health.service}.{health.id}"
+    for problem in health.problems:
+        cause = received_reason(problem)
+        yield condition_of(
+            codes.SERVICE_PROBLEM(cause, name=process.name),
+            code="service.problem",
+            over=f"{process.name}: {problem.values.get('what') or problem.code} is right again",
+            each=f"{each}.{problem.values.get('what') or problem.code}",
+        )
     share = lost / max(received + lost, 1)
     standing = f"{WHOLE_SITE}:mesh.loss:{each}" in begun
     if (lost >= _LOSS_LEAST and share > _LOSS) or (standing and share > _LOSS_OVER):

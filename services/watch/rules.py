@@ -174,6 +174,7 @@ RULES: Mapping[str, Rule] = MappingProxyType(
         ),
         # The mesh itself: `consistency.py` keeps these active while they hold.
         "service.gone": Rule(MEDIUM, "See its log; start it again.", each="service"),
+        "service.problem": Rule(LOW, "Everything else runs; the text says what to do.", each="id"),
         "service.silent": Rule(
             MEDIUM, "It hangs, or its line is full: see its log, then start it again.", each="id"
         ),

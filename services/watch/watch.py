@@ -46,11 +46,13 @@ class Settings:
 
     Attributes:
         folder: Folder of the alarms' file.
+        expected: Services that should run, with their robots (`-`: the whole site), beside those seen.
         settled_s: Minimum time for which a service is missing or duplicate before an alarm begins [s].
     """
 
     site: str
     folder: Path = Path("watch")
+    expected: tuple[tuple[str, str], ...] = ()
     settled_s: float = SETTLED_S
 
 
@@ -68,7 +70,7 @@ class _Watch:
         self._mesh = Mesh()
         # A clock that is set back must not hide an alarm for longer than it was shelved.
         self._clock = ForwardClock()
-        self._expected = Expected()
+        self._expected = Expected(dict.fromkeys(settings.expected, ""))
         self._states: dict[str, schema.ControllerState] = {}
         self._registry = AlarmRegistry(settings.folder / f"{settings.site}.json", self._publish_event)
         self._conditions = ConditionTracker()

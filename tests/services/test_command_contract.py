@@ -1,6 +1,7 @@
 """The table of commands: lazy imports, and the options of the contract's table."""
 
 import json
+import os
 import re
 import signal
 import socket
@@ -15,6 +16,9 @@ from services.command_line import main
 from services.command_line.commands import COMMANDS, load
 from services.command_line.main import run
 from services.command_line.site.services import SERVICES
+from services.site_file.console import Console
+from services.site_file.router import Router
+from services.site_file.site import Site
 from tests.conftest import SHARED, free_port
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -205,7 +209,14 @@ def test_doctor_checks_the_packages_of_every_service_with_an_extra() -> None:
 def test_doctor_distinguishes_a_running_site_from_another_program(router: str) -> None:
     from services.command_line.doctor import machine
 
-    assert machine._is_router(int(router.rpartition(":")[2]))
     with socket.create_server(("127.0.0.1", 0)) as other:
-        assert not machine._is_console(other.getsockname()[1])
-    assert not machine._is_router(free_port())
+        site = Site(
+            site="hall",
+            router=Router(listen=(router, "tcp/192.0.2.1:7447"), insecure=True),  # RFC 5737: never ours
+            console=Console(listen=f"127.0.0.1:{other.getsockname()[1]}"),
+        )
+        found = {each.what: each for each in machine._addresses(site)}
+    assert found[f"router's {router}"].text.endswith("is used by a running site")
+    assert found["router's tcp/192.0.2.1:7447"].text == "192.0.2.1:7447 is not this machine's address now"
+    assert not found["console's address"].ok
+    assert f"process {os.getpid()} " in found["console's address"].text

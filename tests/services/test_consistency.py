@@ -158,6 +158,21 @@ def test_a_site_that_is_seen_no_more_is_gone_once():
     assert over.over == "site beijing is there again"
 
 
+def test_a_service_that_should_run_and_was_never_seen_is_missed_after_a_minute():
+    expected = Expected({("recorder", "-"): "", ("gateway", "arm"): ""})
+    mesh, tracker = Mesh(), ConditionTracker()
+    mesh.add_presence(PresenceKey("s", "arm", "gateway", "a1"))
+
+    def judged(now_s: float) -> list[str]:
+        conditions = mesh_conditions(
+            mesh, "s", here="me", expected=expected, begun=frozenset(), now=EPOCH, now_s=now_s
+        )
+        return [condition.text for condition in tracker.update(conditions, now_s)[0]]
+
+    assert judged(0.0) == judged(59.0) == []
+    assert judged(61.0) == ["recorder has not started"]
+
+
 @pytest.mark.parametrize(
     ("service", "robot", "missed"),
     [

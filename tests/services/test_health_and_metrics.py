@@ -3,6 +3,7 @@
 import asyncio
 import os
 import re
+import socket
 import time
 import urllib.request
 from pathlib import Path
@@ -13,15 +14,15 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from robomesh import subscription as subscription_module
 from robomesh.clock import Clock, Reading, hops_of, read_clock, reading_of
-from robomesh.errors import NoAnswerError, SessionError
-from robomesh.health import Served, own_version, present
+from robomesh.errors import NoAnswerError
+from robomesh.health import Served, health_of, own_version, present
 from robomesh.latencies import Latencies
 from robomesh.loop_turns import LONG_S, MeasuredLoop
 from robomesh.metrics import SessionMetrics, serve_metrics
 from robomesh.schemas.robomesh_pb2 import ServiceHealth
 from robomesh.session import open_session
 from services.watch.rules import RULES
-from tests.conftest import free_port, run
+from tests.conftest import run
 from tests.site import robomesh, wait_until
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -160,13 +161,24 @@ def test_the_heartbeat_ages_while_the_event_loop_hangs(mesh):
     run(main())
 
 
-def test_metrics_that_cannot_listen_say_where(mesh):
+def test_a_service_without_its_metrics_runs_and_says_so_and_listens_when_it_can(mesh, monkeypatch):
+    monkeypatch.setattr("robomesh.health._LISTEN_AGAIN_S", 0.1)
+
     async def main():
-        port = free_port()
-        async with open_session(mesh) as session:
-            serve_metrics(session, "127.0.0.1", port, {})
-            with pytest.raises(SessionError, match=f"metrics 127.0.0.1:{port}: cannot listen there"):
-                serve_metrics(session, "127.0.0.1", port, {})
+        with socket.create_server(("127.0.0.1", 0)) as other:
+            port = other.getsockname()[1]
+            served = Served(service="gateway", present_for=(("s", "arm"),), metrics=("127.0.0.1", port))
+            async with open_session(mesh) as session, present(session, served):
+                measured = health_of(session, served)
+                while not (problems := measured().problems):
+                    await asyncio.sleep(0.02)
+                assert problems[0].text.startswith(
+                    f"metrics cannot listen on 127.0.0.1:{port}: Address already"
+                )
+                other.close()
+                while measured().problems:
+                    await asyncio.sleep(0.02)
+                assert await asyncio.to_thread(scrape, f"http://127.0.0.1:{port}/metrics")
 
     run(main())
 

@@ -1,5 +1,6 @@
 """Ports in use: the error names the program, and `up` is ready only when its own console answers."""
 
+import asyncio
 import os
 import re
 import subprocess
@@ -9,12 +10,15 @@ from http.server import HTTPServer, SimpleHTTPRequestHandler
 
 import pytest
 
+from robomesh.session import SessionSettings, open_session
 from services.command_line.site import up
 from services.errors import ListenError
-from services.router.router import check_ports_free
+from services.router.router import Settings, check_ports_free, serve
 from services.site_file.console import Console
+from services.site_file.listen_address import own_addresses
 from services.site_file.site import Site
 from services.used_ports import check_free
+from tests.conftest import free_port, run
 
 
 @pytest.fixture
@@ -69,3 +73,27 @@ def test_a_site_does_not_start_when_a_port_of_it_is_used(foreign, monkeypatch):
 
 def test_a_free_port_is_free():
     check_free("the console", "127.0.0.1", 0, "")
+
+
+def test_a_router_serves_its_other_addresses_while_one_is_not_there_yet(monkeypatch):
+    # RFC 5737: no machine has this address.
+    late, there = f"tcp/192.0.2.1:{free_port()}", f"tcp/127.0.0.1:{free_port()}"
+
+    async def main():
+        settings = Settings(site="hall", listen=(late, there), insecure=True)
+        task = asyncio.create_task(serve(settings))
+        async with open_session(
+            SessionSettings(connect=own_addresses(settings.listen), wait_s=20.0)
+        ) as session:
+            health = session.subscribe("robomesh/hall/-/health/*")
+            assert (
+                f"the router does not listen on {late} yet"
+                in (await anext(health)).message().problems[0].text
+            )
+            monkeypatch.setattr("services.router.router.is_absent", lambda _: False)  # its network is up
+            while (await anext(health)).message().problems:
+                pass
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    run(main())

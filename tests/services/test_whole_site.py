@@ -20,6 +20,7 @@ from robomesh.keys import parse_key
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
 from robomesh.topics import topic
+from services.errors import TRY_AGAIN
 from tests.conftest import free_port, last_value, run
 from tests.refusals import refused
 from tests.site import ONE_ARM, alive, kill, robomesh, running_site, site_file, wait_until
@@ -507,10 +508,10 @@ def test_bad_input_is_one_line_that_names_it_and_exit_status_2(tmp_path):
         assert len(result.stderr.strip().splitlines()) == 1, result.stderr
 
 
-def test_a_taken_port_ends_up_with_one_line_and_exit_status_2(site, tmp_path):
+def test_a_taken_port_ends_up_with_one_line_and_a_status_that_says_to_try_again(site, tmp_path):
     path = site_file(tmp_path, robots=ONE_ARM, router=site.router, console=f"127.0.0.1:{free_port()}")
     result = robomesh("up", str(path))
-    assert result.returncode == 2
+    assert result.returncode == TRY_AGAIN
     user = f"process {site.process.pid} (robomesh up)"
     assert f"cannot listen on {site.router.removeprefix('tcp/')}: {user} uses the port. " in result.stderr
     assert result.stdout == ""

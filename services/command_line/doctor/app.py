@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from services.command_line.keys import KeysFolder, keys_folder
-from services.command_line.options import Json, command_group
+from services.command_line.options import Json, SiteFile, command_group
 
 app = command_group()
 
@@ -20,6 +20,7 @@ def doctor(
         str,
         typer.Option("--connect", metavar="tls/HOST:PORT", help="A router; else those of principals.toml."),
     ] = "",
+    site: SiteFile = None,
     as_json: Json = False,
 ) -> int | None:
     """Check this machine, and say how to fix what is missing."""
@@ -30,5 +31,5 @@ def doctor(
         return check.run(keys_folder(folder, quiet=as_json), addresses(routers), as_json)
     from services.command_line.doctor import machine as command
 
-    command.run(as_json)
+    command.run(site, as_json)
     return None

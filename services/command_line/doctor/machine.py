@@ -2,20 +2,29 @@
 
 import asyncio
 import http.client
-import json
 import os
 import shutil
-import socket
+import ssl
 import sys
 import urllib.request
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
 from robomesh.extras import ADDED_IN_CHECKOUT, install_command, is_missing
 from services.command_line.output import print_json, print_line
+from services.command_line.site.metrics_ports import first_address, ports
 from services.command_line.site.services import SERVICES
+from services.errors import UnavailableError
+from services.site_file.listen_address import reachable, split_address
+from services.used_ports import check_free, is_absent
+
+if TYPE_CHECKING:
+    from services.site_file.site import Site
 
 # Extra -> packages that it installs.
 _EXTRAS = {
@@ -29,6 +38,8 @@ _EXTRAS = {
     "step": ("cascadio",),
 }
 _FREE_BYTES = 1 << 30
+_OTHER = "choose another address in the site file"
+_END = f"end that program, or {_OTHER}"
 # Timeout for a site that runs on this machine.
 _ANSWER_S = 3.0
 
@@ -43,11 +54,17 @@ class Finding:
     fix: str = ""
 
 
-def run(as_json: bool = False) -> None:
-    """Print every finding; exit status 1 when something is missing."""
-    findings = [
-        finding for check in (_python, _extras, _open_gl, _page, _ports, _disk) for finding in check()
-    ]
+def run(site_file: Path | None = None, as_json: bool = False) -> None:
+    """Print every finding; exit status 1 when something is missing.
+
+    Args:
+        site_file: The site whose addresses are checked; None: the built-in site.
+    """
+    from services.site_file.site import load
+
+    site = load(site_file)
+    checks = (_python, _extras, _open_gl, _page, partial(_addresses, site), _disk)
+    findings = [finding for check in checks for finding in check()]
     if as_json:
         rows = [{"what": each.what, "ok": each.ok, "text": each.text, "mend": each.fix} for each in findings]
         print_json({"ok": all(each.ok for each in findings), "findings": rows})
@@ -101,26 +118,56 @@ def _page() -> list[Finding]:
     return [Finding("page", built, "built" if built else "not built", "./dev up builds it")]
 
 
-def _ports() -> list[Finding]:
-    findings = []
-    for what, port in (("router's port", 7447), ("console's port", 8080)):
-        with socket.socket() as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            free = _succeeds(lambda probe=probe, port=port: probe.bind(("127.0.0.1", port)))  # type: ignore[misc]
-        ours = not free and (_is_router(port) if port == 7447 else _is_console(port))
-        state = "is free" if free else "is used by a running site" if ours else "is taken by another program"
-        fix = "end that program, or name another port in the site file"
-        findings.append(Finding(what, free or ours, f"127.0.0.1:{port} {state}", fix))
-    return findings
+def _addresses(site: "Site") -> Iterator[Finding]:
+    """Yield whether each address of the site can be listened on, or a running site uses it."""
+    metered = first_address(site, "")
+    uses: list[tuple[str, str, int, Callable[[], bool]]] = [
+        (
+            f"router's {each}",
+            *split_address(each.partition("/")[2].partition("?")[0]),
+            partial(_is_router, each),
+        )
+        for each in map(reachable, site.listened)
+    ]
+    console = partial(_serves, f"{site.console.url}health", b'"mesh"')
+    uses.append(("console's address", *split_address(site.console.listen), console))
+    if metered is not None:
+        host, _ = metered
+        uses += [
+            (
+                f"metrics of {name}",
+                host,
+                port,
+                partial(_serves, f"http://{host}:{port}/metrics", b"robomesh_"),
+            )
+            for name, port in ports(metered).items()
+        ]
+    for what, host, port, is_ours in uses:
+        if is_absent(host):
+            text, fix = "is not this machine's address now", "bring its network up, or correct the site file"
+            yield Finding(what, False, f"{host}:{port} {text}", fix)
+            continue
+        try:
+            check_free(what, host, port, _OTHER)
+        except UnavailableError as error:
+            ours = is_ours()
+            yield Finding(
+                what,
+                ours,
+                f"{host}:{port} is used by a running site" if ours else str(error).partition(". End")[0],
+                _END,
+            )
+        else:
+            yield Finding(what, True, f"{host}:{port} is free")
 
 
-def _is_router(port: int) -> bool:
-    """Return whether a Zenoh router answers on the port, by TCP or, with `--keys`, by TLS."""
+def _is_router(endpoint: str) -> bool:
+    """Return whether a Zenoh router answers at the endpoint, by TCP or, with `--keys`, by TLS."""
     from robomesh.errors import RobomeshError
     from services.command_line import discovery
 
     async def answers() -> bool:
-        async with asyncio.timeout(_ANSWER_S), discovery.attached(f"tcp/127.0.0.1:{port}"):
+        async with asyncio.timeout(_ANSWER_S), discovery.attached(endpoint):
             return True
 
     try:
@@ -129,11 +176,13 @@ def _is_router(port: int) -> bool:
         return False
 
 
-def _is_console(port: int) -> bool:
-    """Return whether a console answers on the port."""
+def _serves(url: str, mark: bytes) -> bool:
+    """Return whether an answer with the mark comes from there."""
+    # This looks who serves, not for whom its certificate is.
+    context = ssl._create_unverified_context() if url.startswith("https") else None
     try:
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/health", timeout=_ANSWER_S) as answer:
-            return isinstance(json.loads(answer.read(100_000)), dict)
+        with urllib.request.urlopen(url, timeout=_ANSWER_S, context=context) as answer:
+            return mark in answer.read(100_000)
     except (OSError, ValueError, http.client.HTTPException):
         return False
 
@@ -149,11 +198,3 @@ def _disk() -> list[Finding]:
             "free space for recordings and the audit log: without audit no motion is allowed",
         )
     ]
-
-
-def _succeeds(attempt: Callable[[], None]) -> bool:
-    try:
-        attempt()
-    except OSError:
-        return False
-    return True

@@ -13,6 +13,7 @@ from robomesh.enum_names import enum_name, enum_word
 from robomesh.errors import NoAnswerError
 from robomesh.keys import ROOT, WHOLE_SITE, PresenceKey, is_replay, robot_key
 from robomesh.last_values import last_values
+from robomesh.messages import received_reason
 from robomesh.presence import SILENT
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
@@ -129,6 +130,7 @@ def _service(key: PresenceKey, health: schema.ServiceHealth | None, clock: Clock
         "service": key.service,
         "id": key.id,
         **known,
+        "problems": [] if health is None else [str(received_reason(each)) for each in health.problems],
         "round_trip_s": None if best is None else best.round_trip_s,
         "clock_offset_s": None if best is None else best.offset_s,
     }

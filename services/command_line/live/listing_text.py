@@ -35,6 +35,9 @@ def listing_text(found: dict[str, Any], width: int) -> "Group":
         if row["replay"] is not None
     ]
     parts.append(_services(found["services"], width))
+    problems = {(row["id"], each): row for row in found["services"] for each in row["problems"]}
+    for (_, problem), row in problems.items():
+        parts.append(styled(f" {row['site']}: {row['service']}: {problem}", "yellow"))
     parts += [styled(f" {_site(row)}", _alarm_style(row)) for row in found["sites"]]
     if found["partial"]:
         text = " This list is partial: it leaves out sessions of operators and monitors, which are too many."

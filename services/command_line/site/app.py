@@ -12,6 +12,11 @@ from services.simulator.fault_table import FAULTS
 
 app = command_group()
 
+Supervised = Annotated[
+    bool,
+    typer.Option(help="robomesh up runs every service of the site, and the robots that the page starts."),
+]
+
 
 @app.command()
 def up(
@@ -106,9 +111,7 @@ def renderer(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER, metrics: 
 def console(
     site: SiteFile = None,
     connect: Connect = DEFAULT_ROUTER,
-    supervised: Annotated[
-        bool, typer.Option(help="Let the page start robots, which a supervisor runs (robomesh up).")
-    ] = False,
+    supervised: Supervised = False,
     metrics: Metrics = "",
 ) -> None:
     """Serve the page."""
@@ -116,9 +119,14 @@ def console(
 
 
 @app.command()
-def watch(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER, metrics: Metrics = "") -> None:
+def watch(
+    site: SiteFile = None,
+    connect: Connect = DEFAULT_ROUTER,
+    supervised: Supervised = False,
+    metrics: Metrics = "",
+) -> None:
     """Hold the site's alarms, and check presence, clocks, versions and names."""
-    _run("watch", site, connect, metrics)
+    _run("watch", site, connect, metrics, supervised=supervised)
 
 
 @app.command()

@@ -12,7 +12,7 @@ from services.command_line.site.controllers import ControllerError
 from services.command_line.site.metrics_ports import own_address
 from services.command_line.site.services import SERVICES, Options
 from services.site_file import site as site_file
-from services.site_file.listen_address import reachable
+from services.site_file.listen_address import own_addresses
 from services.site_file.site import Site
 from services.site_file.started_robots import read_started
 
@@ -53,8 +53,8 @@ def session_settings(site: Site, connect: str, certificate: str) -> SessionSetti
     if given is not None:
         return given
     routers, tls = addresses(connect), site.tls_of(certificate)
-    if tls is not None and routers == (DEFAULT_ROUTER,):
-        routers = tuple(map(reachable, site.listened))
+    if routers == (DEFAULT_ROUTER,):
+        routers = own_addresses(site.listened)
     return SessionSettings(connect=routers, tls=tls)
 
 

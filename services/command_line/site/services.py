@@ -22,7 +22,7 @@ class Options:
         site_file: The site file; None: the built-in site.
         controllers: ROBOT=tcp://HOST:PORT of robots whose address differs from the site file's.
         started: Run for this robot only, which was started from the page; empty: for the site's robots.
-        supervised: A supervisor starts the robots that are started from the page.
+        supervised: `robomesh up` runs every service of the site, and the robots that the page starts.
     """
 
     site_file: Path | None = None
@@ -39,7 +39,7 @@ class Service:
         module: Has the service's `Settings` and `serve`.
         settings: Makes the Settings; None: `site/router.py` does, which reads a part of the site file.
         of_robots: It declares presence for each robot, and a site without robots does not run it.
-        required: `robomesh up` ends if it cannot start.
+        required: `robomesh up` ends if it cannot start as it is configured.
         standby: `robomesh up` keeps a second process loaded.
         last: `robomesh up` ends it after the others, which need it until their end.
         finishes: Work at its end that no kill may cut, for a line of log; empty: none.
@@ -187,10 +187,16 @@ def _player(site: "Site", _: Options) -> Any:
     return Settings(site=site.site, folder=site.recorder.folder)
 
 
-def _watch(site: "Site", _: Options) -> Any:
+def _watch(site: "Site", options: Options) -> Any:
     from services.watch import Settings
 
-    return Settings(site=site.site, folder=site.watch.folder)
+    robots = [robot.name for robot in site.robot]
+    expected = [
+        (name, each) for name, row in SERVICES.items() for each in (robots if row.of_robots else ["-"])
+    ]
+    return Settings(
+        site=site.site, folder=site.watch.folder, expected=tuple(expected) if options.supervised else ()
+    )
 
 
 def _store(site: "Site", _: Options) -> Any:
@@ -248,6 +254,7 @@ SERVICES = {
     "recorder": Service(
         module="services.recorder",
         settings=_recorder,
+        required=False,
         finishes="closing its recordings",
         packages=("mcap", "mcap_protobuf"),
     ),

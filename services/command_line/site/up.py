@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 
 from robomesh import service
+from robomesh.client.connection import addresses
 from robomesh.keys import robot_key
 from robomesh.session import SessionSettings, open_session
 from services.command_line import main
@@ -24,7 +25,7 @@ from services.pki import Folder
 from services.pki.errors import KeysError
 from services.router.router import check_ports_free
 from services.site_file import site as site_file
-from services.site_file.listen_address import reachable, split_address
+from services.site_file.listen_address import own_addresses, split_address
 from services.site_file.robot import Robot
 from services.site_file.site import Site
 from services.site_file.started_robots import may_start, read_started
@@ -43,7 +44,7 @@ def run(path: Path | None, metrics: str = "") -> None:
         metrics: HOST:PORT of the first service's Prometheus endpoint; empty: the site file decides.
     """
     site = site_file.load(path)
-    endpoint = reachable(site.listened[0])
+    endpoint = ",".join(own_addresses(site.listened))
     metered = first_address(site, metrics)
     _check_ports_free(site)
     started = _Started(site, path, endpoint)
@@ -82,7 +83,7 @@ def programs(site: Site, path: Path | None, endpoint: str) -> tuple[Program, ...
             simulator, controller = _simulator(robot, site.site, (*of_site, *attach))
             simulators.append(simulator)
             controllers += controller
-    more = {"gateway": controllers, "console": ["--supervised"]}
+    more = {"gateway": controllers, "console": ["--supervised"], "watch": ["--supervised"]}
     services = [
         _program(name, (*of_site, *attach, *more.get(name, ())))
         for name, row in SERVICES.items()
@@ -233,7 +234,9 @@ def _check_ports_free(site: Site) -> None:
 
 async def _until_page_shows_robots(site: Site, endpoint: str) -> None:
     """Wait until the console serves, every robot is described, and the simulated robots publish frames."""
-    async with open_session(SessionSettings(connect=(endpoint,), tls=site.tls_of("console"))) as session:
+    async with open_session(
+        SessionSettings(connect=addresses(endpoint), tls=site.tls_of("console"))
+    ) as session:
         for robot in site.robot:
             topic = "frames" if robot.simulated else "description"
             subscription = session.subscribe(robot_key(site.site, robot.name, topic))

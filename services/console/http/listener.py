@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
-from services.errors import ListenError
+from services.errors import UnavailableError
 from services.used_ports import in_use
 
 # Send buffer of a connection: a second of state for a slow browser, not a minute.
@@ -86,7 +86,7 @@ def listening(host: str, port: int) -> Iterator[socket.socket]:
     """Yield a listening socket with small send buffers.
 
     Raises:
-        ListenError: If the address is in use, or is not this machine's.
+        UnavailableError: If the address is in use, or is not this machine's.
     """
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
@@ -94,7 +94,7 @@ def listening(host: str, port: int) -> Iterator[socket.socket]:
         )[0]
         listener = Listener(family, kind, protocol)
     except OSError as error:
-        raise ListenError(f"the console cannot listen on {host}:{port}: {error.strerror}") from None
+        raise UnavailableError(f"the console cannot listen on {host}:{port}: {error.strerror}") from None
     with listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
@@ -108,7 +108,7 @@ def listening(host: str, port: int) -> Iterator[socket.socket]:
             remedy = "choose another address with [console] listen"
             if error.errno == errno.EADDRINUSE:
                 raise in_use("the console", host, port, remedy) from None
-            raise ListenError(
+            raise UnavailableError(
                 f"the console cannot listen on {host}:{port}: {error.strerror}; {remedy}"
             ) from None
         yield listener

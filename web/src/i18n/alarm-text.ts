@@ -63,6 +63,7 @@ const CHINESE: Record<string, readonly [title: string, advice: string]> = {
   "account.refused": ["多次登录失败", "询问账户持有人是否本人操作；若不是，请停用账户或更换密码。"],
   "accounts.unreadable": ["账户文件无法读取", "请修复账户文件；在此之前账户保持不变。"],
   "service.gone": ["服务离线", "查看其日志，并重新启动。"],
+  "service.problem": ["服务缺少一项功能", "其余功能正常；文字说明应做什么。"],
   "service.silent": ["服务无响应", "服务卡住，或其线路拥塞：查看日志并重新启动。"],
   "site.gone": ["站点失联", "到该站点的线路中断或站点已关闭：请联系其人员。"],
   "clock.off": ["时钟偏差", "请用 NTP 校时；录制中的时间会不一致。"],

@@ -1835,6 +1835,22 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     "mesh.service_twice",
     ["robot {robot} has {count} {service} services: {names}", "机器人 {robot} 有 {count} 个 {service} 服务：{names}"],
   ],
+  [
+    "service.cannot_listen",
+    [
+      "{what} cannot listen on {address}: {detail}: it is tried again; end the program that uses the port, or choose another address",
+      "{what} 无法监听 {address}：{detail}：将会重试；请结束占用该端口的程序，或选择其他地址",
+    ],
+  ],
+  [
+    "service.address_absent",
+    [
+      "{what} does not listen on {address} yet: this machine has no such address now: it is tried again; bring its network up",
+      "{what} 尚未监听 {address}：本机现在没有该地址：将会重试；请启用其网络",
+    ],
+  ],
+  ["service.problem", ["{name}: {cause}", "{name}：{cause}"]],
+  ["service.missing", ["{name} has not started", "{name} 未启动"]],
   ["service.gone", ["{name} is gone", "{name} 已离线"]],
   [
     "service.silent",
