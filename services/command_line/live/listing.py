@@ -17,6 +17,7 @@ from robomesh.messages import received_reason
 from robomesh.presence import SILENT
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
+from robomesh.topics import Role
 from services.command_line import discovery
 from services.command_line.alarm_lists import gone_sites, lists
 from services.command_line.live.listing_text import listing_text
@@ -31,6 +32,8 @@ _Alarm = schema.Alarm
 # Requests per process, of which the quickest counts; requests in parallel; timeout.
 _CLOCKS, _CLOCKS_AT_ONCE, _CLOCK_S = 3, 8, 0.7
 _AGAIN_S = 2.0
+# Timeouts for the last values of a robot, and of one whose gateway is present.
+_ANSWER_S, _LATE_S = 1.5, 8.0
 
 
 @dataclass
@@ -83,8 +86,9 @@ async def _collect(session: Session, clocks: _Clocks) -> dict[str, Any]:
     sessions, complete = await session.present_sessions()
     alive = sorted(services + sessions)
     robots = sorted({(key.site, key.robot) for key in alive if key.robot != WHOLE_SITE})
+    with_gateway = {(key.site, key.robot) for key in alive if key.service == Role.GATEWAY.value}
     rows, health, listed = await asyncio.gather(
-        asyncio.gather(*(_row(session, site, robot) for site, robot in robots)),
+        asyncio.gather(*(_row(session, *each, gateway=each in with_gateway) for each in robots)),
         last_values(session, f"{ROOT}/*/{WHOLE_SITE}/health/*"),
         lists(session),
     )
@@ -166,16 +170,18 @@ def _sites(alive: list[PresenceKey], listed: list[schema.AlarmList]) -> list[dic
     return rows
 
 
-async def _row(session: Session, site: str, robot: str) -> dict[str, Any]:
+async def _row(session: Session, site: str, robot: str, *, gateway: bool) -> dict[str, Any]:
     if is_replay(robot):
         # Its recorded controller and holder are not current.
         return _row_without_gateway(site, robot, "replay") | {"replay": await _replayed(session, site, robot)}
+    # One that is present may be far away, or its machine busy.
+    timeout_s = _LATE_S if gateway else _ANSWER_S
     state, lease = await asyncio.gather(
-        session.last(robot_key(site, robot, "controller"), timeout_s=1.5),
-        session.last(robot_key(site, robot, "lease"), timeout_s=1.5),
+        session.last(robot_key(site, robot, "controller"), timeout_s=timeout_s),
+        session.last(robot_key(site, robot, "lease"), timeout_s=timeout_s),
     )
     if not isinstance(state, _State):
-        return _row_without_gateway(site, robot, "no gateway")
+        return _row_without_gateway(site, robot, "no answer" if gateway else "no gateway")
     return {
         "site": site,
         "robot": robot,

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import signal
+import time
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from typing import NamedTuple
@@ -22,6 +23,8 @@ from services.command_line.recordings.listing import show, summary
 _Request = schema.RecorderRequest
 # The recorder publishes each second; after this silence its presence is checked.
 _SILENCE_S = 5.0
+# A router restarts in less time.
+_SITE_GONE_S = 30.0
 # A full disk ends a recording within this time.
 _EARLY_END_S = 0.3
 
@@ -97,7 +100,7 @@ async def _ended(
     session: Session, robot: discovery.Robot, states: Subscription, started: schema.Recording
 ) -> _Done:
     """Wait until the recording ends early."""
-    newest = started
+    newest, heard_s = started, time.monotonic()
     while True:
         try:
             async with asyncio.timeout(_SILENCE_S):
@@ -106,11 +109,14 @@ async def _ended(
             try:
                 alive = await session.present()
             except NoAnswerError:
+                if time.monotonic() - heard_s > _SITE_GONE_S:
+                    return _Done(newest, _unknown(newest))
                 continue  # the recorder may still be present
             if not any((who.site, who.service) == (robot.site, "recorder") for who in alive):
                 return _Done(newest, _gone(newest))
             continue
         assert isinstance(state, schema.Recording)
+        heard_s = time.monotonic()
         if state.name != started.name:
             # Another recording runs now; or none, because the recorder restarted.
             return _Done(
@@ -125,11 +131,21 @@ async def _ended(
 
 
 def _gone(newest: schema.Recording) -> str:
-    until_s = (newest.start.ToNanoseconds() + newest.duration.ToNanoseconds()) * 1e-9
     return (
         f"the recorder of {newest.site}/{newest.robot} ended while it recorded {newest.name}, which is kept "
-        f"until about {time_text(until_s)}; begin again for what follows"
+        f"until about {_until(newest)}; begin again for what follows"
     )
+
+
+def _unknown(newest: schema.Recording) -> str:
+    return (
+        f"no router answers any more: {newest.name} of {newest.site}/{newest.robot} was seen until "
+        f"{_until(newest)}. It may go on there: robomesh recordings list shows it, record --stop ends it"
+    )
+
+
+def _until(newest: schema.Recording) -> str:
+    return time_text((newest.start.ToNanoseconds() + newest.duration.ToNanoseconds()) * 1e-9)
 
 
 @asynccontextmanager
