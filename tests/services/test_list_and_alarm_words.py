@@ -63,15 +63,36 @@ def test_a_robots_row_has_what_its_driver_can_do(mesh):
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
             gateway.declare_publisher("hall", "arm", "controller").put(state)
-            while (await listing._row(monitor, "hall", "arm"))["link"] != "up":
+            while (await listing._row(monitor, "hall", "arm", gateway=True))["link"] != "up":
                 await asyncio.sleep(0.02)
-            return [await listing._row(monitor, "hall", name) for name in ("arm", "other")]
+            return [await listing._row(monitor, "hall", name, gateway=False) for name in ("arm", "other")]
 
     arm, other = run(main())
     keys = ("stops", "commands", "absolute", "dies_with_link", "recoveries")
     assert [arm[key] for key in keys] == ["ours", [], True, False, ["power_on", "brake_release"]]
     assert [other[key] for key in keys] == [None, [], None, None, []]
     assert "a motion goes on without the gateway" in listing_text._state(arm)
+
+
+def test_a_gateway_that_answers_late_is_not_called_missing(mesh, monkeypatch):
+    monkeypatch.setattr("services.command_line.live.listing._LATE_S", 4.0)
+    monkeypatch.setattr("services.command_line.live.listing._ANSWER_S", 0.2)
+
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            gateway.declare_presence("hall", "arm", "gateway")
+            gateway.declare_presence("hall", "mute", "gateway")
+            gateway.declare_presence("hall", "other", "kinematics")
+            asyncio.get_running_loop().call_later(
+                1.0,
+                gateway.declare_publisher("hall", "arm", "controller").put,
+                schema.ControllerState(link=1),
+            )
+            while len((found := await listing._collect(monitor, listing._Clocks()))["robots"]) < 3:
+                pass
+            return {row["robot"]: row["link"] for row in found["robots"]}
+
+    assert run(main()) == {"arm": "down", "mute": "no answer", "other": "no gateway"}
 
 
 def test_a_list_that_leaves_out_sessions_says_that_it_is_partial(mesh, capsys):

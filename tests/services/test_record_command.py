@@ -6,12 +6,15 @@ import signal
 from contextlib import asynccontextmanager
 
 import pytest
+import zenoh
 
+from robomesh.endpoints import router_config
 from robomesh.errors import RefusedError
+from robomesh.session import SessionSettings
 from services.command_line.discovery import Robot
 from services.command_line.live.send import joined
 from services.command_line.recordings.record import _interrupted, _record, _stop
-from tests.conftest import run
+from tests.conftest import free_port, run
 from tests.services.recording import put_states, recording_site, trace_off
 from tests.services.test_recorder import fill_disk_under
 
@@ -82,6 +85,25 @@ def test_a_recording_ended_by_another_client_is_reported(mesh, router, tmp_path,
             return await recording
 
     assert run(main()).problem == "recording trial was ended by another"
+
+
+def test_a_recording_whose_site_has_gone_ends_after_a_while_and_says_where_to_look(
+    tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr("services.command_line.recordings.record._SILENCE_S", 0.5)
+    monkeypatch.setattr("services.command_line.recordings.record._SITE_GONE_S", 2.0)
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+
+    async def main():
+        router = zenoh.open(router_config((endpoint,)))
+        async with arm_recorded(SessionSettings(connect=(endpoint,), wait_s=5.0), tmp_path):
+            recording = asyncio.create_task(_record("arm", "trial", ["-"], endpoint))
+            await until_printed(capsys, "Ctrl-C ends it")
+            await asyncio.to_thread(router.close)
+            return await recording
+
+    problem = run(main()).problem
+    assert problem.startswith("no router answers any more: trial of site/arm was seen until ")
 
 
 def test_a_full_disk_ends_a_recording_with_its_error(mesh, router, tmp_path, capsys):
