@@ -31,8 +31,9 @@ READERS: Mapping[str, Callable[..., Mesh]] = {
     ".gltf": read_trimesh,
     ".step": read_step,
     ".stp": read_step,
+    ".iges": read_step,
+    ".igs": read_step,
 }
-_IGES = {".igs", ".iges"}
 # Formats with a signature; OBJ, and VRML without its header, have none.
 _BEGINNINGS = (
     (b"#VRML", ".wrl"),
@@ -55,11 +56,7 @@ def read_mesh(path: Path, progress: Progress | None = None, *, within: Path | No
         MeshError: If the format is not supported, or the file is invalid.
     """
     ending = path.suffix.lower()
-    if ending in _IGES:
-        raise MeshError(path, "IGES is not supported: export STEP (.step), which every CAD program writes")
     kind = _kind_of_content(path) or ending
-    if kind == "iges":
-        raise MeshError(path, "contains IGES, which is not supported: export STEP (.step)")
     reader = READERS.get(kind)
     if reader is None:
         raise MeshError(path, f"ending {path.suffix!r} is not supported; use {', '.join(READERS)}")
@@ -75,7 +72,7 @@ def read_mesh(path: Path, progress: Progress | None = None, *, within: Path | No
 
 
 def _kind_of_content(path: Path) -> str:
-    """Return the ending that fits a file's first bytes, or "iges"; empty if they are ambiguous."""
+    """Return the ending that fits a file's first bytes; empty if they are ambiguous."""
     try:
         with path.open("rb") as file:
             head = file.read(1024)
@@ -94,6 +91,6 @@ def _kind_of_content(path: Path) -> str:
         return ".stl"
     if text[:1] == b"0" and b"SECTION" in head[:40]:
         return ".dxf"
-    if len(head) > 80 and head[72:73] == b"S" and head[73:80].strip() == b"1":
-        return "iges"
+    if head[72:73] == b"S" and head[73:80].lstrip(b" 0") == b"1":
+        return ".iges"
     return ""

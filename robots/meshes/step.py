@@ -1,6 +1,6 @@
-"""STEP reader: Open CASCADE (cascadio) triangulates; the file's unit and axes are kept.
+"""STEP and IGES reader: Open CASCADE (cascadio) triangulates; the axes and STEP's unit are kept.
 
-    python -m robots.meshes.step IN.step OUT.glb MEMORY_LIMIT      converts one file in a separate process
+    python -m robots.meshes.step IN OUT.glb MEMORY_LIMIT FORMAT    converts one file in a separate process
 
 Some damaged files make Open CASCADE run forever or allocate without bound, and it cannot be stopped
 within this process. So it runs in another process, with limits.
@@ -36,28 +36,45 @@ _NO_MEMORY = re.compile(rb"MemoryError|bad_alloc|Cannot allocate memory|failed t
 _ENDED_BY_MEMORY = {_OUT_OF_MEMORY, -signal.SIGABRT}
 _PREFIXES = {"MILLI": 1e-3, "CENTI": 1e-2, "DECI": 1e-1, "MICRO": 1e-6, "$": 1.0, "KILO": 1e3}
 _INCHES = {"INCH": 0.0254, "FOOT": 0.3048}
+# Entity 314, a colour that the standard does not number, in the directory section of an IGES file.
+_IGES_COLOR = re.compile(rb"^ {5}314 ", re.MULTILINE)
+_NO_COLORS = "the colours of IGES are not read: export STEP to keep them"
 
 
-def read_step(path: Path, *, time_limit_s: float = TIME_LIMIT_S, memory_limit: int = MEMORY_LIMIT) -> Mesh:
-    """Return the triangles of a .step or .stp file, in the file's unit and axes.
+def read_step(
+    path: Path,
+    *,
+    kind: str = "step",
+    time_limit_s: float = TIME_LIMIT_S,
+    memory_limit: int = MEMORY_LIMIT,
+) -> Mesh:
+    """Return the triangles of a STEP or IGES file, in its axes, and in the unit of STEP or millimetres.
 
     Args:
+        kind: "step", "stp", "iges" or "igs".
         memory_limit: Largest address space of the reading process [bytes].
 
     Raises:
-        MeshError: If it is not a readable STEP file, or exceeds the time or memory limit.
+        MeshError: If it is not a readable file of that kind, or exceeds the time or memory limit.
     """
+    form = "IGES" if kind in ("iges", "igs") else "STEP"
     if is_missing("cascadio"):
         raise MeshError(path, missing("cascadio"))
     data = content(path)
-    if b"ISO-10303-21" not in data[:1024]:
+    if form == "IGES":
+        # Open CASCADE converts IGES to millimetres, and STEP to metres.
+        made_m = unit_m = 1e-3
+        warnings: tuple[str, ...] = (_NO_COLORS,) if _IGES_COLOR.search(data) else ()
+    elif b"ISO-10303-21" in data[:1024]:
+        made_m, (unit_m, warnings) = 1.0, _unit(data)
+    else:
         raise MeshError(path, "is not a STEP file: one begins with ISO-10303-21")
-    unit_m, warnings = _unit(data)
     with tempfile.TemporaryDirectory() as folder:
         glb = Path(folder) / "made.glb"
+        arguments = (str(path), str(glb), str(memory_limit), form.lower())
         try:
             done = subprocess.run(
-                [sys.executable, "-P", "-m", "robots.meshes.step", str(path), str(glb), str(memory_limit)],
+                [sys.executable, "-P", "-m", "robots.meshes.step", *arguments],
                 capture_output=True,
                 timeout=time_limit_s,
                 check=False,
@@ -76,11 +93,11 @@ def read_step(path: Path, *, time_limit_s: float = TIME_LIMIT_S, memory_limit: i
                 "or is damaged",
             )
         if done.returncode or not glb.is_file():
-            raise MeshError(path, f"cannot be read as STEP: {_reason(done.stdout + done.stderr)}")
+            raise MeshError(path, f"cannot be read as {form}: {_reason(done.stdout + done.stderr, form)}")
         mesh = read_trimesh(glb)
     if not mesh.triangle_count:
         raise MeshError(path, "has no solid or surface that can be drawn")
-    mesh = transformed_mesh(mesh, np.diag([1 / unit_m] * 3 + [1.0]))
+    mesh = transformed_mesh(mesh, np.diag([made_m / unit_m] * 3 + [1.0]))
     return replace(mesh, warnings=(*mesh.warnings, *warnings), unit_m=unit_m, up="z")
 
 
@@ -97,37 +114,38 @@ def _unit(data: bytes) -> tuple[float, tuple[str, ...]]:
     return 1e-3, ("does not state exactly one unit of length; its numbers are given in millimetres",)
 
 
-def _reason(output: bytes) -> str:
+def _reason(output: bytes, form: str) -> str:
     text = re.sub(r"\x1b\[[0-9;]*m", "", output.decode("utf-8", errors="replace"))
     places = re.findall(r"Line (\d+): *([^*\n]+)", text)
     if places:
         line, reason = places[0]
         return f"line {line}: {reason.strip()}"
-    return "Open CASCADE found no STEP model"
+    return f"Open CASCADE found no {form} model"
 
 
 def main() -> None:
     """Convert one file; exit with status 1 if that failed, 77 if memory was short."""
-    source, made, memory_limit = sys.argv[1], sys.argv[2], int(sys.argv[3])
+    source, made, memory_limit, iges = *map(Path, sys.argv[1:3]), int(sys.argv[3]), sys.argv[4] == "iges"
     resource.setrlimit(resource.RLIMIT_AS, (memory_limit, memory_limit))
     # The parent enforces the time limit, but it may have exited.
     resource.setrlimit(resource.RLIMIT_CPU, (int(TIME_LIMIT_S), int(TIME_LIMIT_S)))
     import cascadio
 
     try:
-        status = cascadio.step_to_glb(
-            source,
-            made,
+        glb = cascadio.load(
+            source.read_bytes(),
+            "iges" if iges else "step",
             tol_linear=_DEVIATION_MM,
             tol_angular=_TURN,
             use_parallel=False,
-            merge_primitives=False,
+            # A STEP file's faces may have colours of their own.
+            merge_primitives=iges,
         )
     except MemoryError:
         sys.exit(_OUT_OF_MEMORY)
-    if status and not _has_memory(memory_limit):
-        status = _OUT_OF_MEMORY
-    sys.exit(status if status in (0, _OUT_OF_MEMORY) else 1)
+    if not glb:
+        sys.exit(1 if _has_memory(memory_limit) else _OUT_OF_MEMORY)
+    made.write_bytes(glb)
 
 
 def _has_memory(limit: int) -> bool:

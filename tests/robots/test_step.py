@@ -1,4 +1,4 @@
-"""STEP files of a box, read by Open CASCADE in a separate process."""
+"""STEP and IGES files of a box, read by Open CASCADE in a separate process."""
 
 from itertools import count
 from pathlib import Path
@@ -174,14 +174,26 @@ def test_lack_of_memory_is_reported_instead_of_a_missing_model(tmp_path: Path, m
         read_step(path, time_limit_s=20.0, memory_limit=megabytes << 20)
 
 
-@pytest.mark.parametrize("name", ["part.igs", "part.IGES"])
-def test_iges_is_rejected_and_the_error_recommends_step(tmp_path: Path, name: str) -> None:
-    with pytest.raises(MeshError, match="IGES is not supported: export STEP"):
-        read_mesh(tmp_path / name)
+@pytest.mark.parametrize("name", ["part.igs", "part.IGES", "part.stl"])
+@pytest.mark.slow
+def test_iges_is_read_in_millimetres_whatever_its_unit_and_ending_are(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    # 10 x 20 x 30 inches, by Open CASCADE 8.0.
+    path.write_bytes((Path(__file__).parent / "box_in_inches.igs").read_bytes())
+    mesh = read_mesh(path)
+    np.testing.assert_allclose(bounds(mesh), [[0, 0, 0], [254, 508, 762]], atol=1e-4)
+    volume = sum(np.linalg.det(p.vertices[t]) for p in mesh.parts for t in p.triangles) / 6
+    assert volume == pytest.approx(254 * 508 * 762, rel=1e-5)
+    assert (mesh.unit_m, mesh.up) == (0.001, "z")
+    assert mesh.warnings[-1] == "the colours of IGES are not read: export STEP to keep them"
+    assert len(mesh.warnings) == 1 + (name == "part.stl")
 
 
-def test_iges_with_another_extension_is_recognised_by_its_content(tmp_path: Path) -> None:
-    path = tmp_path / "part.stl"
-    path.write_text("from a CAD program".ljust(72) + "S      1\n")
-    with pytest.raises(MeshError, match="contains IGES, which is not supported: export STEP"):
+@pytest.mark.parametrize("kept", [0, 4, 60])
+@pytest.mark.slow
+def test_a_cut_iges_file_is_rejected_with_a_reason(tmp_path: Path, kept: int) -> None:
+    path = tmp_path / "cut.igs"
+    whole = (Path(__file__).parent / "box_in_inches.igs").read_text()
+    path.write_text("".join(whole.splitlines(keepends=True)[:kept]))
+    with pytest.raises(MeshError, match=r"is empty|Open CASCADE found no IGES model"):
         read_mesh(path)

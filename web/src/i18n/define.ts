@@ -14,8 +14,8 @@ const TEXTS = {
   ],
   start_files: ["From link files", "从连杆文件开始"],
   start_files_words: [
-    "Drop them here, all at once: the first in the order becomes the base, each other one a link with a joint of its own. The order is guessed from names and shapes, and can be changed. VRML, 3DS, STL, OBJ, PLY, DAE, GLB, DXF, STEP, with the files that they refer to.",
-    "一次拖入全部文件：第一个为基座，其余各为一个连杆及其关节。顺序按名称和外形推测，可更改。支持 VRML、3DS、STL、OBJ、PLY、DAE、GLB、DXF、STEP 及其引用的文件。",
+    "Drop them here, all at once: the first in the order becomes the base, each other one a link with a joint of its own. The order is guessed from names and shapes, and can be changed. VRML, 3DS, STL, OBJ, PLY, DAE, GLB, DXF, STEP, IGES, with the files that they refer to.",
+    "一次拖入全部文件：第一个为基座，其余各为一个连杆及其关节。顺序按名称和外形推测，可更改。支持 VRML、3DS、STL、OBJ、PLY、DAE、GLB、DXF、STEP、IGES 及其引用的文件。",
   ],
   choose_files: ["Choose files…", "选择文件…"],
   start_urdf: ["From a URDF or a zip", "从 URDF 或 zip 开始"],
