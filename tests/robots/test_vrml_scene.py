@@ -472,8 +472,21 @@ def test_unknown_nodes_are_named_once_each(draw: Draw) -> None:
         "Company: is not a node of VRML 2.0; skipped",
         "NurbsSurface: is not a geometry node of VRML 2.0; left out",
         "Other: is not a node of VRML 2.0; skipped",
-        "Text: is not drawn",
+        "Text: is not drawn: 'hi'",
     ]
+
+
+def test_each_text_that_is_left_out_is_quoted_once_in_one_warning(draw: Draw) -> None:
+    """A Text without a string draws nothing, so it is not missing."""
+    texts = "".join(
+        f"Shape {{ geometry Text {{ {field} }} }} "
+        for field in ('string [ "axis", "J1" ]', 'string "J2"', 'string "J2"', 'string ""', "")
+    )
+    (warning,) = draw(f"{SHAPE} {texts}").warnings
+    assert warning.endswith(": Text: is not drawn: 'axis J1', 'J2'")
+    many = "".join(f'Shape {{ geometry Text {{ string "{number}" }} }} ' for number in range(500))
+    (warning,) = draw(f"{SHAPE} {many}").warnings
+    assert len(warning) < 300
 
 
 def test_list_of_nodes_is_not_copied_at_each_use(tmp_path: Path) -> None:

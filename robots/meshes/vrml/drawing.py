@@ -69,6 +69,8 @@ class Drawing:
     _drawn: int = 0
     _triangles: int = 0
     _skipped: dict[str, Node] = field(default_factory=dict)
+    # Text nodes by their words. Drawing them would take a font and its library.
+    _texts: dict[str, Node] = field(default_factory=dict)
     _geometry: dict[Node, Surface | Strokes] = field(default_factory=dict)
     _materials: dict[Node, Material] = field(default_factory=dict)
 
@@ -158,12 +160,11 @@ class Drawing:
                 shape.warn("concave faces take too long to triangulate; some are drawn beyond their outline")
         elif shape.type in STROKES:
             drawn = STROKES[shape.type](shape)
+        elif shape.type == "Text":
+            self._texts.setdefault(" ".join(strings(shape, "string"))[:100], shape)
+            return None
         else:
-            known = shape.type == "Text"
-            shape.warn(
-                "is not drawn" if known else "is not a geometry node of VRML 2.0; left out",
-                once=f"no {shape.type}",
-            )
+            shape.warn("is not a geometry node of VRML 2.0; left out", once=f"no {shape.type}")
             return None
         if len(drawn.vertices) <= _MOST_KEPT:
             self._geometry[shape] = drawn
@@ -205,6 +206,9 @@ class Drawing:
 
     def warn_of_skipped(self) -> None:
         """Warn, once for each type, of nodes that were skipped."""
+        words = [each for each in self._texts if each.strip()]
+        if words:
+            self._texts[words[0]].warn(f"is not drawn: {', '.join(map(repr, words[:100]))}")
         known = [name for name in self._skipped if name in _NOT_DRAWN]
         if known:
             node = self._skipped[known[0]]
