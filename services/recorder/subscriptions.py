@@ -9,6 +9,7 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import zenoh
@@ -39,9 +40,8 @@ _RING_S, _SMALLEST_RING = 20.0, 512
 _MAX_BATCH = 2048
 _MAX_MISSING = 10_000
 _LOG_INTERVAL_S = 10.0
-# Limit of a view's frames since its newest key frame; longer sequences are dropped whole, because a part
-# without the key frame cannot be decoded.
-_MAX_PREAMBLE_BYTES = 16 << 20
+# Limit of a view's frames since its newest key frame, and what each needs besides its payload, about.
+_MAX_PREAMBLE_BYTES, _FRAME_BYTES = 16 << 20, 200
 _REPLY_TIMEOUT_S = 2.0
 
 
@@ -65,24 +65,12 @@ class _Sequence:
         self.skipped: set[int] = set()
 
 
+@dataclass
 class _Preamble:
     """What a file that is opened now lacks: the last value, or the frames since a key frame."""
 
-    def __init__(self) -> None:
-        self.entries: list[tuple[Header, bytes]] = []
-        self._bytes = 0
-        self._full = False
-
-    def begin(self) -> None:
-        self.entries, self._bytes, self._full = [], 0, False
-
-    def add(self, entry: tuple[Header, bytes]) -> None:
-        self._bytes += len(entry[1])
-        self._full = self._full or self._bytes > _MAX_PREAMBLE_BYTES
-        if self._full:
-            self.entries = []
-        else:
-            self.entries.append(entry)
+    entries: list[tuple[Header, bytes]] = field(default_factory=list)
+    size: int = 0
 
 
 class _TopicSubscription:
@@ -197,10 +185,16 @@ class _TopicSubscription:
             sink.take(key, self.row, header, payload, received_ns)
 
     def _keep(self, key: str, header: Header, payload: bytes) -> None:
-        preamble = self.preamble.setdefault(key, _Preamble())
         if self.is_static or holds_key_frame(payload):
-            preamble.begin()
-        preamble.add((header, payload))
+            self.preamble[key] = _Preamble()
+        if (kept := self.preamble.get(key)) is None:
+            return
+        kept.entries.append((header, payload))
+        kept.size += len(payload) + _FRAME_BYTES
+        without_loss = header.sequence == kept.entries[0][0].sequence + len(kept.entries) - 1
+        if not without_loss or kept.size > _MAX_PREAMBLE_BYTES:
+            # Frames without their key frame, or after a lost one, cannot be decoded.
+            del self.preamble[key]
 
     def _accepts(self, kind: str, key: str) -> bool:
         return key in self._sequences or self._ignored.key(kind, key) is not None

@@ -178,18 +178,54 @@ def test_the_rings_of_a_hundred_robots_fit_into_memory():
     assert states * 100 * 300 < 256 << 20
 
 
-def test_frames_since_a_key_frame_are_kept_whole_or_not_at_all(monkeypatch):
-    preamble = subscriptions._Preamble()
-    for number in range(1000):
-        preamble.add((Header(7, number, 0), PICTURE))
-    assert len(preamble.entries) == 1000
-    monkeypatch.setattr(subscriptions, "_MAX_PREAMBLE_BYTES", 1000)
-    preamble.add((Header(7, 1000, 0), PICTURE))
-    preamble.add((Header(7, 1001, 0), PICTURE))
-    assert preamble.entries == [], "frames without their key frame cannot be decoded"
-    preamble.begin()
-    preamble.add((Header(7, 1002, 0), KEY_PICTURE))
-    assert len(preamble.entries) == 1
+def test_a_new_file_takes_older_pictures_only_if_its_decoder_needs_and_can_use_them(mesh, monkeypatch):
+    async def main():
+        async with open_session(mesh) as service, open_session(mesh) as other:
+            subscribed = subscriptions.Subscriptions(service.zenoh_session, "site", service.ignored)
+            first = Sink()
+
+            async def put(numbers, *, key_frames=()):
+                for number in numbers:
+                    data = picture(KEY_PICTURE if number in key_frames else PICTURE)
+                    other.zenoh_session.put(VIDEO, data, attachment=pack(Header(7, number, number)))
+                await until(lambda: first.taken[-1:] == [(VIDEO, number)])
+
+            async def taken_by_new_sink(number):
+                """Return what a sink takes with the first picture after it was attached."""
+                sink = Sink()
+                with subscribed.lock:
+                    subscribed.robot("arm").attach(sink, frozenset({"video/front"}))
+                await put([number])
+                with subscribed.lock:
+                    subscribed.robot("arm").detach(sink)
+                return [taken for _, taken in sink.taken]
+
+            try:
+                with subscribed.lock:
+                    subscribed.robot("arm").attach(first, frozenset({"video/front"}))
+                while not first.taken:  # until the router knows the subscriber
+                    other.zenoh_session.put(VIDEO, picture(PICTURE), attachment=pack(Header(7, 1, 1)))
+                    await asyncio.sleep(0.02)
+                found = {"no key frame yet": await taken_by_new_sink(2)}
+                await put(range(3, 7), key_frames=(3, 5))
+                found["the last of two key frames"] = await taken_by_new_sink(7)
+                await put([9])
+                found["a lost picture"] = await taken_by_new_sink(10)
+                await put([11], key_frames=(11,))
+                found["a key frame after it"] = await taken_by_new_sink(12)
+                monkeypatch.setattr(subscriptions, "_MAX_PREAMBLE_BYTES", 0)
+                found["too many bytes"] = await taken_by_new_sink(13), await taken_by_new_sink(14)
+                return found
+            finally:
+                subscribed.close()
+
+    assert run(main(), timeout_s=60.0) == {
+        "no key frame yet": [2],
+        "the last of two key frames": [5, 6, 7],
+        "a lost picture": [10],
+        "a key frame after it": [11, 12],
+        "too many bytes": ([11, 12, 13], [14]),
+    }
 
 
 def test_a_recording_begins_with_a_new_picture_and_with_an_old_one_only_to_decode_it(
