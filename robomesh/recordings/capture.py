@@ -120,7 +120,7 @@ class Capture:
         self.counts[key] += 1
 
     def add_text(self, topic: str, text: str, header: Header, *, received_ns: int) -> None:
-        """Add a ROS 2 text (std_msgs/msg/String), from which viewers read a robot's description."""
+        """Add a ROS 2 text (std_msgs/msg/String), the only schema that viewers' URDF layers read."""
         channel = self._topics.get(topic)
         if channel is None:
             channel = self._register(topic, "cdr", "std_msgs/msg/String", "ros2msg", b"string data\n")

@@ -6,21 +6,46 @@ import struct
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer
+from mcap_protobuf.decoder import DecoderFactory
 
 from robomesh.header import Header
 from robomesh.recordings import indexed_writer
 from robomesh.recordings.capture import Capture
+from robomesh.recordings.channel_names import ROBOT_DESCRIPTION
 from robomesh.recordings.errors import CaptureError
 from robomesh.recordings.files import describe_file
 from robomesh.recordings.layout import layout_of
 from robomesh.recordings.recover import State, close_in_place, is_ours, recover, state_of
 from robomesh.recordings.reindex import index, rewrite
-from robomesh.topics import topic
+from robomesh.topics import TOPICS, topic
 from tests.recordings import write_recording
 
 ABOUT = {"site": "site", "robot": "arm", "name": "trial", "started_by": "request"}
 JOINTS, EVENTS = "robomesh/site/arm/joints", "robomesh/site/arm/events"
 SECOND = 1_000_000_000
+
+
+def test_the_usual_decoders_read_every_recorded_topic(tmp_path):
+    """One channel is not protobuf: viewers' URDF layers take only ROS 2's std_msgs/String."""
+    path, header = tmp_path / "trial.mcap", Header(7, 1, SECOND)
+    capture = Capture(path, ABOUT, start_ns=SECOND)
+    rows = {f"robomesh/site/arm/{row.name}".replace("*", "x"): row for row in TOPICS.values() if row.recorded}
+    for key, row in rows.items():
+        capture.add(key, row, header, row.schema().SerializeToString(), received_ns=SECOND)
+    capture.add_text(ROBOT_DESCRIPTION, "<robot name='臂'/>", header, received_ns=SECOND)
+    capture.finish({})
+    index(path)
+
+    def read(*factories, topics=None):
+        with path.open("rb") as stream:
+            reader = make_reader(stream, decoder_factories=factories)
+            return {channel.topic: found for _, channel, _, found in reader.iter_decoded_messages(topics)}
+
+    assert read(DecoderFactory(), topics=[*rows]).keys() == rows.keys()
+    ros2 = pytest.importorskip("mcap_ros2.decoder", reason="the rest needs the package mcap-ros2-support")
+    found = read(DecoderFactory(), ros2.DecoderFactory())
+    assert found.keys() == {*rows, ROBOT_DESCRIPTION}
+    assert found[ROBOT_DESCRIPTION].data == "<robot name='臂'/>"
 
 
 def payload(number):
