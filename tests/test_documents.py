@@ -8,6 +8,7 @@ import pytest
 
 import robomesh
 from tests import make_python_reference, make_site_file, make_topics
+from tests.long import documented_commands
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -103,3 +104,12 @@ def test_the_chinese_readme_has_the_content_of_the_english_one():
         elif pattern.startswith(r"\d"):
             of_each = [sorted(set(found)) for found in of_each]
         assert of_each[0] == of_each[1], pattern
+
+
+def test_every_command_of_the_documents_is_tried_by_the_long_tests():
+    found = {
+        command
+        for name in documented_commands.DOCUMENTS
+        for command in documented_commands.documented((ROOT / name).read_text(encoding="utf-8"))
+    }
+    assert found == documented_commands.COMMANDS.keys()
