@@ -20,6 +20,7 @@ from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.cells import CellDescription, CellRobot
 from robots.programs.jog_steps import MOST_M_S
+from robots.schema import Model
 from robots.verification_record import VerificationRecord
 
 _KNOWN_UNKNOWNS = frozenset({"mode", "homed"})
@@ -56,7 +57,7 @@ class RobotSettings:
     """
 
     name: str
-    description: str | Path
+    description: Model
     host: str
     port: int
     ports: Mapping[str, int] = field(default_factory=dict)

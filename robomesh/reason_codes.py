@@ -1107,6 +1107,11 @@ LINK_WITHOUT_SHAPE = Code(
 FIXED_WITHOUT_SHAPE = Code(
     "check.fixed_without_shape", "not checked, because they have no shape: {links} of {name}"
 )
+LIMITS_DOUBTFUL = Code(
+    "check.limits_doubtful",
+    "limits of {name} are doubtful: {joints} ({detail})",
+    "state their limits and max_speed in robot.toml or the site file, or correct the URDF",
+)
 
 # ------------------------------------------------------------------- audit log and latch file
 

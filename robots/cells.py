@@ -5,11 +5,11 @@ that only forwards it needs no kinematics.
 """
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from robots.joints import FloatArray
 from robots.kinematic_tree import Shape
 from robots.meshes.mesh import Color
+from robots.schema import Model
 
 # Default clearances between an arm and the fixtures and other robots of its cell.
 WARNING_M = 0.05
@@ -50,7 +50,7 @@ class CellRobot:
     """
 
     name: str
-    model: str | Path
+    model: Model
     base_to_site: FloatArray
     confined: bool = False
     warning_m: float = WARNING_M

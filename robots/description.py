@@ -18,7 +18,19 @@ from robots.bounded_toml import MOST_CHARACTERS, parse_toml
 from robots.description_checks import Problem, Step, file_problems, row_problems, type_problem
 from robots.errors import DescriptionError, MeshError
 from robots.example_robots import EXAMPLES, ExampleRobot, example_names, example_robot, example_values
-from robots.schema import DhDescription, JointType, Pose, RobotDescription, UrdfDescription, nearest
+from robots.schema import (
+    DhDescription,
+    JointSettings,
+    JointType,
+    Model,
+    Pose,
+    RobotDescription,
+    StatedModel,
+    Units,
+    UrdfDescription,
+    nearest,
+)
+from robots.units import position_factor
 from robots.urdf.checks import urdf_problems
 from robots.urdf.files import files_of
 from robots.urdf.read import MOST_URDF_BYTES, UrdfRobot, read_urdf
@@ -63,24 +75,46 @@ def known_names() -> tuple[str, ...]:
     return (*library_names(), *example_names())
 
 
-def load(source: str | Path, *, confined: bool = False) -> RobotDescription:
+def load(source: Model, *, confined: bool = False) -> RobotDescription:
     """Read a robot's description.
 
     Args:
         source: A library robot's name ("pt600"), an example robot's ("ur5"), or the path of a robot.toml,
-            its folder, a URDF, or an OpenHRP robot in VRML.
+            its folder, a URDF, or an OpenHRP robot in VRML; or one of these with stated limits.
         confined: Never read a file outside the description's folder; for a description that is not trusted.
 
     Raises:
         DescriptionError: If the file does not exist or has a problem; the text names the file, the key,
             its value and what would be right.
     """
+    if isinstance(source, StatedModel):
+        return _with_limits(load(source.model, confined=confined), source)
     path = _find(source)
     if isinstance(path, ExampleRobot):
         return describe_urdf(example_values(path), path.urdf)
     if path.suffix.lower() in ROBOT_FILES:
         return describe_urdf({"name": robot_name(path.stem), "urdf": path.name}, path, confined=confined)
     return parse(_text(path), path, confined=confined)
+
+
+def _with_limits(description: RobotDescription, stated: StatedModel) -> RobotDescription:
+    if not isinstance(description, UrdfDescription):
+        raise DescriptionError(stated.model, ["has no URDF: change limits and max_speed in its robot.toml"])
+    types = {joint.name: joint.type for joint in description.robot.tree.joints}
+    rows = {row.name: row for row in description.joints}
+    for row in stated.joints:
+        kind = types.get(row.name, JointType.ROTARY)
+        factor = position_factor(kind, Units()) / position_factor(kind, description.units)
+        values = {
+            "limits": row.limits and (row.limits[0] * factor, row.limits[1] * factor),
+            "max_speed": row.max_speed and row.max_speed * factor,
+        }
+        given = {key: each for key, each in values.items() if each is not None}
+        rows[row.name] = rows.get(row.name, JointSettings(name=row.name)).model_copy(update=given)
+    description = description.model_copy(update={"joints": tuple(rows.values())})
+    if problems := tuple(urdf_problems(description)):
+        raise _refusal(description.source, problems)
+    return description
 
 
 def describe_urdf(values: dict[str, Any], urdf: Path, *, confined: bool = False) -> RobotDescription:

@@ -10,6 +10,7 @@ from robots.bounded_toml import parse_toml
 from robots.description import ROBOT_FILES, describe_urdf, load, robot_name
 from robots.errors import DescriptionError
 from robots.glb import collision_meshes, glb_of, link_mesh, link_meshes
+from robots.joints import doubt_notes
 from robots.kinematic_tree import tree_of
 from robots.meshes.read import read_mesh
 from robots.schema import DhDescription, RobotDescription, UrdfDescription
@@ -72,7 +73,7 @@ def _import_urdf(description: UrdfDescription) -> ImportedRobot:
     files = {values["urdf"]: text.encode()} | {glb_beside(link): glb for link, glb in meshes.items()}
     files |= {collision_beside(link): glb for link, glb in collision_meshes(description).items()}
     robot = description.robot
-    return ImportedRobot(values, files, tuple(robot.notes), tuple(robot.missing))
+    return ImportedRobot(values, files, (*robot.notes, *doubt_notes(description)), tuple(robot.missing))
 
 
 def import_as_dh(description: UrdfDescription) -> ImportedRobot:
@@ -95,7 +96,8 @@ def import_as_dh(description: UrdfDescription) -> ImportedRobot:
                 body |= {key: address(link), "mesh_scale": 1.0}
                 files[body[key]] = glb_of(link_mesh(shapes))
     robot = description.robot
-    return ImportedRobot(values, files, (*robot.notes, *form.notes), tuple(robot.missing))
+    notes = (*robot.notes, *doubt_notes(description), *form.notes)
+    return ImportedRobot(values, files, notes, tuple(robot.missing))
 
 
 def _provenance(description: RobotDescription) -> str:

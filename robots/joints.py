@@ -1,6 +1,7 @@
 """A robot's joints in SI: limits, speeds, coupled limits. Has no kinematics and imports nothing heavy."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from math import degrees, isfinite, radians
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import ArrayLike
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.errors import JointCountError
-from robots.kinematic_tree import tree_of
+from robots.kinematic_tree import Doubt, tree_of
 from robots.poses import FloatArray
 from robots.schema import DhDescription, JointSettings, JointType, RobotDescription, UrdfDescription
 from robots.units import angle_factor, length_factor, position_factor
@@ -62,6 +63,7 @@ class Joints:
 
     Attributes:
         continuous: The source gives no limits: lower and upper are defaults.
+        doubts: Doubts about the source that the description does not settle, by joint and key.
     """
 
     names: tuple[str, ...]
@@ -74,6 +76,7 @@ class Joints:
     home: FloatArray
     continuous: tuple[bool, ...]
     constraints: tuple[Constraint, ...] = ()
+    doubts: Mapping[str, Mapping[str, Doubt]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.names)
@@ -87,6 +90,31 @@ def joints_of(description: RobotDescription) -> Joints:
         assert isinstance(description, DhDescription)
         joints = _row_joints(description)
     return replace(joints, constraints=_constraints_of(description, joints))
+
+
+def doubt_texts(joints: Joints) -> dict[str, str]:
+    """Return by joint what is doubtful about its limits."""
+    return {name: "; ".join(each.text for each in found.values()) for name, found in joints.doubts.items()}
+
+
+def doubt_notes(description: RobotDescription) -> tuple[str, ...]:
+    """Return a sentence for each joint whose limits are doubtful, with what to do."""
+    return tuple(
+        f'joint {name!r}: {text}. check = "require" refuses motion until the URDF is right, or robot.toml or '
+        "the site file states its limits and max_speed"
+        for name, text in doubt_texts(joints_of(description)).items()
+    )
+
+
+def doubtful_limits(robot: str, joints: Joints) -> Reason | None:
+    """Return the reason why limits of a robot are doubtful; None if none are."""
+    if not joints.doubts:
+        return None
+    (*names,) = joints.doubts
+    listed = ", ".join(names[:8]) + (f", ... ({len(names)})" if len(names) > 8 else "")
+    return codes.LIMITS_DOUBTFUL(
+        name=robot, joints=listed, detail=f"{names[0]}: {doubt_texts(joints)[names[0]]}"
+    )
 
 
 def _row_joints(description: DhDescription) -> Joints:
@@ -113,7 +141,7 @@ def _urdf_joints(description: UrdfDescription) -> Joints:
     """Return the URDF's joints, with the description's settings in place of the URDF's values."""
     tree = tree_of(description)
     settings = {row.name: row for row in description.joints}
-    columns = []
+    columns, doubts = [], {}
     free = [tree.joints[number] for number in tree.free]
     for joint in free:
         given = settings.get(joint.name) or JointSettings(name=joint.name)
@@ -129,6 +157,8 @@ def _urdf_joints(description: UrdfDescription) -> Joints:
         jerk = value(given.max_jerk, JERK_PER_ACCELERATION * acceleration)
         home = value(given.home, 0.0 if lower <= 0.0 <= upper else (lower + upper) / 2)
         columns.append((lower, upper, speed, acceleration, jerk, home))
+        if found := {key: each for key, each in joint.doubts.items() if getattr(given, key) is None}:
+            doubts[joint.name] = found
     lower_, upper_, speeds, accelerations, jerks, homes = map(_readonly, np.array(columns).T)
     return Joints(
         names=tuple(joint.name for joint in free),
@@ -140,6 +170,7 @@ def _urdf_joints(description: UrdfDescription) -> Joints:
         max_jerk=jerks,
         home=homes,
         continuous=tuple(joint.continuous and not _has_limits(settings.get(joint.name)) for joint in free),
+        doubts=doubts,
     )
 
 

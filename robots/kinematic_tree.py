@@ -5,8 +5,8 @@ All in SI. A joint rotates about or moves along an axis through the origin of it
 NumPy.
 """
 
-from collections.abc import Collection
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +57,21 @@ class Mimic:
     offset: float
 
 
+@dataclass(frozen=True)
+class Doubt:
+    """A value of a source that no arm has.
+
+    Attributes:
+        text: The value, why it is doubtful, and what is used in its place.
+        stated: Attributes of URDF's <limit> that state it [rad] or [m], and per second.
+        assumed: The value in its place is a default.
+    """
+
+    text: str
+    stated: Mapping[str, float]
+    assumed: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class TreeJoint:
     """A movable joint.
@@ -69,6 +84,7 @@ class TreeJoint:
         max_speed: [rad/s] or [m/s].
         mimic: The followed joint; a mimic joint is not one of the robot's joints.
         continuous: The source gives no limits; lower and upper are defaults.
+        doubts: Doubts about the source, by the key of a robot.toml that settles each (limits, max_speed).
     """
 
     name: str
@@ -81,6 +97,7 @@ class TreeJoint:
     max_speed: float
     mimic: Mimic | None = None
     continuous: bool = False
+    doubts: Mapping[str, Doubt] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

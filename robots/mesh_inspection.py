@@ -9,6 +9,7 @@ import numpy as np
 
 from robots.errors import MeshError
 from robots.glb import link_mesh
+from robots.joints import doubt_notes
 from robots.kinematic_tree import Shape, tree_of
 from robots.meshes.mesh import bounds
 from robots.schema import RobotDescription, UrdfDescription, similar
@@ -37,7 +38,7 @@ def mesh_findings(description: RobotDescription) -> tuple[list[Finding], list[Fi
             Finding(source, f"mesh {name!r}: no such file{hints.get(name, '')}")
             for name in description.robot.missing
         ]
-        warnings += [Finding(source, note) for note in description.robot.notes]
+        warnings += [Finding(source, note) for note in (*description.robot.notes, *doubt_notes(description))]
     for link in tree_of(description).links:
         for shape in (*link.shapes, *link.collision):
             if not isinstance(shape.mesh, Path):

@@ -193,6 +193,22 @@ class JointSettings(TitledJoint):
     home: Number | None = None
 
 
+class StatedModel(_Table):
+    """A robot whose site file states limits of its joints.
+
+    Attributes:
+        model: Source for `robots.description.load`.
+        joints: Limits and speeds in degrees and millimetres; they replace those of the description.
+    """
+
+    model: str
+    joints: tuple[JointSettings, ...]
+
+
+# Source of a robot's description.
+Model = str | Path | StatedModel
+
+
 class LinkColor(_Table):
     """The colour of a link of a URDF."""
 

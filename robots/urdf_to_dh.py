@@ -214,6 +214,9 @@ def _joint_values(chain: _Chain, joints: Joints) -> Iterator[dict[str, Any]]:
         joint = chain.tree.joints[number]
         index = joints.names.index(joint.name)
         factor = degrees(1.0) if joint.type is JointType.ROTARY else 1000.0
+        limits = [_rounded(joints.lower[index] * factor), _rounded(joints.upper[index] * factor)]
+        # Assumed values become invalid ones, so that right ones must be stated.
+        assumed = {key for key, each in joints.doubts.get(joint.name, {}).items() if each.assumed}
         yield {
             "name": joint.name,
             "type": str(joint.type),
@@ -221,8 +224,8 @@ def _joint_values(chain: _Chain, joints: Joints) -> Iterator[dict[str, Any]]:
             "alpha": _degrees(row.alpha),
             "d": _mm(row.d),
             "theta": _degrees(row.theta),
-            "limits": [_rounded(joints.lower[index] * factor), _rounded(joints.upper[index] * factor)],
-            "max_speed": _rounded(joints.max_speed[index] * factor),
+            "limits": [0.0, 0.0] if "limits" in assumed else limits,
+            "max_speed": 0.0 if "max_speed" in assumed else _rounded(joints.max_speed[index] * factor),
             "max_acceleration": _rounded(joints.max_acceleration[index] * factor),
             "max_jerk": _rounded(joints.max_jerk[index] * factor),
             "home": _rounded(joints.home[index] * factor),

@@ -22,7 +22,7 @@ from robomesh.reasons import Reason
 from robomesh.worker import answer_all
 from robots.collision import Cell, build_cell, missing_meshes, pending, unshaped, unshaped_moving
 from robots.inverse import InverseSolver, build_solver
-from robots.joints import FloatArray
+from robots.joints import FloatArray, doubtful_limits
 from robots.programs.check import check_plan, check_program
 from robots.programs.jog import next_part
 from robots.programs.steps import CheckResult, Step, StepKind, Violation, ViolationKind
@@ -63,7 +63,7 @@ def begin(cells: Cells) -> Callable[[Any], Any]:
             collisions=question.collisions,
             more=question.more,
         )
-        uncovered, warnings = _coverage(cell) if question.collisions else ([], [])
+        uncovered, warnings = _coverage(cell, robot) if question.collisions else ([], [])
         return Extended(
             target=None if part.target is None else tuple(part.target.tolist()),
             commanded=part.commanded,
@@ -92,14 +92,12 @@ def begin(cells: Cells) -> Callable[[Any], Any]:
                     Step(line=0, kind=StepKind.MOVE, target=np.array(target)) for target in question.targets
                 ]
                 start, others = np.array(question.start), _paths(question.others)
-                return _checked(
-                    cell, check_plan(cell, question.robot, start, steps, others=others, far=False)
-                )
+                result = check_plan(cell, question.robot, start, steps, others=others, far=False)
+                return _checked(cell, question.robot, result)
             case CheckProgram():
                 start, others = np.array(question.start), _paths(question.others)
-                return _checked(
-                    cell, check_program(question.text, cell, question.robot, start, others=others, far=False)
-                )
+                result = check_program(question.text, cell, question.robot, start, others=others, far=False)
+                return _checked(cell, question.robot, result)
 
     return answer
 
@@ -112,9 +110,11 @@ def _uncheckable(cell: Cell, robot: str) -> Reason | None:
     return None
 
 
-def _coverage(cell: Cell) -> tuple[list[Reason], list[Reason]]:
-    """Return the parts of a cell that checks do not cover: moving ones, and fixed ones."""
+def _coverage(cell: Cell, robot: str) -> tuple[list[Reason], list[Reason]]:
+    """Return what checks of a robot's motions do not cover: limits and moving parts, and fixed parts."""
     uncovered, warnings = [], []
+    if reason := doubtful_limits(robot, cell.arms[robot].joints):
+        uncovered.append(reason)
     for name, arm in cell.arms.items():
         bare, missing = unshaped(cell, name), missing_meshes(cell, name)
         moving = unshaped_moving(cell, name)
@@ -133,8 +133,8 @@ def _paths(others: Mapping[str, tuple[Positions, ...]]) -> dict[str, FloatArray]
     return {name: np.array(path) for name, path in others.items()}
 
 
-def _checked(cell: Cell, result: CheckResult) -> Checked:
-    uncovered, warnings = _coverage(cell)
+def _checked(cell: Cell, robot: str, result: CheckResult) -> Checked:
+    uncovered, warnings = _coverage(cell, robot)
     return Checked(
         refusals=tuple(_reason(each) for each in result.violations if each.refuses),
         uncovered=tuple(uncovered),

@@ -6,7 +6,6 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from robots.errors import MeshError
 from robots.joints import FloatArray, Joints
 from robots.kinematic_tree import BASE, Tree, bare_links, tree_of
 from robots.model import RobotModel, build_model
-from robots.schema import RobotDescription, UrdfDescription, nearest
+from robots.schema import Model, RobotDescription, UrdfDescription, nearest
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,9 +138,7 @@ def build_cell(description: CellDescription, *, exact: bool = False, wait: bool 
 
 
 @lru_cache(maxsize=8)
-def _read(
-    model: str | Path, confined: bool, exact: bool
-) -> tuple[RobotDescription, tuple[tuple[int, Body], ...]]:
+def _read(model: Model, confined: bool, exact: bool) -> tuple[RobotDescription, tuple[tuple[int, Body], ...]]:
     """Read a robot's description and its links' bodies; cached, because a plant has many equal arms."""
     description = load(model, confined=confined)
     bodies_of = exact_bodies if exact else hull_bodies

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 
@@ -26,7 +25,7 @@ from robots.description import load
 from robots.joints import FloatArray
 from robots.kinematic_tree import Tree, TreeLink, are_neighbours, tree_of
 from robots.model import RobotModel, build_model, link_placements
-from robots.schema import RobotDescription, UrdfDescription
+from robots.schema import Model, RobotDescription, UrdfDescription
 
 Bodies = tuple[tuple[int, Body], ...]
 Links = tuple[str, str]
@@ -87,7 +86,7 @@ def ignored_pairs(description: RobotDescription, tree: Tree) -> dict[frozenset[s
     return found
 
 
-def plan_pairs(model: str | Path, confined: bool, *, wait: bool) -> PairPlan:
+def plan_pairs(model: Model, confined: bool, *, wait: bool) -> PairPlan:
     """Plan an arm's self-collision check.
 
     Args:
@@ -138,7 +137,7 @@ class _Preparation:
 
 
 @lru_cache(maxsize=8)
-def _prepare_model(model: str | Path, confined: bool) -> _Preparation:
+def _prepare_model(model: Model, confined: bool) -> _Preparation:
     return _prepare(load(model, confined=confined))
 
 

@@ -12,7 +12,7 @@ from robots.collision import Cell, pending, unshaped
 from robots.collision.floor import floor_advice
 from robots.errors import ProgramError
 from robots.inverse import InverseSolver, build_solver
-from robots.joints import FloatArray, Joints, as_positions, violations
+from robots.joints import FloatArray, Joints, as_positions, doubtful_limits, violations
 from robots.programs.path import PathSamples
 from robots.programs.plan import plan_program
 from robots.programs.segments import Segment, SegmentChecker
@@ -256,6 +256,8 @@ def _cover_notes(cell: Cell, robot: str, others: Mapping[str, FloatArray]) -> tu
             owner = "" if name == robot else f"{name}/"
             links = ", ".join(f"{owner}{link}" for link in bare)
             notes.append(codes.CHECK_NOTE_NO_SHAPE(links=links))
+    if doubt := doubtful_limits(robot, cell.arms[robot].joints):
+        notes.append(doubt)
     if robot in pending(cell):
         notes.append(codes.CHECK_NOTE_PENDING())
     notes += [

@@ -59,7 +59,7 @@ def _row(
     unit = description.units.angle if joint.type == "rotary" else description.units.length
     limits = row.limits or (joint.lower / factor, joint.upper / factor)
     yield from limit_problems(place, row.name, limits, row.home, unit)
-    if row.limits and not joint.continuous:
+    if row.limits and not joint.continuous and "limits" not in joint.doubts:
         # Tolerates rounding of hand-written numbers.
         slack = 1e-6 * (joint.upper - joint.lower)
         if row.limits[0] * factor < joint.lower - slack or row.limits[1] * factor > joint.upper + slack:

@@ -11,16 +11,16 @@ import xml.etree.ElementTree as Xml
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from math import pi
 from pathlib import Path
 
 import numpy as np
 
 from robots.errors import DescriptionError
-from robots.kinematic_tree import BASE, Mimic, Tree, TreeJoint, TreeLink
+from robots.kinematic_tree import BASE, Doubt, Mimic, Tree, TreeJoint, TreeLink
 from robots.poses import FloatArray, axis_rotation
 from robots.schema import JointType
 from robots.urdf.files import Resolve
+from robots.urdf.limits import REACH, probable_range, probable_speed
 from robots.urdf.shapes import Shapes
 from robots.urdf.values import WrongElement, numbers, origin, quoted
 from robots.xml_text import XmlError, read_xml
@@ -28,11 +28,6 @@ from robots.xml_text import XmlError, read_xml
 MOST_URDF_BYTES = 20_000_000
 _MOST_LINKS = 2_000
 _TYPES = {"revolute": JointType.ROTARY, "continuous": JointType.ROTARY, "prismatic": JointType.PRISMATIC}
-# A continuous joint gets limits, which sliders, planners and controllers need. Every direction can be
-# reached from both sides, and a cable is not wound up.
-_CONTINUOUS = 2 * pi
-# Defaults if a file gives no speed [rad/s], [m/s].
-_SPEEDS = {JointType.ROTARY: pi / 2, JointType.PRISMATIC: 0.25}
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +192,7 @@ class _Reading:
             known = "revolute, continuous, prismatic and fixed"
             raise WrongElement(f"{what} type {kind!r}: is not supported; use {known}")
         axis = self._axis(element, what)
-        lower, upper, speed = self._limits(element, what, kind)
+        lower, upper, speed, doubts = self._limits(element, what, kind)
         if lower == upper and element.find("mimic") is None:
             self.notes.append(f"{what}: its limits are equal, so it is fixed at {lower:g}")
             self.fixed_positions[name] = lower
@@ -211,7 +206,9 @@ class _Reading:
             lower=lower,
             upper=upper,
             max_speed=speed,
-            continuous=kind == "continuous",
+            continuous=kind == "continuous"
+            or (kind == "revolute" and "limits" in doubts and doubts["limits"].assumed),
+            doubts=doubts,
         )
         self.numbers[name] = len(self.tree_joints)
         self.tree_joints.append(joint)
@@ -228,28 +225,38 @@ class _Reading:
         # A vector of length one keeps exactly the digits of the file.
         return vector if length == 1.0 else vector / length
 
-    def _limits(self, element: Xml.Element, what: str, kind: str) -> tuple[float, float, float]:
+    def _limits(
+        self, element: Xml.Element, what: str, kind: str
+    ) -> tuple[float, float, float, dict[str, Doubt]]:
+        """Return lower and upper limit and speed, and the doubts about those that the file states."""
         limit = element.find("limit")
         if limit is None and kind != "continuous":
             raise WrongElement(f"{what}: has no <limit lower upper velocity>; a {kind} joint needs one")
-        unit = "m" if kind == "prismatic" else "rad"
         (lower,), (upper,), (speed,) = (
             numbers(limit, key, 1, f"{what} limit", "0") for key in ("lower", "upper", "velocity")
         )
-        no_speed = speed <= 0
-        if no_speed:
-            speed = _SPEEDS[_TYPES[kind]]
-            self.notes.append(f"{what}: has no velocity limit; {speed:.4g} {unit}/s is assumed")
-        if kind == "revolute" and lower == upper == 0 and no_speed:
-            kind = "continuous"
-            self.notes.append(f"{what}: its limits are all zero, probably not filled in, and are ignored")
+        type_, doubt = _TYPES[kind], None
         if kind == "continuous":
-            return -_CONTINUOUS, _CONTINUOUS, speed
-        if lower > upper:
+            lower, upper = -REACH[type_], REACH[type_]
+        elif lower > upper:
             raise WrongElement(
                 f"{what} limit lower = {lower:g}, upper = {upper:g}: lower must be less than upper"
             )
-        return lower, upper, speed
+        # The limits of a joint that follows another one, or that cannot move, are not used.
+        elif element.find("mimic") is None and not lower == upper != 0:
+            stated = (
+                value if limit is not None and key in limit.attrib else None
+                for key, value in (("lower", lower), ("upper", upper))
+            )
+            lower, upper, doubt = probable_range(type_, *stated)
+        probable, doubtful_speed = probable_speed(type_, speed, doubt)
+        doubts = {"limits": doubt, "max_speed": doubtful_speed}
+        found = {key: each for key, each in doubts.items() if each is not None}
+        # URDF demands no <limit> of a continuous joint, and that of a mimic joint is not used.
+        unused = element.find("mimic") is not None or (kind == "continuous" and speed <= 0)
+        if unused and "max_speed" in found:
+            self.notes.append(f"{what}: {found.pop('max_speed').text}")
+        return lower, upper, probable, found
 
     def _followers(self) -> Iterator[TreeJoint]:
         """Yield the joints; a mimic joint refers to the free joint at the end of its chain."""

@@ -110,7 +110,11 @@ def _with_limits(tree: Tree, number: int, lower: float, upper: float, max_speed:
     joints = list(tree.joints)
     old = joints[number]
     kept = old.continuous and (lower, upper) == (old.lower, old.upper)
-    joints[number] = replace(old, lower=lower, upper=upper, max_speed=max_speed, continuous=kept)
+    unchanged = {"limits": (lower, upper) == (old.lower, old.upper), "max_speed": max_speed == old.max_speed}
+    doubts = {key: doubt for key, doubt in old.doubts.items() if unchanged[key]}
+    joints[number] = replace(
+        old, lower=lower, upper=upper, max_speed=max_speed, continuous=kept, doubts=doubts
+    )
     return replace(tree, joints=tuple(joints))
 
 
@@ -142,15 +146,20 @@ def _add_joint(
     robot: Xml.Element, tree: Tree, joint: TreeJoint, parent: tuple[str, FloatArray], child: str
 ) -> None:
     rotary = joint.type is JointType.ROTARY
-    kind = "continuous" if joint.continuous else "revolute" if rotary else "prismatic"
+    doubtful = "limits" in joint.doubts
+    kind = "continuous" if joint.continuous and not doubtful else "revolute" if rotary else "prismatic"
     element = Xml.SubElement(robot, "joint", name=joint.name, type=kind)
     parent_link, parent_link_to_joint = parent
     _add_origin(element, inverse(parent_link_to_joint) @ joint.joint_to_parent)
     Xml.SubElement(element, "parent", link=parent_link)
     Xml.SubElement(element, "child", link=child)
     Xml.SubElement(element, "axis", xyz=" ".join(map(_exact, joint.axis)))
-    limits = {} if joint.continuous else {"lower": _exact(joint.lower), "upper": _exact(joint.upper)}
-    Xml.SubElement(element, "limit", limits, velocity=_exact(joint.max_speed), effort="0")
+    limits = {} if joint.continuous or doubtful else {"lower": joint.lower, "upper": joint.upper}
+    limits["velocity"] = joint.max_speed
+    # A doubtful value is written as it was read, so that it stays doubtful.
+    for doubt in joint.doubts.values():
+        limits |= doubt.stated
+    Xml.SubElement(element, "limit", {key: _exact(each) for key, each in limits.items()}, effort="0")
     if joint.mimic is not None:
         Xml.SubElement(
             element,

@@ -47,7 +47,7 @@ def _floor(robots: Sequence[Robot]) -> Floor | None:
 def _robot(site: Site, robot: Robot) -> CellRobot:
     return CellRobot(
         name=robot.name,
-        model=robot.model,
+        model=robot.described,
         base_to_site=pose_matrix(robot.pose, Units()),
         # A robot that was defined on the page may only read files in its folder.
         confined=Path(robot.model).absolute().is_relative_to(site.define.folder.absolute()),

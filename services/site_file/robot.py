@@ -19,6 +19,7 @@ from robomesh import keys
 from robomesh.access_rights import PROBE_ROBOT
 from robomesh.errors import KeyNameError
 from robots.description import Pose
+from robots.schema import JointSettings, Model, Positive, Range, StatedModel
 from robots.verification_record import VerificationRecord, read_record
 from services.errors import ListenError
 from services.site_file.fanuc import FTP_RATE, Fanuc
@@ -83,6 +84,9 @@ class Robot(BaseModel):
             or 0.8 s without one. Absent: ten times the slowest of the last checks, between 2 and 5 s.
         jog_speed: The tool's greatest speed [mm/s] while an operator holds a button to jog it; 0: no jogs.
         clearance: Distances to fixtures and other robots.
+        limits: Lowest and highest position of joints of a URDF (degrees or mm), as in `{ j1 = [-170, 170] }`.
+            Needed where those of the URDF are doubtful; otherwise they must be within the URDF's.
+        max_speed: Highest speed of joints of a URDF (degrees/s or mm/s), as in `{ j1 = 180 }`.
         floor: The floor of its cell: its height [mm], a table, or `false` for none. In a cell of several
             robots one robot's key applies to all.
         stop_proven: The stop was tried on this controller (docs/safety.md); otherwise the robot is read-only.
@@ -124,6 +128,8 @@ class Robot(BaseModel):
     jog_speed: Annotated[float, Field(ge=0, le=250)] = 250.0
     clearance: Clearance = Clearance()
     floor: Floor | None = Floor()
+    limits: dict[str, Range] = Field(default_factory=dict)
+    max_speed: dict[str, Positive] = Field(default_factory=dict)
     stop_proven: StrictBool | StopTrial | None = None
     verified: Path | None = None
     experimental: StrictBool = False
@@ -250,6 +256,16 @@ class Robot(BaseModel):
                 f"{'udp' if hses else 'tcp'}://{self.address}"
             )
         return self
+
+    @property
+    def described(self) -> Model:
+        """Source of its description, with the limits that this file states."""
+        names = (*self.limits, *(name for name in self.max_speed if name not in self.limits))
+        rows = tuple(
+            JointSettings(name=name, limits=self.limits.get(name), max_speed=self.max_speed.get(name))
+            for name in names
+        )
+        return StatedModel(model=self.model, joints=rows) if rows else self.model
 
     @property
     def address(self) -> str:

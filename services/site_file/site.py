@@ -227,7 +227,7 @@ def load(path: Path | None) -> Site:
     unseen: dict[str, str] = {}
     for robot in site.robot:
         try:
-            described = description.load(robot.model)
+            described = description.load(robot.described)
             tree = tree_of(described)
         except DescriptionError as error:
             raise SiteFileError(f"{path}: robot {robot.name}: model = {robot.model!r}: {error}") from None

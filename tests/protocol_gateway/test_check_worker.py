@@ -18,8 +18,9 @@ from robomesh import reason_codes as codes
 from robots.cells import CellDescription, CellRobot, Fixture
 from robots.kinematic_tree import Shape
 from robots.meshes.mesh import Material, Mesh, Part
+from robots.schema import JointSettings, StatedModel
 from tests.conftest import run
-from tests.robots.boxes import bar_arm, block, placed
+from tests.robots.boxes import bar_arm, block, one_joint_arm, placed
 
 STANDING = (0.0, 0.0)
 BARE = """<robot name="bare"><link name="base"/><link name="tip"/>
@@ -173,6 +174,23 @@ def test_a_fixed_link_without_a_shape_is_a_warning(tmp_path):
     checked = begin({"arm": CellDescription((arm,))})(motion("arm"))
     assert checked.uncovered == checked.refusals == ()
     assert checked.warnings == (codes.FIXED_WITHOUT_SHAPE(name="arm", links="base"),)
+
+
+def test_doubtful_limits_of_the_checked_robot_are_uncovered(tmp_path):
+    degrees = one_joint_arm(tmp_path / "degrees", 'lower="-180" upper="180" velocity="1"')
+    radians = one_joint_arm(tmp_path / "radians", 'lower="-1" upper="1" velocity="1"')
+    robots = CellRobot("arm", degrees, placed(0.0)), CellRobot("mate", radians, placed(5.0))
+    answer = begin(dict.fromkeys(("arm", "mate"), CellDescription(robots)))
+
+    def uncovered(robot, other):
+        return answer(motion(robot, (0.1,), start=(0.0,), others={other: ((0.0,),)})).uncovered
+
+    (reason,) = uncovered("arm", "mate")
+    assert (reason.code, uncovered("mate", "arm")) == ("check.limits_doubtful", ())
+    assert "j1" in reason.text
+    stated = StatedModel(model=str(degrees), joints=(JointSettings(name="j1", limits=(-180.0, 180.0)),))
+    cell = CellDescription((CellRobot("arm", stated, placed(0.0)),))
+    assert begin({"arm": cell})(motion("arm", (0.1,), start=(0.0,))).uncovered == ()
 
 
 def test_a_long_program_of_another_robot_is_checked_only_where_near(tmp_path):

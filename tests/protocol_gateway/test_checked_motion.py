@@ -22,7 +22,7 @@ from services.site_file import fixtures
 from services.watch.rules import RULES
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, kept_control, refusal, simulator, until
-from tests.robots.boxes import bar_arm
+from tests.robots.boxes import bar_arm, one_joint_arm
 
 # The arm reaches out along x at home, and into this post at waist +90 degrees.
 POST = fixtures.Fixture(cell="a", name="post", box=(200.0, 200.0, 800.0), pose={"xyz": (0.0, 500.0, 400.0)})
@@ -257,6 +257,28 @@ def test_required_a_moving_link_without_a_shape_is_refused(mesh, tmp_path):
             assert "elbow moves and has no shape" in text
 
     run(main(), timeout_s=90)
+
+
+def test_with_doubtful_limits_require_refuses_and_warn_reports(mesh, tmp_path):
+    urdf = one_joint_arm(tmp_path, 'lower="-180" upper="180" velocity="1"')
+    cell = CellDescription((CellRobot("arm", urdf, np.eye(4)),))
+
+    async def main(policy):
+        async with (
+            simulator(robot=str(urdf)) as port,
+            gateway(mesh, tmp_path, port, check=policy, cell=cell, description=str(urdf)) as site,
+        ):
+            await until(lambda: not site.controller.check_text, timeout_s=60)
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            if policy == "require":
+                return await refusal(site.command(C.HOME))
+            await site.command(C.HOME)
+            return (await until(lambda: site.events("check.skipped")))[0].text
+
+    for policy in ("require", "warn"):
+        text = run(main(policy), timeout_s=90)
+        assert "j1: lower = -180 rad is 28 turns; probably degrees: -3.1416 to 3.1416 rad" in text
+        assert "state their limits" in text
 
 
 def test_an_unchecked_motion_has_no_warning_about_clearance(mesh, tmp_path):

@@ -48,6 +48,19 @@ def bar_arm(folder: Path, more: str = "", *, bare: tuple[str, ...] = ()) -> Path
     return path
 
 
+def one_joint_arm(folder: Path, limit: str, kind: str = "revolute") -> Path:
+    """Write the URDF of an arm whose only joint, j1, has a <limit> with these attributes."""
+    box = '<visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual>'
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "arm.urdf"
+    path.write_text(
+        f'<robot name="arm"><link name="base">{box}</link><link name="tip">{box}</link>'
+        f'<joint name="j1" type="{kind}"><parent link="base"/><child link="tip"/><origin xyz="0 0 1"/>'
+        f'<axis xyz="0 0 1"/><limit {limit} effort="1"/></joint></robot>'
+    )
+    return path
+
+
 def placed(x: float, y: float = 0.0, z: float = 0.0, *, yaw: float = 0.0) -> FloatArray:
     """Return a (4, 4) placement from [m], [rad]."""
     placement = np.eye(4)

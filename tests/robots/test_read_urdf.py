@@ -288,9 +288,10 @@ def test_joint_with_equal_limits_is_fixed_at_that_position() -> None:
     np.testing.assert_allclose(arm.link_to_joint, expected, atol=1e-12)
 
 
-def test_missing_speed_is_assumed_with_a_note() -> None:
-    robot = read(with_change('velocity="3"', ""))
-    assert robot.notes == ("joint 'turn': has no velocity limit; 1.571 rad/s is assumed",)
+def test_missing_speed_of_a_continuous_joint_is_assumed_with_a_note() -> None:
+    robot = read(with_change('<limit velocity="2" effort="1"/>', ""))
+    assert robot.notes == ("joint 'roll': has no velocity limit; 1.571 rad/s is assumed",)
+    assert not any(joint.doubts for joint in robot.tree.joints)
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,20 @@
 """Site files: values, and the errors of invalid ones."""
 
+from math import radians
 from pathlib import Path
 
 import pytest
 
+from robots import description
+from robots.joints import joints_of
 from services.errors import ListenError, SiteFileError
 from services.site_file import site
+from services.site_file.cells import cells_of
 from services.site_file.listen_address import check_reach, split_address
 from services.site_file.router import OTHER_PARTS, RoutedSite, read_routed
 from services.site_file.started_robots import read_started, robot_to_start, write_started
 from services.site_file.validation_errors import problem_text
+from tests.robots.boxes import one_joint_arm
 
 ROBOT = '[[robot]]\nname = "arm"\nmodel = "pt600"\n'
 
@@ -216,6 +221,17 @@ listen = ["tcp/127.0.0.1:7447", "tcp/[::1]:7447", "quic/127.0.0.1:5401"]
 def test_an_unknown_model_is_refused_before_anything_starts(tmp_path):
     with pytest.raises(SiteFileError, match=r"robot arm: model = .pt60.*did you mean"):
         load(tmp_path, 'site = "hall"\n[[robot]]\nname = "arm"\nmodel = "pt60"\n')
+
+
+def test_limits_of_a_urdfs_joints_can_be_stated(tmp_path):
+    one_joint_arm(tmp_path, 'lower="-180" upper="180" velocity="180"')
+    text = 'site = "hall"\n[[robot]]\nname = "arm"\nmodel = "arm.urdf"\n'
+    stated = load(tmp_path, f"{text}limits = {{ j1 = [-90, 90] }}\nmax_speed = {{ j1 = 45.0 }}\n")
+    joints = joints_of(description.load(stated.robot[0].described))
+    assert (joints.doubts, joints.upper[0], joints.max_speed[0]) == ({}, radians(90), radians(45))
+    assert cells_of(stated)["arm"].robots[0].model == stated.robot[0].described
+    with pytest.raises(SiteFileError, match=r"robot arm: .*joint 'j2': the URDF has no such movable joint"):
+        load(tmp_path, f"{text}max_speed = {{ j2 = 45.0 }}\n")
 
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path):

@@ -66,7 +66,7 @@ def _gateway(site: "Site", options: Options) -> Any:
     robots = tuple(
         RobotSettings(
             name=robot.name,
-            description=robot.model,
+            description=robot.described,
             **addresses[robot.name]._asdict(),
             protocol=robot.protocol,
             options=_driver_options(robot),

@@ -1750,6 +1750,13 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     "check.fixed_without_shape",
     ["not checked, because they have no shape: {links} of {name}", "{name} 的 {links} 没有形状，未检查"],
   ],
+  [
+    "check.limits_doubtful",
+    [
+      "limits of {name} are doubtful: {joints} ({detail}): state their limits and max_speed in robot.toml or the site file, or correct the URDF",
+      "{name} 的关节限位可疑：{joints}（{detail}）：请在 robot.toml 或站点文件中写明其 limits 和 max_speed，或更正 URDF",
+    ],
+  ],
   ["audit.slow", ["the audit log's disk takes longer than {seconds} s", "审计日志所在磁盘超过 {seconds} 秒无响应"]],
   ["audit.not_writable", ["the audit log {file} cannot be written ({cause})", "审计日志 {file} 无法写入（{cause}）"]],
   ["audit.queue_full", ["{count} entries wait for the disk", "{count} 条记录等待写入磁盘"]],
