@@ -249,7 +249,8 @@ def _skip(entity: Any, found: _Found) -> None:
 
 
 def _copies(path: Path, insert: Any, found: _Found) -> Iterator[Any]:
-    count = insert.mcount
+    # ezdxf visits every row and column, also without a spacing.
+    count = insert.dxf.row_count * insert.dxf.column_count if insert.mcount > 1 else 1
     found.copies += count
     if found.copies > MAX_COPIES:
         raise MeshError(

@@ -3,6 +3,7 @@
 LWPOLYLINE, POLYLINE    with their arcs
 LINE, ARC, CIRCLE, ELLIPSE, SPLINE
                         joined where one ends and another begins
+INSERT                  the curves of its block, once per row and column, also nested
 """
 
 import importlib
@@ -26,10 +27,29 @@ from robots.schema import nearest
 
 _CURVES = {"LINE", "LWPOLYLINE", "POLYLINE", "CIRCLE", "ARC", "ELLIPSE", "SPLINE"}
 _MOST_CURVES = 5_000
+# Curves and INSERTs that are drawn by blocks: a few kilobytes of nested blocks can draw billions.
+_MOST_COPIES = 20_000
+_MOST_NESTED = 32
 # Far more points of a curve than a program can hold.
 _MOST_POINTS = 100_000
 # Ends within this distance are joined.
 _JOINED_MM = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """A curve of the drawing or of a block.
+
+    Attributes:
+        placement: (4, 4) from the block to the drawing, for rows of coordinates.
+        layer: Its own, or on layer 0 of a block that of its INSERT.
+        handles: Its own and those of the INSERTs that draw it.
+    """
+
+    entity: Any
+    placement: FloatArray
+    layer: str
+    handles: frozenset[str]
 
 
 @dataclass(frozen=True)
@@ -37,8 +57,8 @@ class DxfPath:
     """Selection of curves, and their placement.
 
     Attributes:
-        layer: Take all curves of this layer, unless empty.
-        handle: Take the curve with this handle, unless empty.
+        layer: Take all curves of this layer; empty: of the only layer with curves.
+        handle: Take the curve, or the curves of the INSERT, with this handle, unless empty.
         frame: Pose of the drawing in the arm's base frame: x y z [mm], roll pitch yaw [deg].
         tool: Roll, pitch and yaw of the tool in that frame [deg].
         approach_mm: Height above the curves, along the frame's z, at which the tool approaches and departs.
@@ -55,6 +75,9 @@ class DxfPath:
     unit_mm: float = 0.0
 
 
+_TOO_LARGE = "gives {count} points, more than a program can hold: use a larger tolerance, or one curve"
+
+
 def program_from_dxf(path: Path, selection: DxfPath) -> str:
     """Return the text of a program that follows curves of a drawing, in the drawing's order.
 
@@ -67,8 +90,13 @@ def program_from_dxf(path: Path, selection: DxfPath) -> str:
         unit_mm = UNITS_M.get(int(drawing.header.get("$INSUNITS", 0) or 0), 0.0) * 1000 or selection.unit_mm
         if not unit_mm:
             raise MeshError(path, "does not state its unit ($INSUNITS); give it with --unit, in mm")
-        entities = _entities(path, drawing, selection)
-        curves = [_flattened(path, each, selection.tolerance_mm / unit_mm) * unit_mm for each in entities]
+        which, selected = _selected(path, drawing, selection)
+        curves, count = [], 0
+        for each in selected:
+            curves.append(_placed(path, each, selection.tolerance_mm / unit_mm) * unit_mm)
+            count += len(curves[-1])
+            if count > _MOST_POINTS:
+                raise MeshError(path, _TOO_LARGE.format(count=count))
     except MeshError:
         raise
     except MemoryError as error:
@@ -81,7 +109,6 @@ def program_from_dxf(path: Path, selection: DxfPath) -> str:
     chains = [chain for chain in chains if len(chain) > 1]
     if not chains:
         raise MeshError(path, "its curves have no length")
-    which = f"curve {selection.handle}" if selection.handle else f"layer {selection.layer}"
     what = f"{path.name}, {which}: {len(chains)} path{'s' if len(chains) > 1 else ''}"
     comment = f"# {what}, curves flattened to {number(selection.tolerance_mm)} mm"
     # A file or layer name may contain a line break.
@@ -89,37 +116,97 @@ def program_from_dxf(path: Path, selection: DxfPath) -> str:
     text = "".join(f"{line}\n" for line in lines)
     if len(text.encode()) > MOST_BYTES or len(lines) > MOST_LINES:
         count = sum(len(chain) for chain in chains)
-        raise MeshError(
-            path, f"gives {count} points, more than a program can hold: use a larger tolerance, or one curve"
-        )
+        raise MeshError(path, _TOO_LARGE.format(count=count))
     return text
 
 
-def _entities(path: Path, drawing: Any, selection: DxfPath) -> list[Any]:
-    """Return the selected curves, in the drawing's order."""
-    curves = [entity for entity in drawing.modelspace() if entity.dxftype() in _CURVES]
+def _selected(path: Path, drawing: Any, selection: DxfPath) -> tuple[str, list[_Drawn]]:
+    """Return the name of the selection and its curves, in the drawing's order."""
+    space = drawing.modelspace()
+    _check_copies(path, space)
+    curves = list(_drawn(path, space, np.eye(4), "", frozenset()))
     if selection.handle:
-        found = [each for each in curves if str(each.dxf.handle).lower() == selection.handle.lower()]
+        found = [each for each in curves if selection.handle.lower() in each.handles]
         if not found:
             raise MeshError(path, f"has no curve of handle {selection.handle!r} in its model space")
-        return found
-    layers = Counter(str(each.dxf.layer) for each in curves)
-    if not selection.layer:
+        return f"curve {selection.handle}", found
+    layers = Counter(each.layer for each in curves)
+    layer = selection.layer or (next(iter(layers)) if len(layers) == 1 else "")
+    if not layer:
         known = ", ".join(f"{name} ({count})" for name, count in sorted(layers.items())[:20])
         raise MeshError(path, f"no curves selected. Name a layer or a handle; curves: {known or 'none'}")
-    found = [each for each in curves if str(each.dxf.layer).lower() == selection.layer.lower()]
+    found = [each for each in curves if each.layer.lower() == layer.lower()]
     if not found:
-        hint = nearest(selection.layer, sorted(layers)) if layers else "; it has no curves"
-        raise MeshError(path, f"has no curve on layer {selection.layer!r}{hint}")
+        hint = nearest(layer, sorted(layers)) if layers else "; it has no curves"
+        raise MeshError(path, f"has no curve on layer {layer!r}{hint}")
     if len(found) > _MOST_CURVES:
-        raise MeshError(
-            path, f"has {len(found)} curves on layer {selection.layer!r}; up to {_MOST_CURVES} are read"
-        )
-    return found
+        raise MeshError(path, f"has {len(found)} curves on layer {layer!r}; up to {_MOST_CURVES} are read")
+    return f"layer {layer}", found
+
+
+def _check_copies(path: Path, space: Any) -> None:
+    """Count what blocks draw, without drawing it.
+
+    Raises:
+        MeshError: If it is too much, or a block contains itself.
+    """
+    sizes: dict[str, tuple[int, int]] = {}
+
+    def size(layout: Any, inside: tuple[str, ...]) -> tuple[int, int]:
+        """Return the number of curves and INSERTs that a layout draws, and the depth of its blocks."""
+        count, depth = 0, 0
+        for entity in layout:
+            count += bool(inside) and entity.dxftype() in _CURVES
+            block = entity.block() if entity.dxftype() == "INSERT" else None
+            if block is None:
+                continue
+            names = (*inside, block.name)
+            if block.name in inside:
+                raise MeshError(path, f"block {block.name!r} contains itself: {' > '.join(names)}")
+            if block.name not in sizes and len(names) <= _MOST_NESTED:
+                sizes[block.name] = size(block, names)
+            copies, below = sizes.get(block.name, (0, _MOST_NESTED))
+            if (depth := max(depth, 1 + below)) > _MOST_NESTED:
+                raise MeshError(path, f"block {names[0]!r} is nested deeper than {_MOST_NESTED}")
+            # ezdxf visits every row and column, also without a spacing.
+            count += max(entity.dxf.row_count, 1) * max(entity.dxf.column_count, 1) * (1 + copies)
+            if count > _MOST_COPIES:
+                raise MeshError(path, f"its blocks draw more than {_MOST_COPIES:,} curves and blocks")
+        return count, depth
+
+    size(space, ())
+
+
+def _drawn(
+    path: Path, layout: Any, placement: FloatArray, layer: str, handles: frozenset[str]
+) -> Iterator[_Drawn]:
+    """Yield the curves of a layout and of the blocks that it draws."""
+    for entity in layout:
+        if entity.dxftype() not in _CURVES | {"INSERT"}:
+            continue
+        own = layer if layer and entity.dxf.layer == "0" else str(entity.dxf.layer)
+        here = handles | {str(entity.dxf.handle).lower()}
+        if entity.dxftype() != "INSERT":
+            yield _Drawn(entity, placement, own, here)
+        elif (block := entity.block()) is not None:
+            for one in entity.multi_insert() if entity.mcount > 1 else (entity,):
+                inner = np.array(list(one.matrix44())).reshape(4, 4) @ placement
+                if not np.isfinite(inner).all():
+                    raise MeshError(path, f"INSERT {entity.dxf.handle} has a value that is not finite")
+                yield from _drawn(path, block, inner, own, here)
+
+
+def _placed(path: Path, curve: _Drawn, tolerance: float) -> FloatArray:
+    """Return the (m, 3) corners of a curve's straight parts, in the drawing and its unit."""
+    turn = curve.placement[:3, :3]
+    # No part deviates more than this many times as far as in the block.
+    scale = max(float(np.linalg.norm(turn, 2)), 1e-9)
+    placed: FloatArray = _flattened(path, curve.entity, tolerance / scale) @ turn + curve.placement[3, :3]
+    return placed
 
 
 def _flattened(path: Path, entity: Any, tolerance: float) -> FloatArray:
-    """Return the (m, 3) corners of a curve's straight parts, in the drawing's unit."""
+    """Return the (m, 3) corners of a curve's straight parts, where it is defined."""
     curve = importlib.import_module("ezdxf.path").make_path(entity)
     corners = np.array([(v.x, v.y, v.z) for v in curve.control_vertices()], dtype=np.float64).reshape(-1, 3)
     name = f"{entity.dxftype()} {entity.dxf.handle}"

@@ -63,7 +63,11 @@ def probable_speed(kind: JointType, speed: float, limits: Doubt | None) -> tuple
     text = f"velocity = {_amount(speed, kind, '/s')}" if speed > 0 else "has no velocity limit"
     assumed = not fastest < speed <= _FASTEST[kind] / factor
     probable = SPEED[kind] if assumed else speed * factor
-    text += f"; {probable:.4g} {unit}/s is assumed" if assumed else f"; probably {other}/s: {probable:.5g} {unit}/s"
+    text += (
+        f"; {probable:.4g} {unit}/s is assumed"
+        if assumed
+        else f"; probably {other}/s: {probable:.5g} {unit}/s"
+    )
     return probable, Doubt(text, {"velocity": speed}, assumed)
 
 

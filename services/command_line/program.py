@@ -113,8 +113,10 @@ def plan(
 @app.command("from-dxf")
 def from_dxf(
     file: Annotated[Path, typer.Argument(metavar="IN.dxf")],
-    layer: Annotated[str, typer.Option(metavar="NAME", help="Every curve of this layer.")] = "",
-    handle: Annotated[str, typer.Option(metavar="HEX", help="The curve with this handle.")] = "",
+    layer: Annotated[
+        str, typer.Option(metavar="NAME", help="Curves of this layer; else of the only one.")
+    ] = "",
+    handle: Annotated[str, typer.Option(metavar="HEX", help="The curve or block with this handle.")] = "",
     frame: Annotated[
         str, typer.Option(metavar="'X Y Z R P Y'", help="Drawing in the base frame: mm, degrees.")
     ] = "0 0 0 0 0 0",

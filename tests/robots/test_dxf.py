@@ -145,9 +145,10 @@ def test_nested_blocks_with_millions_of_copies_are_rejected(tmp_path: Path, draw
         read(tmp_path, drawing)
 
 
-def test_huge_array_is_refused(tmp_path: Path, drawing: Any) -> None:
+@pytest.mark.parametrize("row_spacing", [0, 1])
+def test_huge_array_is_refused(tmp_path: Path, drawing: Any, row_spacing: int) -> None:
     drawing.blocks.new("b").add_3dface(SQUARE)
-    spread = {"column_count": 30000, "row_count": 30000, "column_spacing": 1, "row_spacing": 1}
+    spread = {"column_count": 30000, "row_count": 30000, "column_spacing": 1, "row_spacing": row_spacing}
     drawing.modelspace().add_blockref("b", (0, 0), dxfattribs=spread)
     with pytest.raises(MeshError, match="INSERT 'b': 900000000 copies"):
         read(tmp_path, drawing)

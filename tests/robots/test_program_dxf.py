@@ -1,11 +1,14 @@
 """Drawings as programs: the drawn points, placed by the frame."""
 
+import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import ezdxf
 import numpy as np
 import pytest
+from ezdxf.document import Drawing
 
 from robots.description import load
 from robots.errors import MeshError
@@ -120,6 +123,128 @@ def test_curves_that_cannot_be_followed_are_refused_with_a_reason(
 ) -> None:
     with pytest.raises(MeshError, match=sentence):
         program_from_dxf(drawn(tmp_path), asked)
+
+
+def blocks(folder: Path, fill: Callable[[Drawing], object], unit: int = 4) -> Path:
+    drawing = ezdxf.new()
+    drawing.header["$INSUNITS"] = unit
+    fill(drawing)
+    path = folder / "part.dxf"
+    drawing.saveas(path)
+    return path
+
+
+def places(path: Path, **asked: str) -> list[list[float]]:
+    """Return the points of each move [mm]."""
+    text = program_from_dxf(path, DxfPath(approach_mm=0.0, **asked))
+    return [(1000 * pose[:2, 3]).round(4).tolist() for _, pose in moves(text)[1:-1]]
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ({}, [[1, 0], [3, 0], [3, 1]]),
+        ({"xscale": -1}, [[-1, 0], [-3, 0], [-3, 1]]),
+        ({"rotation": 90}, [[0, 1], [0, 3], [-1, 3]]),
+        ({"xscale": 2, "yscale": -3}, [[2, 0], [6, 0], [6, -3]]),
+        ({"xscale": 2, "yscale": 3, "rotation": 90}, [[0, 2], [0, 6], [-3, 6]]),
+        ({"extrusion": (0, 0, -1)}, [[-1, 0], [-3, 0], [-3, 1]]),
+    ],
+)
+def test_curves_of_a_block_are_placed_by_its_insert(
+    tmp_path: Path, values: dict[str, object], expected: list[list[float]]
+) -> None:
+    def fill(drawing: Drawing) -> None:
+        block = drawing.blocks.new("corner", base_point=(1, 1))
+        block.add_lwpolyline([(2, 1), (4, 1), (4, 2)])
+        drawing.modelspace().add_blockref("corner", (10, 20), {"layer": "cut", **values})
+
+    x, y = (-10, 20) if "extrusion" in values else (10, 20)
+    wanted = [[x + dx, y + dy] for dx, dy in expected]
+    assert places(blocks(tmp_path, fill)) == wanted
+    assert places(tmp_path / "part.dxf", layer="CUT") == wanted
+
+
+def test_blocks_in_blocks_in_rows_and_columns_are_followed_within_the_tolerance(tmp_path: Path) -> None:
+    def fill(drawing: Drawing) -> None:
+        drawing.blocks.new("hole").add_circle((0, 0), 1)
+        row = drawing.blocks.new("row")
+        row.add_blockref("hole", (0, 0), {"rotation": 30, "column_count": 3, "column_spacing": 10})
+        drawing.modelspace().add_blockref(
+            "row", (0, 0), {"xscale": 4, "yscale": -2, "row_count": 2, "row_spacing": 50}
+        )
+
+    path = blocks(tmp_path, fill)
+    asked = DxfPath(approach_mm=5.0, tolerance_mm=0.05)
+    text = program_from_dxf(path, asked)
+    assert text.startswith("# part.dxf, layer 0: 6 paths")
+    points = np.array([1000 * pose[:3, 3] for _, pose in moves(text)])
+    points = points[np.abs(points[:, 2]) < 1e-6][:, :2]
+    step = np.array([4 * 10 * np.cos(np.pi / 6), -2 * 10 * np.sin(np.pi / 6)])
+    centres = np.array([column * step + (0, 50 * row) for row in range(2) for column in range(3)])
+    # Each point is on one of the ellipses of half-axes 4 and 2.
+    away = np.abs(np.linalg.norm((points[:, None] - centres) / (4, 2), axis=2) - 1).min(axis=1)
+    assert away.max() < 1e-6
+    # The chords stay within the tolerance: an ellipse has at least this many.
+    assert len(points) > 6 * 16
+
+
+def test_one_layer_needs_no_name(tmp_path: Path) -> None:
+    path = blocks(tmp_path, lambda drawing: drawing.modelspace().add_line((0, 0), (5, 0), {"layer": "a"}))
+    text = program_from_dxf(path, DxfPath())
+    assert text.startswith("# part.dxf, layer a: 1 path,")
+
+
+def test_an_insert_is_selected_by_its_handle(tmp_path: Path) -> None:
+    def fill(drawing: Drawing) -> None:
+        drawing.blocks.new("line").add_line((0, 0), (5, 0))
+        for y, layer in ((0, "a"), (7, "b")):
+            drawing.modelspace().add_blockref("line", (0, y), {"layer": layer})
+
+    path = blocks(tmp_path, fill)
+    handle = ezdxf.readfile(path).modelspace()[1].dxf.handle
+    assert places(path, handle=handle) == [[0, 7], [5, 7]]
+
+
+def nested(drawing: Drawing, depth: int, copies: int) -> None:
+    drawing.blocks.new("b0").add_line((0, 0), (1, 0))
+    for number in range(1, depth):
+        block = drawing.blocks.new(f"b{number}")
+        for x in range(copies):
+            block.add_blockref(f"b{number - 1}", (x, 0))
+    drawing.modelspace().add_blockref(f"b{depth - 1}", (0, 0))
+
+
+def cyclic(drawing: Drawing) -> None:
+    nested(drawing, 2, 1)
+    drawing.blocks.get("b0").add_blockref("b1", (0, 0))
+
+
+def grid(drawing: Drawing) -> None:
+    drawing.blocks.new("empty")
+    values = {"row_count": 2**15, "column_count": 2**15, "row_spacing": 0, "column_spacing": 1}
+    drawing.modelspace().add_blockref("empty", (0, 0), values)
+
+
+@pytest.mark.parametrize(
+    ("fill", "sentence"),
+    [
+        (lambda drawing: nested(drawing, 30, 10), "its blocks draw more than 20,000 curves and blocks"),
+        (lambda drawing: nested(drawing, 200, 1), "block 'b199' is nested deeper than 32"),
+        (grid, "its blocks draw more than 20,000 curves and blocks"),
+        (cyclic, "block 'b1' contains itself: b1 > b0 > b1"),
+        (lambda drawing: drawing.modelspace().add_blockref("none", (0, 0)), "curves: none"),
+        (lambda drawing: drawing.modelspace().add_text("none"), "curves: none"),
+    ],
+)  # fmt: skip
+def test_blocks_that_cannot_be_expanded_are_refused_at_once(
+    tmp_path: Path, fill: Callable[[Drawing], object], sentence: str
+) -> None:
+    path = blocks(tmp_path, fill)
+    start = time.monotonic()
+    with pytest.raises(MeshError, match=sentence):
+        program_from_dxf(path, DxfPath())
+    assert time.monotonic() - start < 2
 
 
 @pytest.mark.parametrize("content", [b"", b"solid a", b"0\nSECTION\n2\nENTITIES\n0\nLINE\n"])
