@@ -240,27 +240,19 @@ def _pieces(entity: Any, tolerance: float) -> Iterator[Sequence[Any]]:
 def _joined(curves: Sequence[FloatArray], *, near: float = _JOINED_MM) -> Iterator[FloatArray]:
     """Join curves that meet at their ends, reversing them where necessary."""
     rest = [curve for curve in curves if len(curve)]
-    while rest:
-        chain = rest.pop(0)
+    ends = np.array([(curve[0], curve[-1]) for curve in rest]).reshape(-1, 2, 3)
+    for place, chain in enumerate(rest):
+        if np.isinf(ends[place, 0, 0]):
+            continue
+        ends[place] = np.inf  # joined already
         # Extend the end, reverse the chain, then extend the beginning.
         for _ in range(2):
-            while (found := _at_end(chain[-1], rest, near)) is not None:
-                index, reverse = found
-                more = rest.pop(index)
-                chain = np.concatenate([chain, more[::-1] if reverse else more])
+            while len(found := np.argwhere(np.linalg.norm(ends - chain[-1], axis=2) <= near)):
+                index, side = found[0]
+                ends[index] = np.inf
+                chain = np.concatenate([chain, rest[index][::-1] if side else rest[index]])
             chain = chain[::-1]
         yield chain
-
-
-def _at_end(end: FloatArray, curves: Sequence[FloatArray], near: float) -> tuple[int, bool] | None:
-    """Return the first curve that begins or ends at a position, and whether to reverse it."""
-    if not curves:
-        return None
-    begins = np.array([curve[0] for curve in curves])
-    ends = np.array([curve[-1] for curve in curves])
-    here = np.array([np.linalg.norm(side - end, axis=1) <= near for side in (begins, ends)])
-    found = np.flatnonzero(here.any(axis=0))
-    return (int(found[0]), not here[0, found[0]]) if len(found) else None
 
 
 def _distinct(chain: FloatArray) -> FloatArray:
