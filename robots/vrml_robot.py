@@ -10,7 +10,6 @@ In SI, as OpenHRP. `robots.meshes.vrml.drawing` reads such a file as a mesh with
 
 import re
 from dataclasses import dataclass, field, replace
-from math import pi
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +24,7 @@ from robots.meshes.vrml.protos import found_proto, instance
 from robots.meshes.vrml.transform import transform_matrix
 from robots.meshes.vrml.values import nodes_of, number, numbers, strings
 from robots.schema import JointType
+from robots.urdf.limits import REACH, SPEED, probable_range, probable_speed
 
 _TYPES = {
     "rotate": JointType.ROTARY,
@@ -35,9 +35,6 @@ _TYPES = {
 _CHAIN = ("Humanoid", "Joint", "Segment")
 _AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 _FARTHEST = 1e9  # [m]
-# Defaults for a file without limits: [rad] or [m], and [rad/s] or [m/s].
-_REACH = {JointType.ROTARY: 2 * pi, JointType.PRISMATIC: 1.0}
-_SPEED = {JointType.ROTARY: pi / 2, JointType.PRISMATIC: 0.25}
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,24 +147,29 @@ class _Reading:
             for name in ("uvlimit", "lvlimit")
             if len(values := numbers(node, name, [])) and values[0]
         ]
+        known = bool(len(numbers(node, "ulimit", [])))
+        lower, upper, doubt = probable_range(kind, *limits) if known else (*limits, None)
+        speed, doubtful_speed = probable_speed(kind, min(speeds, default=SPEED[kind]), doubt)
+        doubts = {"limits": doubt, "max_speed": doubtful_speed}
         return TreeJoint(
             name=self.unique(node.name or " ".join(strings(node, "name")) or f"joint{len(self.joints) + 1}"),
             type=kind,
             parent=parent,
             joint_to_parent=placed,
             axis=_axis(node),
-            lower=limits[0],
-            upper=limits[1],
-            max_speed=min(speeds, default=_SPEED[kind]),
-            continuous=not len(numbers(node, "ulimit", [])) and kind is JointType.ROTARY,
+            lower=lower,
+            upper=upper,
+            max_speed=speed,
+            continuous=kind is JointType.ROTARY and (not known or (doubt is not None and doubt.assumed)),
+            doubts={key: each for key, each in doubts.items() if each is not None},
         )
 
     def limits(self, node: Node, kind: JointType) -> tuple[float, float] | None:
         """Return the lower and upper limit; None if they are equal, so that the joint cannot move."""
         lower, upper = numbers(node, "llimit", []), numbers(node, "ulimit", [])
         if not len(lower) or not len(upper):
-            node.warn(f"no llimit and ulimit; {-_REACH[kind]:.4g} to {_REACH[kind]:.4g} is taken")
-            return -_REACH[kind], _REACH[kind]
+            node.warn(f"no llimit and ulimit; {-REACH[kind]:.4g} to {REACH[kind]:.4g} is taken")
+            return -REACH[kind], REACH[kind]
         low, high = float(lower[0]), float(upper[0])
         if low > high:
             raise node.error(f"llimit {low:g} is above ulimit {high:g}; swap them")

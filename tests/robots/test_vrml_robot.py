@@ -134,6 +134,14 @@ def test_joint_without_limits_turns_once_each_way(tmp_path: Path) -> None:
     assert "no llimit and ulimit" in found.notes[0]
 
 
+def test_limits_in_degrees_are_doubtful(tmp_path: Path) -> None:
+    fields = 'jointType "rotate" llimit -170 ulimit 170 uvlimit 180'
+    (known,) = robot(tmp_path, joint("A", fields)).tree.joints
+    assert (known.upper, known.max_speed) == pytest.approx((170 * pi / 180, pi))
+    assert "probably degrees: -2.9671 to 2.9671 rad" in known.doubts["limits"].text
+    assert known.doubts["max_speed"].stated == {"velocity": 180}
+
+
 def test_free_root_is_fixed(tmp_path: Path) -> None:
     found = robot(tmp_path, joint("W", 'jointType "free" translation 0 0 2', joint("A", TURNS)))
     (known,) = found.tree.joints
