@@ -286,7 +286,7 @@ def collisions(name: str) -> dict[str, Any]:
 
 
 def messages() -> dict[str, float]:
-    """Return the times of what the kinematics service publishes for a Pt600 beside another one [us]."""
+    """Return the times of what the kinematics service publishes for a Pt600 next to another one [us]."""
     apart = np.eye(4)
     apart[1, 3] = 0.9
     arms = CellRobot("arm", "pt600", np.eye(4)), CellRobot("other", "pt600", apart)

@@ -451,7 +451,7 @@ def nats_server(arguments: Any) -> str:
 
 
 def end(process: "subprocess.Popen[bytes]") -> None:
-    """End what is left of a program's session: first as Ctrl-C does, then without asking."""
+    """End the rest of a program's session: first as Ctrl-C does, then without asking."""
     if process.poll() is None:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGINT)

@@ -159,7 +159,7 @@ class Subscription:
         """Return the next sample without waiting; None: there is none. On any thread.
 
         Args:
-            awaited: If there is none, the event loop is woken by the next one, and not only `wait`.
+            awaited: Without one, the event loop is woken by the next one, and not only `wait`.
         """
         with self._lock:
             if self._ring:

@@ -76,7 +76,7 @@ class ProgramOutput(asyncio.SubprocessProtocol):
 
         Raises:
             ProgramError: If the program ended before.
-            TimeoutError: If there is none in time; the program is ended.
+            TimeoutError: If it does not connect in time; the program is ended.
         """
         try:
             async with asyncio.timeout(CONNECTS_WITHIN_S):

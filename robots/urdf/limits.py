@@ -73,6 +73,6 @@ def probable_speed(kind: JointType, speed: float, limits: Doubt | None) -> tuple
 
 def _amount(value: float, kind: JointType, per: str) -> str:
     turns = int(abs(value) / (2 * pi))
-    # The turns of an absurd number help nobody.
+    # Of an absurd number the turns say nothing more.
     shown = f" is {turns:,} turns{per}" if kind is _ROTARY and turns < 1e6 else ""
     return f"{value:.6g} {_UNIT[kind]}{per}{shown}"

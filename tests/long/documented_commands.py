@@ -2,7 +2,7 @@
 
     .venv/bin/python -m tests.long.documented_commands
 
-`./dev up` runs beside them. Exit status 1: one of them does not do what the documents say.
+`./dev up` runs at the same time. Exit status 1: one of them does not do what the documents say.
 """
 
 import os
@@ -50,7 +50,7 @@ class How:
 # In the order in which they are typed.
 COMMANDS = {
     "git clone ADDRESS robomesh": How(not_here="the checkout in which this runs"),
-    "./dev up": How(not_here="runs beside the others"),
+    "./dev up": How(not_here="runs during all others"),
     "robomesh --help": How(says="monitor"),
     "robomesh doctor": How(says="OpenGL", statuses=(0, 1)),
     "robomesh list": How(says="pt600"),

@@ -1,7 +1,7 @@
 """Runs on other Pythons and systems: `./dev test --long [PART ...]`. CONTRIBUTING.md has their table.
 
-Each part clones this commit into a folder of its own, here or in a bare Debian, and sets it up as the README
-says. Its log and its result stay in `.long`. It needs root and mmdebstrap, for the Debians.
+Each part clones this commit into a new folder, here or in a bare Debian, and sets it up as the README says. Its log and its result stay in `.long`.
+It needs root and mmdebstrap, for the Debians.
 """
 
 import json
@@ -158,7 +158,7 @@ def in_debian(folder: Path, part: Part) -> str:
     variables = {"HOME": home, "PATH": "/usr/sbin:/usr/bin:/sbin:/bin", **installers, **part.environment}
     bare = "env -i " + " ".join(f"{name}={shlex.quote(value)}" for name, value in variables.items())
     inside = f"chroot {folder}"
-    # Without this capability nobody makes namespaces.
+    # Without this capability a user cannot make namespaces.
     typed_by = f"setpriv --bounding-set -sys_admin --reuid {part.user} --regid {part.user} --init-groups"
     lines = [
         f"mmdebstrap --quiet --variant=minbase --include={_BARE} {part.debian} {folder}",

@@ -122,7 +122,7 @@ def _after(title: str, otherwise: str) -> Generator[None, str | None, None]:
     """Skip a file's lines until its title.
 
     Raises:
-        ValueError: If there is none.
+        ValueError: If it has no title.
     """
     while (line := (yield)) is not None:
         if line.startswith(title):
