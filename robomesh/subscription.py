@@ -86,6 +86,7 @@ class _Seen:
     header: Header
     is_replay: bool = False
     is_reply: bool = False  # of the newest sample
+    heard: bool = False  # a publication of this publisher has arrived
     delay: Delay = field(default_factory=Delay)
     live_at: float | None = None
     received_at: float = 0.0
@@ -433,8 +434,10 @@ class Subscription:
             if queried_at is not None and self.topic.history is History.LAST_100:
                 payload, new = self._newest_of_list(payload, gap)
                 seen.lost += gap - new
-            else:
+            # Between the first reply and the first publication, the publisher did not know the subscription.
+            elif seen.heard or self.topic.history is not History.LAST:
                 seen.lost += gap - 1
+        seen.heard = queried_at is None or (seen.heard and header.publisher == seen.header.publisher)
         seen.header, seen.received_at, seen.is_reply = header, now, queried_at is not None
         self._received += 1
         late_s = 0.0

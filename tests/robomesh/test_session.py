@@ -353,6 +353,26 @@ def test_gap_in_the_numbers_is_counted_as_lost(mesh):
     run(main())
 
 
+def test_what_was_published_before_the_subscription_was_known_is_not_lost(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            publisher = gateway.declare_publisher("site", "arm", "joints")
+            publisher.remember(joints(1), source_time_ns=1)
+            subscription = monitor.subscribe("robomesh/site/arm/joints", newest=10)
+            assert not (await anext(subscription)).live
+            await until(lambda: publisher.watched)
+            publisher._sequence += 147
+            publisher.put(joints(2))
+            assert (await anext(subscription)).live
+            assert subscription.lost(publisher.key) == 0
+            publisher._sequence += 5
+            publisher.put(joints(3))
+            await anext(subscription)
+            assert subscription.lost(publisher.key) == 5
+
+    run(main())
+
+
 def test_first_put_and_get_on_the_second_link_wait_for_their_declarations(mesh):
     async def main():
         async with open_session(mesh) as monitor:
