@@ -55,7 +55,7 @@ COMMANDS = {
     "robomesh doctor": How(says="OpenGL", statuses=(0, 1)),
     "robomesh list": How(says="pt600"),
     "robomesh monitor pt600": How(says="waist", ctrl_c_s=5.0),
-    "robomesh send pt600 stop": How(says="latched"),
+    "robomesh send pt600 stop": How(says="stop request"),
     "robomesh send pt600 move 10 40 -60 20 0": How(
         typed=(
             "robomesh send pt600 reset",
