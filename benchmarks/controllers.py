@@ -86,9 +86,8 @@ async def _rtde(ready: Callable[[Sequence[int]], None]) -> None:
 async def _rtde_motion(ready: Callable[[Sequence[int]], None]) -> None:
     from services.simulator.universal_robots.service import UrSettings, serve_rtde
 
-    settings = UrSettings(scripts="127.0.0.1:0", dashboard="127.0.0.1:0")
     await serve_rtde(
-        settings, ready=lambda each: ready([each.rtde, each.primary, each.scripts, each.dashboard])
+        UrSettings(), ready=lambda each: ready([each.rtde, each.primary, each.scripts[0], each.dashboard])
     )
 
 

@@ -34,7 +34,7 @@ def test_targets_are_absolute_and_programs_hold_numbers_only(mesh, tmp_path, mon
     async def main():
         async with (
             controller(monkeypatch) as (ports, server),
-            wire(ports.scripts) as gate,
+            wire(ports.scripts[0]) as gate,
             movable(mesh, tmp_path, ports, ports={**others(ports), "scripts": gate.port}) as site,
         ):
             await in_control(site)
@@ -69,7 +69,7 @@ def test_a_program_makes_one_motion_after_the_other(mesh, tmp_path, monkeypatch)
     async def main():
         async with (
             controller(monkeypatch) as (ports, server),
-            wire(ports.scripts) as gate,
+            wire(ports.scripts[0]) as gate,
             movable(mesh, tmp_path, ports, ports={**others(ports), "scripts": gate.port}) as site,
         ):
             await in_control(site)

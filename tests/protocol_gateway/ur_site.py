@@ -30,7 +30,7 @@ async def controller(monkeypatch, **settings):
 
 def others(ports):
     """Return the ports of the interfaces other than RTDE, as the site file names them."""
-    return {"primary": ports.primary, "scripts": ports.scripts, "dashboard": ports.dashboard}
+    return {"primary": ports.primary, "scripts": ports.scripts[0], "dashboard": ports.dashboard}
 
 
 @contextlib.asynccontextmanager

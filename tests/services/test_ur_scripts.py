@@ -14,6 +14,7 @@ from protocol_gateway.drivers.universal_robots.modes import RuntimeState
 from protocol_gateway.drivers.universal_robots.primary import KeyMessage, Popup, PrimaryText, RuntimeFault
 from protocol_gateway.drivers.universal_robots.rtde_messages import ControllerVersion
 from robots.description import load
+from robots.joints import violations
 from services.simulator.demo import demo_tour
 from services.simulator.universal_robots import dashboard
 from services.simulator.universal_robots.controller import UrController
@@ -67,6 +68,17 @@ class Simulated:
 
     def ask(self, command, *, remote=True, version=VERSION):
         return dashboard.answer(command, self.controller, version, remote=remote, now_s=self.now_s)
+
+    def values(self, name):
+        return self.controller.values((name,), self.now_s)[name]
+
+    def placed(self):
+        """Return the tool's pose."""
+        return np.array(self.values("actual_TCP_pose"))
+
+    def goal(self, *way):
+        """Return the tool's pose after a way [m]."""
+        return (self.placed() + np.array([*way, 0, 0, 0])).tolist()
 
     @property
     def positions(self):
@@ -257,6 +269,145 @@ def test_two_threads_cannot_move_the_arm():
     (fault,) = arm.of(RuntimeFault)
     assert "another thread" in fault.text
     assert fault.line == 3
+
+
+@pytest.mark.parametrize("kind", ["pose", "joints"])
+def test_movel_moves_the_tool_on_a_straight_line_at_its_speed(kind):
+    arm = Simulated()
+    begin = arm.placed()
+    goal = arm.goal(-0.1, 0.15, -0.1)
+    way = np.array(goal[:3]) - begin[:3]
+    direction = way / np.linalg.norm(way)
+    target = f"p{goal}" if kind == "pose" else f"get_inverse_kin(p{goal})"
+    arm.send(f"movel({target}, a=1.0, v=0.2)")
+    speeds, off, turned = [], [], []
+
+    def look():
+        pose, speed = (arm.values(f"actual_TCP_{name}") for name in ("pose", "speed"))
+        away = np.array(pose[:3]) - begin[:3]
+        speeds.append(np.linalg.norm(speed[:3]))
+        off.append(np.linalg.norm(away - away @ direction * direction))
+        turned.append(np.abs(np.subtract(pose[3:], begin[3:])).max())
+
+    arm.run(2.0, look)
+    assert arm.placed() == pytest.approx(goal, abs=1e-9)
+    assert max(speeds) == pytest.approx(0.2, rel=1e-3)
+    assert (max(off), max(turned)) < (2e-6, 2e-5)
+    assert arm.state is RuntimeState.STOPPED
+    assert not arm.of(RuntimeFault)
+
+
+def test_movel_stays_on_its_line_when_it_is_paused_and_stopped():
+    arm = Simulated()
+    begin, goal = arm.placed(), arm.goal(0.0, 0.2, 0.0)
+    arm.send("thread move():", f"movel(p{goal}, a=1, v=0.2)", "end", "h = run move()", "sleep(1.8)")
+    arm.run(0.4)
+    arm.ask("pause")
+    arm.run(0.5)
+    paused = arm.placed()
+    assert 0.03 < paused[1] - begin[1] < 0.1
+    arm.run(0.3)
+    assert arm.placed() == pytest.approx(paused)
+    arm.ask("play")
+    arm.run(0.4)
+    assert arm.placed()[1] > paused[1] + 0.03
+    arm.run(3.0)
+    assert [*arm.placed()[[0, 2]]] == pytest.approx([*begin[[0, 2]]], abs=1e-6)
+    assert arm.placed()[1] < goal[1]
+    arm.send(f"movel(p{begin.tolist()}, a=5, v=0.2)")
+    arm.run(0.2)
+    arm.controller.programs.brake(0.5, arm.now_s, of_joints=False)  # 0.04 m from 0.2 m/s
+    stopped = arm.placed()
+    arm.run(0.39)
+    assert arm.controller.programs.moving(arm.now_s)
+    arm.run(0.02)
+    assert stopped[1] - arm.placed()[1] == pytest.approx(0.04, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("line", "text"),
+    [
+        ("movel(p[3, 0, 0, 0, 0, 0])", "cannot follow the line: its end cannot be reached: out of reach"),
+        ("movej(p[3, 0, 0, 0, 0, 0])", "the pose cannot be reached: out of reach"),
+        ("movel(p[1e300, 0, 0, 0, 0, 0])", "less than 1e+06 m is right"),
+        ("movej(p[1e300, 0, 0, 0, 0, 0])", "less than 1e+06 m is right"),
+        ("movel([0, 0, 0, 0, 0])", "a list of six numbers"),
+        ("movel(get_actual_tcp_pose(), r=0.1)", "a blend radius is not simulated"),
+        ("servoj([9, 0, 0, 0, 0, 0])", "outside the joint limits"),
+        ("speedj([1, 0, 0, 0, 0, 0], t=9)", "outside the joint limits"),
+        ("speedl([0.5, 0, 0, 0, 0, 0], t=9)", "too near a singular position"),
+        ("servoc(get_actual_tcp_pose())", "servoc is unknown"),
+    ],
+)
+def test_motion_that_cannot_be_ends_the_program_with_an_error(line, text):
+    arm = Simulated()
+    arm.send("sync()", line)
+    arm.run(9.0)
+    (fault,) = arm.of(RuntimeFault)
+    assert text in fault.text
+    assert fault.line == 3
+    assert arm.state is RuntimeState.STOPPED
+    assert not violations(arm.controller.joints, arm.positions)
+
+
+def test_servoj_follows_targets_late_by_its_lookahead_time():
+    arm = Simulated()
+    start = arm.positions
+    arm.send(
+        "q = get_actual_joint_positions()",
+        "i = 0",
+        "while i < 100:",
+        "  i = i + 1",
+        "  q[0] = q[0] + 0.005",
+        "  servoj(q, t=0.01, lookahead_time=0.1, gain=300)",
+        "end",
+        "stopj(2)",
+    )
+    late = []
+    arm.run(1.0, lambda: late.append(0.5 * (arm.now_s - 100.0) - (arm.positions - start)[0]))
+    assert late[-1] == pytest.approx(0.05, abs=0.01)
+    arm.run(1.0)
+    assert (arm.positions - start)[1:] == pytest.approx([0] * 5, abs=1e-9)
+    assert arm.state is RuntimeState.STOPPED
+
+
+def test_speeds_of_joints_and_tool_are_reached_and_end_with_a_stop():
+    arm = Simulated()
+    begin = arm.placed()
+    arm.send("speedl([0, 0.1, 0, 0, 0, 0], a=0.5, t=1.0)", "stopl(1)", "speedj([0.2, 0, 0, 0, 0, 0], a=1)")
+    arm.run(0.9)
+    assert arm.values("actual_TCP_speed") == pytest.approx((0, 0.1, 0, 0, 0, 0), abs=1e-6)
+    assert arm.placed() - begin == pytest.approx([0, 0.08, 0, 0, 0, 0], abs=2e-3)
+    arm.run(0.4)
+    fastest = []
+    arm.run(0.6, lambda: fastest.append(arm.values("actual_qd")[0]))
+    assert max(fastest) == pytest.approx(0.2, abs=1e-6)
+    assert arm.state is RuntimeState.STOPPED
+
+
+@pytest.mark.parametrize(
+    ("expression", "value"),
+    [
+        ("get_inverse_kin(get_forward_kin([0.3, -0.6, 0.8, 0.3, 0.7, 0.2]))[1] < 9", "True"),
+        ("norm(get_inverse_kin(get_forward_kin()) - get_actual_joint_positions()) < 0.000001", "True"),
+        (
+            "norm(get_forward_kin([0,0,0,0,0,0], get_tcp_offset()) - get_forward_kin([0,0,0,0,0,0])) < 1e-9",
+            "True",
+        ),
+        ("get_inverse_kin_has_solution(p[3, 0, 0, 0, 0, 0])", "False"),
+        ("is_within_safety_limits(get_actual_tcp_pose())", "True"),
+        ("is_within_safety_limits([9, 0, 0, 0, 0, 0])", "False"),
+        ("pose_trans(p[1, 0, 0, 0, 0, 0], p[0, 2, 0, 0, 0, 0.5])", "p[1, 2, 0, 0, 0, 0.5]"),
+        ("pose_trans(pose_inv(p[1, 2, 0, 0, 0, 0.5]), p[1, 2, 0, 0, 0, 1])", "p[0, 0, 0, 0, 0, 0.5]"),
+        ("pose_sub(p[1, 2, 0, 0, 0, 0.5], p[0, 1, 0, 0, 0, 0.25])", "p[1, 1, 0, 0, 0, 0.25]"),
+    ],
+)
+def test_functions_of_poses(expression, value):
+    arm = Simulated()
+    arm.send(f"textmsg({expression})")
+    arm.run(0.05)
+    assert not arm.of(RuntimeFault)
+    assert [each.text for each in arm.of(PrimaryText)] == [value]
 
 
 @pytest.mark.parametrize("action", ["stop", "pause"])

@@ -50,6 +50,7 @@ from robots.description import load
 from robots.joints import joints_of
 from robots.model import build_model, tool_placement
 from robots.poses import rotation_vector
+from services.command_line.site import simulated_controller
 from services.errors import ListenError
 from services.simulator.errors import FaultError, SimulatorError
 from services.simulator.fault_table import LEAP
@@ -459,16 +460,34 @@ def test_rotation_vector_is_the_axis_times_the_angle():
             assert found == pytest.approx(axis * angle, abs=1e-7)
 
 
+@pytest.mark.parametrize(
+    ("listen", "scripts", "others"),
+    [
+        ("", "127.0.0.1:30001 127.0.0.1:30002 127.0.0.1:30003", ["127.0.0.1:30011", "127.0.0.1:29999"]),
+        ("[::1]:30004", "::1:30001 ::1:30002 ::1:30003", ["::1:30011", "::1:29999"]),
+        ("10.0.0.7:4", "10.0.0.7:0 10.0.0.7:0 10.0.0.7:0", ["10.0.0.7:0", "10.0.0.7:0"]),
+    ],
+)
+def test_other_interfaces_are_at_the_address_of_rtde_unless_their_own_is_given(
+    monkeypatch, listen, scripts, others
+):
+    found = []
+    monkeypatch.setattr(service, "serve_rtde", lambda settings, ready: found.append(settings))
+    monkeypatch.setattr(simulated_controller.service, "run_until_signalled", lambda served: None)
+    monkeypatch.setattr(simulated_controller.service, "log_to_stderr", lambda: None)
+    common = {"robot": "", "listen": listen, "demo": False, "faults": (), "insecure": True, "mesh": None}
+    for options in (
+        {"primary": "", "scripts": [], "dashboard": ""},
+        {"primary": "a:1", "scripts": ["b:2"], "dashboard": "c:3"},
+    ):
+        simulated_controller.run("rtde", options, **common)
+    one, other = ((" ".join(each.scripts), [each.primary, each.dashboard]) for each in found)
+    assert one == (scripts, others)
+    assert other == ("b:2", ["a:1", "c:3"])
+
+
 def test_command_serves_all_interfaces():
-    words = (
-        "simulate",
-        "--protocol",
-        "rtde",
-        "--demo",
-        "--listen",
-        "127.0.0.1:0",
-        *(word for name in ("primary", "scripts", "dashboard") for word in (f"--{name}", "127.0.0.1:0")),
-    )
+    words = ("simulate", "--protocol", "rtde", "--demo", "--listen", "127.0.0.1:0")
 
     async def main():
         process = await asyncio.create_subprocess_exec(
@@ -477,7 +496,7 @@ def test_command_serves_all_interfaces():
         try:
             line = (await process.stdout.readline()).decode()
             ports = re.fullmatch(
-                r"listening on \S+:(\d+), primary interface on \S+:(\d+), scripts on \S+:(\d+), "
+                r"listening on \S+:(\d+), primary interface on \S+:(\d+), scripts on \S+:\d+, \d+, \d+, "
                 r"dashboard on \S+:(\d+)\n",
                 line,
             )

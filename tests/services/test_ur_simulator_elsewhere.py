@@ -70,6 +70,42 @@ while receive.getRuntimeState() != 1:
 print(json.dumps([target, there, stopped]))
 """
 
+LINE = """
+import json, sys, time
+from rtde_control import RTDEControlInterface
+from rtde_receive import RTDEReceiveInterface
+control = RTDEControlInterface(sys.argv[1])
+receive = RTDEReceiveInterface(sys.argv[1])
+begin = receive.getActualTCPPose()
+target = [begin[0] - 0.05, begin[1] + 0.1, *begin[2:]]
+control.moveL(target, 0.2, 1.0, True)
+on_line = []
+while not on_line or on_line[-1][1] < target[1] - 1e-6:
+    on_line.append(receive.getActualTCPPose())
+    time.sleep(0.01)
+there = receive.getActualTCPPose()
+control.moveL(begin, 0.2, 1.0, True)
+time.sleep(0.3)
+control.stopL(2.0)
+stopped = receive.getActualTCPPose()
+refused = control.moveL([3.0, *begin[1:]], 0.2, 1.0)
+control.reuploadScript()
+while not control.isProgramRunning():
+    time.sleep(0.01)
+for _ in range(50):
+    control.speedL([0.0, 0.0, -0.1, 0.0, 0.0, 0.0], 1.0)
+    time.sleep(0.01)
+speed = receive.getActualTCPSpeed()
+control.speedStop()
+joints = receive.getActualQ()
+joints[0] += 0.1
+for _ in range(100):
+    control.servoJ(joints, 0.0, 0.0, 0.01, 0.1, 300)
+    time.sleep(0.01)
+control.servoStop()
+print(json.dumps([begin, target, on_line, there, stopped, refused, speed, joints, receive.getActualQ()]))
+"""
+
 RECOVER = """
 import json, sys, time
 from dashboard_client import DashboardClient
@@ -140,7 +176,7 @@ async def simulator(address, *, demo=True, faults=()):
     settings = UrSettings(
         listen=f"{address}:30004",
         primary=f"{address}:0",
-        scripts=f"{address}:30003",  # where ur_rtde sends its program
+        scripts=(f"{address}:30003",),  # where ur_rtde sends its program
         dashboard=f"{address}:29999",
         demo=demo,
         faults=faults,
@@ -228,6 +264,21 @@ def test_program_of_ur_rtde_moves_and_stops_the_arm_and_its_watchdog_ends_it():
         assert stopped[1:] == pytest.approx(target[1:], abs=1e-9)
 
     run(main())
+
+
+def test_ur_rtde_moves_the_tool_on_a_line_at_a_speed_and_by_targets():
+    async def main():
+        async with simulator("127.0.31.7", demo=False):
+            return await client_of("127.0.31.7", LINE)
+
+    begin, target, on_line, there, stopped, refused, speed, joints, reached = run(main())
+    assert there == pytest.approx(target, abs=1e-6)
+    for x, y, *others in (*on_line, stopped):
+        assert [y, *others] == pytest.approx([begin[1] - 2 * (x - begin[0]), *begin[2:]], abs=1e-5)
+    assert begin[1] < stopped[1] < target[1]
+    assert not refused
+    assert speed == pytest.approx([0, 0, -0.1, 0, 0, 0], abs=1e-3)
+    assert reached == pytest.approx(joints, abs=1e-3)
 
 
 def test_dashboard_client_of_ur_rtde_recovers_the_arm():

@@ -188,15 +188,29 @@ def simulate(
         ),
     ] = SimulatedProtocol.UNIT,
     primary: Annotated[
-        str, typer.Option(metavar="HOST:PORT", help="The primary interface for reading; with rtde.")
-    ] = "127.0.0.1:30011",
-    scripts: Annotated[
         str,
-        typer.Option(metavar="HOST:PORT", help="The primary interface that takes scripts; with rtde."),
-    ] = "127.0.0.1:30001",
+        typer.Option(
+            metavar="HOST:PORT",
+            help="The primary interface for reading; with rtde.",
+            show_default="as --listen, port 30011",
+        ),
+    ] = "",
+    scripts: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="An interface that takes scripts; with rtde.",
+            show_default="as --listen, ports 30001, 30002, 30003",
+        ),
+    ] = None,
     dashboard: Annotated[
-        str, typer.Option(metavar="HOST:PORT", help="The dashboard server; with rtde.")
-    ] = "127.0.0.1:29999",
+        str,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="The dashboard server; with rtde.",
+            show_default="as --listen, port 29999",
+        ),
+    ] = "",
     yaskawa: Annotated[
         str, typer.Option(metavar="JSON", help="The site file's table `yaskawa` as JSON; with hses.")
     ] = "",
@@ -230,7 +244,7 @@ def simulate(
             "max_clients": max_clients,
             "code": code or [],
             "primary": primary,
-            "scripts": scripts,
+            "scripts": scripts or [],
             "dashboard": dashboard,
             "yaskawa": yaskawa,
             "fanuc": fanuc,

@@ -38,13 +38,15 @@ class Options(TypedDict):
     max_clients: int
     code: list[str]
     primary: str
-    scripts: str
+    scripts: list[str]
     dashboard: str
     yaskawa: str
     fanuc: str
     rmi: str
     path: str
 
+
+_RTDE_PORT = 30004
 
 # Runs a controller; calls the function with the line that says where it listens.
 _Run = Callable[[Callable[[str], None]], Coroutine[Any, Any, None]]
@@ -121,18 +123,28 @@ def _unit(common: _Common, options: Options) -> _Run:
 
 
 def _rtde(common: _Common, options: Options) -> _Run:
-    from services.simulator.universal_robots.service import UrSettings, serve_rtde
+    from services.simulator.universal_robots.service import UrPorts, UrSettings, serve_rtde
 
-    primary, scripts, dashboard = options["primary"], options["scripts"], options["dashboard"]
+    host, port = split_address(common["listen"])
+
+    def address(real: int) -> str:
+        # A second controller has an address of its own, or free ports.
+        return f"{host}:{real if port == _RTDE_PORT else 0}"
+
+    primary, dashboard = options["primary"] or address(30011), options["dashboard"] or address(29999)
+    scripts = tuple(options["scripts"] or map(address, (30001, 30002, 30003)))
     settings = UrSettings(**common, primary=primary, scripts=scripts, dashboard=dashboard)
-    names = ("listening on", "primary interface on", "scripts on", "dashboard on")
-    hosts = [split_address(each)[0] for each in (common["listen"], primary, scripts, dashboard)]
-    return lambda tell: serve_rtde(
-        settings,
-        ready=lambda ports: tell(
-            ", ".join(f"{name} {host}:{port}" for name, host, port in zip(names, hosts, ports, strict=True))
-        ),
-    )
+
+    def line(ports: UrPorts) -> str:
+        def at(text: str, *numbers: int) -> str:
+            return f"{split_address(text)[0]}:{', '.join(map(str, numbers))}"
+
+        return (
+            f"listening on {host}:{ports.rtde}, primary interface on {at(primary, ports.primary)}, "
+            f"scripts on {at(scripts[0], *ports.scripts)}, dashboard on {at(dashboard, ports.dashboard)}"
+        )
+
+    return lambda tell: serve_rtde(settings, ready=lambda ports: tell(line(ports)))
 
 
 def _hses(common: _Common, options: Options) -> _Run:
@@ -196,7 +208,7 @@ class _Protocol(NamedTuple):
 # Ports of real controllers, or ports like them that need no rights.
 _PROTOCOLS = {
     "unit": _Protocol("pt600", "127.0.0.1:5400", _unit),
-    "rtde": _Protocol("puma560", "127.0.0.1:30004", _rtde),
+    "rtde": _Protocol("puma560", f"127.0.0.1:{_RTDE_PORT}", _rtde),
     "hses": _Protocol("puma560", "127.0.0.1:10040", _hses),
     "snpx": _Protocol("puma560", "127.0.0.1:60008", _snpx),
     "fanuc-ftp": _Protocol("puma560", "127.0.0.1:2121", _fanuc_ftp),

@@ -8,6 +8,7 @@ voltages and inputs are invented.
 import logging
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping
+from functools import cached_property
 
 import numpy as np
 
@@ -32,15 +33,17 @@ from protocol_gateway.drivers.universal_robots.primary import (
 )
 from protocol_gateway.drivers.universal_robots.rtde_messages import Value
 from robots.description import RobotDescription
+from robots.inverse import InverseSolver, build_solver
 from robots.joints import FloatArray, joints_of
 from robots.model import build_model, link_placements, tool_jacobian, tool_placement
-from robots.poses import rotation_vector
 from services.simulator.errors import SimulatorError
 from services.simulator.universal_robots.fields import OFFERED
+from services.simulator.universal_robots.motion_functions import pose_of
 from services.simulator.universal_robots.programs import Programs
 from services.simulator.universal_robots.registers import Registers
 from services.simulator.universal_robots.script.code import compile_script
 from services.simulator.universal_robots.script.errors import ScriptError
+from services.simulator.universal_robots.script.machine import Pose
 from services.simulator.universal_robots.script_functions import functions_of
 
 logger = logging.getLogger(__name__)
@@ -79,6 +82,7 @@ class UrController:
 
     Attributes:
         joints: The arm's joints.
+        model: Its kinematic model.
         registers: General purpose registers.
         programs: The program that runs, and the arm's motion.
         remote: Remote control: scripts and commands of the network are executed.
@@ -104,11 +108,12 @@ class UrController:
                 f"robot {description.name} has {len(self.joints)} joints, "
                 f"this protocol needs {JOINTS} rotary ones: simulate puma560 or another arm with six"
             )
-        self._model = build_model(description)
-        flange_to_base = link_placements(self._model, self.joints.home)[-1]
-        tool_to_base = tool_placement(self._model, self.joints.home)
+        self._description = description
+        self.model = build_model(description)
+        flange_to_base = link_placements(self.model, self.joints.home)[-1]
+        tool_to_base = tool_placement(self.model, self.joints.home)
         self.payload_kg = _PAYLOAD_KG
-        self.tool_offset = _pose(np.linalg.inv(flange_to_base) @ tool_to_base)
+        self.tool_offset: tuple[float, ...] = pose_of(np.linalg.inv(flange_to_base) @ tool_to_base)
         self._announce = announce
         self._boot_s = now_s
         self._mode = RobotMode.RUNNING if powered else RobotMode.POWER_OFF
@@ -255,6 +260,11 @@ class UrController:
         """Return the time since the boot [s]."""
         return now_s - self._boot_s
 
+    @cached_property
+    def solver(self) -> InverseSolver:
+        """Inverse kinematics of the arm."""
+        return build_solver(self._description)
+
     @property
     def robot_mode(self) -> RobotMode:
         """Mode of the robot."""
@@ -301,16 +311,16 @@ class UrController:
             **self.registers.outputs,
         }
         if any("TCP_pose" in name for name in names):
-            found["target_TCP_pose"] = _pose(tool_placement(self._model, state.positions))
-            found["actual_TCP_pose"] = _pose(tool_placement(self._model, positions))
+            found["target_TCP_pose"] = pose_of(tool_placement(self.model, state.positions))
+            found["actual_TCP_pose"] = pose_of(tool_placement(self.model, positions))
         if any("TCP_speed" in name for name in names):
-            speed = _tuple(tool_jacobian(self._model, state.positions) @ state.velocities)
+            speed = _tuple(tool_jacobian(self.model, state.positions) @ state.velocities)
             found["actual_TCP_speed"] = found["target_TCP_speed"] = speed
         return {name: found.get(name, _ZEROS[OFFERED[name]]) for name in names}
 
-    def tool_pose(self, now_s: float) -> tuple[float, ...]:
+    def tool_pose(self, now_s: float) -> Pose:
         """Return the tool centre point in the base frame: position [m], rotation vector [rad]."""
-        return _pose(tool_placement(self._model, self.programs.arm(now_s).positions))
+        return pose_of(tool_placement(self.model, self.programs.arm(now_s).positions))
 
     def _modes(self) -> dict[str, Value]:
         normal = self._safety is SafetyMode.NORMAL
@@ -340,7 +350,7 @@ class UrController:
         on = 1.0 if self._powered else 0.0
         warm = 1.0 - math.exp(-self.uptime_s(now_s) / _WARM_UP_S)
         # Row 2: height of the tool per joint; on a vertical axis gravity has no torque.
-        lift = tool_jacobian(self._model, positions)[2]
+        lift = tool_jacobian(self.model, positions)[2]
         torques = on * (
             (self.payload_kg + _ARM_KG) * _GRAVITY * lift
             + _INERTIAS * accelerations
@@ -395,8 +405,3 @@ _ZEROS: Mapping[str, Value] = {
 
 def _tuple(values: FloatArray) -> tuple[float, ...]:
     return tuple(values.tolist())
-
-
-def _pose(placement: FloatArray) -> tuple[float, ...]:
-    """Return a (4, 4) placement as position [m] and rotation vector [rad]."""
-    return (*placement[:3, 3].tolist(), *rotation_vector(placement[:3, :3]).tolist())

@@ -1,6 +1,6 @@
 """Programs of the simulated controller: the demo's tour, or a script; they move its arm. Time is an argument.
 
-A stopped arm brakes on its line with an invented deceleration.
+A stopped arm brakes on its path with an invented deceleration.
 """
 
 import logging
@@ -10,7 +10,7 @@ from protocol_gateway.drivers.universal_robots.modes import RuntimeState
 from robots.joints import FloatArray, Joints
 from robots.motion import ArmState
 from services.simulator.demo import DemoProgram
-from services.simulator.universal_robots.line_motion import LineMotion
+from services.simulator.universal_robots.line_motion import JointLine, Path, PathMotion
 from services.simulator.universal_robots.registers import Registers
 from services.simulator.universal_robots.script.code import Program
 from services.simulator.universal_robots.script.errors import ScriptError
@@ -54,7 +54,7 @@ class Programs:
         self._machine: Machine | None = None
         self._secondary: list[Machine] = []
         self._next: Program | None = None
-        self._line: LineMotion | None = None
+        self._line: PathMotion | None = None
         self._mover = 0
         self._moved_s = float("-inf")
         self._slider = 1.0
@@ -98,7 +98,7 @@ class Programs:
             if self._demo_runs:
                 self._demo.go_on(now_s)
             elif self._line is not None and self._mover:
-                self._replan(now_s)
+                self._line = self._line.resumed(now_s, max(self._slider, _LOWEST_SPEED))
             return True
         if self._tour is None or self.state is not RuntimeState.STOPPED:
             return False
@@ -114,7 +114,7 @@ class Programs:
     def pause(self, now_s: float) -> None:
         """Brake, and keep the program."""
         if self.state is RuntimeState.PLAYING:
-            self._brake(STOP_DECELERATION, now_s)
+            self.brake(STOP_DECELERATION, now_s)
             self.state = RuntimeState.PAUSED
 
     def stop(self, now_s: float) -> None:
@@ -125,7 +125,7 @@ class Programs:
         name = DEMO if self._demo_runs else "" if self._machine is None else self._machine.program.name
         self._machine, self._mover, self._demo_runs = None, 0, False
         self._registers.forget_watchdogs()
-        self._brake(STOP_DECELERATION, now_s)
+        self.brake(STOP_DECELERATION, now_s)
         if self.state is not RuntimeState.STOPPING:
             self._report_key("PROGRAM_XXX_STOPPED", name)
         self.state = RuntimeState.STOPPING
@@ -200,24 +200,18 @@ class Programs:
         if self._line is not None:
             self._line.scale(max(fraction, _LOWEST_SPEED), now_s)
 
-    def begin_move(
-        self, thread: int, target: FloatArray, *, speed: float, acceleration: float, now_s: float
-    ) -> None:
+    def begin_move(self, thread: int, path: Path, *, speed: float, acceleration: float, now_s: float) -> None:
         """Begin a motion of a script's thread.
+
+        Args:
+            speed, acceleration: In the path's unit.
 
         Raises:
             ScriptError: If another thread moves the arm.
         """
         self.take_arm(thread)
-        self._request = speed, acceleration
-        self._line = LineMotion(
-            self.arm(now_s).positions,
-            target,
-            speed=speed,
-            acceleration=acceleration,
-            now_s=now_s,
-            scale=max(self._slider, _LOWEST_SPEED),
-        )
+        scale = max(self._slider, _LOWEST_SPEED)
+        self._line = PathMotion(path, speed=speed, acceleration=acceleration, now_s=now_s, scale=scale)
 
     def take_arm(self, thread: int) -> None:
         """Give the arm to a script's thread.
@@ -233,23 +227,18 @@ class Programs:
         """Take the arm back: the motion has ended."""
         self._mover = 0
 
-    def brake(self, deceleration: float, now_s: float) -> None:
-        """Come to rest on the line."""
-        self._brake(deceleration, now_s)
+    def brake(self, deceleration: float, now_s: float, *, of_joints: bool = True) -> None:
+        """Come to rest on the path.
 
-    def _brake(self, deceleration: float, now_s: float) -> None:
+        Args:
+            deceleration: Of the leading joint [rad/s²], or in the path's unit.
+        """
         if self._line is None:
             self._demo.stop(now_s)
         elif self._line.moving(now_s) and not self._line.braking:
-            self._line.brake(deceleration, now_s)
-
-    def _replan(self, now_s: float) -> None:
-        """Continue the motion after a pause."""
-        assert self._line is not None
-        speed, acceleration = self._request
-        self.begin_move(self._mover, self._line.target, speed=speed, acceleration=acceleration, now_s=now_s)
+            self._line.brake(deceleration, now_s, of_joints=of_joints)
 
     def _rest(self, now_s: float) -> None:
-        """Begin a line at rest, from which scripts move."""
+        """Begin a path at rest, from which scripts move."""
         positions = self.arm(now_s).positions
-        self._line = LineMotion(positions, positions, speed=1.0, acceleration=1.0, now_s=now_s)
+        self._line = PathMotion(JointLine(positions, positions), speed=1.0, acceleration=1.0, now_s=now_s)

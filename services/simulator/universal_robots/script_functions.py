@@ -4,10 +4,13 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from robots.joints import violations
-from services.simulator.universal_robots.line_motion import speed_for
+from services.simulator.universal_robots.motion_functions import (
+    STEP_S,
+    MotionFunctions,
+    number,
+    positive,
+    vector,
+)
 from services.simulator.universal_robots.script.errors import ScriptError
 from services.simulator.universal_robots.script.machine import (
     ControllerFunction,
@@ -21,17 +24,17 @@ from services.simulator.universal_robots.script.machine import (
 if TYPE_CHECKING:
     from services.simulator.universal_robots.controller import UrController
 
-_JOINTS = 6
 _MOST_MESSAGES = 20  # a second
-_STEP_S = 0.01
 _MOST_READ = 30
 
 
 def functions_of(controller: "UrController") -> dict[str, ControllerFunction]:
     """Return the functions by their names."""
-    functions = ScriptFunctions(controller)
     named: dict[str, ControllerFunction] = {
-        name: getattr(functions, name) for name in dir(functions) if not name.startswith("_")
+        name: getattr(functions, name)
+        for functions in (ScriptFunctions(controller), MotionFunctions(controller))
+        for name in dir(functions)
+        if not name.startswith("_")
     }
     return named | _PURE | dict.fromkeys(_WITHOUT_EFFECT, _nothing)
 
@@ -45,57 +48,6 @@ class ScriptFunctions:
         self._registers = controller.registers
         self._messages: list[float] = []
 
-    # ------------------------------------------------------------------ motion
-
-    def movej(
-        self,
-        machine: Machine,
-        thread: int,
-        q: Value,
-        a: Value = 1.4,
-        v: Value = 1.05,
-        t: Value = 0.0,
-        r: Value = 0.0,
-    ) -> Value:
-        """Move on a straight line in joint space; r is not simulated."""
-        if isinstance(q, Pose):
-            raise ScriptError("movej to a pose is not simulated: joint positions are")
-        target = np.array(_vector(q))
-        acceleration, speed, time_s = (_positive(each) for each in (a, v, t if t else 1.0))
-        if _number(r) != 0.0:
-            raise ScriptError("movej with a blend radius is not simulated")
-        self._need_arm(machine)
-        if outside := violations(self._controller.joints, target):
-            raise ScriptError(f"target outside the joint limits: {outside[0]}")
-        if t:
-            length = float(np.abs(target - self._programs.arm(machine.now_s).positions).max())
-            speed, acceleration = speed_for(max(length, 1e-9), acceleration, time_s)
-        self._programs.begin_move(thread, target, speed=speed, acceleration=acceleration, now_s=machine.now_s)
-        return Wait(self._arrived)
-
-    def stopj(self, machine: Machine, thread: int, a: Value = 2.0) -> Value:
-        """Brake to rest."""
-        self._need_arm(machine)
-        self._programs.take_arm(thread)
-        self._programs.brake(_positive(a), machine.now_s)
-        return Wait(self._arrived)
-
-    stopl = stopj
-
-    def is_steady(self, machine: Machine, thread: int) -> Value:
-        """Return whether the arm has rested for half a second."""
-        return self._programs.steady(machine.now_s)
-
-    def _need_arm(self, machine: Machine) -> None:
-        if not self._programs.is_running(machine):
-            raise ScriptError("a secondary program cannot move the arm")
-
-    def _arrived(self, now_s: float) -> tuple[Value] | None:
-        if self._programs.moving(now_s):
-            return None
-        self._programs.release_arm()
-        return (None,)
-
     # ------------------------------------------------------------------- time
 
     def sync(self, machine: Machine, thread: int) -> Value:
@@ -104,12 +56,12 @@ class ScriptFunctions:
 
     def sleep(self, machine: Machine, thread: int, t: Value) -> Value:
         """Wait."""
-        end_s = machine.now_s + _number(t)
+        end_s = machine.now_s + number(t)
         return Wait(lambda now_s: (None,) if now_s >= end_s else None)
 
     def get_steptime(self, machine: Machine, thread: int) -> Value:
         """Return the period of a tick [s]."""
-        return _STEP_S
+        return STEP_S
 
     # ------------------------------------------------------------------- state
 
@@ -127,16 +79,26 @@ class ScriptFunctions:
 
     def get_actual_tcp_pose(self, machine: Machine, thread: int) -> Value:
         """Return the pose of the tool centre point."""
-        return Pose(self._controller.tool_pose(machine.now_s))
+        return self._controller.tool_pose(machine.now_s)
+
+    get_target_tcp_pose = get_actual_tcp_pose
+
+    def get_tcp_offset(self, machine: Machine, thread: int) -> Value:
+        """Return the offset of the tool centre point."""
+        return Pose(self._controller.tool_offset)
+
+    def get_target_payload(self, machine: Machine, thread: int) -> Value:
+        """Return the mass of the payload."""
+        return self._controller.payload_kg
 
     def set_tcp(self, machine: Machine, thread: int, pose: Value, tcp_name: Value = "") -> Value:
         """Set the offset of the tool centre point."""
-        self._controller.tool_offset = _vector(pose)
+        self._controller.tool_offset = vector(pose)
         return None
 
     def set_payload(self, machine: Machine, thread: int, m: Value, cog: Value = (0.0, 0.0, 0.0)) -> Value:
         """Set the mass of the payload."""
-        self._controller.payload_kg = _number(m)
+        self._controller.payload_kg = number(m)
         return None
 
     set_target_payload = set_payload
@@ -228,38 +190,20 @@ class ScriptFunctions:
         return len(self._messages) < _MOST_MESSAGES
 
 
-def _number(value: Value) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ScriptError(f"a number is right, not {text_of(value)[:40]}")
-    return float(value)
-
-
-def _positive(value: Value) -> float:
-    if _number(value) <= 0.0:
-        raise ScriptError(f"a number above 0 is right, not {value:g}")
-    return float(value)
-
-
-def _vector(value: Value) -> tuple[float, ...]:
-    if not isinstance(value, tuple) or len(value) != _JOINTS:
-        raise ScriptError("a list of six numbers is right")
-    return tuple(_number(each) for each in value)
-
-
 def _nothing(machine: Machine, thread: int, *given: Value, **named: Value) -> Value:
     return None
 
 
 def _nothing_read(machine: Machine, thread: int, number: Value, *given: Value, **named: Value) -> Value:
-    return (0,) * (1 + min(int(_positive(number)), _MOST_READ))
+    return (0,) * (1 + min(int(positive(number)), _MOST_READ))
 
 
 def _of_numbers(function: Callable[..., float]) -> ControllerFunction:
-    return lambda machine, thread, *given: function(*map(_number, given))
+    return lambda machine, thread, *given: function(*map(number, given))
 
 
 def _norm(machine: Machine, thread: int, a: Value) -> Value:
-    return math.hypot(*map(_number, a)) if isinstance(a, tuple) else abs(_number(a))
+    return math.hypot(*map(number, a)) if isinstance(a, tuple) else abs(number(a))
 
 
 def _length(machine: Machine, thread: int, value: Value) -> Value:

@@ -32,7 +32,8 @@ class UrSettings:
         robot: A library robot, or a path to a robot.toml or URDF, with six rotary joints.
         listen: `HOST:PORT` of RTDE; a real controller has 30004; port 0 takes a free one.
         primary: `HOST:PORT` of the primary interface; a real controller has 30011 for reading.
-        scripts: `HOST:PORT` of the primary interface that takes scripts, on a real controller 30001.
+        scripts: Each `HOST:PORT` of the primary interface that takes scripts; on a real controller 30001,
+            and 30002 and 30003, of which ur_rtde uses the last.
         dashboard: `HOST:PORT` of the dashboard, on a real controller 29999.
         version: Version of the software: 3 is CB3 with at most 125 Hz, 5 and above have at most 500 Hz.
         demo: A program runs and moves the arm.
@@ -45,7 +46,7 @@ class UrSettings:
     robot: str = "puma560"
     listen: str = "127.0.0.1:0"
     primary: str = "127.0.0.1:0"
-    scripts: str = "127.0.0.1:0"
+    scripts: tuple[str, ...] = ("127.0.0.1:0",)
     dashboard: str = "127.0.0.1:0"
     version: tuple[int, int, int, int] = (5, 21, 0, 0)
     demo: bool = False
@@ -60,8 +61,8 @@ class UrPorts(NamedTuple):
 
     rtde: int
     primary: int
-    scripts: int
     dashboard: int
+    scripts: tuple[int, ...]
 
 
 async def serve_rtde(settings: UrSettings, *, ready: Callable[[UrPorts], None] | None = None) -> None:
@@ -75,7 +76,7 @@ async def serve_rtde(settings: UrSettings, *, ready: Callable[[UrPorts], None] |
         SimulatorError: If a setting is invalid.
         DescriptionError: If the robot is unknown.
     """
-    addresses = settings.listen, settings.primary, settings.scripts, settings.dashboard
+    addresses = settings.listen, settings.primary, settings.dashboard, *settings.scripts
     for address in addresses:
         host, _ = split_address(address)
         remedy = "listen on 127.0.0.1, or take the risk with --insecure: these protocols have no TLS"
@@ -88,8 +89,8 @@ async def serve_rtde(settings: UrSettings, *, ready: Callable[[UrPorts], None] |
     protocols = (
         server.new_rtde_client,
         server.new_monitor,
-        server.new_script_client,
         server.new_dashboard_client,
+        *(server.new_script_client for _ in settings.scripts),
     )
     with contextlib.ExitStack() as opened:
         opened.callback(server.close)
@@ -99,7 +100,8 @@ async def serve_rtde(settings: UrSettings, *, ready: Callable[[UrPorts], None] |
             opened.callback(listener.close)
             listening.append(listener)
         if ready is not None:
-            ready(UrPorts(*(each.sockets[0].getsockname()[1] for each in listening)))
+            rtde, primary, dashboard, *scripts = (each.sockets[0].getsockname()[1] for each in listening)
+            ready(UrPorts(rtde, primary, dashboard, tuple(scripts)))
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(server.run())
             if settings.mesh is not None:

@@ -120,7 +120,11 @@ class Machine:
 
     def _run(self, thread: _Thread) -> None:
         if thread.wait is not None:
-            value = thread.wait.over(self.now_s)
+            try:
+                value = thread.wait.over(self.now_s)
+            except ScriptError as error:
+                frame = thread.frames[-1]
+                raise ScriptError(error.text, frame.function.code[frame.at - 1].line) from None
             if value is None:
                 return
             thread.wait = None
