@@ -71,6 +71,6 @@ const answer = (value) => process.stdout.write(JSON.stringify(value), () => proc
 """
 
 
-def ask(module: Path, script: str, asked: object) -> object:
+def ask(module: Path, script: str, asked: object, **environment: str) -> object:
     """Return what a script gives to `answer`; it has all exports of the modules in `page`, and `asked`."""
-    return run(module, ASK + script, asked)
+    return run(module, ASK + script, asked, **environment)

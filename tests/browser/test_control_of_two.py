@@ -58,7 +58,7 @@ def test_one_asks_and_is_handed_control(open_arm):
     alice, bob, carol = open_arm(), open_arm(), open_arm(width=360, height=740)
     take(alice, "alice")
     expect(region(carol, "Control").get_by_text(re.compile("^since "))).to_have_text(
-        re.compile(r"since \d\d:\d\d:\d\d")
+        re.compile(r"since \d\d:\d\d:\d\d[+-]\d\d:\d\d")
     )
     ask(bob, "bob", "the gripper must be changed")
     for page in (alice, carol):

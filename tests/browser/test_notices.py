@@ -77,7 +77,7 @@ def test_what_was_sent_is_done_when_the_arm_is_there_and_gone_when_it_was_stoppe
     stop_button(page).click()
     expect(state_word(page)).to_have_text("Stopped")
     expect(page.get_by_role("main")).not_to_contain_text("Sent: ")
-    asked = re.compile(r"li asked for a stop at \d\d:\d\d:\d\d\.")
+    asked = re.compile(r"li asked for a stop at \d\d:\d\d:\d\d[+-]\d\d:\d\d\.")
     expect(events(page).filter(has_text=asked)).not_to_have_count(0)
     page.get_by_role("button", name="Reset stop").click()
     button(page, "Release").click()

@@ -115,7 +115,7 @@ def test_a_stop_that_cannot_be_sent_is_shown_so_and_sent_when_the_connection_ret
         expect(stop).to_be_enabled()
         stop.click()
         expect(page.get_by_role("banner").get_by_role("alert")).to_contain_text(
-            re.compile(r"^\d\d:\d\d:\d\d Stop request to hall/arm failed")
+            re.compile(r"^\d\d:\d\d:\d\d[+-]\d\d:\d\d Stop request to hall/arm failed")
         )
         expect(button(page, "Send again")).to_have_count(0)  # nothing can be sent
         page.evaluate("wall -= 60e3")  # it is recent, however slow this machine is

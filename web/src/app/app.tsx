@@ -7,7 +7,7 @@ import { SignIn } from "../features/account/sign-in";
 import { FleetPage } from "../features/fleet/fleet-page";
 import { ControllerStateSchema } from "../gen/robomesh_pb";
 import { a } from "../i18n/account";
-import { timeOfDay } from "../i18n/format";
+import { whenText } from "../i18n/format";
 import { language, type TextName, t } from "../i18n/texts";
 import { mustSignIn } from "../mesh/account";
 import { hello, lostAt, reachable } from "../mesh/connection";
@@ -221,7 +221,7 @@ function Banners() {
         {lost !== null && lost > 0 && (
           <div class="banner warning" role="alert">
             <span class="shape warning" aria-hidden="true" />
-            {t("reconnecting", { time: timeOfDay(lost) })}
+            {t("reconnecting", { time: whenText(lost) })}
           </div>
         )}
         {lost === null && hello.value?.connected === false && (

@@ -7,7 +7,7 @@ import type { Event, Note } from "../gen/robomesh_pb";
 import { Event_Severity as Severity } from "../gen/robomesh_pb";
 import { alarmTitle } from "./alarm-text";
 import { isolated } from "./foreign-text";
-import { dateOf, stampTime, timeOfDay } from "./format";
+import { stampWhen, whenText } from "./format";
 import { reasonText } from "./reasons";
 import { isSaid, operatorText } from "./stop-words";
 import { language, t } from "./texts";
@@ -116,7 +116,7 @@ export function eventText(event: Event): string {
   const reason = values.reason;
   switch (code) {
     case "stop.latched": {
-      const time = stampTime(event.timestamp);
+      const time = stampWhen(event.timestamp);
       const text = t(values.sent === "True" ? "event_stop" : "event_stop_unsent", { by: operatorText(by), time });
       return isSaid(reason) ? `${text} ${t("stop_reason", { reason })}` : text;
     }
@@ -138,7 +138,6 @@ export function eventText(event: Event): string {
 function noteTime({ begin, end }: Note, written: Timestamp | undefined): string {
   const [from, at] = [begin, written].map((stamp) => (stamp ? timestampMs(stamp) : 0)) as [number, number];
   if (!end && Math.abs(at - from) < AT_ONCE_MS) return "";
-  const isToday = new Date(from).toDateString() === new Date(at).toDateString();
-  const first = isToday ? timeOfDay(from) : `${dateOf(from)} ${timeOfDay(from)}`;
-  return end ? `${first} – ${timeOfDay(timestampMs(end))}` : first;
+  const first = whenText(from, at);
+  return end ? `${first} – ${whenText(timestampMs(end), from)}` : first;
 }

@@ -81,7 +81,7 @@ export function clock(seconds: number): string {
   return [Math.floor(whole / 60), whole % 60].map((part) => String(part).padStart(2, "0")).join(":");
 }
 
-/** Return the local time of day, to the second. */
+/** Return the local time of day, to the second, for lists and axes; a title or heading has the zone. */
 export function timeOfDay(ms: number): string {
   return new Date(ms).toLocaleTimeString("en-GB", { hour12: false });
 }
@@ -93,17 +93,37 @@ export function dateOf(ms: number): string {
   return [date.getFullYear(), pad(date.getMonth() + 1), pad(date.getDate())].join("-");
 }
 
-/** Return local date, time and zone, for tooltips. */
-export function fullTime(ms: number): string {
-  return new Date(ms).toLocaleString("en-GB", { timeZoneName: "short" });
+/** Return the zone at a time: +08:00. */
+export function zoneOf(ms: number): string {
+  const minutes = -new Date(ms).getTimezoneOffset();
+  return (minutes < 0 ? "-" : "+") + clock(Math.abs(minutes));
+}
+
+/** Return a local time as in the terminal and in pictures: 2026-11-29 14:02:11+08:00; 0 is not known.
+ *
+ * @param exact - with milliseconds. */
+export function timeText(ms: number, exact = false): string {
+  const at = new Date(ms || Number.NaN);
+  if (Number.isNaN(at.getTime())) return DASH;
+  const fraction = exact ? `.${String(at.getMilliseconds()).padStart(3, "0")}` : "";
+  return `${dateOf(ms)} ${timeOfDay(ms)}${fraction}${zoneOf(ms)}`;
+}
+
+/** Return a local time for a sentence, with its zone; without its date on the same day as `now`. */
+export function whenText(ms: number, now = Date.now()): string {
+  return dateOf(ms) === dateOf(now) ? timeText(ms).slice("2026-11-29 ".length) : timeText(ms);
 }
 
 export function stampTime(stamp: Timestamp | undefined): string {
   return stamp ? timeOfDay(timestampMs(stamp)) : DASH;
 }
 
+export function stampWhen(stamp: Timestamp | undefined): string {
+  return stamp ? whenText(timestampMs(stamp)) : DASH;
+}
+
 export function stampFull(stamp: Timestamp | undefined): string {
-  return stamp ? fullTime(timestampMs(stamp)) : "";
+  return stamp ? timeText(timestampMs(stamp)) : "";
 }
 
 /** Return roll, pitch, yaw [rad] (about fixed x, y, z) of a 4x4 placement, by rows.

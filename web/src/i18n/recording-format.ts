@@ -2,7 +2,7 @@
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Recording } from "../gen/robomesh_pb";
-import { count, dateOf, fixed, timeOfDay } from "./format";
+import { count, fixed } from "./format";
 import { r } from "./recordings";
 
 const UNITS = ["B", "kB", "MB", "GB", "TB"];
@@ -21,12 +21,6 @@ export function startMs({ start }: Recording): number {
 
 export function durationS({ duration }: Recording): number {
   return duration ? Number(duration.seconds) + duration.nanos / 1e9 : 0;
-}
-
-/** Format a local date and time: 2026-11-21 14:03:09. */
-export function dateText(ms: number): string {
-  if (!ms) return "–";
-  return `${dateOf(ms)} ${timeOfDay(ms)}`;
 }
 
 /** Format a time within a recording: 00:03.25, 1:02:03.00. */

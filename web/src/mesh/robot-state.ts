@@ -11,7 +11,7 @@ import {
   ControllerState_Mode as Mode,
   Capabilities_Stops as Stops,
 } from "../gen/robomesh_pb";
-import { stampTime } from "../i18n/format";
+import { stampWhen } from "../i18n/format";
 import { reasonsText, reasonText } from "../i18n/reasons";
 import { operatorText } from "../i18n/stop-words";
 import type { TextName } from "../i18n/texts";
@@ -88,7 +88,7 @@ export function stopText({ stop, activity }: ControllerState, disobeyed = false)
       : NOT_MOVING.has(activity)
         ? "stopped_by"
         : "stop_sent_by";
-  return t(text, { by: operatorText(stop.by), time: stampTime(stop.since) });
+  return t(text, { by: operatorText(stop.by), time: stampWhen(stop.since) });
 }
 
 /** Return the state word of a robot, the most urgent first. */

@@ -2,7 +2,7 @@
 
 import { effect, signal } from "@preact/signals";
 import { StopAnswerSchema, StopRequestSchema } from "../gen/robomesh_pb";
-import { timeOfDay } from "../i18n/format";
+import { whenText } from "../i18n/format";
 import { reasonText } from "../i18n/reasons";
 import { t } from "../i18n/texts";
 import { AskError, ask, reachable, reopenIfSilent } from "./connection";
@@ -61,7 +61,7 @@ export async function stop(robotKeys: readonly string[], pressedAt = Date.now())
   const notice: Notice =
     of("done").length === outcomes.length
       ? { kind: "done", text }
-      : { kind: "refused", text: `${timeOfDay(pressedAt)} ${text}` };
+      : { kind: "refused", text: `${whenText(pressedAt)} ${text}` };
   stopNotice.value = notice;
   if (unsent.length) unsentStop.value = { robotKeys: unsent, at: pressedAt };
   if (notice.kind === "done") setTimeout(() => stopNotice.value === notice && (stopNotice.value = null), NOTICE_MS);

@@ -4,7 +4,7 @@ import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { useState } from "preact/hooks";
 import type { ControllerState, Event } from "../gen/robomesh_pb";
 import { Event_Severity as Severity } from "../gen/robomesh_pb";
-import { stampFull, stampTime } from "../i18n/format";
+import { stampFull, stampWhen } from "../i18n/format";
 import { t } from "../i18n/texts";
 import { DISOBEYED, disobeys, msBefore } from "../mesh/robot-state";
 
@@ -25,7 +25,7 @@ export function RobotAlarm({ state, events }: { state: ControllerState | undefin
   const event = events.find(({ severity }) => severity === Severity.CRITICAL);
   const at = event?.timestamp ? timestampMs(event.timestamp) : 0;
   if (!event || at <= dismissed || (state && msBefore(state, event.timestamp) > SHOWN_MS)) return null;
-  const time = stampTime(event.timestamp);
+  const time = stampWhen(event.timestamp);
   return (
     <div class="over-page">
       <div class="alarm-band past" role="alert">

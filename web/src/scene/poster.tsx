@@ -1,7 +1,7 @@
 // The renderer's last picture of the robot, in the place of the 3-D view until that can draw.
 
 import { useState } from "preact/hooks";
-import { timeOfDay } from "../i18n/format";
+import { whenText } from "../i18n/format";
 import { t, viewText } from "../i18n/texts";
 import { presence } from "../mesh/connection";
 
@@ -31,7 +31,7 @@ export function Poster({ robotKey, view, why }: { robotKey: string; view: string
         />
       )}
       <p class={known ? "poster-word" : "scene-word dim"} role="status">
-        {known ? t("poster", { time: timeOfDay(known.at), why }) : why}
+        {known ? t("poster", { time: whenText(known.at), why }) : why}
       </p>
     </>
   );

@@ -4,7 +4,7 @@ import { create } from "@bufbuild/protobuf";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import type { Description, View } from "../gen/robomesh_pb";
 import { KinematicStateSchema, ReplayStateSchema, View_Projection, ViewSchema } from "../gen/robomesh_pb";
-import { staleText, timeOfDay } from "../i18n/format";
+import { staleText, whenText } from "../i18n/format";
 import { r } from "../i18n/recordings";
 import { t, viewText } from "../i18n/texts";
 import { distanceText, useClearanceLevel } from "../mesh/clearance";
@@ -256,7 +256,7 @@ export function SceneView(props: {
           <span class="shape warning" aria-hidden="true" />
           {/* Announce it once, not each second. */}
           <span aria-live="off">{age === undefined ? t("no_data") : staleText(age)}</span>
-          {props.lostAt !== null && <span class="dim">{t("no_link_since", { time: timeOfDay(props.lostAt) })}</span>}
+          {props.lostAt !== null && <span class="dim">{t("no_link_since", { time: whenText(props.lostAt) })}</span>}
         </p>
       )}
     </section>

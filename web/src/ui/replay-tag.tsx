@@ -1,7 +1,6 @@
 // The mark of everything that is played back, in magenta and in words.
 
-import { fullTime } from "../i18n/format";
-import { dateText } from "../i18n/recording-format";
+import { timeText } from "../i18n/format";
 import { r } from "../i18n/recordings";
 import { Tag } from "./tag";
 
@@ -10,7 +9,7 @@ export function ReplayTag({ robot, start }: { robot: string; start: number }) {
   return (
     <Tag kind="replay">
       <span class="replay-shape" aria-hidden="true" />
-      <span title={start ? fullTime(start) : ""}>{r("replay_of", { robot, time: dateText(start) })}</span>
+      <span>{r("replay_of", { robot, time: timeText(start) })}</span>
     </Tag>
   );
 }

@@ -6,7 +6,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { CompressedVideoSchema } from "../gen/foxglove/CompressedVideo_pb";
 import type { AuditEntry, Recording } from "../gen/robomesh_pb";
 import { RangeRequestSchema, RecordedMessagesSchema, RecordingListSchema } from "../gen/robomesh_pb";
-import { fixed } from "../i18n/format";
+import { fixed, timeText } from "../i18n/format";
 import { durationS, startMs } from "../i18n/recording-format";
 import { t, viewText } from "../i18n/texts";
 import { ask, inOwnName } from "../mesh/connection";
@@ -100,7 +100,7 @@ function SeenDialog(props: { site: string; robot: string; seen: Seen; close: () 
   const facts: [string, string][] = [
     [t("view"), seen.view === OWN_DRAWING ? t("scene") : seen.view ? viewText(seen.view) : "–"],
     [t("seen_number"), seen.number || "–"],
-    [t("seen_time"), seen.sourceMs === null ? "–" : timeText(seen.sourceMs)],
+    [t("seen_time"), seen.sourceMs === null ? "–" : timeText(seen.sourceMs, true)],
     [t("seen_picture_age"), ageOf(seen.pictureAge)],
     [t("seen_state_age"), ageOf(seen.stateAge)],
   ];
@@ -138,11 +138,6 @@ function SeenDialog(props: { site: string; robot: string; seen: Seen; close: () 
       </div>
     </dialog>
   );
-}
-
-function timeText(ms: number): string {
-  const at = new Date(ms);
-  return `${at.toLocaleTimeString("en-GB", { hour12: false })}.${String(at.getMilliseconds()).padStart(3, "0")}`;
 }
 
 /** Find the picture in the recordings of its site; null: no recording has it. */

@@ -2,7 +2,7 @@
 
 import { useEffect } from "preact/hooks";
 import { d } from "../../i18n/define";
-import { timeOfDay } from "../../i18n/format";
+import { whenText } from "../../i18n/format";
 import { FileButton } from "../../ui/file-button";
 import { empty } from "./description";
 import { hasStoredDraft, newDrafts, openDraft, restoreDraft } from "./draft";
@@ -29,7 +29,7 @@ export function NewRobot() {
         {newDrafts().map(({ id, name, at }) => (
           <p key={id} class="start-draft">
             <button class="action" onClick={() => restoreDraft("", id)}>
-              {d("continue_draft", { name, time: timeOfDay(at) })}
+              {d("continue_draft", { name, time: whenText(at) })}
             </button>
           </p>
         ))}

@@ -2,7 +2,7 @@
 
 import { useState } from "preact/hooks";
 import { d } from "../../i18n/define";
-import { timeOfDay } from "../../i18n/format";
+import { whenText } from "../../i18n/format";
 import { t } from "../../i18n/texts";
 import { outcomeRole } from "../../ui/notice-line";
 import { robotLink } from "../../ui/route";
@@ -89,7 +89,7 @@ export function Outcomes() {
     <div class="outcomes">
       {restoredFrom.value !== null && draft.value && (
         <div class="outcome" role="status">
-          <span>{sure ? d("discard_sure") : d("brought_back", { time: timeOfDay(restoredFrom.value) })}</span>
+          <span>{sure ? d("discard_sure") : d("brought_back", { time: whenText(restoredFrom.value) })}</span>
           {sure ? (
             <>
               <button class="action small-action" onClick={discardDraft}>

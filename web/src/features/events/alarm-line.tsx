@@ -4,7 +4,7 @@ import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { alarmAdvice, alarmText } from "../../i18n/alarm-text";
 import type { EventsTextName } from "../../i18n/events";
 import { e } from "../../i18n/events";
-import { fullTime, stampFull, stampTime, timeOfDay } from "../../i18n/format";
+import { stampFull, stampTime, stampWhen } from "../../i18n/format";
 import type { Alarm } from "../../mesh/alarms";
 import { isUnacknowledged, nameOf, State } from "../../mesh/alarms";
 import { PriorityMark } from "../../ui/priority-mark";
@@ -113,16 +113,11 @@ export function AlarmLine(props: {
 function more(alarm: Alarm): string[] {
   const { count, since, last, returned, by, at, state, shelvedUntil, reason } = alarm;
   const words = [`${alarm.source} · ${alarm.code}`];
-  if (since && last && timestampMs(last) > timestampMs(since)) words.push(e("since", { time: stampTime(since) }));
+  if (since && last && timestampMs(last) > timestampMs(since)) words.push(e("since", { time: stampWhen(since) }));
   if (count > 1) words.push(e("times", { count }));
-  if (returned && state === State.RETURNED) words.push(e("over_at", { time: stampTime(returned) }));
+  if (returned && state === State.RETURNED) words.push(e("over_at", { time: stampWhen(returned) }));
   if (state === State.SHELVED) {
-    const until = shelvedUntil ? timestampMs(shelvedUntil) : 0;
-    words.push(e("shelved_by", { by, time: sameDay(until) ? timeOfDay(until) : fullTime(until), reason }));
-  } else if (by) words.push(e("by_at", { by, time: stampTime(at) }));
+    words.push(e("shelved_by", { by, time: stampWhen(shelvedUntil), reason }));
+  } else if (by) words.push(e("by_at", { by, time: stampWhen(at) }));
   return words;
-}
-
-function sameDay(ms: number): boolean {
-  return new Date(ms).toDateString() === new Date().toDateString();
 }

@@ -3,7 +3,7 @@
 import { useEffect, useState } from "preact/hooks";
 import type { DayTextName } from "../../i18n/day";
 import { d, lastedText } from "../../i18n/day";
-import { count, DASH, dateOf, fullTime, timeOfDay } from "../../i18n/format";
+import { count, DASH, dateOf, timeOfDay, timeText, whenText, zoneOf } from "../../i18n/format";
 import { lostAt } from "../../mesh/connection";
 import { saveFile } from "../../ui/save-file";
 import type { DayLine, Totals } from "./day";
@@ -45,6 +45,7 @@ export function DayView({ robotKey, events }: { robotKey: string; events: readon
         >
           →
         </button>
+        {span && <span class="dim small">{zoneOf(span.from)}</span>}
         {answers && <Sentences robotKey={robotKey} date={date} answers={answers} events={events} />}
       </div>
       {!answers && <p class="empty">{d("reading")}</p>}
@@ -105,7 +106,7 @@ function Sentences(props: { robotKey: string; date: string; answers: DayAnswers;
     const sources = sourcesOf(props.robotKey, props.answers, props.events);
     const totals = totalsOf(sources);
     const head = [
-      `${name}  ${props.date}  ${Intl.DateTimeFormat().resolvedOptions().timeZone}`,
+      `${name}  ${props.date}  ${zoneOf(props.answers.day.from)}`,
       ...TOTALS.map((each) => `${d(each)}: ${totalText(each, totals, props.answers, sources.eventsFrom)}`),
       ...missing(props.answers, sources.eventsFrom),
     ];
@@ -174,7 +175,7 @@ function Hours({
 function Sentence({ line }: { line: DayLine }) {
   return (
     <li>
-      <time title={fullTime(line.ms)}>{timeOfDay(line.ms)}</time>
+      <time title={timeText(line.ms)}>{timeOfDay(line.ms)}</time>
       <span class="dim small">{d(`kind_${line.kind}`)}</span>
       <span class="day-text">
         {line.bad && <span class="shape warning" aria-hidden="true" />}
@@ -194,9 +195,9 @@ function totalText(name: keyof Totals, totals: Totals, { problems }: DayAnswers,
 function missing({ day, problems, cutAt, audit }: DayAnswers, eventsFrom: number | null): string[] {
   const gaps: string[] = [];
   if (problems.audit) gaps.push(d("no_audit", { text: problems.audit }));
-  if (cutAt !== null) gaps.push(d("cut_audit", { count: count(audit.length), time: timeOfDay(cutAt) }));
+  if (cutAt !== null) gaps.push(d("cut_audit", { count: count(audit.length), time: whenText(cutAt, cutAt) }));
   if (eventsFrom === null || eventsFrom >= day.to) gaps.push(d("no_events"));
-  else if (eventsFrom > day.from) gaps.push(d("events_from", { time: timeOfDay(eventsFrom) }));
+  else if (eventsFrom > day.from) gaps.push(d("events_from", { time: whenText(eventsFrom, eventsFrom) }));
   if (problems.notes) gaps.push(d("no_notes", { text: problems.notes }));
   if (problems.recordings) gaps.push(d("no_recordings", { text: problems.recordings }));
   return gaps;

@@ -7,7 +7,7 @@ import { alarmTitle } from "../../i18n/alarm-text";
 import { entrySentence, entryText } from "../../i18n/audit-text";
 import { eventText } from "../../i18n/event-text";
 import { e } from "../../i18n/events";
-import { count, stampFull } from "../../i18n/format";
+import { count, dateOf, stampFull, timeOfDay } from "../../i18n/format";
 import { n } from "../../i18n/notes";
 import type { Notice } from "../../mesh/control";
 import { reasonOf } from "../../mesh/control";
@@ -333,10 +333,8 @@ function Withdraw({ robotKey, note }: { robotKey: string; note: Note }) {
 
 /** Return the time of day, with the date unless it is today's. */
 function dayTime(ms: number): string {
-  const at = new Date(ms);
-  const time = at.toLocaleTimeString("en-GB", { hour12: false });
-  if (at.toDateString() === new Date().toDateString()) return time;
-  return `${String(at.getDate()).padStart(2, "0")}/${String(at.getMonth() + 1).padStart(2, "0")} ${time}`;
+  const date = dateOf(ms);
+  return date === dateOf(Date.now()) ? timeOfDay(ms) : `${date.slice("2026-".length)} ${timeOfDay(ms)}`;
 }
 
 const NARROW = matchMedia("(max-width: 899px)");

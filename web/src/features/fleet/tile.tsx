@@ -6,7 +6,7 @@ import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
 import type { Description } from "../../gen/robomesh_pb";
 import { DescriptionSchema } from "../../gen/robomesh_pb";
 import { f } from "../../i18n/fleet";
-import { robotTitle, staleText, stampFull, stampTime } from "../../i18n/format";
+import { robotTitle, staleText, stampFull, stampWhen } from "../../i18n/format";
 import { t } from "../../i18n/texts";
 import { alarmsOf } from "../../mesh/alarms";
 import { hello, watch } from "../../mesh/connection";
@@ -92,7 +92,7 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
             {!leaseKnown
               ? t("holder_unknown")
               : holder
-                ? `${t("somebody", { name: holder })}, ${t("since", { time: stampTime(lease.message.since) })}`
+                ? `${t("somebody", { name: holder })}, ${t("since", { time: stampWhen(lease.message.since) })}`
                 : t("nobody")}
           </span>
         </div>

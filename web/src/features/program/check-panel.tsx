@@ -1,7 +1,7 @@
 // Result of the check: the verdict in words, its assumptions, and a row a violation.
 
 import type { CheckAnswer } from "../../gen/robomesh_pb";
-import { timeOfDay } from "../../i18n/format";
+import { whenText } from "../../i18n/format";
 import { p } from "../../i18n/program";
 import { reasonText } from "../../i18n/reasons";
 import { t } from "../../i18n/texts";
@@ -83,7 +83,7 @@ function Verdict({ moved }: { moved: boolean }) {
             ? ""
             : moved
               ? p("moved_since")
-              : p("checked_at", { time: timeOfDay(checked.value.at) })}
+              : p("checked_at", { time: whenText(checked.value.at) })}
       </span>
     </p>
   );

@@ -3,7 +3,7 @@
 import { useState } from "preact/hooks";
 import type { ControllerState, ProgramState } from "../../gen/robomesh_pb";
 import { ProgramState_Outcome as Outcome } from "../../gen/robomesh_pb";
-import { clock, stampTime } from "../../i18n/format";
+import { clock, stampWhen } from "../../i18n/format";
 import { p } from "../../i18n/program";
 import { reasonText } from "../../i18n/reasons";
 import { t } from "../../i18n/texts";
@@ -87,7 +87,7 @@ function Progress({ state }: { state: ProgramState }) {
           {word}
         </span>
         <strong>{name}</strong>
-        <span class="dim small">{p("by_since", { name: operator, time: stampTime(state.since) })}</span>
+        <span class="dim small">{p("by_since", { name: operator, time: stampWhen(state.since) })}</span>
       </p>
       <progress
         max={Math.max(1, steps)}

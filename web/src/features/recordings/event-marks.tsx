@@ -5,7 +5,7 @@ import type { ReadonlySignal } from "@preact/signals";
 import { useComputed, useSignal } from "@preact/signals";
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { eventText } from "../../i18n/event-text";
-import { count, fullTime } from "../../i18n/format";
+import { count, timeText } from "../../i18n/format";
 import { n } from "../../i18n/notes";
 import { momentText } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
@@ -193,7 +193,7 @@ function EventButton({ happened, seek }: { happened: RecordedEvent; seek: (to: n
   const { event, at } = happened;
   return (
     <button
-      title={`${event.timestamp ? fullTime(timestampMs(event.timestamp)) : ""} · ${event.source} · ${event.code}`}
+      title={`${event.timestamp ? timeText(timestampMs(event.timestamp)) : ""} · ${event.source} · ${event.code}`}
       onClick={() => seek(at)}
     >
       <time>{momentText(at)}</time>

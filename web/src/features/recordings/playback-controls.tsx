@@ -3,8 +3,8 @@
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { ReadonlySignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
-import { fullTime } from "../../i18n/format";
-import { dateText, momentText } from "../../i18n/recording-format";
+import { timeText } from "../../i18n/format";
+import { momentText } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
 import { heldLease } from "../../mesh/control";
 import type { Replay } from "../../mesh/replay";
@@ -64,9 +64,7 @@ export function PlaybackControls(props: {
           />
         </div>
         <div class="transport-time">
-          <span class="recorded-clock" title={fullTime(recordedMs)}>
-            {dateText(recordedMs)}
-          </span>
+          <span class="recorded-clock">{timeText(recordedMs)}</span>
           <span class="figure">
             {momentText(at)} <span class="dim">/ {momentText(durationS)}</span>
           </span>

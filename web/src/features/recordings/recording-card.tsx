@@ -3,10 +3,9 @@
 import type { Signal } from "@preact/signals";
 import { useState } from "preact/hooks";
 import type { Recording } from "../../gen/robomesh_pb";
-import { count, fullTime } from "../../i18n/format";
+import { count, timeText } from "../../i18n/format";
 import { reasonText } from "../../i18n/reasons";
 import {
-  dateText,
   durationS,
   fileUrl,
   isEmpty,
@@ -72,7 +71,7 @@ export function RecordingCard(props: {
         </div>
         <p class="recording-facts dim">
           <span>{props.sited ? `${site} / ${robots}` : robots}</span>
-          <time title={fullTime(startMs(recording))}>{dateText(startMs(recording))}</time>
+          <time>{timeText(startMs(recording))}</time>
           <span class="figure">{momentText(durationS(recording), 0)}</span>
           <span class="figure">{sizeText(recording.bytes)}</span>
           <span class="figure">{r("messages", { count: count(messagesOf(recording)) })}</span>

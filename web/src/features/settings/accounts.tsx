@@ -1,7 +1,7 @@
 // The console's accounts, for an administrator: add, change role or password, disable, remove.
 
 import { useEffect, useState } from "preact/hooks";
-import { fullTime } from "../../i18n/format";
+import { timeText } from "../../i18n/format";
 import { s } from "../../i18n/settings";
 import { me, post } from "../../mesh/account";
 import type { Notice } from "../../mesh/control";
@@ -96,7 +96,7 @@ function Row({ account, change }: { account: Account; change: Change }) {
       <td>
         {disabled ? s("disabled") : account.sessions ? s("sessions_of", { count: account.sessions }) : s("active")}
       </td>
-      <td>{fullTime(Date.parse(account.created))}</td>
+      <td>{timeText(Date.parse(account.created))}</td>
       <td class="account-actions">
         {own ? null : openForm === "password" ? (
           <Password of={name} set={(password) => run("password", { password })} close={() => setOpen(null)} />

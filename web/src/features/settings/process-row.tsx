@@ -2,7 +2,7 @@
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { MeshState, MeshState_Seen as Seen } from "../../gen/robomesh_pb";
-import { ageText, count, DASH, fixed, stampFull, timeOfDay } from "../../i18n/format";
+import { ageText, count, DASH, fixed, stampFull, whenText } from "../../i18n/format";
 import { s } from "../../i18n/settings";
 import { hello } from "../../mesh/connection";
 import { isClockOff, isSilent, reportAge } from "../../mesh/site-health";
@@ -55,7 +55,7 @@ export function ProcessRow(props: { of: string; seen: Seen; latest: Latest<MeshS
       </th>
       <td data-column={s("age")}>
         {goneAt !== null ? (
-          <Marked wrong>{s("gone", { time: timeOfDay(goneAt) })}</Marked>
+          <Marked wrong>{s("gone", { time: whenText(goneAt) })}</Marked>
         ) : silent ? (
           <Marked wrong>{s("silent", { age: ageText(reportAge(seen, latest)) })}</Marked>
         ) : (

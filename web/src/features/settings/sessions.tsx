@@ -1,7 +1,7 @@
 // Signed-in browsers: the account's own, an administrator's view of all; each can be signed out.
 
 import { useEffect, useState } from "preact/hooks";
-import { fullTime } from "../../i18n/format";
+import { timeText } from "../../i18n/format";
 import { s } from "../../i18n/settings";
 import { post } from "../../mesh/account";
 import type { Notice } from "../../mesh/control";
@@ -52,7 +52,7 @@ export function Sessions() {
             <strong>{session.account}</strong>
             <span>{session.address}</span>
             <span class="dim" title={session.agent}>
-              {`${s("began")} ${fullTime(Date.parse(session.began))}`}
+              {`${s("began")} ${timeText(Date.parse(session.began))}`}
             </span>
             {session.resting && <span class="dim">{s("session_resting")}</span>}
             {session.this ? (

@@ -4,7 +4,7 @@ import { useEffect, useState } from "preact/hooks";
 import type { CompressedImage } from "../../gen/foxglove/CompressedImage_pb";
 import { CompressedImageSchema } from "../../gen/foxglove/CompressedImage_pb";
 import { ControllerStateSchema, DescriptionSchema } from "../../gen/robomesh_pb";
-import { stampFull, stampTime, timeOfDay } from "../../i18n/format";
+import { stampFull, stampTime, whenText } from "../../i18n/format";
 import { t, viewText } from "../../i18n/texts";
 import { v } from "../../i18n/view";
 import { hello, lostAt } from "../../mesh/connection";
@@ -65,7 +65,7 @@ export function ViewPage({ site, robot, view }: ViewName) {
 function problemText(): string {
   if (refused.value) return refused.value;
   if (lostAt.value === 0) return t("connecting");
-  if (lostAt.value !== null) return v("lost", { time: timeOfDay(lostAt.value) });
+  if (lostAt.value !== null) return v("lost", { time: whenText(lostAt.value) });
   return hello.value?.connected === false ? v("router_lost") : "";
 }
 

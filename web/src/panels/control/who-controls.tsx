@@ -3,7 +3,7 @@
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { Lease, Lease_Asker } from "../../gen/robomesh_pb";
-import { ageText, stampFull, stampTime } from "../../i18n/format";
+import { ageText, stampFull, stampWhen } from "../../i18n/format";
 import { t } from "../../i18n/texts";
 import { hello, reachable } from "../../mesh/connection";
 import {
@@ -49,7 +49,7 @@ export function Holder(props: { robotKey: string; holder: string | null; lease: 
       </span>
       {holder && (
         <span class="since dim" title={stampFull(props.lease?.since)}>
-          {t("since", { time: stampTime(props.lease?.since) })}
+          {t("since", { time: stampWhen(props.lease?.since) })}
         </span>
       )}
     </>
