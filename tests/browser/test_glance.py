@@ -181,7 +181,7 @@ def test_the_last_still_is_shown_until_the_3_d_view_can_draw_and_looks_neither_l
         view = region(page, "3-D view")
         poster = view.get_by_role("img", name=re.compile("^Last picture of pt600"))
         expect(poster).to_be_visible()
-        expect(view).to_contain_text(re.compile(r"Picture of [\d:]+, not live\. Loading the model…"))
+        expect(view).to_contain_text(re.compile(r"Picture of [\d:+-]+, not live\. Loading the model…"))
         expect(view).not_to_have_class(re.compile("is-stale"))
         expect(scene_stale(page)).to_have_count(0)
         for _ in range(600):

@@ -377,7 +377,7 @@ def test_a_note_of_one_page_is_seen_and_withdrawn_on_another(noted, plant, open_
     button(form, "Last minute").click()
     button(form, "Save note").click()
     line = journal_lines(other).filter(has_text="gripper slips")
-    expect(line).to_contain_text(re.compile(r"li noted on [\d:]+ – [\d:]+: gripper slips"))
+    expect(line).to_contain_text(re.compile(r"li noted on [\d:+-]+ – [\d:+-]+: gripper slips"))
     expect(form).to_have_count(0)
     line.click()
     expect(journal_entry(other)).to_contain_text("gripper slips")

@@ -315,7 +315,9 @@ def test_a_reload_keeps_unsaved_work_and_says_so_until_it_is_discarded(open_page
     expect(canvas).to_have_attribute("data-shapes", "2")
     field(page, "joint/0/d").fill("312.5")
     page.reload()
-    expect(page.get_by_text(re.compile(r"Unsaved draft from \d\d:\d\d:\d\d[+-]\d\d:\d\d brought back"))).to_be_visible()
+    expect(
+        page.get_by_text(re.compile(r"Unsaved draft from \d\d:\d\d:\d\d[+-]\d\d:\d\d brought back"))
+    ).to_be_visible()
     expect(field(page, "joint/0/d")).to_have_value("312.5")
     expect(canvas).to_have_attribute("data-shapes", "2")
     button(page, "Discard it").click()

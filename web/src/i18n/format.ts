@@ -81,7 +81,7 @@ export function clock(seconds: number): string {
   return [Math.floor(whole / 60), whole % 60].map((part) => String(part).padStart(2, "0")).join(":");
 }
 
-/** Return the local time of day, to the second, for lists and axes; a title or heading has the zone. */
+/** Return the local time of day, to the second, where a title or heading has the zone. */
 export function timeOfDay(ms: number): string {
   return new Date(ms).toLocaleTimeString("en-GB", { hour12: false });
 }

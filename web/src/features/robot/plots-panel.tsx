@@ -2,7 +2,7 @@
 
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
 import type { Description } from "../../gen/robomesh_pb";
-import { ageText, DASH, fixed, jointTitle, whenText, zoneOf } from "../../i18n/format";
+import { ageText, DASH, fixed, jointTitle, whenText } from "../../i18n/format";
 import { p, partText, rangeText } from "../../i18n/plots";
 import { fullSignalText } from "../../i18n/signals";
 import { commonOf, shownUnit } from "../../i18n/value-names";
@@ -61,9 +61,7 @@ export function PlotsPanel(props: {
       title={p("plots")}
       end={
         <>
-          {pausedAt === null ? (
-            <span class="dim small">{zoneOf(Date.now())}</span>
-          ) : (
+          {pausedAt !== null && (
             <span class="paused-at">
               {p("paused_at", { time: whenText(Date.now() - ageClock() + pausedAt * 1000) })}
             </span>
