@@ -1,7 +1,7 @@
 """Runs on other Pythons and systems: `./dev test --long [PART ...]`. CONTRIBUTING.md has their table.
 
-Each part clones this commit into a new folder, here or in a bare Debian, and sets it up as the README says. Its log and its result stay in `.long`.
-It needs root and mmdebstrap, for the Debians.
+Each part clones this commit into a new folder, here or in a bare Debian, and sets it up as the README says.
+Its log and its result stay in `.long`. It needs root and mmdebstrap, for the Debians.
 """
 
 import json

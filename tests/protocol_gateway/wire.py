@@ -61,7 +61,7 @@ class Wire:
         await self.open()
 
     def keep_back(self, which=lambda data: True):
-        """Keep what the gateway sends until `release`: datagrams of that kind, or all bytes from the first one on."""
+        """Keep what the gateway sends until `release`: datagrams of a kind, or all bytes after the first."""
         self._keeps = which
 
     def release(self):
