@@ -59,8 +59,9 @@ def reachable(endpoint: str) -> str:
     protocol, _, rest = endpoint.partition("/")
     address, question, options = rest.partition("?")
     host, port = split_address(address)
-    host = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, host)
-    return f"{protocol}/{host}:{port}{question}{options}"
+    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
+    shown = f"[{host}]" if ":" in host else host
+    return f"{protocol}/{shown}:{port}{question}{options}"
 
 
 def own_addresses(endpoints: Iterable[str]) -> tuple[str, ...]:
