@@ -358,10 +358,12 @@ class UrMover(Mover):
     }
 
     @staticmethod
-    def controller(monkeypatch):
+    @contextlib.asynccontextmanager
+    async def controller(monkeypatch):
         # Gateway and controller share one event loop here: let a busy machine be late.
         monkeypatch.setattr(motion_script, "WATCHDOG_HZ", 1)
-        return ur_site.controller(monkeypatch, demo=True)
+        async with ur_site.controller(monkeypatch, demo=True) as (ports, server):
+            yield (ports.rtde, *ur_site.others(ports).values()), server
 
     @staticmethod
     def settle(server):

@@ -312,12 +312,13 @@ async def controller(**settings):
 
 @contextlib.asynccontextmanager
 async def whole_controller(**settings):
-    """Run a simulated controller; yield all its ports."""
+    """Run a simulated controller; yield its ports: RTDE, primary, scripts, dashboard."""
     ready = asyncio.get_running_loop().create_future()
     task = asyncio.create_task(serve_rtde(UrSettings(**settings), ready=ready.set_result))
     await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
     try:
-        yield await ready
+        ports = await ready
+        yield ports.rtde, ports.primary, ports.scripts[0], ports.dashboard
     finally:
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
