@@ -55,6 +55,10 @@ def run(arguments: list[str]) -> int:
         if module in EXTRAS:
             return _failed(missing(module))
         return _failed_ourselves(error)
+    except ImportError as error:
+        if str(error).startswith("libgomp.so.1:"):  # Pinocchio's wheel lacks it
+            return _failed(f"{error}: apt-get install libgomp1")
+        return _failed_ourselves(error)
     except Exception as error:
         # Services run their robots in task groups.
         while isinstance(error, ExceptionGroup):

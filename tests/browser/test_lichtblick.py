@@ -26,6 +26,7 @@ from robots.kinematic_tree import tree_of
 from robots.model import build_model, link_placements
 from services.viewer_layout import viewer_layout
 from tests.browser.conftest import ARGUMENTS, CHROMIUM, LAUNCH_MS
+from tests.compatibility.earlier import unpack
 from tests.conftest import free_port
 from tests.site import running_site, wait_until
 
@@ -87,8 +88,7 @@ def site(tmp_path_factory):
 @pytest.fixture(scope="module")
 def files(site, tmp_path_factory):
     """Yield a folder with Lichtblick and a layout of its 3-D panel, and the address that serves it."""
-    folder = tmp_path_factory.mktemp("lichtblick")
-    subprocess.run(["tar", "--extract", "--file", BUILD, "--directory", folder], check=True)
+    folder = unpack(BUILD, tmp_path_factory.mktemp("lichtblick") / "viewer")
     with robomesh.connect(site.router, timeout_s=20.0) as mesh:
         layout = viewer_layout("test", "arm", mesh.robot("arm").description())
     scene = layout["configById"]["3D!arm"]

@@ -22,7 +22,7 @@ _SUITE, _QUICK = "./dev test", "./dev test --quick"
 _COMMANDS = ".venv/bin/python -m tests.long.documented_commands"
 _BARE = "python3,python3-pip,git,ca-certificates"
 # What the README names, and a user without rights cannot install.
-_PACKAGES = "chromium fonts-noto-cjk libatomic1 libegl1 libgl1"
+_PACKAGES = "chromium fonts-noto-cjk libatomic1 libegl1 libgl1 libgomp1"
 # Of the machine's network, for installers.
 _NETWORK = ("etc/resolv.conf", "etc/hosts", "etc/pip.conf", "etc/ssl/certs", "root/.npmrc")
 _OF_INSTALLERS = re.compile(r"^(PIP|UV|SSL|NODE|npm|CURL|REQUESTS|GIT_SSL)_|_(PROXY|proxy)$")
