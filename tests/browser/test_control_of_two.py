@@ -22,6 +22,7 @@ from tests.browser.robot_page import (
     ready,
     region,
     requests,
+    reset_stop,
     serious,
     state_word,
     stop_panel,
@@ -228,7 +229,7 @@ def test_space_on_a_step_button_stops_and_steps_nothing(open_arm, plant):
     expect(state_word(page)).to_have_text("Stopped")
     expect(button(page, "waist +1°")).to_be_disabled()
     assert audited(plant, "MOVE_RELATIVE") == moves
-    page.get_by_role("button", name="Reset stop").click()
+    reset_stop(page)
     expect(button(page, "waist +1°")).to_be_enabled()
 
 

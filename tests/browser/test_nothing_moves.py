@@ -18,6 +18,7 @@ from tests.browser.robot_page import (
     joints_notice,
     ready,
     region,
+    reset_stop,
     stop_button,
     stop_panel,
     who_controls,
@@ -84,8 +85,7 @@ def test_controls_keep_their_places_when_stopped_and_without_a_connection(page):
     expect(stop_panel(page)).to_be_visible()
     stopped = page.evaluate(PLACES)
     assert stopped == {name: place for name, place in before.items() if name in stopped}
-    page.get_by_role("button", name="Reset stop").click()
-    expect(stop_panel(page)).to_have_count(0)
+    reset_stop(page)
     assert page.evaluate(PLACES) == before
 
 

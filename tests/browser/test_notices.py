@@ -16,6 +16,7 @@ from tests.browser.robot_page import (
     move_slowly,
     ready,
     region,
+    reset_stop,
     set_speed,
     stand_still,
     state_word,
@@ -79,7 +80,7 @@ def test_what_was_sent_is_done_when_the_arm_is_there_and_gone_when_it_was_stoppe
     expect(page.get_by_role("main")).not_to_contain_text("Sent: ")
     asked = re.compile(r"li asked for a stop at \d\d:\d\d:\d\d[+-]\d\d:\d\d\.")
     expect(events(page).filter(has_text=asked)).not_to_have_count(0)
-    page.get_by_role("button", name="Reset stop").click()
+    reset_stop(page)
     button(page, "Release").click()
 
 
@@ -124,7 +125,7 @@ def test_a_window_that_is_closed_has_not_given_control_back(open_page):
         re.compile("alice's page or program has disconnected|page was hidden or closed")
     )
     take(bob, "bob")
-    bob.get_by_role("button", name="Reset stop").click()
+    reset_stop(bob)
     set_speed(bob, 100)
     button(bob, "Release").click()
 

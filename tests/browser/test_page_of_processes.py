@@ -14,10 +14,10 @@ from tests.browser.robot_page import (
     drag,
     ready,
     region,
+    reset_stop,
     sent,
     state_word,
     stop_button,
-    stop_panel,
     take,
     wait_to_move,
     who_controls,
@@ -54,8 +54,7 @@ def test_home_trace_move_and_stop_from_the_page_reach_the_controller_and_the_rec
         wait_to_move(page, "waist", lambda: drag(page, "waist", -120))
         stop_button(page).click()
         expect(state_word(page)).to_have_text("Stopped")
-        page.get_by_role("button", name="Reset stop").click()
-        expect(stop_panel(page)).to_have_count(0)
+        reset_stop(page)
         sent(page, button(page, "Trace off").click)
         wait_until(lambda: not recordings(site)[0]["open"], what="the recording did not close")
         button(page, "Release").click()
