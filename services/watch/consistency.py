@@ -226,12 +226,12 @@ def _of_process(process: Process, begun: frozenset[str], now: float, now_s: floa
     received, lost = process.lost_lately
     each = f"{health.service}.{health.id}"
     for problem in health.problems:
-        cause = received_reason(problem)
+        address = problem.values.get("address", problem.code)
         yield condition_of(
-            codes.SERVICE_PROBLEM(cause, name=process.name),
+            codes.SERVICE_PROBLEM(received_reason(problem), name=process.name),
             code="service.problem",
-            over=f"{process.name}: {problem.values.get('what') or problem.code} is right again",
-            each=f"{each}.{problem.values.get('what') or problem.code}",
+            over=f"{process.name} listens on {address}",
+            each=f"{each}.{address}",
         )
     share = lost / max(received + lost, 1)
     standing = f"{WHOLE_SITE}:mesh.loss:{each}" in begun

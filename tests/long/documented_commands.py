@@ -83,8 +83,9 @@ COMMANDS = {
     "robomesh --install-completion": How(statuses=(0, 1)),
     "robomesh keys init site.toml": How(
         typed=(
-            'sh -c "printf \'site = \\"hall\\"\\n[keys]\\nfolder = \\"keys\\"\\n\' > /tmp/site.toml"',
-            "robomesh keys init /tmp/site.toml",
+            "mkdir -p dist",
+            'sh -c "printf \'site = \\"hall\\"\\n[keys]\\nfolder = \\"keys\\"\\n\' > dist/site.toml"',
+            "robomesh keys init dist/site.toml",
         )
     ),
     "robomesh accounts add": How(typed=("robomesh accounts add --help",)),

@@ -2,8 +2,10 @@
 
 import pytest
 
+from robomesh import reason_codes as codes
 from robomesh.clock import Reading
 from robomesh.keys import PresenceKey
+from robomesh.messages import reason_message
 from robomesh.schemas.robomesh_pb2 import ControllerState, ServiceHealth
 from services.errors import SiteFileError
 from services.site_file import site as site_file
@@ -156,6 +158,17 @@ def test_a_site_that_is_seen_no_more_is_gone_once():
     mesh.add_presence(PresenceKey("beijing", "-", "router", "b2"))
     _, (over,) = judged(8.0)
     assert over.over == "site beijing is there again"
+
+
+def test_each_address_that_a_process_cannot_listen_on_is_a_condition():
+    problems = [
+        reason_message(codes.ADDRESS_ABSENT(what="the router", address=address))
+        for address in ("tcp/192.0.2.1:7447", "tcp/192.0.2.2:7447")
+    ]
+    assert found(mesh_of(health("router", problems=problems))).keys() == {
+        "-:service.problem:router.a1.tcp/192.0.2.1:7447",
+        "-:service.problem:router.a1.tcp/192.0.2.2:7447",
+    }
 
 
 def test_a_service_that_should_run_and_was_never_seen_is_missed_after_a_minute():
