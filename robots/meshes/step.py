@@ -28,8 +28,8 @@ _DEVIATION_MM = 0.1
 _TURN = 0.35
 TIME_LIMIT_S = 120.0
 MEMORY_LIMIT = 6 << 30
-# Memory is allocated piece by piece: a failure above this share of the limit is taken for a lack of memory.
-_NEAR = 0.9
+# Memory is allocated in pieces of up to 64 MiB: a failure so near to the limit is taken for a lack of memory.
+_NEAR, _PIECES = 0.9, 128 << 20
 _OUT_OF_MEMORY = 77
 # Without memory the C++ code aborts, or dereferences a null pointer.
 _NO_MEMORY = re.compile(rb"MemoryError|bad_alloc|Cannot allocate memory|failed to map segment")
@@ -126,12 +126,13 @@ def _reason(output: bytes, form: str) -> str:
 def main() -> None:
     """Convert one file; exit with status 1 if that failed, 77 if memory was short."""
     source, made, memory_limit, iges = *map(Path, sys.argv[1:3]), int(sys.argv[3]), sys.argv[4] == "iges"
-    resource.setrlimit(resource.RLIMIT_AS, (memory_limit, memory_limit))
+    _, most = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (memory_limit, most))
     # The parent enforces the time limit, but it may have exited.
     resource.setrlimit(resource.RLIMIT_CPU, (int(TIME_LIMIT_S), int(TIME_LIMIT_S)))
-    import cascadio
-
     try:
+        import cascadio
+
         glb = cascadio.load(
             source.read_bytes(),
             "iges" if iges else "step",
@@ -141,8 +142,13 @@ def main() -> None:
             # A STEP file's faces may have colours of their own.
             merge_primitives=iges,
         )
-    except MemoryError:
+    except Exception:
+        # Python's own modules fail too, with errors of many kinds.
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
+        if _has_memory(memory_limit):
+            raise
         sys.exit(_OUT_OF_MEMORY)
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
     if not glb:
         sys.exit(1 if _has_memory(memory_limit) else _OUT_OF_MEMORY)
     made.write_bytes(glb)
@@ -151,7 +157,7 @@ def main() -> None:
 def _has_memory(limit: int) -> bool:
     """Return whether peak memory stayed well below the limit; Open CASCADE does not report why it failed."""
     most = int(Path("/proc/self/status").read_text().split("VmPeak:")[1].split()[0]) * 1024
-    return most < _NEAR * limit
+    return most < min(_NEAR * limit, limit - _PIECES)
 
 
 if __name__ == "__main__":

@@ -138,17 +138,16 @@ class Listener:
 
     async def _forward(self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         server_reader, server_writer = await asyncio.open_connection(*self._server)
-        for end in (writer, server_writer):
-            end.transport.set_write_buffer_limits(high=_MAX_BUFFERED)
-        # A client that acknowledges nothing for this long has lost its connection.
-        connection = writer.get_extra_info("socket")
-        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _SEND_TIMEOUT_MS)
-        server_writer.write(head)
-        pumps = [
-            asyncio.create_task(_pump(reader, server_writer)),
-            asyncio.create_task(_pump(server_reader, writer)),
-        ]
+        pumps: list[asyncio.Task[None]] = []
         try:
+            for end in (writer, server_writer):
+                end.transport.set_write_buffer_limits(high=_MAX_BUFFERED)
+            # A client that acknowledges nothing for this long has lost its connection.
+            connection = writer.get_extra_info("socket")
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _SEND_TIMEOUT_MS)
+            server_writer.write(head)
+            pumps.append(asyncio.create_task(_pump(reader, server_writer)))
+            pumps.append(asyncio.create_task(_pump(server_reader, writer)))
             await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
         finally:
             for pump in pumps:

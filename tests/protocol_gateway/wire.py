@@ -84,13 +84,16 @@ class Wire:
 
     async def _join(self, reader, writer):
         self._ends.add(writer.transport)
-        with contextlib.suppress(OSError):
+        try:
             there, back = await asyncio.open_connection("127.0.0.1", self.target)
-            self._ends.add(back.transport)
-            await asyncio.gather(
-                self._forward(reader, back, self.sent, lambda data: self.pass_on(data, back.write)),
-                self._forward(there, writer, [], lambda data: writer.writelines(self.answers(data))),
-            )
+        except OSError:
+            writer.transport.abort()
+            return
+        self._ends.add(back.transport)
+        await asyncio.gather(
+            self._forward(reader, back, self.sent, lambda data: self.pass_on(data, back.write)),
+            self._forward(there, writer, [], lambda data: writer.writelines(self.answers(data))),
+        )
 
     async def _forward(self, reader, writer, seen, send):
         swallowed = False
