@@ -98,6 +98,9 @@ def refusal_of_router(endpoint: str, tls: Tls | None) -> str | None:
         except ssl.SSLCertVerificationError as error:
             assert tls is not None
             return f"{endpoint} has a certificate that {tls.ca} did not sign: {error.verify_message}"
+        except (ssl.SSLEOFError, ssl.SSLZeroReturnError, ConnectionError):
+            # A router without TLS does so with the longer first message of newer OpenSSLs.
+            return None if plain else f"{endpoint} accepts connections, but ends them: {_NO_TLS}"
         except ssl.SSLError as error:
             return None if plain else _verdict(endpoint, tls, error)
         except OSError:

@@ -52,7 +52,8 @@ class RunningSite:
         """
         for line in _output("ps", "-ww", "-o", "pid=,args=", "--ppid", str(self.process.pid)).splitlines():
             pid, *words = line.split()
-            with suppress(FileNotFoundError):
+            # Of a process that exits, only root may know the files.
+            with suppress(FileNotFoundError, PermissionError):
                 spare = "pipe:" in str(Path(f"/proc/{pid}/fd/0").readlink())
                 if "services.command_line.main" in words and not spare:
                     yield int(pid), words[words.index("services.command_line.main") + 1 :]

@@ -1,6 +1,7 @@
 """A whole site in one thread (router, controller, gateway, kinematics, console) and a Chromium before it."""
 
 import asyncio
+import os
 import re
 import threading
 from collections.abc import Iterator
@@ -252,7 +253,13 @@ def chromium(plant):
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS, timeout=LAUNCH_MS)
+        browser = playwright.chromium.launch(
+            executable_path=str(CHROMIUM),
+            args=ARGUMENTS,
+            timeout=LAUNCH_MS,
+            # In the locale C it opens no file whose path has letters beyond ASCII.
+            env={**os.environ, "LC_ALL": "C.UTF-8"},
+        )
         yield browser
         browser.close()
 
