@@ -17,6 +17,7 @@ WORKDIR /source
 COPY pyproject.toml requirements.lock README.md LICENSE ./
 COPY robomesh robomesh
 COPY robots robots
+COPY controllers controllers
 COPY protocol_gateway protocol_gateway
 COPY renderer renderer
 COPY services services

@@ -68,7 +68,7 @@ class Kind:
 
 
 async def _unit(ready: Callable[[Sequence[int]], None]) -> None:
-    from services.simulator.simulator import Settings, serve
+    from controllers.unit.simulated.service import Settings, serve
 
     await serve(Settings(robot="pt600", demo=True), ready=lambda line: ready([_port(line)]))
 
@@ -78,13 +78,13 @@ def _port(line: str) -> int:
 
 
 async def _rtde(ready: Callable[[Sequence[int]], None]) -> None:
-    from services.simulator.universal_robots.service import UrSettings, serve_rtde
+    from controllers.universal_robots.simulated.service import UrSettings, serve_rtde
 
     await serve_rtde(UrSettings(demo=True), ready=lambda ports: ready([ports.rtde, ports.primary]))
 
 
 async def _rtde_motion(ready: Callable[[Sequence[int]], None]) -> None:
-    from services.simulator.universal_robots.service import UrSettings, serve_rtde
+    from controllers.universal_robots.simulated.service import UrSettings, serve_rtde
 
     await serve_rtde(
         UrSettings(), ready=lambda each: ready([each.rtde, each.primary, each.scripts[0], each.dashboard])
@@ -92,31 +92,31 @@ async def _rtde_motion(ready: Callable[[Sequence[int]], None]) -> None:
 
 
 async def _hses(ready: Callable[[Sequence[int]], None]) -> None:
-    from services.simulator.yaskawa.service import HsesSettings, serve_hses
+    from controllers.yaskawa.simulated.service import HsesSettings, serve_hses
 
     await serve_hses(HsesSettings(demo=True), ready=lambda port: ready([port]))
 
 
 async def _hses_at_rest(ready: Callable[[Sequence[int]], None]) -> None:
-    from services.simulator.yaskawa.service import HsesSettings, serve_hses
+    from controllers.yaskawa.simulated.service import HsesSettings, serve_hses
 
     await serve_hses(HsesSettings(), ready=lambda port: ready([port]))
 
 
 async def _snpx(ready: Callable[[Sequence[int]], None]) -> None:
-    from services.simulator.fanuc.service import SnpxSettings, serve_snpx
+    from controllers.fanuc.simulated.service import SnpxSettings, serve_snpx
 
     await serve_snpx(SnpxSettings(demo=True), ready=lambda ports: ready([ports.snpx]))
 
 
 async def _rmi(ready: Callable[[Sequence[int]], None]) -> None:
-    from services.simulator.fanuc.service import SnpxSettings, serve_snpx
+    from controllers.fanuc.simulated.service import SnpxSettings, serve_snpx
 
     await serve_snpx(SnpxSettings(rmi="127.0.0.1:0"), ready=ready)
 
 
 async def _opcua(ready: Callable[[Sequence[int]], None]) -> None:
-    from services.simulator.opcua.service import OpcUaSimulatorSettings, serve_opcua
+    from controllers.opcua.simulated.service import OpcUaSimulatorSettings, serve_opcua
 
     settings = OpcUaSimulatorSettings(demo=True, listen=f"127.0.0.1:{free_port()}")
     await serve_opcua(settings, ready=lambda port: ready([port]))

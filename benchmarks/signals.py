@@ -17,18 +17,18 @@ from typing import Any
 
 from google.protobuf.message import Message
 
-from protocol_gateway.drivers.driver import Report, SignalsReceived
-from protocol_gateway.drivers.universal_robots import rtde_messages as rtde
-from protocol_gateway.drivers.universal_robots.driver import RTDE, RtdeDriver
-from protocol_gateway.drivers.universal_robots.state import OUTPUTS
+from controllers.simulated.demo import demo_tour
+from controllers.universal_robots import rtde_messages as rtde
+from controllers.universal_robots.driver import RTDE, RtdeDriver
+from controllers.universal_robots.simulated.controller import UrController
+from controllers.universal_robots.state import OUTPUTS
 from protocol_gateway.journal import Journal
 from protocol_gateway.link.timestamping import Received, Timestamper
+from protocol_gateway.seam import Report, SignalsReceived
 from protocol_gateway.signals import Signals
 from protocol_gateway.telemetry import Telemetry
 from robots.description import load
 from robots.joints import joints_of
-from services.simulator.demo import demo_tour
-from services.simulator.universal_robots.controller import UrController
 
 JOINTS_AND_MODES = frozenset(
     ("timestamp", "actual_q", "actual_qd", "robot_mode", "safety_mode", "safety_status", "runtime_state")

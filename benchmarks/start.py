@@ -57,7 +57,7 @@ ENDS_WITHIN_S = 20.0
 MORE_MODULES = {
     "up": "services.command_line.site.up",
     "router": "services.command_line.site.router",
-    "simulate": "services.simulator.simulator",
+    "simulate": "controllers.unit.simulated.service",
 }
 IMPORTING = """
 import importlib, sys, time

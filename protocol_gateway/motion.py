@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Sequence
 
-from protocol_gateway.drivers.driver import Activity
+from protocol_gateway.seam import Activity
 from robots.joints import JointType
 
 # Long enough to distinguish the slowest motion (1 % of 20 degrees a second) from a sensor's last digit.

@@ -6,7 +6,7 @@ A proof is valid for the model, the driver and the software of the controller wi
 from dataclasses import dataclass
 from datetime import date
 
-from protocol_gateway.drivers.driver import Capabilities, Stop
+from protocol_gateway.seam import Capabilities, Stop
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.description import RobotDescription

@@ -28,10 +28,9 @@ from protocol_gateway.control.jog import Jogs
 from protocol_gateway.control.program import Programs
 from protocol_gateway.control.robot_authority import HEED_TIMEOUT_S, RobotAuthority
 from protocol_gateway.core.codes import code_table
-from protocol_gateway.drivers.driver import Activity, Carries, Channel
-from protocol_gateway.drivers.registry import driver_maker
 from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.journal import Journal
+from protocol_gateway.kinds import driver_maker
 from protocol_gateway.legacy.clients import LegacyClients
 from protocol_gateway.link.link import (
     JOINT_COUNT,
@@ -44,6 +43,7 @@ from protocol_gateway.link.link import (
 from protocol_gateway.link.status import transition_events
 from protocol_gateway.mesh_requests import MeshRequests
 from protocol_gateway.proofs import Proofs
+from protocol_gateway.seam import Activity, Carries, Channel
 from protocol_gateway.settings import RobotSettings
 from protocol_gateway.signals import Signals
 from protocol_gateway.state_messages import controller_state, lease_state, timestamp

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 
-from protocol_gateway.drivers.driver import SignalValue
+from protocol_gateway.seam import SignalValue
 from robomesh.atomic_write import write_atomically
 
 LONGEST_FILE = 65_536

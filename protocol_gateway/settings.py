@@ -9,11 +9,11 @@ import numpy as np
 
 from protocol_gateway.audit.log import ROTATE_BYTES
 from protocol_gateway.checking.policy import Policy
-from protocol_gateway.drivers.driver import Recovery
-from protocol_gateway.drivers.registry import is_known, protocols
 from protocol_gateway.errors import GatewaySettingsError
+from protocol_gateway.kinds import is_known, protocols
 from protocol_gateway.legacy.settings import LegacySettings
 from protocol_gateway.proofs import StopProof
+from protocol_gateway.seam import Recovery
 from robomesh.keys import check_name
 from robomesh.quotas import DEFAULT_QUOTAS, Quotas
 from robomesh.reasons import Reason
@@ -36,7 +36,7 @@ class RobotSettings:
         host: Host of the controller, with `port`.
         ports: Ports of the controller's other interfaces, where they are not the usual ones:
             {"primary": 30011}.
-        protocol: Protocol of the controller, by its name in `protocol_gateway.drivers.registry`.
+        protocol: Protocol of the controller, by its name in `protocol_gateway.kinds`.
         options: Settings of the protocol's driver, such as `YaskawaSettings`; None: it has none.
         codes: Type codes, where the controller sends numbers: {2: "ABSOLUTE.DEG", 101: "COMMAND:home"}.
         accept_unknown: States that the controller never reports and that are not required: "mode", "homed".

@@ -16,9 +16,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from protocol_gateway.drivers.driver import Signal, SignalsReceived, SignalValue
 from protocol_gateway.journal import Journal
 from protocol_gateway.link.timestamping import Received
+from protocol_gateway.seam import Signal, SignalsReceived, SignalValue
 from protocol_gateway.text_limits import LONGEST_TEXT
 from robomesh.publisher import Publisher
 from robomesh.schemas import robomesh_pb2 as schema

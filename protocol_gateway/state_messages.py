@@ -9,9 +9,9 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from protocol_gateway.authority.lease_rules import Authority, Lease, Now, Stop
 from protocol_gateway.authority.preconditions import Controller, commands_of, recoveries_of
 from protocol_gateway.checking.policy import Policy
-from protocol_gateway.drivers.driver import Activity, JointsReceived, Mode, StopEnds, UnknownReceived
 from protocol_gateway.link.health import LinkHealth
 from protocol_gateway.link.link import LinkCounters, LinkState
+from protocol_gateway.seam import Activity, JointsReceived, Mode, StopEnds, UnknownReceived
 from robomesh import reason_codes as codes
 from robomesh.messages import reason_message
 from robomesh.reasons import Reason

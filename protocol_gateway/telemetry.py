@@ -5,7 +5,10 @@
 
 from collections.abc import Callable
 
-from protocol_gateway.drivers.driver import (
+from protocol_gateway.journal import Journal
+from protocol_gateway.link.link import Received
+from protocol_gateway.motion import MotionDetector, is_moving
+from protocol_gateway.seam import (
     Activity,
     AlarmReceived,
     AxesUndeclared,
@@ -22,9 +25,6 @@ from protocol_gateway.drivers.driver import (
     StatusReceived,
     UnknownReceived,
 )
-from protocol_gateway.journal import Journal
-from protocol_gateway.link.link import Received
-from protocol_gateway.motion import MotionDetector, is_moving
 from protocol_gateway.signals import Signals
 from protocol_gateway.state_messages import JointStatesMessage, raw_record
 from protocol_gateway.text_limits import LONGEST_TEXT

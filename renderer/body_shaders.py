@@ -95,7 +95,7 @@ vec4 seen_color(vec4 at, vec3 facing, vec4 body_paint, vec2 material) {
 }
 """
 
-# Shared by both programs of bodies, whose triangles meet without gaps.
+# Shared by both programs of bodies: their triangles meet without gaps.
 _PLACED = """
 invariant gl_Position;
 uniform mat4 site_to_clip, part_to_site;

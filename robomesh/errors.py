@@ -3,6 +3,8 @@
 RobomeshError
 ├── SessionError            a session that cannot be opened with its settings
 │   └── ForkedError         a session of the process from which this one was forked
+├── ListenError             a service cannot listen on an address
+│   └── UnavailableError    it cannot now: the address is in use, or not there
 ├── NoAnswerError           a request without an answer in time
 │   └── BrokenAnswerError   a long answer that ended early
 └── CodedError              an error with a reason of the table
@@ -31,6 +33,14 @@ class SessionError(RobomeshError):
 
 class ForkedError(SessionError):
     """A session of the process from which this one was forked; open one here."""
+
+
+class ListenError(RobomeshError):
+    """A service cannot listen on an address: in use, unavailable, or not permitted."""
+
+
+class UnavailableError(ListenError):
+    """A service cannot listen on an address now: another program uses it, or its network is not there yet."""
 
 
 class CodedError(RobomeshError):

@@ -1,9 +1,7 @@
 """Errors of the services.
 
 ServiceError
-├── SiteFileError           a site file cannot be read, or a value in it is invalid
-└── ListenError             a service cannot listen on an address
-    └── UnavailableError    it cannot now: the address is in use, or not there
+└── SiteFileError           a site file cannot be read, or a value in it is invalid
 """
 
 import os
@@ -18,11 +16,3 @@ class ServiceError(Exception):
 
 class SiteFileError(ServiceError):
     """A site file cannot be read, or a value in it is invalid."""
-
-
-class ListenError(ServiceError):
-    """A service cannot listen on an address: in use, unavailable, or not permitted."""
-
-
-class UnavailableError(ListenError):
-    """A service cannot listen on an address now: another program uses it, or its network is not there yet."""

@@ -28,6 +28,7 @@ from typing import NamedTuple, NoReturn, Protocol
 
 from setproctitle import setproctitle, setthreadtitle
 
+from robomesh.errors import ListenError
 from services.errors import ServiceError
 
 # A site stops within 2 s, unless a process still has to finish its writes.
@@ -197,7 +198,7 @@ async def supervise(
             group.create_task(_run_extra(extra, running, keep, write))
     except ExceptionGroup as errors:
         # Not `except*`: before Python 3.11.4 an exception raised in it is wrapped in a group again.
-        could_not, others = errors.split(ServiceError)
+        could_not, others = errors.split((ServiceError, ListenError))
         if others is not None or could_not is None:
             raise
         raise could_not.exceptions[0] from None

@@ -7,7 +7,7 @@ from pathlib import PurePath
 
 import psutil
 
-from services.errors import UnavailableError
+from robomesh.errors import UnavailableError
 
 _OWN_MODULE = "services.command_line.main"
 

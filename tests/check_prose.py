@@ -22,6 +22,7 @@ PACKAGES = (
     "robomesh",
     "robots",
     "protocol_gateway",
+    "controllers",
     "renderer",
     "services",
     "web",

@@ -28,8 +28,8 @@ _LONGEST_FIRST = (
     "tests/browser/test_cell_on_page.py",
     "tests/browser/test_lichtblick.py",
     "tests/browser/test_draws.py",
-    "tests/protocol_gateway/test_conformance_of_motion.py",
-    "tests/protocol_gateway/test_conformance.py",
+    "tests/controllers/test_conformance_of_motion.py",
+    "tests/controllers/test_conformance.py",
 )
 
 

@@ -19,18 +19,18 @@ from typing import Any, Protocol
 
 import pytest
 
+from controllers.fanuc import data as fanuc_data
+from controllers.fanuc import files, ftp, rmi, srtp
+from controllers.opcua import facts
+from controllers.opcua.driver import OPCUA, OpcUaDriver
+from controllers.universal_robots import dashboard, packages, primary, rtde_messages
+from controllers.yaskawa import hses
 from protocol_gateway.audit.entry import chain_link, parse_line
 from protocol_gateway.core.grammar import type_code
 from protocol_gateway.core.records import read_number, speed_percent
 from protocol_gateway.core.stream import Unit, UnitStream
-from protocol_gateway.drivers import pendant_text, signal_names
-from protocol_gateway.drivers.fanuc import data as fanuc_data
-from protocol_gateway.drivers.fanuc import files, ftp, rmi, srtp
-from protocol_gateway.drivers.opcua import facts
-from protocol_gateway.drivers.opcua.driver import OPCUA, OpcUaDriver
-from protocol_gateway.drivers.universal_robots import dashboard, packages, primary, rtde_messages
-from protocol_gateway.drivers.yaskawa import hses
 from protocol_gateway.legacy.requests import requests_of
+from protocol_gateway.seam import pendant_text, signal_names
 from robomesh import keys, messages, reasons, texts
 from robomesh.topics import REQUESTS
 from robots.bounded_toml import check_bounds, parse_toml

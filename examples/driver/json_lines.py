@@ -11,7 +11,8 @@ docs/controllers/own-driver.md explains each method.
 import json
 from collections.abc import Callable, Hashable, Mapping, Sequence
 
-from protocol_gateway.drivers.driver import (
+from protocol_gateway.errors import CommandError, GatewaySettingsError
+from protocol_gateway.seam import (
     ALL,
     Activity,
     Capabilities,
@@ -32,7 +33,6 @@ from protocol_gateway.drivers.driver import (
     StatusReceived,
     Stop,
 )
-from protocol_gateway.errors import CommandError, GatewaySettingsError
 from robots.joints import JointType
 
 LINES = Channel(name="lines", carries=ALL)

@@ -20,7 +20,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, not_sent
-from protocol_gateway.drivers.driver import (
+from protocol_gateway.link.link import LinkState, LinkStatus
+from protocol_gateway.seam import (
     COMMANDS,
     Activity,
     Capabilities,
@@ -39,7 +40,6 @@ from protocol_gateway.drivers.driver import (
     StopEnds,
     Trace,
 )
-from protocol_gateway.link.link import LinkState, LinkStatus
 from robomesh import reason_codes as codes
 from robomesh.enum_names import enum_name
 from robomesh.reasons import Reason

@@ -32,9 +32,9 @@ from protocol_gateway.checking.worker_messages import (
 from protocol_gateway.clocks import read_clocks
 from protocol_gateway.control.effects import Finding
 from protocol_gateway.control.robot_authority import RobotAuthority
-from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import CheckError
 from protocol_gateway.motion import has_arrived
+from protocol_gateway.seam import Activity
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest

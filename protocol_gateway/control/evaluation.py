@@ -15,7 +15,7 @@ from protocol_gateway.authority.preconditions import Controller, obstacle, predi
 from protocol_gateway.control.effects import Program, Seen
 from protocol_gateway.control.entries import MESH
 from protocol_gateway.control.events import CommandsRequested
-from protocol_gateway.drivers.driver import Activity
+from protocol_gateway.seam import Activity
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest

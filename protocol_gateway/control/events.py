@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeAlias
 
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, Lease, Now
 from protocol_gateway.control.effects import Finding, Program
-from protocol_gateway.drivers.driver import Activity
+from protocol_gateway.seam import Activity
 from robomesh import reason_codes as codes
 from robomesh.enum_names import enum_name
 from robomesh.reasons import Reason

@@ -28,9 +28,9 @@ from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.control import Control, command_answer, refusal
 from protocol_gateway.control.effects import Finding, Program
 from protocol_gateway.control.events import JogEnded, JogEnding, JogHeld, JogPartReady, StopRequested
-from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import CheckError
 from protocol_gateway.journal import Journal
+from protocol_gateway.seam import Activity
 from robomesh import reason_codes as codes
 from robomesh.enum_names import enum_word
 from robomesh.errors import RefusedError

@@ -26,9 +26,9 @@ from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.control import Control, command_answer, refusal
 from protocol_gateway.control.effects import Program
 from protocol_gateway.control.events import ProgramEnded
-from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import CheckError
 from protocol_gateway.journal import Journal
+from protocol_gateway.seam import Activity
 from protocol_gateway.state_messages import timestamp
 from protocol_gateway.text_limits import LONGEST_TEXT
 from robomesh import reason_codes as codes

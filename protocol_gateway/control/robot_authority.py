@@ -40,10 +40,10 @@ from protocol_gateway.control import effects, entries, evaluation, events, repor
 from protocol_gateway.control.effects import Effects, Finding, Seen
 from protocol_gateway.control.evaluation import RunningProgram
 from protocol_gateway.control.events import LeaseResult, StopResult
-from protocol_gateway.drivers.driver import Activity, Mode, Stop
 from protocol_gateway.errors import CommandError
 from protocol_gateway.link.link import LinkState
 from protocol_gateway.motion import has_arrived, motion_may_be_held
+from protocol_gateway.seam import Activity, Mode, Stop
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.request_queue import RateLimit

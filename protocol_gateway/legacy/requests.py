@@ -21,8 +21,8 @@ from protocol_gateway.core.records import (
     speed_percent,
 )
 from protocol_gateway.core.scales import si_scales
-from protocol_gateway.drivers.driver import Recovery
 from protocol_gateway.errors import UnitError
+from protocol_gateway.seam import Recovery
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest
 from robots.joints import Joints

@@ -11,7 +11,8 @@ import asyncio
 from collections.abc import Callable, Hashable, Sequence
 from functools import partial
 
-from protocol_gateway.drivers.driver import (
+from protocol_gateway.link.timestamping import Received
+from protocol_gateway.seam import (
     AlarmReceived,
     ControllerEvent,
     JointsReceived,
@@ -19,7 +20,6 @@ from protocol_gateway.drivers.driver import (
     SignalsReceived,
     StatusReceived,
 )
-from protocol_gateway.link.timestamping import Received
 
 # Limits for half a second: twice what the fastest controllers send (1,000 units a second, of 300 bytes).
 _BIN_S = 0.5

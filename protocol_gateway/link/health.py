@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from statistics import median
 
-from protocol_gateway.drivers.driver import ControllerEvent, Refused, StatusReceived
 from protocol_gateway.link.timestamping import Received
+from protocol_gateway.seam import ControllerEvent, Refused, StatusReceived
 
 _WINDOW_S = 5.0
 _MOST_ARRIVALS = 512

@@ -22,7 +22,15 @@ from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from operator import attrgetter
 
-from protocol_gateway.drivers.driver import (
+from protocol_gateway.errors import LinkDownError, LinkError
+from protocol_gateway.link.channel import KeptChannel
+from protocol_gateway.link.connection import READ_BYTES
+from protocol_gateway.link.flood import EventDispatcher, FloodDetector
+from protocol_gateway.link.health import Arrivals, LinkHealth, LossCounter, Questions, ResponseTimer
+from protocol_gateway.link.plausibility import Plausibility
+from protocol_gateway.link.status import LinkState, LinkStatus
+from protocol_gateway.link.timestamping import Received, Timestamper
+from protocol_gateway.seam import (
     Carries,
     Channel,
     Close,
@@ -44,14 +52,6 @@ from protocol_gateway.drivers.driver import (
     StopEnds,
     UnknownReceived,
 )
-from protocol_gateway.errors import LinkDownError, LinkError
-from protocol_gateway.link.channel import KeptChannel
-from protocol_gateway.link.connection import READ_BYTES
-from protocol_gateway.link.flood import EventDispatcher, FloodDetector
-from protocol_gateway.link.health import Arrivals, LinkHealth, LossCounter, Questions, ResponseTimer
-from protocol_gateway.link.plausibility import Plausibility
-from protocol_gateway.link.status import LinkState, LinkStatus
-from protocol_gateway.link.timestamping import Received, Timestamper
 from robomesh import reason_codes as codes
 from robomesh.loop_turns import LoopTurns, turns_of
 from robomesh.reasons import Reason
@@ -218,7 +218,7 @@ class ControllerLink:
         finally:
             self._failed.cancel()
             self._set_timer(None)
-            # The driver is not told of these ends, so it opens nothing.
+            # The driver does not hear of these ends, so it opens nothing.
             self._channels.clear()
             tasks = [*self._tasks.values()]
             for task in tasks:

@@ -18,7 +18,7 @@ from collections.abc import Mapping, Sequence
 from math import inf, isfinite, pi, radians, remainder
 from sys import float_info
 
-from protocol_gateway.drivers.driver import Activity, StatusReceived
+from protocol_gateway.seam import Activity, StatusReceived
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.joints import Joints, JointType, position_text

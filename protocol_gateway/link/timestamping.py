@@ -20,7 +20,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from protocol_gateway.drivers.driver import (
+from protocol_gateway.seam import (
     ControllerEvent,
     JointsReceived,
     SignalsReceived,

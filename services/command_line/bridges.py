@@ -7,10 +7,10 @@ from typing import Annotated
 import typer
 
 from robomesh.endpoints import DEFAULT_ROUTER
+from robomesh.listen_address import check_reach, split_address
 from services.command_line.connection_options import attachment, own_identity
 from services.command_line.options import Connect, Metrics, command_group
 from services.command_line.output import print_line
-from services.site_file.listen_address import check_reach, split_address
 
 Robots = Annotated[
     list[str] | None,

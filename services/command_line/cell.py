@@ -211,11 +211,11 @@ def _content(file: Path, state: schema.CellState) -> schema.CellContent:
     """
     from pydantic import ValidationError
 
+    from protocol_gateway.seam.table import problem_text
     from robots.bounded_toml import read_toml
     from services.site_file.cell_content import content_of
     from services.site_file.fixtures import Fixture
     from services.site_file.robot import Robot as SiteRobot
-    from services.site_file.validation_errors import problem_text
 
     try:
         values = read_toml(file)

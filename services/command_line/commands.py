@@ -39,7 +39,7 @@ COMMANDS = {
     "store": Row("site.app", "Store the site's programs with all their versions."),
     "metrics": Row("site.app", "Print a Prometheus configuration that scrapes every service of a site."),
     "simulate": Row(
-        "site.app", "Run a simulated controller with the old text protocol, RTDE, HSES, SNPX, FTP or OPC UA."
+        "site.simulate", "Run a simulated controller of any kind that a site file's `protocol` can name."
     ),
     "foxglove": Row("bridges", "Serve Foxglove and Lichtblick on a Foxglove WebSocket, ws://127.0.0.1:8765."),
     "ros2": Row("bridges", "Publish the robots to ROS 2 nodes with rmw_zenoh."),

@@ -11,11 +11,12 @@ from typing import Any
 
 import typer
 
+from robomesh.errors import UnavailableError
 from robomesh.extras import EXTRAS, missing
 from services.command_line.commands import root
 from services.command_line.output import discard, print_line, print_text, protect
 from services.command_line.reading_limits import limit
-from services.errors import TRY_AGAIN, UnavailableError
+from services.errors import TRY_AGAIN
 
 
 def main() -> None:

@@ -25,6 +25,7 @@ from robomesh import reason_codes as codes
 from robomesh.errors import NoAnswerError
 from robomesh.health import own_version
 from robomesh.keys import PresenceKey
+from robomesh.listen_address import check_page_reach, split_address
 from robomesh.recordings.values import live_topics
 from robomesh.schemas.robomesh_pb2 import Event, ToPage
 from robomesh.session import Session
@@ -57,7 +58,6 @@ from services.console.requested_views import Views
 from services.console.websocket.page_connection import Browser
 from services.console.websocket.shared_subscriptions import SharedSubscriptions
 from services.console.websocket.websocket_transport import transport_of
-from services.site_file.listen_address import check_page_reach, split_address
 
 log = logging.getLogger(__name__)
 

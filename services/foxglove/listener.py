@@ -17,9 +17,9 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from urllib.parse import urlsplit
 
-from services.errors import UnavailableError
+from robomesh.errors import UnavailableError
+from robomesh.listen_address import is_loopback
 from services.foxglove.settings import ORIGINS
-from services.site_file.listen_address import is_loopback
 
 log = logging.getLogger(__name__)
 

@@ -5,15 +5,15 @@ import logging
 import ssl
 from collections.abc import Callable
 
+from robomesh.errors import ListenError
 from robomesh.keys import check_chunk
 from robomesh.linked_site import be_present
+from robomesh.listen_address import check_reach, is_loopback, split_address
 from robomesh.session import Session
-from services.errors import ListenError
 from services.foxglove.bridge import Bridge
 from services.foxglove.commands import Commands
 from services.foxglove.listener import Listener, hidden_address
 from services.foxglove.settings import Settings
-from services.site_file.listen_address import check_reach, is_loopback, split_address
 
 log = logging.getLogger(__name__)
 

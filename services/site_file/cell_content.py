@@ -12,12 +12,12 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from protocol_gateway.seam.table import problem_text
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from services.site_file.fixtures import Fixture, Floor
 from services.site_file.robot import Robot
-from services.site_file.validation_errors import problem_text
 
 _DECIMALS = 6
 _DEGREE_DECIMALS = 9

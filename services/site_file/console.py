@@ -5,8 +5,8 @@ from pathlib import Path
 
 from pydantic import BaseModel, StrictBool, field_validator
 
-from services.site_file.listen_address import split_address
-from services.site_file.part import PART_CONFIG
+from protocol_gateway.seam.table import PART_CONFIG
+from robomesh.listen_address import split_address
 
 _ORIGIN = re.compile(r"https?://(?:[a-z0-9.-]+|\[[0-9a-f:]+\])(?::\d{1,5})?")
 

@@ -11,6 +11,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
 
+from protocol_gateway.seam.table import PART_CONFIG
 from robomesh import keys
 from robomesh.errors import KeyNameError
 from robots.errors import MeshError
@@ -21,7 +22,6 @@ from robots.meshes.normals import creased
 from robots.meshes.solids import ball, box, turned
 from robots.poses import pose_matrix
 from robots.schema import Pose, Positive, Units, nearest
-from services.site_file.part import PART_CONFIG
 
 _ROUND = 48
 _MILLIMETRE = 1e-3

@@ -5,12 +5,11 @@ from typing import Annotated, Any
 from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
 
 from protocol_gateway.legacy.settings import LegacySettings, plain_address
+from protocol_gateway.seam.table import PART_CONFIG
 from protocol_gateway.text_limits import LONGEST_TEXT
 from robomesh import keys
-from robomesh.errors import KeyNameError
-from services.errors import ListenError
-from services.site_file.listen_address import check_reach, is_loopback, split_address
-from services.site_file.part import PART_CONFIG
+from robomesh.errors import KeyNameError, ListenError
+from robomesh.listen_address import check_reach, is_loopback, split_address
 
 
 class Commander(BaseModel):

@@ -4,9 +4,9 @@ from typing import Annotated
 
 from pydantic import BaseModel, Field
 
+from protocol_gateway.seam.table import PART_CONFIG
 from robomesh.quotas import DEFAULT_QUOTAS as DEFAULT
 from robomesh.quotas import Quotas as QuotaSettings
-from services.site_file.part import PART_CONFIG
 
 
 class Quotas(BaseModel):

@@ -1,35 +1,39 @@
 """The site file's `[[robot]]`."""
 
+from collections.abc import Mapping, Sequence
 from datetime import date
+from functools import cache
+from inspect import cleandoc
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
-from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    Field,
+    StrictBool,
+    ValidationError,
+    create_model,
+    field_validator,
+    model_validator,
+)
 
 from protocol_gateway.core.codes import code_table
-from protocol_gateway.drivers.driver import Recovery
-from protocol_gateway.drivers.fanuc.axes import FanucSettings
-from protocol_gateway.drivers.opcua.settings import OpcUaSettings
-from protocol_gateway.drivers.registry import OWN, is_known, protocols
-from protocol_gateway.drivers.universal_robots.settings import UniversalRobotsSettings
-from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
-from protocol_gateway.errors import CodeTableError
+from protocol_gateway.errors import CodeTableError, GatewaySettingsError
+from protocol_gateway.kinds import is_known, kind_of, own_kinds, protocols
 from protocol_gateway.proofs import StopProof
+from protocol_gateway.seam import Recovery
+from protocol_gateway.seam.kind import Kind
+from protocol_gateway.seam.table import PART_CONFIG, Declared, Table, problem_text
 from robomesh import keys
 from robomesh.access_rights import PROBE_ROBOT
-from robomesh.errors import KeyNameError
+from robomesh.errors import KeyNameError, ListenError
+from robomesh.listen_address import is_loopback, split_address
 from robots.description import Pose
+from robots.joints import JointType
 from robots.schema import JointSettings, Model, Positive, Range, StatedModel
 from robots.verification_record import VerificationRecord, read_record
-from services.errors import ListenError
-from services.site_file.fanuc import FTP_RATE, Fanuc
 from services.site_file.fixtures import Clearance, Floor
 from services.site_file.legacy_clients import LegacyClients
-from services.site_file.listen_address import is_loopback, split_address
-from services.site_file.opcua import OpcUa
-from services.site_file.part import PART_CONFIG
-from services.site_file.universal_robots import UniversalRobots
-from services.site_file.yaskawa import Yaskawa
 
 
 class StopTrial(BaseModel):
@@ -67,11 +71,6 @@ class Robot(BaseModel):
             (docs/controllers/yaskawa.md), `snpx` for one of FANUC (docs/controllers/fanuc.md),
             `fanuc-ftp` to read one without SNPX once a second, `opcua` to read an OPC UA server
             (docs/controllers/opcua.md), or that of an installed driver (docs/controllers/own-driver.md).
-        universal_robots: Motion of a robot of Universal Robots; with the protocol `rtde`.
-        yaskawa: Properties of the robot that a Yaskawa controller does not report; with the protocol `hses`.
-        fanuc: Properties of the robot that a FANUC controller does not report; with the protocols `snpx`
-            and `fanuc-ftp`.
-        opcua: The OPC UA server, and what is read from it; with the protocol `opcua`.
         driver: Settings of an installed driver (docs/controllers/own-driver.md), which it gets unchanged.
         codes: Type codes of a controller that sends numbers, as in
             `{ 2 = "ABSOLUTE.DEG", 101 = "COMMAND:home" }`; they replace the default codes. Empty: the gateway
@@ -116,10 +115,6 @@ class Robot(BaseModel):
     controller: str = "simulated"
     ports: dict[str, Annotated[int, Field(gt=0, lt=65536)]] = Field(default_factory=dict)
     protocol: str = "unit"
-    universal_robots: UniversalRobots | None = None
-    yaskawa: Yaskawa | None = None
-    fanuc: Fanuc | None = None
-    opcua: OpcUa | None = None
     driver: dict[str, Any] = Field(default_factory=dict)
     codes: dict[int, str] = Field(default_factory=dict)
     accept_unknown: tuple[Literal["mode", "homed"], ...] = ()
@@ -225,37 +220,63 @@ class Robot(BaseModel):
 
     @model_validator(mode="after")
     def _of_protocol(self) -> "Robot":
-        hses = self.protocol == "hses"
-        if self.driver and self.protocol in OWN:
+        own = own_kinds().get(self.protocol)
+        if self.driver and own is not None:
             raise ValueError(
                 f"driver needs the protocol of an installed driver, this robot's is {self.protocol!r}"
             )
-        if self.simulated and self.protocol not in OWN:
+        for key, of_key in _protocols_by_key().items():
+            if getattr(self, key) is not None and self.protocol not in of_key:
+                needed = " or ".join(map(repr, of_key))
+                raise ValueError(f"{key} needs the protocol {needed}, this robot's is {self.protocol!r}")
+        kind = self.kind
+        if self.simulated and not kind.simulated:
             raise ValueError(f"controller: protocol {self.protocol!r} has no simulator: name its address")
-        for part, of_part in (
-            ("universal_robots", ("rtde",)),
-            ("yaskawa", ("hses",)),
-            ("fanuc", ("snpx", "fanuc-ftp")),
-            ("opcua", ("opcua",)),
-        ):
-            if getattr(self, part) is not None and self.protocol not in of_part:
-                needed = " or ".join(map(repr, of_part))
-                raise ValueError(f"{part} needs the protocol {needed}, this robot's is {self.protocol!r}")
-        if self.protocol == "fanuc-ftp":
-            (self.fanuc or Fanuc()).check_ftp(self.stale_after_s)
-        elif self.fanuc is not None:
-            self.fanuc.check_snpx()
-        if self.protocol == "opcua" and not self.simulated:
-            host, _ = split_address(self.address)
-            (self.opcua or OpcUa()).check(loopback=is_loopback(host))
-        if self.protocol not in OWN:
-            return self
-        if not self.simulated and self.controller.startswith("udp://") is not hses:
-            raise ValueError(
-                f"controller {self.controller}: protocol {self.protocol!r} needs "
-                f"{'udp' if hses else 'tcp'}://{self.address}"
-            )
+        if self.table is not None:
+            self.table.check(self.declared)
+        if own is not None and not self.simulated:
+            scheme = "udp" if own.datagrams else "tcp"
+            if not self.controller.startswith(f"{scheme}://"):
+                raise ValueError(
+                    f"controller {self.controller}: protocol {self.protocol!r} needs "
+                    f"{scheme}://{self.address}"
+                )
         return self
+
+    @property
+    def kind(self) -> Kind:
+        """Its kind of controller."""
+        try:
+            return kind_of(self.protocol)
+        except GatewaySettingsError:
+            # The gateway says why the package's driver cannot be used.
+            return Kind(driver="")
+
+    @property
+    def table(self) -> Table | None:
+        """The table of its kind of controller, with defaults where the file has none; None: none is known."""
+        kind = self.kind
+        if kind.table_model is None:
+            return None
+        if kind.key == "driver":
+            try:
+                return kind.table_model.model_validate(self.driver)
+            except ValidationError as error:
+                problem = error.errors()[0]
+                where = ".".join(map(str, ("driver", *problem["loc"])))
+                raise ValueError(f"{where}: {problem_text(problem)}") from None
+        return cast("Table | None", getattr(self, kind.key)) or kind.table_model()
+
+    @property
+    def declared(self) -> Declared:
+        """What is declared besides the table."""
+        loopback = self.simulated or is_loopback(split_address(self.address)[0])
+        return Declared(
+            protocol=self.protocol,
+            simulated=self.simulated,
+            loopback=loopback,
+            stale_after_s=self.stale_after_s,
+        )
 
     @property
     def described(self) -> Model:
@@ -275,30 +296,17 @@ class Robot(BaseModel):
     @property
     def group(self) -> str:
         """Control group or device of its controller, where one has several robots; empty: it has one."""
-        if self.protocol in ("snpx", "fanuc-ftp"):
-            return f"G{(self.fanuc or Fanuc()).group}"
-        if self.protocol == "opcua":
-            return (self.opcua or OpcUa()).device
-        return (self.yaskawa or Yaskawa()).group if self.protocol == "hses" else ""
+        return "" if self.table is None else self.table.arm(self.declared)
 
     @property
-    def options(
-        self,
-    ) -> YaskawaSettings | FanucSettings | OpcUaSettings | UniversalRobotsSettings | dict[str, Any] | None:
+    def options(self) -> object:
         """Settings of the protocol's driver, which the gateway passes on; None: it has none."""
-        match self.protocol:
-            case "hses":
-                return (self.yaskawa or Yaskawa()).settings
-            case "snpx":
-                return (self.fanuc or Fanuc()).settings
-            case "fanuc-ftp":
-                return (self.fanuc or Fanuc()).ftp_settings
-            case "opcua":
-                return (self.opcua or OpcUa()).settings(simulated=self.simulated)
-            case "rtde":
-                return (self.universal_robots or UniversalRobots()).settings
-            case _:
-                return self.driver or None
+        return (self.driver or None) if self.table is None else self.table.options(self.declared)
+
+    def simulated_options(self, joint_types: Sequence[JointType]) -> object:
+        """Return the driver's settings before a simulated controller."""
+        table = self.table
+        return None if table is None else table.simulated_options(self.declared, joint_types)
 
     @property
     def simulated(self) -> bool:
@@ -310,9 +318,7 @@ class Robot(BaseModel):
         """The stale time [s]: as declared, or the protocol's."""
         if self.stale_after_s is not None:
             return self.stale_after_s
-        if self.protocol == "fanuc-ftp":
-            return 3.0 / ((self.fanuc or Fanuc()).rate or FTP_RATE)
-        return 1.0
+        return 1.0 if self.table is None else self.table.stale_time_s(self.declared)
 
     @property
     def proof_of_stop(self) -> StopProof | bool:
@@ -329,3 +335,30 @@ class Robot(BaseModel):
             VerificationRecordError: If the file cannot be used.
         """
         return None if self.verified is None else read_record(self.verified)
+
+
+@cache
+def _protocols_by_key() -> Mapping[str, tuple[str, ...]]:
+    """Return the protocols of robomesh by the key of their table."""
+    found: dict[str, tuple[str, ...]] = {}
+    for protocol, kind in own_kinds().items():
+        if kind.table:
+            found[kind.key] = (*found.get(kind.key, ()), protocol)
+    return found
+
+
+def _with_tables() -> type[Robot]:
+    """Return the model with a key for the table of each of robomesh's own kinds."""
+    models = {kind.key: kind.table_model for kind in own_kinds().values() if kind.table_model}
+    lines = []
+    for key, model in models.items():
+        first, _, _ = cleandoc(model.__doc__ or "").partition(".\n")
+        names = " or ".join(f"`{each}`" for each in _protocols_by_key()[key])
+        lines.append(f"    {key}: {first}; with the protocol {names}.")
+    doc = "\n".join((cleandoc(Robot.__doc__ or "").partition("\n")[0], "", "Attributes:", *lines))
+    fields: dict[str, Any] = {key: (model | None, None) for key, model in models.items()}
+    return create_model("Robot", __base__=Robot, __doc__=doc, __module__=__name__, **fields)
+
+
+if not TYPE_CHECKING:
+    Robot = _with_tables()

@@ -6,17 +6,16 @@ from typing import Annotated
 
 from pydantic import BaseModel, Field, StrictBool, ValidationError, field_validator
 
+from protocol_gateway.seam.table import PART_CONFIG
 from robomesh.access_rights import Border
 from robomesh.certificate_identity import read_identity
 from robomesh.endpoints import Link, Tls
-from robomesh.errors import KeyNameError
+from robomesh.errors import KeyNameError, ListenError
 from robomesh.keys import check_name
+from robomesh.listen_address import reachable, split_address
 from robots.bounded_toml import read_toml
-from services.errors import ListenError
 from services.pki import Folder
 from services.pki.errors import KeysError
-from services.site_file.listen_address import reachable, split_address
-from services.site_file.part import PART_CONFIG
 
 # A robot's page is #/<site>/<robot>: a site with one of these names would collide with a page of the console.
 _PAGES = ("define", "events", "program", "recordings", "settings", "wall")

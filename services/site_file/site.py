@@ -18,23 +18,24 @@ from pydantic import (
     model_validator,
 )
 
-from robots import description
-from robots.bounded_toml import read_toml
-from robots.errors import DescriptionError, VerificationRecordError
-from robots.kinematic_tree import BASE, bare_links, tree_of
-from robots.schema import Pose, UrdfDescription
-from services.errors import ListenError, SiteFileError
-from services.site_file.console import Console
-from services.site_file.console import resolve_paths as resolve_console_paths
-from services.site_file.fixtures import Fixture, fixture_problem, name_problem
-from services.site_file.listen_address import (
+from protocol_gateway.seam.table import PART_CONFIG, Table
+from robomesh.errors import ListenError
+from robomesh.listen_address import (
     cannot_both_listen,
     check_page_reach,
     check_reach,
     same_address,
     split_address,
 )
-from services.site_file.part import PART_CONFIG
+from robots import description
+from robots.bounded_toml import read_toml
+from robots.errors import DescriptionError, VerificationRecordError
+from robots.kinematic_tree import BASE, bare_links, tree_of
+from robots.schema import Pose, UrdfDescription
+from services.errors import SiteFileError
+from services.site_file.console import Console
+from services.site_file.console import resolve_paths as resolve_console_paths
+from services.site_file.fixtures import Fixture, fixture_problem, name_problem
 from services.site_file.quotas import Quotas
 from services.site_file.renderer_and_recorder import ALWAYS_RENDERED, Recorder, Renderer
 from services.site_file.robot import Robot
@@ -318,10 +319,9 @@ def _resolve_robot(robot: Robot, folder: Path) -> Robot:
         paths["model"] = str(folder / robot.model)
     if robot.verified is not None:
         paths["verified"] = folder / robot.verified
-    if robot.opcua is not None:
-        paths["opcua"] = robot.opcua.in_folder(folder)
-    if robot.fanuc is not None:
-        paths["fanuc"] = robot.fanuc.in_folder(folder)
+    for key, value in robot:
+        if isinstance(value, Table):
+            paths[key] = value.in_folder(folder)
     return robot.model_copy(update=paths)
 
 

@@ -7,6 +7,8 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
+from protocol_gateway.seam.table import problem_text
+
 
 def sentence(path: Path, problem: Any, values: dict[str, Any], model: type[BaseModel]) -> str:
     """Return one of pydantic's problems as one line: file, key, value and what would be right.
@@ -43,13 +45,6 @@ def sentence(path: Path, problem: Any, values: dict[str, Any], model: type[BaseM
     if not where or (given and isinstance(given, dict | list | tuple)):
         return f"{path}: {where + ': ' if where else ''}{message}"
     return f"{path}: {where} = {given!r}: {message}"
-
-
-def problem_text(problem: Any) -> str:
-    """Return what is wrong: the text of the model's own error, otherwise pydantic's."""
-    if problem["type"] == "value_error":
-        return str(problem["ctx"]["error"])
-    return str(problem["msg"]).removeprefix("Input ")  # the sentence names the key in place of "Input"
 
 
 def _keys(model: type[BaseModel], place: Sequence[str | int]) -> list[str]:

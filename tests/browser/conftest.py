@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 import zenoh
 
+from controllers.simulated.fault_requests import Mesh
+from controllers.unit.simulated import service as simulator
 from protocol_gateway import gateway
 from protocol_gateway.legacy.settings import LegacySettings
 from protocol_gateway.settings import RobotSettings
@@ -24,8 +26,6 @@ from robots.cells import Fixture
 from services.console import app
 from services.console.websocket import shared_subscriptions
 from services.kinematics import kinematics
-from services.simulator import simulator
-from services.simulator.fault_requests import Mesh
 from services.watch import watch
 from tests.cells import single_arm
 from tests.conftest import free_port
@@ -257,7 +257,7 @@ def chromium(plant):
             executable_path=str(CHROMIUM),
             args=ARGUMENTS,
             timeout=LAUNCH_MS,
-            # In the locale C it opens no file whose path has letters beyond ASCII.
+            # In the locale C it opens no file if the path has letters beyond ASCII.
             env={**os.environ, "LC_ALL": "C.UTF-8"},
         )
         yield browser

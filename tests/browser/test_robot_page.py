@@ -8,10 +8,10 @@ import time
 import pytest
 from playwright.sync_api import expect
 
+from controllers.universal_robots.modes import RobotMode
+from controllers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
 from protocol_gateway import gateway
-from protocol_gateway.drivers.driver import Recovery
-from protocol_gateway.drivers.universal_robots.modes import RobotMode
-from protocol_gateway.drivers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
+from protocol_gateway.seam import Recovery
 from protocol_gateway.settings import RobotSettings
 from robomesh.session import SessionSettings, open_session
 from services.kinematics import kinematics
@@ -45,7 +45,7 @@ from tests.browser.robot_page import (
     who_controls,
 )
 from tests.cells import single_arm
-from tests.protocol_gateway import ur_site
+from tests.controllers.universal_robots import ur_site
 from tests.site import wait_until
 
 pytestmark = pytest.mark.browser

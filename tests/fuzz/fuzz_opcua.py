@@ -19,7 +19,9 @@ from typing import Any
 if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[2])
 
-from protocol_gateway.drivers.driver import (
+from controllers.opcua.driver import OPCUA, OpcUaDriver
+from controllers.opcua.settings import OpcUaSettings
+from protocol_gateway.seam import (
     Activity,
     ControllerEvent,
     JointsReceived,
@@ -27,8 +29,6 @@ from protocol_gateway.drivers.driver import (
     Report,
     StatusReceived,
 )
-from protocol_gateway.drivers.opcua.driver import OPCUA, OpcUaDriver
-from protocol_gateway.drivers.opcua.settings import OpcUaSettings
 from robots.joints import JointType
 from tests.fuzz.fuzzing import Finding, campaign, changed, cut
 

@@ -19,7 +19,10 @@ from typing import Any, ClassVar
 if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[2])
 
-from protocol_gateway.drivers.driver import (
+from controllers.fanuc.axes import FanucSettings
+from controllers.fanuc.motion_driver import RMI, SESSION, FanucMotionDriver
+from protocol_gateway.errors import NotReadyError
+from protocol_gateway.seam import (
     Activity,
     Effects,
     FateUnknown,
@@ -31,9 +34,6 @@ from protocol_gateway.drivers.driver import (
     Send,
     StatusReceived,
 )
-from protocol_gateway.drivers.fanuc.axes import FanucSettings
-from protocol_gateway.drivers.fanuc.motion_driver import RMI, SESSION, FanucMotionDriver
-from protocol_gateway.errors import NotReadyError
 from robots.joints import JointType
 from tests.fuzz.fuzzing import Finding, answers, campaign, changed
 

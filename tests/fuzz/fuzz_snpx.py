@@ -20,7 +20,9 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[2])
 
-from protocol_gateway.drivers.driver import (
+from controllers.fanuc.axes import FanucSettings
+from controllers.fanuc.driver import SNPX, SnpxDriver
+from protocol_gateway.seam import (
     AlarmReceived,
     ControllerEvent,
     Effects,
@@ -31,8 +33,6 @@ from protocol_gateway.drivers.driver import (
     SetTimer,
     StatusReceived,
 )
-from protocol_gateway.drivers.fanuc.axes import FanucSettings
-from protocol_gateway.drivers.fanuc.driver import SNPX, SnpxDriver
 from robots.joints import JointType
 from tests.fuzz.fuzzing import Finding, answers, campaign, changed
 

@@ -25,7 +25,18 @@ from typing import Any
 if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[2])
 
-from protocol_gateway.drivers.driver import (
+from controllers.universal_robots.driver import PRIMARY, RTDE
+from controllers.universal_robots.motion_driver import (
+    DASHBOARD,
+    INPUTS,
+    SCRIPTS,
+    RtdeMotionDriver,
+)
+from controllers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
+from controllers.universal_robots.state import OUTPUTS
+from protocol_gateway.errors import NotReadyError
+from protocol_gateway.link.link import UnaskedSends
+from protocol_gateway.seam import (
     Activity,
     Channel,
     Close,
@@ -47,17 +58,6 @@ from protocol_gateway.drivers.driver import (
     StatusReceived,
     Stop,
 )
-from protocol_gateway.drivers.universal_robots.driver import PRIMARY, RTDE
-from protocol_gateway.drivers.universal_robots.motion_driver import (
-    DASHBOARD,
-    INPUTS,
-    SCRIPTS,
-    RtdeMotionDriver,
-)
-from protocol_gateway.drivers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
-from protocol_gateway.drivers.universal_robots.state import OUTPUTS
-from protocol_gateway.errors import NotReadyError
-from protocol_gateway.link.link import UnaskedSends
 from robots.joints import JointType
 from tests.fuzz.fuzz_universal_robots import PRIMARY as PRIMARY_MESSAGES
 from tests.fuzz.fuzz_universal_robots import TOKENS, rtde_package, strict_packages

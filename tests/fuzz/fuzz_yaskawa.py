@@ -17,7 +17,9 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[2])
 
-from protocol_gateway.drivers.driver import (
+from controllers.yaskawa.axes import YaskawaSettings
+from controllers.yaskawa.driver import HSES, HsesDriver
+from protocol_gateway.seam import (
     AlarmReceived,
     ControllerEvent,
     Effects,
@@ -29,8 +31,6 @@ from protocol_gateway.drivers.driver import (
     SignalsReceived,
     StatusReceived,
 )
-from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
-from protocol_gateway.drivers.yaskawa.driver import HSES, HsesDriver
 from robots.joints import JointType
 from tests.fuzz.fuzzing import Finding, answers, campaign, changed
 

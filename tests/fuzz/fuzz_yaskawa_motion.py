@@ -23,7 +23,12 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[2])
 
-from protocol_gateway.drivers.driver import (
+from controllers.yaskawa.axes import YaskawaSettings
+from controllers.yaskawa.driver import HSES
+from controllers.yaskawa.motion_driver import MOTION, STOP, HsesMotionDriver
+from protocol_gateway.errors import NotReadyError
+from protocol_gateway.link.link import UnaskedSends
+from protocol_gateway.seam import (
     Activity,
     Channel,
     Close,
@@ -43,12 +48,7 @@ from protocol_gateway.drivers.driver import (
     StatusReceived,
     Stop,
 )
-from protocol_gateway.drivers.pendant_text import text
-from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
-from protocol_gateway.drivers.yaskawa.driver import HSES
-from protocol_gateway.drivers.yaskawa.motion_driver import MOTION, STOP, HsesMotionDriver
-from protocol_gateway.errors import NotReadyError
-from protocol_gateway.link.link import UnaskedSends
+from protocol_gateway.seam.pendant_text import text
 from robots.joints import JointType
 from tests.fuzz.fuzz_yaskawa import (
     BUSY,

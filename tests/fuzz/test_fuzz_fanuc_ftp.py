@@ -5,8 +5,8 @@ from collections import Counter
 
 import pytest
 
-from protocol_gateway.drivers.fanuc import files, ftp
-from protocol_gateway.drivers.fanuc.ftp_driver import FtpDriver
+from controllers.fanuc import files, ftp
+from controllers.fanuc.ftp_driver import FtpDriver
 from tests.fuzz import fuzz_fanuc_ftp as fuzzer
 
 

@@ -11,20 +11,20 @@ from typing import Any
 
 import pytest
 
-from protocol_gateway.drivers.fanuc import data as fanuc_data
-from protocol_gateway.drivers.fanuc import rmi
-from protocol_gateway.drivers.fanuc.assignments import Block
-from protocol_gateway.drivers.fanuc.data import Position as FanucPosition
-from protocol_gateway.drivers.fanuc.rmi import Answer
-from protocol_gateway.drivers.opcua import driver as opcua_driver
-from protocol_gateway.drivers.opcua.joints import Joiner
-from protocol_gateway.drivers.universal_robots import motion_driver as ur_motion
-from protocol_gateway.drivers.universal_robots import primary
-from protocol_gateway.drivers.universal_robots.dashboard import Dashboard
-from protocol_gateway.drivers.universal_robots.rtde_messages import Recipe
-from protocol_gateway.drivers.yaskawa import data as yaskawa_data
-from protocol_gateway.drivers.yaskawa import motion_driver as yaskawa_motion
-from protocol_gateway.drivers.yaskawa.data import Position as YaskawaPosition
+from controllers.fanuc import data as fanuc_data
+from controllers.fanuc import rmi
+from controllers.fanuc.assignments import Block
+from controllers.fanuc.data import Position as FanucPosition
+from controllers.fanuc.rmi import Answer
+from controllers.opcua import driver as opcua_driver
+from controllers.opcua.joints import Joiner
+from controllers.universal_robots import motion_driver as ur_motion
+from controllers.universal_robots import primary
+from controllers.universal_robots.dashboard import Dashboard
+from controllers.universal_robots.rtde_messages import Recipe
+from controllers.yaskawa import data as yaskawa_data
+from controllers.yaskawa import motion_driver as yaskawa_motion
+from controllers.yaskawa.data import Position as YaskawaPosition
 from tests.fuzz import (
     fuzz_opcua,
     fuzz_rmi,

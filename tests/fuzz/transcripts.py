@@ -1,4 +1,4 @@
-"""Transcripts of drivers: what each was told, and what it returned. A changed driver is told the same again.
+"""Transcripts of drivers: calls and what they returned. A changed driver gets the same calls again.
 
     python tests/fuzz/transcripts.py record FOLDER [--inputs N]
     python tests/fuzz/transcripts.py replay FOLDER
@@ -27,30 +27,30 @@ from typing import Any, NamedTuple
 if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[2])
 
-from protocol_gateway.drivers.driver import Channel, Close, FateUnknown, Open, Report, Send, SetTimer
+from protocol_gateway.seam import Channel, Close, FateUnknown, Open, Report, Send, SetTimer
 
 ROOT = Path(__file__).parents[2]
 DRIVERS = {
-    "RtdeDriver": "protocol_gateway.drivers.universal_robots.driver",
-    "RtdeMotionDriver": "protocol_gateway.drivers.universal_robots.motion_driver",
-    "HsesDriver": "protocol_gateway.drivers.yaskawa.driver",
-    "HsesMotionDriver": "protocol_gateway.drivers.yaskawa.motion_driver",
-    "SnpxDriver": "protocol_gateway.drivers.fanuc.driver",
-    "FanucMotionDriver": "protocol_gateway.drivers.fanuc.motion_driver",
-    "FtpDriver": "protocol_gateway.drivers.fanuc.ftp_driver",
-    "OpcUaDriver": "protocol_gateway.drivers.opcua.driver",
-    "UnitDriver": "protocol_gateway.drivers.unit",
+    "RtdeDriver": "controllers.universal_robots.driver",
+    "RtdeMotionDriver": "controllers.universal_robots.motion_driver",
+    "HsesDriver": "controllers.yaskawa.driver",
+    "HsesMotionDriver": "controllers.yaskawa.motion_driver",
+    "SnpxDriver": "controllers.fanuc.driver",
+    "FanucMotionDriver": "controllers.fanuc.motion_driver",
+    "FtpDriver": "controllers.fanuc.ftp_driver",
+    "OpcUaDriver": "controllers.opcua.driver",
+    "UnitDriver": "protocol_gateway.unit_driver",
 }
 FUZZERS = ("ur_motion", "yaskawa", "yaskawa_motion", "snpx", "rmi", "fanuc_ftp", "opcua")
 SUITES = ("test_conformance.py", "test_conformance_of_motion.py")
 TOLD = ("started", "opened", "received", "skipped", "closed", "timer_ended", "controlled", "stop_ends_now")
 COMMANDS = ("encode", "command")
-# The fuzz program of RMI tells its driver a state in this way.
+# The fuzz program of RMI gives its driver a state in this way.
 BESIDE = ("_noted",)
 
 
 class Call(NamedTuple):
-    """A call of a driver, and what came of it.
+    """A call of a driver and its result.
 
     Attributes:
         given: Arguments; a channel is its name.
@@ -81,7 +81,7 @@ def main() -> None:
             f"print({name!r}, fuzz({arguments.inputs}, 1, collections.Counter()))"
         )
         subprocess.run([sys.executable, "-c", code], env=environment, cwd=ROOT, check=True)
-    tests = [f"tests/protocol_gateway/{each}" for each in SUITES]
+    tests = [f"tests/controllers/{each}" for each in SUITES]
     plugin = ("-p", "tests.fuzz.transcripts", "-n", "4", "-q", "-W", "default")
     subprocess.run([sys.executable, "-m", "pytest", *plugin, *tests], env=environment, cwd=ROOT, check=False)
 
@@ -270,7 +270,7 @@ def entries(path: Path) -> Iterator[Any]:
 
 
 def replay(folder: Path) -> bool:
-    """Tell each driver what it was told; print what differs, and return whether nothing does."""
+    """Repeat the calls of each driver; print what differs, and return whether nothing does."""
     equal: Counter[str] = Counter()
     calls: Counter[str] = Counter()
     different: Counter[str] = Counter()

@@ -102,7 +102,7 @@ COMMANDS = {
     "./dev run python web/build_page.py --format": How(),
     "./dev test tests/robots/test_dh.py -k base": How(says="passed"),
     "./dev test tests/robots": How(says="passed"),
-    "./dev test tests/protocol_gateway/test_conformance_of_motion.py -v -rs": How(says="passed"),
+    "./dev test tests/controllers/test_conformance_of_motion.py -v -rs": How(says="passed"),
     "./dev test tests/services/test_zenohd.py": How(says="skipped"),
     "./dev test --quick": How(says="passed"),
     "./dev run python tests/check_prose.py --list 40": How(),

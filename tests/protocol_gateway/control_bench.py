@@ -8,11 +8,11 @@ from protocol_gateway.authority.preconditions import Controller
 from protocol_gateway.control.audit_trail import AuditTrail
 from protocol_gateway.control.control import Control, Ports
 from protocol_gateway.control.robot_authority import RobotAuthority
-from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
-from protocol_gateway.drivers.unit import UnitDriver
 from protocol_gateway.errors import LinkDownError
 from protocol_gateway.journal import Journal
 from protocol_gateway.link.link import LinkState, LinkStatus
+from protocol_gateway.seam import Activity, Mode, StatusReceived
+from protocol_gateway.unit_driver import UnitDriver
 from robomesh import reason_codes as codes
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.description import load

@@ -2,8 +2,8 @@
 
 import contextlib
 
+from controllers.simulated.fault_requests import Mesh
 from robomesh.schemas import robomesh_pb2 as schema
-from services.simulator.fault_requests import Mesh
 from tests.protocol_gateway.gateway_site import gateway, simulator
 
 

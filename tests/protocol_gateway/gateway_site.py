@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from controllers.unit.simulated.service import Settings as SimulatorSettings
+from controllers.unit.simulated.service import serve as simulate
 from protocol_gateway.gateway import RobotSettings, Settings, serve
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
-from services.simulator.simulator import Settings as SimulatorSettings
-from services.simulator.simulator import serve as simulate
 from tests.conftest import last_value
 
 C = schema.CommandRequest.Command

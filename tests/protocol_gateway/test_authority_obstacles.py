@@ -13,7 +13,9 @@ from protocol_gateway.authority.preconditions import (
     obstacle,
     recoveries_of,
 )
-from protocol_gateway.drivers.driver import (
+from protocol_gateway.link.link import LinkState, LinkStatus
+from protocol_gateway.motion import MotionDetector, has_arrived, is_moving, motion_may_be_held
+from protocol_gateway.seam import (
     Activity,
     Capabilities,
     Mode,
@@ -26,8 +28,6 @@ from protocol_gateway.drivers.driver import (
     Stop,
     Trace,
 )
-from protocol_gateway.link.link import LinkState, LinkStatus
-from protocol_gateway.motion import MotionDetector, has_arrived, is_moving, motion_may_be_held
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest
 from robomesh.schemas.robomesh_pb2 import Recover as RecoverMessage

@@ -10,7 +10,7 @@ import pytest
 from protocol_gateway.checking.cell_occupancy import CellOccupancy
 from protocol_gateway.checking.policy import Policy
 from protocol_gateway.control.checks import Checks
-from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
+from protocol_gateway.seam import Activity, Mode, StatusReceived
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from controllers.simulated.errors import SimulatorError
+from controllers.simulated.fault_requests import Mesh
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import SessionSettings
-from services.simulator.errors import SimulatorError
-from services.simulator.fault_requests import Mesh
 from tests.conftest import run
 from tests.protocol_gateway.faulty_site import faulty_site
 from tests.protocol_gateway.gateway_site import STATE, gateway, refusal, simulator, until
@@ -108,7 +108,7 @@ def test_a_simulator_serves_without_a_router(mesh, tmp_path):
 
 SIMULATOR = """
 import asyncio
-from services.simulator.simulator import Settings, serve
+from controllers.unit.simulated.service import Settings, serve
 settings = Settings(robot="pt600", listen="10.219.77.2:5400", insecure=True, demo=True)
 asyncio.run(serve(settings, ready=lambda line: print(line, flush=True)))
 """

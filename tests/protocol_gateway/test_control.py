@@ -15,7 +15,7 @@ from protocol_gateway.control.events import (
     SessionEnded,
     UnitRefused,
 )
-from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
+from protocol_gateway.seam import Activity, Mode, StatusReceived
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema

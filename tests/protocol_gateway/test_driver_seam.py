@@ -6,7 +6,9 @@ import time
 
 import pytest
 
-from protocol_gateway.drivers.driver import (
+from protocol_gateway.errors import LinkDownError, NotReadyError
+from protocol_gateway.link.link import ControllerLink, LinkSettings, LinkState
+from protocol_gateway.seam import (
     ALL,
     Capabilities,
     Carries,
@@ -19,8 +21,6 @@ from protocol_gateway.drivers.driver import (
     Send,
     SetTimer,
 )
-from protocol_gateway.errors import LinkDownError, NotReadyError
-from protocol_gateway.link.link import ControllerLink, LinkSettings, LinkState
 from robomesh import reason_codes as codes
 from robomesh.loop_turns import LONG_S, MeasuredLoop, turns_of
 from tests.conftest import free_port, run

@@ -12,10 +12,10 @@ from protocol_gateway.control.control import Control, Ports
 from protocol_gateway.control.effects import Finding, Program
 from protocol_gateway.control.events import LeaseEnded, LinkLost, LinkRestored, MotionObserved
 from protocol_gateway.control.robot_authority import RobotAuthority
-from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
-from protocol_gateway.drivers.unit import UnitDriver
 from protocol_gateway.errors import AuditError, LinkDownError
 from protocol_gateway.link.link import LinkState, LinkStatus
+from protocol_gateway.seam import Activity, Mode, StatusReceived
+from protocol_gateway.unit_driver import UnitDriver
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest

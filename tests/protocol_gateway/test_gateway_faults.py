@@ -21,7 +21,7 @@ FAR = [2.4, 0.2, -0.2, 0.1, 0.5]
 HOUSE = Path(__file__).resolve().parents[2]
 SIMULATOR = """
 import asyncio
-from services.simulator.simulator import Settings, serve
+from controllers.unit.simulated.service import Settings, serve
 asyncio.run(serve(Settings(robot="pt600", demo=True), ready=lambda line: print(line, flush=True)))
 """
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from protocol_gateway.drivers.driver import Activity, JointsReceived, Refused, StatusReceived
 from protocol_gateway.link.health import Arrivals, LossCounter, ResponseTimer
+from protocol_gateway.seam import Activity, JointsReceived, Refused, StatusReceived
 
 IDLE, MOVING = StatusReceived(activity=Activity.IDLE), StatusReceived(activity=Activity.MOVING)
 

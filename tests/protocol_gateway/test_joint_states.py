@@ -3,7 +3,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol_gateway.drivers.driver import JointsReceived
+from protocol_gateway.seam import JointsReceived
 from protocol_gateway.state_messages import JointStatesMessage, timestamp
 
 NAMES = ("waist", "elbow")

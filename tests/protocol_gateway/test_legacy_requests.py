@@ -13,14 +13,6 @@ from protocol_gateway.authority.preconditions import Controller
 from protocol_gateway.control.events import LeaseEnded, MotionObserved
 from protocol_gateway.core.records import Error, read_records, write_unit
 from protocol_gateway.core.stream import Unit, UnitStream
-from protocol_gateway.drivers.driver import (
-    COMMANDS,
-    Activity,
-    Capabilities,
-    Mode,
-    Recovery,
-    StatusReceived,
-)
 from protocol_gateway.legacy.requests import (
     asks_for_more,
     asks_to_stop,
@@ -30,6 +22,14 @@ from protocol_gateway.legacy.requests import (
 )
 from protocol_gateway.legacy.settings import plain_address
 from protocol_gateway.link.link import LinkState, LinkStatus
+from protocol_gateway.seam import (
+    COMMANDS,
+    Activity,
+    Capabilities,
+    Mode,
+    Recovery,
+    StatusReceived,
+)
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest, Recover
 from robots.description import load

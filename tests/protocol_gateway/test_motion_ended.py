@@ -8,7 +8,7 @@ from protocol_gateway.audit.log import GATEWAY
 from protocol_gateway.authority.lease_rules import Authority, Now, end_lease, request_lease
 from protocol_gateway.authority.motion_owner import command_sent, observe, reported
 from protocol_gateway.control.events import MotionObserved, StatusReported
-from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
+from protocol_gateway.seam import Activity, Mode, StatusReceived
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from robots.description import load

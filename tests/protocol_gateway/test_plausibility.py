@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol_gateway.drivers.driver import Activity, StatusReceived
 from protocol_gateway.link.plausibility import Plausibility
+from protocol_gateway.seam import Activity, StatusReceived
 from robots.description import load
 from robots.joints import joints_of
 from tests.robots.arms import TELESCOPE

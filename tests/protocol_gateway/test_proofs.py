@@ -6,10 +6,12 @@ from datetime import date
 import numpy as np
 import pytest
 
-from protocol_gateway.drivers.driver import COMMANDS, Capabilities, Hold
-from protocol_gateway.drivers.yaskawa import data, signals
-from protocol_gateway.drivers.yaskawa.axes import Axes, YaskawaSettings
+from controllers.yaskawa import data, signals
+from controllers.yaskawa.axes import Axes, YaskawaSettings
+from controllers.yaskawa.simulated.controller import HsesController
+from controllers.yaskawa.simulated.service import with_factors
 from protocol_gateway.proofs import Proofs, StopProof
+from protocol_gateway.seam import COMMANDS, Capabilities, Hold
 from robomesh import reason_codes as codes
 from robots.description import load, parse
 from robots.joints import joints_of
@@ -18,11 +20,9 @@ from robots.model import build_model, link_placements
 from robots.poses import axis_rotation
 from robots.verification import POSES, Sample, joints_sha256, verify
 from robots.verification_record import VerificationRecord
-from services.simulator.yaskawa.controller import HsesController
-from services.simulator.yaskawa.service import with_factors
 from tests.conftest import run
+from tests.controllers.yaskawa.test_hses_driver import YASKAWA, controller
 from tests.protocol_gateway.gateway_site import STATE, gateway, until
-from tests.protocol_gateway.test_hses_driver import YASKAWA, controller
 from tests.protocol_gateway.wire import wire
 
 ARM = load("puma560")

@@ -4,6 +4,8 @@ import asyncio
 import contextlib
 import json
 import math
+import os
+import subprocess
 import sys
 import types
 from importlib import metadata
@@ -11,7 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from protocol_gateway.drivers.driver import (
+from protocol_gateway.errors import CommandError, GatewaySettingsError
+from protocol_gateway.kinds import driver_maker, protocols
+from protocol_gateway.seam import (
     Hold,
     JointsReceived,
     MalformedReceived,
@@ -19,8 +23,6 @@ from protocol_gateway.drivers.driver import (
     Refused,
     Stop,
 )
-from protocol_gateway.drivers.registry import driver_maker, protocols
-from protocol_gateway.errors import CommandError, GatewaySettingsError
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.joints import JointType
 from services.errors import SiteFileError
@@ -191,3 +193,60 @@ def test_the_example_reports_what_it_can_read_and_names_what_it_cannot(installed
         driver.encode(Hold())
     with pytest.raises(GatewaySettingsError, match="'limits' is unknown"):
         make((JointType.ROTARY,), {}, relay=None, options={"limits": 1})
+
+
+@pytest.mark.slow
+def test_a_driver_that_imports_the_old_names_runs_with_a_warning_that_says_the_new_ones(tmp_path):
+    old = (
+        (EXAMPLE / "json_lines.py")
+        .read_text()
+        .replace("protocol_gateway.seam", "protocol_gateway.drivers.driver")
+    )
+    (tmp_path / "json_lines.py").write_text(
+        old + "\nfrom protocol_gateway.drivers.only_reads import OnlyReads\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", "import json_lines; print(json_lines.JsonLines((), {}).started(0.0))"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join((str(tmp_path), *sys.path))},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "Open(channel" in done.stdout
+    assert (
+        "FutureWarning: protocol_gateway.drivers will be gone: import from protocol_gateway.seam"
+        in done.stderr
+    )
+
+
+KIND = """
+from protocol_gateway.seam.kind import Kind
+from protocol_gateway.seam.table import Table
+
+class Limit(Table):
+    limit: int = 100
+
+    def options(self, robot):
+        return {"limit": self.limit, "of": robot.protocol}
+
+KIND = Kind(driver="json_lines:JsonLines", table="json_lines_kind:Limit")
+"""
+
+
+def test_a_kind_of_a_package_checks_its_table_and_makes_the_drivers_settings(
+    installed, tmp_path, monkeypatch
+):
+    (tmp_path / "packages" / "json_lines_kind.py").write_text(KIND)
+    information = tmp_path / "packages" / "robomesh_json_lines-0.1.0.dist-info"
+    (information / "entry_points.txt").write_text("[robomesh.drivers]\nwith-table = json_lines_kind:KIND\n")
+    text = SITE.format("with-table", "tcp://10.0.0.7:5000")
+    path = tmp_path / "site.toml"
+    for line, options in (("", 100), ("driver = { limit = 7 }", 7)):
+        path.write_text(f"{text}{line}\n")
+        (robot,) = load(path).robot
+        assert robot.options == {"limit": options, "of": "with-table"}
+    for line, problem in (("{ limit = 'x' }", "driver.limit"), ("{ limits = 1 }", "driver.limits")):
+        path.write_text(f"{text}driver = {line}\n")
+        with pytest.raises(SiteFileError, match=problem):
+            load(path)

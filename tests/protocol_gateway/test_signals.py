@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from protocol_gateway import set_up_file
-from protocol_gateway.drivers.driver import Signal, SignalsReceived
-from protocol_gateway.drivers.signal_names import SHARED, numbered, of_axes, of_joints
 from protocol_gateway.journal import Journal
 from protocol_gateway.link.timestamping import Received
+from protocol_gateway.seam import Signal, SignalsReceived
+from protocol_gateway.seam.signal_names import SHARED, numbered, of_axes, of_joints
 from protocol_gateway.signals import MOST_SIGNALS, Signals
 from tests.conftest import run
+from tests.controllers.universal_robots.test_rtde_driver import UR, controller
 from tests.protocol_gateway.gateway_site import gateway, until
-from tests.protocol_gateway.test_rtde_driver import UR, controller
 
 CURRENT = Signal("joint.current", "A", 0)
 LOAD = Signal("payload.mass", "kg")

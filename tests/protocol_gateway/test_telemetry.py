@@ -2,9 +2,9 @@
 
 from types import SimpleNamespace
 
-from protocol_gateway.drivers.driver import Activity, JointsReceived, Mode, StatusReceived
 from protocol_gateway.journal import Journal
 from protocol_gateway.link.link import Received
+from protocol_gateway.seam import Activity, JointsReceived, Mode, StatusReceived
 from protocol_gateway.signals import Signals
 from protocol_gateway.telemetry import Telemetry
 from robots.description import load

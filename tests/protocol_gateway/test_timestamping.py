@@ -3,14 +3,14 @@ from itertools import pairwise
 
 import pytest
 
-from protocol_gateway.drivers.driver import (
+from protocol_gateway.link.timestamping import Received, Timestamper
+from protocol_gateway.seam import (
     Activity,
     JointsReceived,
     MalformedReceived,
     StatusReceived,
     UnknownReceived,
 )
-from protocol_gateway.link.timestamping import Received, Timestamper
 
 MS = 1_000_000
 

@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol_gateway.drivers.driver import (
+from protocol_gateway.errors import CommandError
+from protocol_gateway.seam import (
     Activity,
     Hold,
     Home,
@@ -22,8 +23,7 @@ from protocol_gateway.drivers.driver import (
     Trace,
     UnknownReceived,
 )
-from protocol_gateway.drivers.unit import UNITS, UnitDriver
-from protocol_gateway.errors import CommandError
+from protocol_gateway.unit_driver import UNITS, UnitDriver
 from robots.joints import JointType
 
 R, P = JointType.ROTARY, JointType.PRISMATIC

@@ -216,7 +216,7 @@ def test_an_address_that_does_not_fit_the_certificate_is_refused_with_the_reason
     plain = f"tcp/127.0.0.1:{free_port()}"
     with zenoh.open(router_config((plain,))):
         reason = refused(plain.replace("tcp/", "tls/"), li)
-        # The latter with OpenSSL 3.5, whose first message is longer.
+        # The latter with OpenSSL 3.5: its first message is longer.
         assert re.search("(does not answer|ends them): name the port of a router with TLS", reason)
     assert caplog.text == ""
 

@@ -12,14 +12,13 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from robomesh.errors import RefusedError
+from robomesh.errors import ListenError, RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
 from robomesh.subscription import Subscription
 from services.console.app import Settings, serve
 from services.console.errors import PageNotBuiltError
 from services.console.websocket import shared_subscriptions
-from services.errors import ListenError
 from tests.conftest import put_unheard, run
 from tests.services.http_refusals import read_refusal
 

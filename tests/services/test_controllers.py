@@ -4,16 +4,16 @@ from pathlib import Path
 
 import pytest
 
-from protocol_gateway.drivers.registry import OWN
+from controllers.fanuc.simulated.service import with_defaults
+from controllers.fanuc.table import Fanuc
+from controllers.yaskawa.simulated.service import with_factors
+from controllers.yaskawa.table import Yaskawa
+from protocol_gateway.kinds import own_kinds
 from robots.joints import JointType
 from services.command_line.site.controllers import ControllerError, controller_addresses
 from services.command_line.site.services import SERVICES, Options
 from services.command_line.site.up import programs
-from services.simulator.fanuc.service import with_defaults
-from services.simulator.yaskawa.service import with_factors
-from services.site_file.fanuc import Fanuc
 from services.site_file.site import Site, load, resolve_site
-from services.site_file.yaskawa import Yaskawa
 
 UR = {"name": "ur", "model": "puma560", "protocol": "rtde", "controller": "tcp://10.0.0.7:30004"}
 
@@ -158,7 +158,9 @@ def test_a_simulated_robot_with_snpx_gets_a_simulator_with_the_same_axes():
         assert (settings.assignments, settings.j23, settings.group) == expected
         if fanuc:
             told = Fanuc.model_validate_json(words[words.index("--fanuc") + 1])
-            assert with_defaults(told.settings, (JointType.ROTARY,) * 6) == settings
+            assert (
+                with_defaults(told.options(simulated.robot[0].declared), (JointType.ROTARY,) * 6) == settings
+            )
 
 
 FTP = {"protocol": "fanuc-ftp", "controller": "tcp://10.0.0.7:21"}
@@ -276,7 +278,7 @@ def test_two_devices_of_one_opc_ua_server_are_two_robots():
 
 def test_the_example_has_a_simulated_controller_of_each_protocol():
     example = load(Path(__file__).resolve().parents[2] / "examples" / "vendors.toml")
-    assert {robot.protocol for robot in example.robot} == {*OWN}
+    assert {robot.protocol for robot in example.robot} == {*own_kinds()}
     ways = {"unit": "tcp", "rtde": "tcp", "hses": "udp", "snpx": "tcp", "fanuc-ftp": "tcp", "opcua": "tcp"}
     named = enumerate(example.robot, start=1)
     addresses = [f"{robot.name}={ways[robot.protocol]}://127.0.0.1:{port}" for port, robot in named]

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from controllers.simulated.fault_requests import Mesh
+from controllers.simulated.fault_table import FAULTS, UNIT_FAULTS
+from controllers.unit.simulated.service import Settings, serve
+from controllers.universal_robots.simulated.server import UR_FAULTS
+from controllers.universal_robots.simulated.service import UrSettings, serve_rtde
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.live.monitor import link_words
-from services.simulator.fault_requests import Mesh
-from services.simulator.fault_table import FAULTS, UNIT_FAULTS
-from services.simulator.simulator import Settings, serve
-from services.simulator.universal_robots.server import UR_FAULTS
-from services.simulator.universal_robots.service import UrSettings, serve_rtde
 from tests.conftest import run
 from tests.site import robomesh
 

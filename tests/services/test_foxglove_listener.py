@@ -9,7 +9,7 @@ import pytest
 import trustme
 import websockets
 
-from services.errors import ListenError
+from robomesh.errors import ListenError
 from services.foxglove import listener
 from services.foxglove.listener import Listener, is_allowed_origin
 from services.foxglove.settings import ORIGINS

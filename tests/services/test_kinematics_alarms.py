@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from controllers.simulated.demo import demo_tour
 from robomesh.schemas.robomesh_pb2 import Event
 from robots.collision import Nearest
 from robots.description import load
@@ -18,7 +19,6 @@ from services.kinematics.conditions import (
     own_conditions,
     singularity_conditions,
 )
-from services.simulator.demo import demo_tour
 
 JOINTS = joints_of(load("pt600"))
 TICK_S = 0.05

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from robomesh.errors import ListenError
 from services.command_line.main import run
 from services.command_line.site.metrics_ports import (
     extra_with_metrics,
@@ -15,7 +16,7 @@ from services.command_line.site.metrics_ports import (
 )
 from services.command_line.site.services import SERVICES
 from services.command_line.site.up import programs
-from services.errors import ListenError, SiteFileError
+from services.errors import SiteFileError
 from services.site_file import site as site_file
 from services.site_file.router import Metrics
 from services.supervisor import Program

@@ -5,18 +5,21 @@ import contextlib
 import http.server
 import socket
 import threading
+from dataclasses import replace
 
 import pytest
 
+from controllers import probing
+from controllers.probing import ProbeError
 from services.command_line import probe
-from services.command_line.probe import ProbeError, examine
+from services.command_line.probe import examine, probes
 from tests.conftest import free_port, run
-from tests.protocol_gateway.ftp_site import controller as fanuc_by_ftp
+from tests.controllers.fanuc.ftp_site import controller as fanuc_by_ftp
+from tests.controllers.fanuc.test_snpx_driver import controller as fanuc
+from tests.controllers.opcua.test_opcua_driver import controller as opcua
+from tests.controllers.universal_robots.test_rtde_driver import controller as universal_robots
+from tests.controllers.yaskawa.test_hses_driver import controller as yaskawa
 from tests.protocol_gateway.gateway_site import simulator
-from tests.protocol_gateway.test_hses_driver import controller as yaskawa
-from tests.protocol_gateway.test_opcua_driver import controller as opcua
-from tests.protocol_gateway.test_rtde_driver import controller as universal_robots
-from tests.protocol_gateway.test_snpx_driver import controller as fanuc
 
 
 @contextlib.contextmanager
@@ -39,7 +42,14 @@ def server(*, says=b""):
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch):
-    monkeypatch.setattr(probe, "_LISTEN_S", 0.5)
+    monkeypatch.setattr(probing, "LISTEN_S", 0.5)
+
+
+def at_ports(monkeypatch, **changed):
+    """Let kinds be known at other ports."""
+    known = probes()
+    ours = {name: replace(each, **changed.get(name, {})) for name, each in known.items()}
+    monkeypatch.setattr(probe, "probes", lambda: ours)
 
 
 def examined(address):
@@ -59,8 +69,7 @@ def test_the_unit_protocol_is_recognized_without_a_byte_sent():
 def test_a_controller_of_universal_robots_is_recognized_by_its_answer(monkeypatch):
     async def main():
         async with universal_robots() as (rtde, primary):
-            monkeypatch.setattr(probe, "_RTDE_PORT", rtde)
-            monkeypatch.setattr(probe, "_PRIMARY_PORTS", (primary,))
+            at_ports(monkeypatch, rtde={"ports": (rtde,), "listens": (primary,)})
             found = await examined(f"tcp://127.0.0.1:{rtde}")
             assert (found.protocol, found.sent) == ("rtde", "the request for RTDE version 2")
             assert "Universal Robots: RTDE, version 2" in found.text
@@ -74,7 +83,7 @@ def test_a_controller_of_universal_robots_is_recognized_by_its_answer(monkeypatc
 def test_a_controller_of_yaskawa_is_recognized_by_its_answer(monkeypatch):
     async def main():
         async with yaskawa() as port:
-            monkeypatch.setattr(probe, "_HSES_PORT", port)
+            at_ports(monkeypatch, hses={"ports": (port,)})
             found = await examined(f"udp://127.0.0.1:{port}")
         assert found.protocol == "hses"
         assert "a controller of Yaskawa with HSES: model" in found.text
@@ -85,7 +94,7 @@ def test_a_controller_of_yaskawa_is_recognized_by_its_answer(monkeypatch):
 def test_a_controller_of_fanuc_is_recognized_by_its_first_answer(monkeypatch):
     async def main():
         async with fanuc() as port:
-            monkeypatch.setattr(probe, "_SNPX_PORTS", (port,))
+            at_ports(monkeypatch, snpx={"ports": (port,)})
             found = await examined(f"tcp://127.0.0.1:{port}")
         assert (found.protocol, found.received_bytes) == ("snpx", 56)
         assert "56 zero bytes" in found.sent
@@ -96,7 +105,7 @@ def test_a_controller_of_fanuc_is_recognized_by_its_first_answer(monkeypatch):
 def test_a_controller_that_is_read_by_ftp_is_recognized_by_its_greeting(monkeypatch):
     async def main():
         async with fanuc_by_ftp() as port:
-            monkeypatch.setattr(probe, "_FTP_PORT", port)
+            at_ports(monkeypatch, **{"fanuc-ftp": {"listens": (port,)}})
             found = await examined(f"tcp://127.0.0.1:{port}")
         assert (found.protocol, found.sent) == ("fanuc-ftp", "nothing")
         assert "of a controller of FANUC: R-30iB FTP server ready." in found.text
@@ -116,7 +125,7 @@ def test_a_controller_that_is_read_by_ftp_is_recognized_by_its_greeting(monkeypa
 )
 def test_an_ftp_server_is_heard_and_nothing_is_sent(monkeypatch, greeting, protocol):
     with server(says=greeting) as (port, heard):
-        monkeypatch.setattr(probe, "_FTP_PORT", port)
+        at_ports(monkeypatch, **{"fanuc-ftp": {"listens": (port,)}})
         found = examine(f"tcp://127.0.0.1:{port}")
     assert (found.protocol, found.sent, heard) == (protocol, "nothing", b"")
     assert "an FTP server" in found.text
@@ -151,7 +160,7 @@ def test_ports_of_other_protocols_are_not_contacted_for_endpoints(monkeypatch, p
 
 def test_the_port_of_rmi_is_described_as_it_is_used(monkeypatch):
     with server() as (port, _):
-        monkeypatch.setattr(probe, "_RMI_PORT", port)
+        at_ports(monkeypatch, snpx={"listens": (port,)})
         found = examine(f"tcp://127.0.0.1:{port}")
     assert "moves by RMI if the site file says so" in found.next
 
@@ -160,28 +169,29 @@ def test_the_port_of_rmi_is_described_as_it_is_used(monkeypatch):
     ("says", "words"), [(b"", "answers nothing"), (b"\x05" * 60, "sends something unknown")]
 )
 def test_to_the_ports_of_snpx_nothing_is_sent_but_56_zero_bytes(monkeypatch, says, words):
-    monkeypatch.setattr(probe, "_ANSWER_S", 0.5)
+    monkeypatch.setattr(probing, "ANSWER_S", 0.5)
     with server(says=says) as (port, heard):
-        monkeypatch.setattr(probe, "_SNPX_PORTS", (port,))
+        at_ports(monkeypatch, snpx={"ports": (port,)})
         found = examine(f"tcp://127.0.0.1:{port}")
     assert found.protocol == ""
     assert words in found.text
     assert heard == (b"" if says else bytes(56))
 
 
-@pytest.mark.parametrize("name", ["_PRIMARY_PORTS", "_RMI_PORT", None])
+@pytest.mark.parametrize("name", ["rtde", "snpx", None])
 def test_to_ports_that_move_an_arm_and_to_unknown_ones_nothing_is_sent(monkeypatch, name):
     with server() as (port, heard):
         if name is not None:
-            monkeypatch.setattr(probe, name, (port,) if name == "_PRIMARY_PORTS" else port)
+            at_ports(monkeypatch, **{name: {"listens": (port,)}})
         found = examine(f"tcp://127.0.0.1:{port}")
     assert (found.protocol, found.sent, heard) == ("", "nothing", b"")
 
 
 def test_ports_that_move_an_arm_are_those_of_the_manuals():
-    assert {30001, 30002, 30003} <= {*probe._PRIMARY_PORTS}
-    assert (probe._RMI_PORT, probe._RTDE_PORT, probe._HSES_PORT) == (16001, 30004, 10040)
-    assert probe._SNPX_PORTS == (60008, 18245)
+    known = probes()
+    assert {30001, 30002, 30003} <= {*known["rtde"].listens}
+    assert (known["snpx"].listens, known["rtde"].ports, known["hses"].ports) == ((16001,), (30004,), (10040,))
+    assert known["snpx"].ports == (60008, 18245)
 
 
 @pytest.mark.parametrize(
@@ -212,8 +222,8 @@ def test_a_web_server_is_no_controller(monkeypatch):
         port = serving.server_address[1]
         try:
             assert "sends nothing within 0.5 s" in examine(f"tcp://127.0.0.1:{port}").text
-            monkeypatch.setattr(probe, "_RTDE_PORT", port)
-            monkeypatch.setattr(probe, "_ANSWER_S", 0.5)
+            at_ports(monkeypatch, rtde={"ports": (port,)})
+            monkeypatch.setattr(probing, "ANSWER_S", 0.5)
             assert "to a request for RTDE" in examine(f"tcp://127.0.0.1:{port}").text
         finally:
             serving.shutdown()

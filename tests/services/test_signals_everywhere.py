@@ -20,8 +20,8 @@ from services.command_line.main import run as robomesh_run
 from services.recorder.answers import Answers
 from services.recorder.settings import Settings
 from tests.conftest import run
+from tests.controllers.universal_robots.test_rtde_driver import UR, controller
 from tests.protocol_gateway.gateway_site import gateway, until
-from tests.protocol_gateway.test_rtde_driver import UR, controller
 from tests.recordings import START_NS, Written, joints
 from tests.site import robomesh
 

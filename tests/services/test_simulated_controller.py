@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from controllers.simulated.demo import demo_tour
+from controllers.unit.simulated.controller import Controller
 from protocol_gateway.core.records import (
     AbsolutePositions,
     Command,
@@ -15,8 +17,6 @@ from protocol_gateway.core.records import (
 )
 from robots.description import load
 from robots.joints import joints_of
-from services.simulator.controller import Controller
-from services.simulator.demo import demo_tour
 
 PT600 = load("pt600")
 JOINTS = joints_of(PT600)

@@ -7,6 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from controllers.simulated.demo import demo_tour
+from controllers.unit.simulated.controller import Controller
 from protocol_gateway.core.records import AbsolutePositions, Command
 from robots.collision.cell import build_cell
 from robots.collision.distance import outside_clearance
@@ -15,8 +17,6 @@ from robots.example_robots import example_folder
 from robots.joints import joints_of, violations
 from robots.model import build_model, tool_placement
 from robots.motion import Motion
-from services.simulator.controller import Controller
-from services.simulator.demo import demo_tour
 from services.site_file.cells import cells_of
 from services.site_file.site import DEMO
 

@@ -10,12 +10,12 @@ from http.server import HTTPServer, SimpleHTTPRequestHandler
 
 import pytest
 
+from robomesh.errors import ListenError
+from robomesh.listen_address import own_addresses
 from robomesh.session import SessionSettings, open_session
 from services.command_line.site import up
-from services.errors import ListenError
 from services.router.router import Settings, check_ports_free, serve
 from services.site_file.console import Console
-from services.site_file.listen_address import own_addresses
 from services.site_file.site import Site
 from services.used_ports import check_free
 from tests.conftest import free_port, run

@@ -22,12 +22,12 @@ from unittest import mock
 
 import numpy as np
 
+from controllers.fanuc.simulated import service as fanuc
+from controllers.simulated import demo
+from controllers.universal_robots.simulated import service as universal_robots
+from controllers.yaskawa.simulated import service as yaskawa
 from robots.description import LIBRARY, RobotDescription, load
 from robots.joints import FloatArray, joints_of
-from services.simulator import demo
-from services.simulator.fanuc import service as fanuc
-from services.simulator.universal_robots import service as universal_robots
-from services.simulator.yaskawa import service as yaskawa
 from tests.conftest import free_port
 from tests.site import lean, robomesh, running_file, site_file
 

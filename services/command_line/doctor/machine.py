@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from robomesh.errors import UnavailableError
 from robomesh.extras import ADDED_IN_CHECKOUT, install_command, is_missing
+from robomesh.listen_address import reachable, split_address
 from services.command_line.output import print_json, print_line
 from services.command_line.site.metrics_ports import first_address, ports
 from services.command_line.site.services import SERVICES
-from services.errors import UnavailableError
-from services.site_file.listen_address import reachable, split_address
 from services.used_ports import check_free, is_absent
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from itertools import combinations
 from typing import NamedTuple
 
 from protocol_gateway.legacy.settings import LegacySettings
+from robomesh.listen_address import same_address, split_address
 from services.errors import ServiceError
-from services.site_file.listen_address import same_address, split_address
 from services.site_file.robot import Robot
 from services.site_file.site import Site
 

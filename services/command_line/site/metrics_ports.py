@@ -7,10 +7,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from robomesh.errors import ListenError
+from robomesh.listen_address import check_reach, split_address
 from services.command_line.output import print_text
 from services.command_line.site.services import SERVICES
-from services.errors import ListenError
-from services.site_file.listen_address import check_reach, split_address
 from services.site_file.router import RoutedSite
 from services.supervisor import ExtraPrograms, Program
 

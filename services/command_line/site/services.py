@@ -98,22 +98,13 @@ def _gateway(site: "Site", options: Options) -> Any:
 
 
 def _driver_options(robot: "Robot") -> object:
-    """Return the settings of the driver; a simulated controller has values of its own, unless declared."""
+    """Return the settings of the driver; a simulated controller has its own values, unless declared."""
     if not robot.simulated:
         return robot.options
-    from protocol_gateway.drivers.fanuc.axes import FanucSettings
-    from protocol_gateway.drivers.yaskawa.axes import YaskawaSettings
     from robots.description import load
     from robots.joints import joints_of
-    from services.simulator.fanuc.service import with_defaults
-    from services.simulator.yaskawa.service import with_factors
 
-    declared = robot.options
-    if isinstance(declared, FanucSettings):
-        return with_defaults(declared, joints_of(load(robot.model)).types)
-    if isinstance(declared, YaskawaSettings):
-        return with_factors(declared, len(joints_of(load(robot.model))))
-    return declared
+    return robot.simulated_options(joints_of(load(robot.model)).types)
 
 
 def _cell_file(site: "Site", options: Options) -> "CellFile":

@@ -15,6 +15,7 @@ from pathlib import Path
 from robomesh import service
 from robomesh.client.connection import addresses
 from robomesh.keys import robot_key
+from robomesh.listen_address import own_addresses, split_address
 from robomesh.session import SessionSettings, open_session
 from services.command_line import main
 from services.command_line.output import print_line
@@ -25,7 +26,6 @@ from services.pki import Folder
 from services.pki.errors import KeysError
 from services.router.router import check_ports_free
 from services.site_file import site as site_file
-from services.site_file.listen_address import own_addresses, split_address
 from services.site_file.robot import Robot
 from services.site_file.site import Site
 from services.site_file.started_robots import may_start, read_started
@@ -126,27 +126,13 @@ def _simulator(robot: Robot, site: str, attach: tuple[str, ...]) -> tuple[Progra
     port = _free_port()
     demo = ("--demo",) if robot.demo else ()
     codes = (option for code, type_ in robot.codes.items() for option in ("--code", f"{code}={type_}"))
-    protocol: tuple[str, ...] = ()
-    controller = f"tcp://127.0.0.1:{port}"
-    if robot.protocol == "rtde":
-        ports = {name: _free_port() for name in ("primary", "scripts", "dashboard")}
-        addresses = (word for name, at in ports.items() for word in (f"--{name}", f"127.0.0.1:{at}"))
-        protocol = ("--protocol", "rtde", *addresses)
-        controller += "".join(f",{name}={at}" for name, at in ports.items())
-    if robot.protocol == "hses":
-        controller = f"udp://127.0.0.1:{port}"
-        declared = robot.yaskawa.model_dump_json(exclude_defaults=True) if robot.yaskawa else ""
-        protocol = ("--protocol", "hses", *(("--yaskawa", declared) if declared else ()))
-    if robot.protocol in ("snpx", "fanuc-ftp"):
-        declared = robot.fanuc.model_dump_json(exclude_defaults=True) if robot.fanuc else ""
-        protocol = ("--protocol", robot.protocol, *(("--fanuc", declared) if declared else ()))
-        if robot.fanuc is not None and robot.fanuc.motion:
-            rmi = _free_port()
-            protocol = (*protocol, "--rmi", f"127.0.0.1:{rmi}")
-            controller += f",rmi={rmi}"
-    if robot.protocol == "opcua":
-        path = robot.opcua.path if robot.opcua else ""
-        protocol = ("--protocol", "opcua", *(("--path", path) if path else ()))
+    kind = robot.kind
+    simulated = kind.simulated_controller
+    assert simulated is not None
+    started = simulated.started(robot.table, _free_port)
+    controller = f"{'udp' if kind.datagrams else 'tcp'}://127.0.0.1:{port}"
+    controller += "".join(f",{name}={at}" for name, at in started.ports)
+    protocol = ("--protocol", robot.protocol, *started.options)
     for_ = ("--for", f"{site}/{robot.name}", *attach)
     address = ("--robot", robot.model, "--listen", f"127.0.0.1:{port}")
     arguments = ("simulate", *address, *demo, *codes, *protocol, *for_)

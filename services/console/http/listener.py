@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
-from services.errors import UnavailableError
+from robomesh.errors import UnavailableError
 from services.used_ports import in_use
 
 # Send buffer of a connection: a second of state for a slow browser, not a minute.

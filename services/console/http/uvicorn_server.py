@@ -11,10 +11,10 @@ from pathlib import Path
 import uvicorn
 from starlette.types import ASGIApp
 
+from robomesh.errors import ListenError
 from services.console.http.request_timeout import Connection
 from services.console.read_scheduler import READS, InTurn, ReadScheduler
 from services.console.websocket.websocket_transport import WebSocketTransport
-from services.errors import ListenError
 
 log = logging.getLogger(__name__)
 

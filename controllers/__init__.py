@@ -1,0 +1,1 @@
+"""Kinds of controllers, a folder each: driver, settings, probe, simulated controller, codes."""

@@ -1,0 +1,594 @@
+"""Driver that also moves the arm, by RMI: one program for each motion, which ends with it.
+
+    channel        port                          carries        sent
+    -----------    ---------------------------   ------------   ------------------------------------------
+    snpx           that of the site file         reading        questions, as without motion
+    rmi            16001                         nothing        FRC_Connect
+    rmi_session    that of FRC_Connect's answer  motion, stop   FRC_Initialize, one FRC_JointMotionJRep,
+                                                                FRC_Abort, FRC_Disconnect
+
+RMI is connected while the robot is controlled, and to deliver a stop. A motion:
+
+    none --command--> initializing --answer--> moving --answer--> ending --answer to FRC_Abort--> none
+          FRC_Initialize        the instruction        FRC_Abort
+
+Between motions nothing of the gateway is in the controller, so a program that runs then is another one. While
+a motion is open, no question is sent by RMI, because the controller refuses a command before it has answered
+the one before: the state is read by SNPX. What does not go as expected ends the motion by FRC_Abort, and
+latches a stop. No motion is sent again; FRC_Abort is, until it is answered.
+"""
+
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum, auto
+from typing import Any
+
+import numpy as np
+
+from controllers.fanuc import rmi
+from controllers.fanuc.axes import FanucSettings
+from controllers.fanuc.driver import SNPX, SnpxDriver
+from controllers.fanuc.rmi import Answer, LineStream
+from controllers.fanuc.srtp import Answer as Packet
+from controllers.fanuc.srtp import Question
+from protocol_gateway.errors import GatewaySettingsError, NotReadyError
+from protocol_gateway.seam import (
+    NOTHING,
+    Activity,
+    AlarmReceived,
+    Carries,
+    Channel,
+    Close,
+    ControllerCommand,
+    ControllerEvent,
+    Effect,
+    Effects,
+    FateUnknown,
+    JointsReceived,
+    MalformedReceived,
+    Mode,
+    MoveAbsolute,
+    Open,
+    Report,
+    Reset,
+    Send,
+    Severity,
+    Signal,
+    SignalsReceived,
+    Speed,
+    StatusReceived,
+    Stop,
+    StopEnds,
+)
+from protocol_gateway.seam.hexadecimal import hexadecimal
+from protocol_gateway.seam.one_motion import FIRST_PERCENT, Timers, encode_words, words_of
+from protocol_gateway.seam.polling import Asked
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+from robots.joints import JointType
+
+RMI = Channel(name="rmi", carries=NOTHING)
+SESSION = Channel(name="rmi_session", carries=Carries.MOTION | Carries.STOP)
+
+ANSWER_S = 5.0
+"""Time for the answer to a command: FRC_Initialize creates a program, FRC_Abort waits for its end."""
+SILENT_S = 5.0
+"""A motion without an answer is given up after the arm has been still for this long."""
+_STATE_VALID_S = 0.7
+_BLIND_S = 1.2
+_WATCH_S = 0.2
+_LATE_S = 0.1
+_RETRY_S = 2.0
+_JOIN_S = 3.0
+_LEAVE_S = 1.0
+_REOPEN_S = 0.05
+_AGAIN_S = 0.05
+_ENDED_S = 0.3
+_STILL_S, _STILL_RAD = 0.5, 1e-3
+_RMI_SENDS_HZ = 20.0
+_TOOL = Signal("tool.number")
+
+
+class _Line(Enum):
+    """State of the connections of RMI."""
+
+    CLOSED = auto()
+    CONNECTING = auto()
+    JOINING = auto()
+    OPEN = auto()
+    LEAVING = auto()
+    LOST = auto()
+
+
+class _Phase(Enum):
+    """State of the motion."""
+
+    NONE = auto()
+    INITIALIZING = auto()
+    MOVING = auto()
+    ENDING = auto()
+    STOPPING = auto()
+
+
+_OPEN_MOTION = frozenset({_Phase.INITIALIZING, _Phase.MOVING})
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """The motion that was commanded.
+
+    Attributes:
+        instruction: Its message.
+        start: Positions that it was checked from [rad] or [m].
+        tool: Number of the active tool then.
+    """
+
+    instruction: bytes
+    start: tuple[float, ...]
+    tool: object
+
+
+class FanucMotionDriver(SnpxDriver):
+    """Driver of SNPX and RMI (`protocol_gateway.seam.FollowsControl`).
+
+    Raises:
+        GatewaySettingsError: As `SnpxDriver`, or if joints or their rate are not declared.
+    """
+
+    ports = frozenset({RMI.name, SESSION.name})
+
+    def __init__(
+        self,
+        joint_types: Sequence[JointType],
+        codes: Mapping[int, str],
+        *,
+        relay: Callable[[bytes, bool, Hashable], None] | None = None,
+        options: object = None,
+    ) -> None:
+        super().__init__(joint_types, codes, relay=relay, options=options)
+        if (problem := self._settings.motion_problem) is not None:
+            raise GatewaySettingsError(f"fanuc {problem}")
+        self.capabilities = replace(
+            self.capabilities,
+            commands=frozenset({MoveAbsolute, Speed, Stop, Reset}),
+            stop_ends=StopEnds.OURS,
+            first_speed_percent=FIRST_PERCENT,
+            dies_with_link=False,
+            experimental=True,
+            stop_means="FRC_Abort of RMI",
+        )
+        self.requests_a_second += _RMI_SENDS_HZ
+        self._controlled = False
+        # A stop that could not be sent; it may be one from before the gateway's start.
+        self._stop_owed = False
+        self._running = False
+        self._forget()
+
+    def _forget(self) -> None:
+        self._line = _Line.CLOSED
+        self._lines = LineStream()
+        self._due = Timers("snpx")
+        self._phase = _Phase.NONE
+        self._motion: _Motion | None = None
+        self._sent_s = float("-inf")
+        self._initialize_open = self._abort_open = False
+        self._percent = FIRST_PERCENT
+        self._rests_after_stop = True
+        self._forget_state()
+
+    def _forget_state(self) -> None:
+        self._positions: tuple[float, ...] | None = None
+        self._positions_s = self._status_s = self._asked_s = float("-inf")
+        self._still: tuple[tuple[float, ...], float] | None = None
+        self._status: StatusReceived | None = None
+        self._tool: object = None
+
+    # -------------------------------------------------------------------------- seam
+
+    def started(self, now_s: float) -> Effects:
+        """Connect to SNPX, and to RMI if a stop is pending."""
+        self._forget()
+        self._running = True
+        return self._due.with_timer((*super().started(now_s), *self._settle(now_s)))
+
+    def controlled(self, taken: bool, now_s: float) -> Effects:
+        """Connect to RMI while the robot is controlled."""
+        self._controlled, self._percent = taken, FIRST_PERCENT
+        return self._due.with_timer(self._settle(now_s))
+
+    def opened(self, channel: Channel, now_s: float) -> Effects:
+        """Greet."""
+        if channel is SNPX:
+            return self._due.with_timer(super().opened(channel, now_s))
+        self._lines = LineStream()
+        if channel is RMI:
+            self._due["connect"] = now_s + ANSWER_S
+            return self._due.with_timer((Send(RMI, rmi.connect()),))
+        if self._line is not _Line.JOINING:
+            # The port of an earlier session, after this one was lost.
+            return (Close(SESSION),)
+        self._line = _Line.OPEN
+        self._due.pop("join", None)
+        if self._stop_owed:
+            self._phase = _Phase.STOPPING
+            return self._due.with_timer(self._abort(now_s))
+        return self._due.with_timer(self._settle(now_s))
+
+    def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
+        """Take the next bytes."""
+        if channel is SNPX:
+            effects = [*super().received(channel, data, now_s)]
+            return self._due.with_timer((*effects, *self._follow(now_s)))
+        effects = []
+        for line in self._lines.receive(data):
+            try:
+                answer = rmi.read(line)
+            except ValueError as error:
+                effects.append(Report([MalformedReceived(0, hexadecimal(line), f"RMI: {error}")], 0))
+            else:
+                effects += self._on_connect(answer, now_s) if channel is RMI else self._on(answer, now_s)
+        if self._lines.broken:
+            effects += self._leave(channel, "its lines are too long", now_s)
+        return self._due.with_timer((*effects, *self._settle(now_s)))
+
+    def skipped(self, channel: Channel, now_s: float) -> Effects:
+        """Read SNPX on; connect RMI again, which cannot be read from its middle."""
+        if channel is SNPX:
+            return self._due.with_timer(super().skipped(channel, now_s))
+        return self._due.with_timer(self._leave(channel, "it sent far too much", now_s))
+
+    def closed(self, channel: Channel, now_s: float) -> Effects:
+        """Handle a lost connection."""
+        if channel is SNPX:
+            self._forget_state()
+            self._percent = FIRST_PERCENT
+            effects = [*super().closed(channel, now_s)]
+            if self._phase in _OPEN_MOTION:
+                effects += self._give_up(codes.FANUC_STATE_OLD(), now_s)
+            return self._due.with_timer(effects)
+        if channel is RMI:
+            self._due.pop("connect", None)
+            return self._due.with_timer(())
+        if self._line in (_Line.OPEN, _Line.LEAVING):
+            return self._due.with_timer(self._lost(now_s))
+        return self._due.with_timer(())
+
+    def timer_ended(self, now_s: float) -> Effects:
+        """Handle the timers that have expired."""
+        effects: list[Effect] = []
+        ended = self._due.ended(now_s)
+        # A late gateway has unread messages.
+        late = now_s - min(ended.values(), default=now_s) > _LATE_S
+        if "snpx" in ended:
+            effects += super().timer_ended(now_s)
+        if "reopen" in ended and self._line is _Line.LOST:
+            self._line = _Line.CLOSED
+            effects += [Close(RMI), Close(SESSION)]
+        if "connect" in ended:
+            effects += self._leave(RMI, "it does not answer", now_s)
+        if "join" in ended:
+            effects += self._leave(SESSION, "its session cannot be joined", now_s)
+        if "leave" in ended:
+            self._line = _Line.CLOSED
+            effects.append(Close(SESSION))
+        if "initialize" in ended or "abort" in ended:
+            effects += self._unanswered(now_s, late=late)
+        if "again" in ended and self._line is _Line.OPEN and not self._abort_open:
+            effects += self._abort(now_s)
+        if "watch" in ended and self._phase in _OPEN_MOTION:
+            effects += self._watch(now_s, late=late)
+        return self._due.with_timer((*effects, *self._settle(now_s)))
+
+    # ------------------------------------------------------------------- connections
+
+    def _settle(self, now_s: float) -> Effects:
+        """Connect to RMI or disconnect."""
+        if not self._running:
+            return ()
+        wanted = self._controlled or self._stop_owed or self._phase is not _Phase.NONE
+        if wanted and self._line is _Line.CLOSED:
+            if "retry" in self._due:
+                return ()
+            self._line = _Line.CONNECTING
+            return (Open(RMI, rmi.PORT),)
+        if wanted:
+            return ()
+        if self._line in (_Line.CONNECTING, _Line.JOINING):
+            self._line = _Line.CLOSED
+            for name in ("connect", "join"):
+                self._due.pop(name, None)
+            return (Close(RMI), Close(SESSION))
+        if self._line is _Line.OPEN:
+            self._line = _Line.LEAVING
+            self._due["leave"] = now_s + _LEAVE_S
+            return (Send(SESSION, rmi.disconnect()),)
+        return ()
+
+    def _leave(self, channel: Channel, why: str, now_s: float) -> Effects:
+        """Close an unusable connection and schedule a retry."""
+        effects = [*self._lost(now_s), Close(channel, why)]
+        self._line = _Line.CLOSED
+        self._due.pop("reopen", None)
+        self._due["retry"] = now_s + _RETRY_S
+        return effects
+
+    def _lost(self, now_s: float) -> Effects:
+        """Handle a lost connection: RMI_MOVE may continue."""
+        before = self._phase
+        if before is not _Phase.NONE:
+            self._stop_owed = True
+        for name in ("connect", "join", "leave", "initialize", "abort", "again", "watch"):
+            self._due.pop(name, None)
+        self._initialize_open = self._abort_open = False
+        self._phase, self._motion = _Phase.NONE, None
+        self._line = _Line.LOST
+        # Before the channel connects to the old session's port again.
+        self._due["reopen"] = now_s + _REOPEN_S
+        if before in _OPEN_MOTION:
+            self._must_rest()
+            return (FateUnknown(codes.FANUC_CONNECTION_LOST()),)
+        return ()
+
+    def _on_connect(self, answer: Answer, now_s: float) -> Effects:
+        if answer.name != rmi.CONNECT or self._line is not _Line.CONNECTING:
+            return ()
+        self._due.pop("connect", None)
+        if answer.error:
+            return self._leave(RMI, answer.problem, now_s)
+        self._line = _Line.JOINING
+        self._due["join"] = now_s + _JOIN_S
+        return (Close(RMI), Open(SESSION, answer.port))
+
+    # ------------------------------------------------------------------------ answers
+
+    def _on(self, answer: Answer, now_s: float) -> Effects:
+        """Handle a message of the session."""
+        match answer.name:
+            case rmi.INITIALIZE if self._initialize_open:
+                return self._on_initialized(answer, now_s)
+            case rmi.JOINT_MOTION if self._phase is _Phase.MOVING and answer.sequence == rmi.FIRST_SEQUENCE:
+                if answer.error:
+                    return self._give_up(_refused(answer), now_s)
+                self._phase, self._motion = _Phase.ENDING, None
+                return self._abort(now_s)
+            case rmi.ABORT if self._abort_open:
+                return self._on_aborted(answer, now_s)
+            case rmi.SYSTEM_FAULT if self._phase in _OPEN_MOTION:
+                return self._give_up(codes.FANUC_SYSTEM_FAULT(), now_s)
+            case rmi.DISCONNECT if self._line is _Line.LEAVING:
+                self._line = _Line.CLOSED
+                self._due.pop("leave", None)
+                return (Close(SESSION),)
+        return ()
+
+    def _on_initialized(self, answer: Answer, now_s: float) -> Effects:
+        self._initialize_open = False
+        self._due.pop("initialize", None)
+        if self._phase is not _Phase.INITIALIZING:
+            # Stopped during the initialization: an earlier abort has not ended this program.
+            return () if self._abort_open else self._abort(now_s)
+        if answer.error:
+            return self._give_up(_refused(answer), now_s)
+        assert self._motion is not None
+        if (problem := self._problem(now_s, self._motion)) is not None:
+            return self._give_up(problem, now_s)
+        if now_s - min(self._positions_s, self._status_s) > _BLIND_S:
+            return self._give_up(codes.FANUC_STATE_OLD(), now_s)
+        if self._positions is None or _moved(self._positions, self._motion.start):
+            return self._give_up(codes.FANUC_MOVED_BEFORE(), now_s)
+        if (extra := self._extra_axes()) is not None:
+            return self._give_up(extra, now_s)
+        self._phase, self._sent_s = _Phase.MOVING, now_s
+        return (Send(SESSION, self._motion.instruction),)
+
+    def _on_aborted(self, answer: Answer, now_s: float) -> Effects:
+        self._abort_open = False
+        self._due.pop("abort", None)
+        if answer.error == rmi.WAIT_FOR_COMMAND:
+            self._due["again"] = now_s + _AGAIN_S
+            return ()
+        if answer.error and answer.error not in rmi.NOT_RUNNING:
+            self._due["again"] = now_s + _LEAVE_S
+            text = f"the controller has not ended RMI_MOVE: {answer.problem}"
+            return (Report([AlarmReceived(Severity.ERROR, text)], 0),)
+        if not self._initialize_open:
+            self._phase, self._stop_owed = _Phase.NONE, False
+        return ()
+
+    def _unanswered(self, now_s: float, *, late: bool) -> Effects:
+        if late:
+            self._due["initialize" if self._initialize_open else "abort"] = now_s + _LATE_S
+            return ()
+        why = codes.FANUC_NO_ANSWER(name=rmi.INITIALIZE)
+        fate = (FateUnknown(why),) if self._phase is _Phase.INITIALIZING else ()
+        self._phase = _Phase.STOPPING
+        # A new session, in which the abort that is owed can be sent.
+        return (*self._leave(SESSION, "it does not answer", now_s), *fate)
+
+    # ------------------------------------------------------------------------- motion
+
+    def _report(self, asked: Asked[Question], answer: Packet, packet: bytes, now_s: float) -> Report:
+        """Store the state, and report an idle arm only after proof of rest."""
+        report = super()._report(asked, answer, packet, now_s)
+        return replace(report, events=[self._noted(each, asked.at_s, now_s) for each in report.events])
+
+    def _noted(self, event: ControllerEvent, asked_s: float, now_s: float) -> ControllerEvent:
+        match event:
+            case JointsReceived(positions):
+                self._positions, self._positions_s = positions, now_s
+                if self._still is None or _moved(positions, self._still[0]):
+                    self._still = positions, now_s
+            case SignalsReceived(values):
+                self._tool = next((value for signal, value in values if signal == _TOOL), self._tool)
+            case StatusReceived():
+                self._status, self._status_s, self._asked_s = event, now_s, asked_s
+                still = self._still is not None and now_s - self._still[1] >= _STILL_S
+                ended = self._phase in (_Phase.NONE, _Phase.STOPPING)
+                at_rest = ended and event.activity is not Activity.MOVING
+                self._rests_after_stop = self._rests_after_stop or (at_rest and still)
+                if event.activity is Activity.IDLE and not (at_rest and self._rests_after_stop):
+                    return replace(event, activity=Activity.MOVING)
+        return event
+
+    def _follow(self, now_s: float) -> Effects:
+        """Check the open motion against the newest state; abort it after an error."""
+        if self._phase not in _OPEN_MOTION or self._motion is None:
+            return ()
+        problem = self._problem(now_s, self._motion)
+        return () if problem is None else self._give_up(problem, now_s)
+
+    def _problem(self, now_s: float, motion: _Motion) -> Reason | None:
+        """Return the reason to abort the open motion; None: there is no reason."""
+        status = self._status
+        if status is None:
+            return codes.FANUC_STATE_OLD()
+        if status.activity not in (Activity.IDLE, Activity.MOVING):
+            return codes.FANUC_ARM_STOPPED(
+                activity="unknown" if status.activity is None else status.activity.value
+            )
+        if status.mode is not Mode.REMOTE:
+            return codes.FANUC_WENT_LOCAL()
+        if self._tool != motion.tool:
+            return codes.FANUC_TOOL_CHANGED()
+        if self._phase is _Phase.MOVING:
+            if status.activity is Activity.IDLE and self._asked_s > self._sent_s + _ENDED_S:
+                return codes.FANUC_LOST_PROGRAM()
+            since_s = max(self._sent_s, self._still[1] if self._still else self._sent_s)
+            if now_s - since_s > SILENT_S:
+                return codes.FANUC_NO_ANSWER(name=rmi.JOINT_MOTION)
+        return None
+
+    def _watch(self, now_s: float, *, late: bool) -> Effects:
+        self._due["watch"] = now_s + _WATCH_S
+        if now_s - min(self._positions_s, self._status_s) > _BLIND_S and not late:
+            return self._give_up(codes.FANUC_STATE_OLD(), now_s)
+        return ()
+
+    def _give_up(self, why: Reason, now_s: float) -> Effects:
+        """End the motion, and have a stop latched."""
+        return (*self._end(now_s), FateUnknown(why))
+
+    def _end(self, now_s: float) -> Effects:
+        """Abort the program of the gateway."""
+        at_rest = self._status is not None and self._status.activity is Activity.IDLE
+        if self._phase is not _Phase.NONE or not at_rest:
+            self._must_rest()
+        self._motion = None
+        self._due.pop("watch", None)
+        if self._line is not _Line.OPEN:
+            return ()
+        self._phase = _Phase.STOPPING
+        return () if self._abort_open else self._abort(now_s)
+
+    def _must_rest(self) -> None:
+        """Report a moving arm until it has rested from now on: the motion may still begin."""
+        self._rests_after_stop, self._still = False, None
+
+    def _abort(self, now_s: float) -> Effects:
+        self._abort_open = True
+        self._due["abort"] = now_s + ANSWER_S
+        self._due.pop("again", None)
+        return (Send(SESSION, rmi.abort()),)
+
+    # ----------------------------------------------------------------------- commands
+
+    def encode(self, *commands: ControllerCommand) -> bytes:
+        """Encode commands; at most one motion, as the last one.
+
+        Raises:
+            CommandError: If they cannot be expressed.
+        """
+        return encode_words(commands, len(self._axes.used))
+
+    def command(self, encoded: bytes, now_s: float) -> Effects:
+        """Send what `encode` returned.
+
+        Raises:
+            NotReadyError: If a motion cannot be sent now.
+        """
+        effects: list[Effect] = []
+        percent, resets = self._percent, False
+        for word, value in words_of(encoded):
+            match word:
+                case "stop":
+                    effects += self._stop_arm(now_s)
+                case "speed":
+                    percent = value
+                case "move":
+                    effects += self._move(value, percent, now_s)
+                case "reset":
+                    resets = self._line is not _Line.OPEN
+        self._percent = percent
+        if resets:
+            # It clears the gateway's latch only, and cancels a stop that was not delivered: after the motion
+            # beside it, which may be refused.
+            self._stop_owed = False
+        return self._due.with_timer((*effects, *self._settle(now_s)))
+
+    def _stop_arm(self, now_s: float) -> Effects:
+        """Abort the motion immediately."""
+        sent = self._end(now_s)
+        if self._line is _Line.OPEN:
+            return sent
+        self._stop_owed = True
+        # It fails: the stop is sent again as soon as the session is connected.
+        return (*self._settle(now_s), Send(SESSION, rmi.abort()))
+
+    def _move(self, target: Sequence[float], percent: float, now_s: float) -> Effects:
+        if (obstacle := self._obstacle(now_s)) is not None:
+            raise NotReadyError(obstacle)
+        assert self._positions is not None
+        speed = max(1, int(self._settings.speed_percent * percent / 100.0))
+        axes = self._axes.values(np.array(target))
+        instruction = rmi.joint_motion(rmi.FIRST_SEQUENCE, axes, percent=speed)
+        self._motion = _Motion(instruction, self._positions, self._tool)
+        self._phase, self._initialize_open = _Phase.INITIALIZING, True
+        self._due |= {"initialize": now_s + ANSWER_S, "watch": now_s + _WATCH_S}
+        return (Send(SESSION, rmi.initialize(self._settings.group)),)
+
+    def _obstacle(self, now_s: float) -> Reason | None:
+        """Return the reason to refuse a motion; None: it can be sent."""
+        status = self._status
+        if self._phase is not _Phase.NONE:
+            return codes.FANUC_MOVES()
+        if status is None or self._positions is None:
+            return codes.FANUC_STATE_OLD()
+        if now_s - min(self._positions_s, self._status_s) > _STATE_VALID_S:
+            return codes.FANUC_STATE_OLD()
+        match status.mode:
+            case None:
+                return codes.CONTROLLER_MODE_UNKNOWN()
+            case Mode.LOCAL:
+                return codes.CONTROLLER_LOCAL()
+        if status.activity is Activity.MOVING:
+            return codes.FANUC_OTHER_PROGRAM()
+        if status.activity is not Activity.IDLE:
+            return codes.FANUC_ARM_STOPPED(
+                activity="unknown" if status.activity is None else status.activity.value
+            )
+        if (extra := self._extra_axes()) is not None:
+            return extra
+        return None if self._line is _Line.OPEN else codes.FANUC_NOT_CONNECTED()
+
+    def _extra_axes(self) -> Reason | None:
+        """Return the refusal of a motion that would move other axes too; None: there are none.
+
+        The instruction has a value for each axis.
+        """
+        extra = ", ".join(map(str, self._other_than_joints(self._axes_read)))
+        return codes.FANUC_EXTRA_AXES(axes=extra) if extra else None
+
+
+def _refused(answer: Answer) -> Reason:
+    return codes.FANUC_REFUSED(name=answer.name, problem=answer.problem)
+
+
+def _moved(here: Sequence[float], there: Sequence[float]) -> bool:
+    return any(abs(a - b) > _STILL_RAD for a, b in zip(here, there, strict=True))
+
+
+def fanuc_driver(joint_types: Sequence[JointType], codes: Mapping[int, str], **given: Any) -> SnpxDriver:
+    """Create the driver that only reads, unless the site file declares motion."""
+    options = given["options"]
+    moves = isinstance(options, FanucSettings) and options.motion
+    return (FanucMotionDriver if moves else SnpxDriver)(joint_types, codes, **given)

@@ -1,0 +1,1 @@
+"""What simulated controllers share: faults, their schedule and requests, and the demo."""

@@ -1,0 +1,10 @@
+"""The gateway's own unit protocol, and its simulated controller."""
+
+from protocol_gateway.seam.kind import Kind
+
+UNIT = Kind(
+    driver="protocol_gateway.unit_driver:UnitDriver",
+    key="",
+    probe="controllers.unit.probe:UNIT",
+    simulated="controllers.unit.simulated.start:UNIT",
+)

@@ -1,0 +1,650 @@
+"""Driver that also moves the arm: one motion to absolute pulses at a time, and HOLD as the stop.
+
+    channel   carries   sent
+    -------   -------   ------------------------------------------------------------------
+    hses      reading   the questions of the driver that only reads; HOLD, as a second way
+    stop      stop      HOLD; the status ten times a second
+    motion    motion    the motions
+
+All are sockets to the same port, so each has its own numbers and answers. UDP loses, doubles and delays:
+
+- A question is repeated, and so is HOLD until the status shows it.
+- A motion is sent once. Without an answer its fate is read from the status and the positions. If they do not
+  show it, or show anything else than the motion, the driver sets HOLD and the gateway latches a stop. A
+  controller on HOLD refuses a motion that arrives late.
+- The end of HOLD is sent once, by RESET, and only if nothing of the gateway's can go on then. Whether a held
+  motion does is not known, so HOLD ends over one only while the servos are off.
+"""
+
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from controllers.yaskawa import commands
+from controllers.yaskawa import data as payloads
+from controllers.yaskawa.axes import YaskawaSettings, instance_of
+from controllers.yaskawa.data import HELD, Position, Status, Status1, Status2
+from controllers.yaskawa.driver import HSES, STATUS, HsesDriver, mode_of
+from controllers.yaskawa.hses import Answer, Read, decode
+from protocol_gateway.errors import GatewaySettingsError, NotReadyError
+from protocol_gateway.seam import (
+    Activity,
+    AlarmReceived,
+    Capabilities,
+    Carries,
+    Channel,
+    Close,
+    ControllerCommand,
+    ControllerEvent,
+    Effect,
+    Effects,
+    FateUnknown,
+    JointsReceived,
+    Mode,
+    MoveAbsolute,
+    Open,
+    Refused,
+    Report,
+    Reset,
+    Send,
+    Severity,
+    SoftwareReceived,
+    Speed,
+    StatusReceived,
+    Stop,
+    StopEnds,
+)
+from protocol_gateway.seam.one_motion import FIRST_PERCENT, Timers, encode_words, words_of
+from protocol_gateway.seam.polling import Polling, Regular
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+from robots.joints import JointType
+
+STOP = Channel(name="stop", carries=Carries.STOP, datagrams=True)
+MOTION = Channel(name="motion", carries=Carries.MOTION, datagrams=True)
+STOP_MEANS = "HOLD, kept until RESET"
+
+START_S = 1.0
+"""Time within which a motion must be seen to have started."""
+STILL_S = 0.5
+_STATUS_S = 0.1
+_FRESH_S = 0.6
+_BLIND_S = 1.0
+_REPEAT_S = 0.2
+_REFUSED_S = 1.0
+_REOPEN_S = 1.0
+_ENDED_S = 0.5
+_OTHERS_S = 1.0
+_BASE_EACH_S = 2.0
+_STILL = {JointType.ROTARY: 1e-3, JointType.PRISMATIC: 1e-4}
+_ARRIVED = {JointType.ROTARY: 2e-3, JointType.PRISMATIC: 2e-4}
+# Numbers of questions on the channel `stop` are below, those of HOLD are from here.
+_FIRST_HOLD = 128
+_NUMBERS = 256
+_NO_SUCH_GROUP, _NO_SUCH_GROUP_ADDED = 0x28, frozenset({0xA001, 0xB008})
+_LAST_TOOL = 63
+
+
+@dataclass
+class _Motion:
+    """A motion that was sent, until it has ended or was given up.
+
+    Attributes:
+        answered: The controller has accepted it.
+        refused: The controller has refused it, or a copy of it.
+        started: It was seen to run, or the arm to move.
+        quiet_s: Since then no motion runs; None: one runs.
+        arrived_s: Since then the arm is at the target; None: it is not.
+    """
+
+    number: int
+    sent_s: float
+    start: tuple[float, ...]
+    target: tuple[float, ...]
+    tool: int
+    answered: bool = False
+    refused: Refused | None = None
+    refused_s: float = 0.0
+    started: bool = False
+    quiet_s: float | None = None
+    arrived_s: float | None = None
+
+
+class HsesMotionDriver(HsesDriver):
+    """Driver of HSES that moves a robot.
+
+    Raises:
+        GatewaySettingsError: As `HsesDriver`; or if the settings do not say how to move the robot.
+    """
+
+    def __init__(
+        self,
+        joint_types: Sequence[JointType],
+        codes: Mapping[int, str],
+        *,
+        relay: Callable[[bytes, bool, Hashable], None] | None = None,
+        options: object = None,
+    ) -> None:
+        assert isinstance(options, YaskawaSettings)
+        super().__init__(joint_types, codes, relay=relay, options=options)
+        if self._axes is None:
+            raise GatewaySettingsError("yaskawa motion needs pulses_per_degree")
+        if options.group[0] != "R":
+            text = f"yaskawa motion: a robot, R1 to R8, can be moved, not {options.group}"
+            raise GatewaySettingsError(text)
+        self._robot = instance_of(options.group)
+        self._still_by = tuple(_STILL[each] for each in joint_types)
+        self._arrived_by = tuple(_ARRIVED[each] for each in joint_types)
+        reading = self.capabilities
+        self.capabilities = Capabilities(
+            commands=frozenset({MoveAbsolute, Speed, Stop, Reset}),
+            first_speed_percent=FIRST_PERCENT,
+            absolute=True,
+            dies_with_link=False,
+            no_joints=reading.no_joints,
+            reports_pose=reading.reports_pose,
+            joint_mapping=reading.joint_mapping,
+            experimental=True,
+            stop_means=STOP_MEANS,
+        )
+        # With the status, HOLD on both channels until it is seen, and the question for a base.
+        self.requests_a_second += 1.0 / _STATUS_S + 2.0 / _REPEAT_S + 2.0
+        self._forget()
+
+    def _forget(self) -> None:
+        self._opened: set[str] = set()
+        self._due = Timers("read")
+        self._stop_polling: Polling[Read] = Polling((), ())
+        self._number = 0
+        self._hold_number = _FIRST_HOLD
+        self._hold_sent_s = self._release_sent_s = float("-inf")
+        self._refused_hold = ""
+        self._state: Status | None = None
+        self._state_s = self._answered_s = float("-inf")
+        self._place: Position | None = None
+        self._joint_positions: tuple[float, ...] = ()
+        self._place_s = float("-inf")
+        self._still_since: tuple[tuple[float, ...], float] | None = None
+        self._motion: _Motion | None = None
+        self._percent = FIRST_PERCENT
+        self._has_base: bool | None = None
+        # HOLD is wanted; it was set by this driver; something of the gateway's may go on when it ends.
+        self._wants_hold = self._set_hold = False
+        self._unfinished = True
+        self._rests_after_stop = True
+        # Software of the controller; whether that behind the present socket is known to be the same.
+        self._software = ""
+        self._same = True
+
+    # ------------------------------------------------------------------- channels
+
+    def started(self, now_s: float) -> Effects:
+        """Open the sockets."""
+        self._forget()
+        return self._due.with_timer((*super().started(now_s), Open(STOP), Open(MOTION)))
+
+    def controlled(self, taken: bool, now_s: float) -> Effects:
+        """Begin with a low speed."""
+        self._percent = FIRST_PERCENT
+        return ()
+
+    def opened(self, channel: Channel, now_s: float) -> Effects:
+        """Begin to ask."""
+        self._opened.add(channel.name)
+        if channel is HSES:
+            self._same = not self._software
+            return self._due.with_timer(super().opened(channel, now_s))
+        if channel is STOP:
+            self._has_base = None
+            regular = [Regular(STATUS, _STATUS_S), Regular(self._base_axes, _BASE_EACH_S)]
+            self._stop_polling = Polling(regular, (STATUS, self._base_axes), numbers=_FIRST_HOLD)
+            self._answered_s = now_s
+            self._due["blind"] = now_s + _BLIND_S
+            effects: list[Effect] = [*self._ask(now_s)]
+            return self._due.with_timer(effects)
+        return self._due.with_timer(())
+
+    def closed(self, channel: Channel, now_s: float) -> Effects:
+        """Give a motion up that needs the connection."""
+        effects: list[Effect] = [*super().closed(channel, now_s)] if channel is HSES else []
+        if channel.name in self._opened:
+            self._opened.discard(channel.name)
+            effects += self._lost(channel, now_s)
+        return self._due.with_timer(effects)
+
+    def _lost(self, channel: Channel, now_s: float) -> Effects:
+        if channel is HSES:
+            # The next connection may reach another controller, where no speed was set.
+            self._percent, self._place, self._joint_positions = FIRST_PERCENT, None, ()
+            self._still_since = None
+        if channel is STOP:
+            self._stop_polling, self._state = Polling((), ()), None
+            self._due.pop("blind", None)
+            self._due.pop("ask", None)
+        if self._motion is None:
+            return ()
+        return self._give_up(codes.HSES_CHANNEL_LOST(name=channel.name), now_s)
+
+    def skipped(self, channel: Channel, now_s: float) -> Effects:
+        """Go on: each datagram is whole."""
+        return self._due.with_timer(super().skipped(channel, now_s) if channel is HSES else ())
+
+    def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
+        """Take an answer."""
+        if channel is HSES:
+            return self._due.with_timer(super().received(channel, data, now_s))
+        try:
+            answer = decode(data)
+        except ValueError:
+            return ()
+        if channel is MOTION:
+            return self._due.with_timer(self._motion_answered(answer, now_s))
+        return self._due.with_timer(self._stop_answered(answer, now_s))
+
+    def timer_ended(self, now_s: float) -> Effects:
+        """Ask, repeat HOLD, and look for what has not happened."""
+        effects: list[Effect] = []
+        ended = self._due.ended(now_s)
+        if "hold" in ended:
+            effects += self._keep_hold(now_s)
+        if "ask" in ended and STOP.name in self._opened:
+            effects += self._ask(now_s)
+        if "blind" in ended and STOP.name in self._opened:
+            effects += self._look(now_s)
+        if "reopen" in ended:
+            effects.append(Open(STOP))
+        if "read" in ended:
+            effects += super().timer_ended(now_s)
+        return self._due.with_timer(effects)
+
+    # ------------------------------------------------------------ the channel of the stop
+
+    def _ask(self, now_s: float) -> Effects:
+        before = self._stop_polling.asked
+        asked = self._stop_polling.next_question(now_s)
+        wake_s = self._stop_polling.wake_s()
+        if wake_s is not None:
+            self._due["ask"] = wake_s
+        if asked is None or asked is before:
+            return ()
+        return (Send(STOP, asked.read.encode(asked.number)),)
+
+    def _look(self, now_s: float) -> Effects:
+        """Open the socket of the stop again if nothing answers on it."""
+        if now_s - self._answered_s < _BLIND_S:
+            self._due["blind"] = self._answered_s + _BLIND_S
+            return ()
+        self._opened.discard(STOP.name)
+        self._due["reopen"] = now_s + _REOPEN_S
+        return (*self._lost(STOP, now_s), Close(STOP, "nothing answers"))
+
+    def _stop_answered(self, answer: Answer, now_s: float) -> Effects:
+        if answer.service == commands.WRITE_SINGLE:
+            return self._hold_answered(answer, now_s)
+        asked = self._stop_polling.take(answer, now_s)
+        effects: list[Effect] = []
+        if asked is not None and asked.read == STATUS and not answer.status:
+            try:
+                status = payloads.status(answer.data)
+            except ValueError:
+                return self._ask(now_s)
+            effects += self._status_seen(status, asked.at_s, now_s)
+        elif asked is not None and asked.read == self._base_axes:
+            self._base_answered(answer)
+        return (*effects, *self._ask(now_s))
+
+    def _base_answered(self, answer: Answer) -> None:
+        """Note whether the robot has a base, which a motion of the robot would move as well."""
+        if answer.busy:
+            return
+        if answer.status:
+            absent = answer.status == _NO_SUCH_GROUP or answer.added_status in _NO_SUCH_GROUP_ADDED
+            self._has_base = False if absent else None
+            return
+        try:
+            self._has_base = any(payloads.axis_names(answer.data))
+        except ValueError:
+            self._has_base = None
+
+    def _hold_answered(self, answer: Answer, now_s: float) -> Effects:
+        """Report once that HOLD, or its end, was refused."""
+        if answer.number != self._hold_number or not answer.status or answer.busy:
+            return ()
+        if self._wants_hold:
+            self._due["hold"] = now_s + _REFUSED_S
+        if self._refused_hold == answer.error:
+            return ()
+        self._refused_hold = answer.error
+        what = "HOLD" if self._wants_hold else "the end of HOLD"
+        text = f"the controller refuses {what}: {answer.error}"
+        return (Report([AlarmReceived(Severity.ERROR, text, f"{answer.added_status:04X}")], 0),)
+
+    # ------------------------------------------------------------------------ HOLD
+
+    def _hold(self, now_s: float, *, on: bool) -> list[Effect]:
+        """Return the effects that send HOLD or its end now."""
+        self._hold_number = max((self._hold_number + 1) % _NUMBERS, _FIRST_HOLD)
+        datagram = commands.hold(self._hold_number, on=on)
+        if not on:
+            self._release_sent_s = now_s
+            return [Send(STOP, datagram)]
+        self._hold_sent_s = now_s
+        self._due["hold"] = now_s + _REPEAT_S
+        effects: list[Effect] = [Send(STOP, datagram, alternative=True)]
+        if HSES.name in self._opened:
+            effects.append(Send(HSES, datagram, alternative=True))
+        return effects
+
+    def stop_ends_now(self, now_s: float) -> StopEnds | None:
+        """Return whose motion HOLD ends: a job's, too; controllers refuse it unless they are in remote."""
+        if self._state is None or mode_of(self._state) is not Mode.REMOTE:
+            return None
+        return StopEnds.ANY
+
+    def _keep_hold(self, now_s: float) -> list[Effect]:
+        """Send HOLD again unless the controller is known to be on HOLD, or in local control."""
+        if not self._wants_hold:
+            return []
+        self._due["hold"] = now_s + _REPEAT_S
+        if not self._same:
+            # It may be another controller, for which no stop was proven.
+            return []
+        if self._fresh(now_s) and self._state is not None and self._state_s >= self._hold_sent_s:
+            if self._state.second & Status2.HELD_BY_COMMAND:
+                return []
+            if self._refused_hold and mode_of(self._state) is not Mode.REMOTE:
+                return []
+        return self._hold(now_s, on=True) if self._opened & {STOP.name, HSES.name} else []
+
+    def _fresh(self, now_s: float) -> bool:
+        """Return whether the newest status is new enough to act on."""
+        return self._state is not None and now_s - self._state_s < _FRESH_S
+
+    # ---------------------------------------------------------------------- motion
+
+    def _status_seen(self, status: Status, asked_s: float, now_s: float) -> Effects:
+        """Follow the motion by a status that was asked for at a time."""
+        self._state, self._state_s, self._answered_s = status, asked_s, now_s
+        running, held = status.first & Status1.RUNNING, status.second & HELD
+        if status.second & Status2.HELD_BY_COMMAND:
+            self._refused_hold = ""
+        if self._motion is not None:
+            return self._follow(self._motion, status, asked_s, now_s)
+        settled = asked_s > max(self._release_sent_s, self._hold_sent_s)
+        if settled and not running and not held and not self._wants_hold:
+            self._unfinished = self._set_hold = False
+        return ()
+
+    def _follow(self, motion: _Motion, status: Status, asked_s: float, now_s: float) -> Effects:
+        if asked_s < motion.sent_s:
+            return ()
+        running = bool(status.first & Status1.RUNNING)
+        known = self._place_s > motion.sent_s
+        moved = known and not _near(self._joint_positions, motion.start, self._arrived_by)
+        if motion.refused is not None and not (motion.answered or motion.started or running or moved):
+            if min(asked_s, self._place_s) <= motion.refused_s:
+                return ()
+            self._motion = None
+            return (Report([motion.refused], 0),)
+        if (problem := _stopped(status)) is not None:
+            return self._give_up(problem, now_s)
+        if status.second & HELD:
+            return self._give_up(codes.HSES_HELD(), now_s)
+        if mode_of(status) is not Mode.REMOTE:
+            return self._give_up(codes.HSES_WENT_LOCAL(), now_s)
+        if now_s - self._place_s > _BLIND_S:
+            return self._give_up(codes.HSES_STATE_OLD(), now_s)
+        if self._place is not None and self._place.tool != motion.tool:
+            return self._give_up(codes.HSES_TOOL_CHANGED(), now_s)
+        arrived = known and _near(self._joint_positions, motion.target, self._arrived_by)
+        if not arrived:
+            motion.arrived_s = None
+        elif motion.arrived_s is None:
+            motion.arrived_s = now_s
+        if running:
+            motion.started, motion.quiet_s = True, None
+            if motion.arrived_s is not None and now_s - motion.arrived_s > _OTHERS_S:
+                return self._give_up(codes.HSES_OTHER_JOB(), now_s)
+            return ()
+        motion.started = motion.started or moved
+        motion.quiet_s = now_s if motion.quiet_s is None else motion.quiet_s
+        if arrived and (motion.answered or motion.started):
+            self._motion, self._unfinished = None, False
+            return ()
+        if motion.started and now_s - motion.quiet_s >= _ENDED_S:
+            return self._give_up(codes.HSES_ENDED_ELSEWHERE(), now_s)
+        if not motion.started and now_s - motion.sent_s >= START_S:
+            return self._give_up(codes.HSES_NOT_STARTED(seconds=START_S), now_s)
+        return ()
+
+    def _motion_answered(self, answer: Answer, now_s: float) -> Effects:
+        motion = self._motion
+        late = motion is None or motion.number != answer.number or motion.answered
+        if motion is None or late or answer.service != commands.WRITE_ALL:
+            return ()
+        if not answer.status:
+            motion.answered = True
+            return ()
+        # The next status decides: of a motion that the network doubled, the second is refused, and answers
+        # may overtake each other.
+        motion.refused, motion.refused_s = Refused(answer.added_status or answer.status, answer.error), now_s
+        return ()
+
+    def _give_up(self, why: Reason, now_s: float) -> Effects:
+        """Set HOLD, and have a stop latched."""
+        # The arm may have moved since the newest position.
+        self._still_since = None
+        self._stop_now()
+        return (*self._hold(now_s, on=True), FateUnknown(why))
+
+    def _stop_now(self) -> None:
+        self._motion = None
+        self._wants_hold = self._set_hold = True
+        self._rests_after_stop = False
+        self._refused_hold = ""
+
+    # ----------------------------------------------------------------------- answers
+
+    def _status(self, status: Status, now_s: float) -> list[ControllerEvent]:
+        return [
+            self._proven(each, now_s) if isinstance(each, StatusReceived) else each
+            for each in super()._status(status, now_s)
+        ]
+
+    def _proven(self, status: StatusReceived, now_s: float) -> StatusReceived:
+        """Return a status that says "moves" after a stop until every joint was still for STILL_S."""
+        runs = self._state is not None and self._state.first & Status1.RUNNING
+        if status.activity is Activity.IDLE and (runs or self._motion is not None):
+            # Of two statuses on two sockets, the later one may be the older one.
+            return replace(status, activity=Activity.MOVING)
+        if self._rests_after_stop or status.activity in (None, Activity.MOVING):
+            return status
+        since = self._still_since
+        # Up to the newest position, because later motion is unknown.
+        if since is not None and self._place_s - since[1] >= STILL_S and now_s - self._place_s < _FRESH_S:
+            self._rests_after_stop = True
+            return status
+        return replace(status, activity=Activity.MOVING)
+
+    def _on_system(self, system: payloads.System) -> list[ControllerEvent]:
+        events = super()._on_system(system)
+        for each in events:
+            if isinstance(each, SoftwareReceived):
+                if self._software not in ("", each.version):
+                    self._wants_hold = self._set_hold = False
+                self._software, self._same = each.version, True
+        return events
+
+    def _joints(self, position: Position, now_s: float) -> list[ControllerEvent]:
+        events = super()._joints(position, now_s)
+        for each in events:
+            if isinstance(each, JointsReceived):
+                self._place, self._joint_positions, self._place_s = position, each.positions, now_s
+                if self._still_since is None or not _near(
+                    each.positions, self._still_since[0], self._still_by
+                ):
+                    self._still_since = each.positions, now_s
+        return events
+
+    # ---------------------------------------------------------------------- commands
+
+    def encode(self, *commands: ControllerCommand) -> bytes:
+        """Encode commands; at most one motion, as the last one.
+
+        Raises:
+            CommandError: If they cannot be expressed.
+        """
+        return encode_words(commands, len(self._arrived_by))
+
+    def command(self, encoded: bytes, now_s: float) -> Effects:
+        """Send what `encode` returned.
+
+        Raises:
+            NotReadyError: If a motion cannot be sent now, or HOLD cannot end now.
+        """
+        effects: list[Effect] = []
+        percent = self._percent
+        words = words_of(encoded)
+        # Raise every refusal before the state changes: all commands are sent, or none.
+        names = {word for word, _ in words}
+        if "reset" in names and (obstacle := self._reset_obstacle(now_s)) is not None:
+            raise NotReadyError(obstacle)
+        if "move" in names and (obstacle := self._obstacle(now_s, resets="reset" in names)) is not None:
+            raise NotReadyError(obstacle)
+        targets = [self._pulses(value) for word, value in words if word == "move"]
+        for word, value in words:
+            match word:
+                case "stop":
+                    effects += self._stop(now_s)
+                case "reset":
+                    effects += self._reset(now_s)
+                case "speed":
+                    percent = value
+                case "move":
+                    effects += self._move(value, targets[0], percent, now_s)
+        self._percent = percent
+        return self._due.with_timer(effects)
+
+    def _stop(self, now_s: float) -> Effects:
+        if self._motion is not None or not self._at_rest(now_s):
+            self._unfinished = True
+            self._still_since = None
+        self._stop_now()
+        return self._hold(now_s, on=True)
+
+    def _at_rest(self, now_s: float) -> bool:
+        """Return whether nothing runs and nothing is held, except by a stop before."""
+        if not self._fresh(now_s) or self._state is None:
+            return False
+        ours = self._set_hold and not self._unfinished
+        held = self._state.second & HELD and not ours
+        return not self._state.first & Status1.RUNNING and not held
+
+    def _reset_obstacle(self, now_s: float) -> Reason | None:
+        """Return why HOLD cannot end now: the state is not known, or something may go on; None: it can."""
+        if not self._wants_hold and not self._set_hold:
+            return None
+        state = self._state
+        if state is None or not self._fresh(now_s) or self._state_s < self._hold_sent_s:
+            return codes.HSES_STATE_OLD()
+        held = state.second & Status2.HELD_BY_COMMAND
+        if held and self._unfinished and state.second & Status2.SERVO_ON:
+            return codes.HSES_HELD_MOTION()
+        return None
+
+    def _reset(self, now_s: float) -> Effects:
+        """End HOLD if this driver has set it."""
+        if not self._wants_hold and not self._set_hold:
+            return ()
+        self._wants_hold = False
+        self._due.pop("hold", None)
+        if self._state is None or not self._state.second & Status2.HELD_BY_COMMAND:
+            self._set_hold = False
+            return ()
+        self._refused_hold = ""
+        return self._hold(now_s, on=False)
+
+    def _pulses(self, target: Sequence[float]) -> Sequence[int]:
+        """Return the pulses of a target.
+
+        Raises:
+            NotReadyError: If a motion cannot hold them.
+        """
+        assert self._axes is not None
+        pulses = self._axes.pulses(np.array(target, dtype=float))
+        if any(abs(each) > commands.LONGEST_NUMBER for each in pulses):
+            raise NotReadyError(codes.HSES_AXES(detail="the target has more pulses than a motion can hold"))
+        return pulses
+
+    def _move(self, target: Sequence[float], pulses: Sequence[int], percent: float, now_s: float) -> Effects:
+        assert self._place is not None
+        self._number = (self._number + 1) % _NUMBERS
+        tool = self._place.tool
+        self._motion = _Motion(self._number, now_s, self._joint_positions, tuple(target), tool)
+        self._unfinished = True
+        datagram = commands.motion(self._number, robot=self._robot, percent=percent, pulses=pulses, tool=tool)
+        return (Send(MOTION, datagram),)
+
+    def _obstacle(self, now_s: float, *, resets: bool) -> Reason | None:
+        """Return why no motion can be sent now; None: it can.
+
+        Args:
+            resets: A reset precedes it, so the driver itself does not want HOLD any longer.
+        """
+        missing = [each.name for each in (HSES, STOP, MOTION) if each.name not in self._opened]
+        if missing:
+            return codes.HSES_CHANNEL_MISSING(name=missing[0])
+        state, place = self._state, self._place
+        if state is None or place is None or not self._fresh(now_s) or now_s - self._place_s > _FRESH_S:
+            return codes.HSES_STATE_OLD()
+        if (extra := self._other_axes(place)) is not None:
+            return extra
+        if place.tool > _LAST_TOOL:
+            detail = f"the controller reports tool {place.tool}; 0 to {_LAST_TOOL} are right"
+            return codes.HSES_AXES(detail=detail)
+        if self._motion is not None:
+            return codes.HSES_MOVES()
+        if state.second & HELD or (self._wants_hold and not resets):
+            return codes.CONTROLLER_HOLDING()
+        if mode_of(state) is not Mode.REMOTE:
+            return codes.CONTROLLER_LOCAL()
+        if (stopped := _stopped(state)) is not None:
+            return stopped
+        return codes.HSES_OTHER_JOB() if state.first & Status1.RUNNING else None
+
+    def _other_axes(self, place: Position) -> Reason | None:
+        """Return why a motion may move, or leave out, an axis that is not the model's; None: it does not."""
+        assert self._axes is not None
+        if not self._names or self._has_base is None:
+            return codes.HSES_AXES(detail="which axes the controller has is not known yet")
+        if self._has_base:
+            return codes.HSES_AXES(detail=f"{self._group} has a base, which the motion would move too")
+        used = self._axes.used
+        named = [name for each, name in enumerate(self._names) if name and each not in used]
+        moved = [str(each + 1) for each, at in enumerate(place.axes) if at and each not in used]
+        if extra := ", ".join(named or moved):
+            return codes.HSES_AXES(detail=f"axis {extra} belongs to no joint of the model")
+        return None
+
+
+def _near(here: Sequence[float], there: Sequence[float], within: Sequence[float]) -> bool:
+    """Return whether all joints are near others."""
+    return all(abs(a - b) <= most for a, b, most in zip(here, there, within, strict=True))
+
+
+def _stopped(status: Status) -> Reason | None:
+    """Return why the controller does not let the arm move; None: it does."""
+    if status.second & (Status2.ALARM | Status2.ERROR):
+        return codes.HSES_ARM_STOPPED(state="an alarm or error is active")
+    if not status.second & Status2.SERVO_ON:
+        return codes.HSES_ARM_STOPPED(state="the servos are off")
+    return None
+
+
+def hses_driver(joint_types: Sequence[JointType], codes: Mapping[int, str], **given: Any) -> HsesDriver:
+    """Create the driver that only reads, unless the site file declares motion."""
+    options = given["options"]
+    moves = isinstance(options, YaskawaSettings) and options.motion
+    return (HsesMotionDriver if moves else HsesDriver)(joint_types, codes, **given)

@@ -1,1 +1,0 @@
-"""SNPX of FANUC's controllers (memory of a GE PLC over TCP), read only, without I/O."""

@@ -1,1 +1,0 @@
-"""Reading of OPC UA servers: a separate process uses the library, and the driver decodes its output."""

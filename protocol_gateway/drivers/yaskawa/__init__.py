@@ -1,1 +1,0 @@
-"""High-Speed Ethernet Server of Yaskawa's controllers (HSES), without I/O."""

@@ -1,0 +1,22 @@
+"""The commands of a driver that has none."""
+
+from protocol_gateway.errors import CommandError
+from protocol_gateway.seam.commands import ControllerCommand
+from protocol_gateway.seam.effects import Effects
+from robomesh import reason_codes
+
+
+class OnlyReads:
+    """Base of drivers that only read: they refuse to encode a command, and send none."""
+
+    def encode(self, *commands: ControllerCommand) -> bytes:
+        """Refuse: nothing is ever commanded.
+
+        Raises:
+            CommandError: Always.
+        """
+        raise CommandError(reason_codes.READS_ONLY())
+
+    def command(self, encoded: bytes, now_s: float) -> Effects:
+        """Send nothing."""
+        return ()
