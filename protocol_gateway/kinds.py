@@ -4,15 +4,18 @@ Both are entry points of the group `robomesh.drivers` (docs/controllers/own-driv
 a site uses are imported.
 """
 
+import logging
 import sys
 from collections.abc import Mapping
 from functools import cache, lru_cache, partial
 from importlib.metadata import EntryPoint, distribution, entry_points
-from typing import Any
+from typing import Any, cast
 
 from protocol_gateway.errors import GatewaySettingsError, ProtocolGatewayError
 from protocol_gateway.seam import Capabilities, Driver
 from protocol_gateway.seam.kind import DriverMaker, Kind
+
+logger = logging.getLogger(__name__)
 
 ENTRY_POINTS = "robomesh.drivers"
 
@@ -21,7 +24,9 @@ ENTRY_POINTS = "robomesh.drivers"
 def own_kinds() -> Mapping[str, Kind]:
     """Return robomesh's own kinds by protocol; an installation may leave out the folder of one."""
     kinds = {}
-    for each in distribution("robomesh").entry_points.select(group=ENTRY_POINTS):
+    found = distribution("robomesh").entry_points.select(group=ENTRY_POINTS)
+    # Installers order them differently; ours is first.
+    for each in sorted(found, key=lambda each: (each.name != "unit", each.name)):
         try:
             kinds[each.name] = each.load()
         except ModuleNotFoundError as error:
@@ -105,9 +110,17 @@ def _created(maker: DriverMaker, whose: str, *given: Any, **named: Any) -> Drive
     try:
         driver = maker(*given, **named)
         if isinstance(driver.capabilities, Capabilities):
-            return driver
+            return _with_new_names(driver, whose)
         raise TypeError("its capabilities have another type than Capabilities")
     except ProtocolGatewayError:
         raise
     except (Exception, SystemExit) as error:
         raise GatewaySettingsError(f"{whose} cannot be created: {error}") from error
+
+
+def _with_new_names(driver: Any, whose: str) -> Driver:
+    """Return a driver, with a warning and new names of its methods if it has old ones."""
+    if not hasattr(driver, "prepare"):
+        logger.warning("%s has encode, which is prepare now: docs/controllers/own-driver.md", whose)
+        driver.prepare = driver.encode
+    return cast("Driver", driver)

@@ -174,7 +174,7 @@ class Robot:
         self._audit = AuditLog(audit_path, on_written=self._on_written, rotate_bytes=rotate_bytes)
         self._audit_trail = AuditTrail(self._audit, self._journal)
         robot_authority = RobotAuthority(
-            self._persisted_authority(), joints, driver.encode, orphan=self._audit.state.mover
+            self._persisted_authority(), joints, driver.prepare, orphan=self._audit.state.mover
         )
         ports = Ports(
             audit_trail=self._audit_trail,

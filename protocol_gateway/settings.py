@@ -37,7 +37,7 @@ class RobotSettings:
         ports: Ports of the controller's other interfaces, where they are not the usual ones:
             {"primary": 30011}.
         protocol: Protocol of the controller, by its name in `protocol_gateway.kinds`.
-        options: Settings of the protocol's driver, such as `YaskawaSettings`; None: it has none.
+        options: Settings of the protocol's driver; None: it has none.
         codes: Type codes, where the controller sends numbers: {2: "ABSOLUTE.DEG", 101: "COMMAND:home"}.
         accept_unknown: States that the controller never reports and that are not required: "mode", "homed".
         simulated: The controller is a simulator of robomesh.

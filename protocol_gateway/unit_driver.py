@@ -147,8 +147,8 @@ class UnitDriver:
                     events.append(MalformedReceived(offset, text, reason))
         return Report(events, units, refusals)
 
-    def encode(self, *commands: ControllerCommand) -> bytes:
-        """Encode commands as one unit, a record each.
+    def prepare(self, *commands: ControllerCommand) -> bytes:
+        """Return commands as one unit, a record each.
 
         Raises:
             CommandError: If a command has the wrong joint count, or a number that is not finite.
@@ -158,9 +158,9 @@ class UnitDriver:
         except UnitFormatError as error:
             raise CommandError(codes.COMMAND_NOT_A_UNIT(detail=error)) from None
 
-    def command(self, encoded: bytes, now_s: float) -> Effects:
+    def command(self, prepared: bytes, now_s: float) -> Effects:
         """Send a unit."""
-        return (Send(UNITS, encoded),)
+        return (Send(UNITS, prepared),)
 
     # -------------------------------------------------------------- from the controller
 

@@ -6,7 +6,6 @@ from pathlib import Path
 # Module -> extra that brings it.
 EXTRAS = {
     "argon2": "keys",
-    "asyncua": "opcua",
     "av": "renderer",
     "cascadio": "step",
     "coal": "robots",
@@ -38,9 +37,14 @@ def is_missing(module: str) -> bool:
     return find_spec(module) is None
 
 
-def missing(module: str) -> str:
-    """Return a sentence on a missing module, with the command that installs it."""
-    return f"this needs the package {module}, which is not installed: {install_command(EXTRAS[module])}"
+def missing(module: str, extra: str = "") -> str:
+    """Return a sentence on a missing module, with the command that installs it.
+
+    Args:
+        extra: The extra that brings it; empty: as in the table.
+    """
+    command = install_command(extra or EXTRAS[module])
+    return f"this needs the package {module}, which is not installed: {command}"
 
 
 def install_command(extra: str) -> str:

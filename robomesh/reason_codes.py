@@ -484,94 +484,6 @@ STOP_WOULD_NOT_ARRIVE = Code(
     "a stop could not be sent now, because its connection to the controller is missing",
     "restore the connection that the event link.channel_lost names",
 )
-UR_NOT_STARTED = Code(
-    "universal_robots.not_started", "the controller has not started its program within {seconds:g} s"
-)
-UR_OTHER_PROGRAM = Code(
-    "universal_robots.other_program",
-    "another program runs or waits on the controller",
-    "end it at the controller",
-)
-UR_LOST_PROGRAM = Code(
-    "universal_robots.lost_program", "the program that runs on the controller is not the gateway's"
-)
-UR_PAUSED = Code("universal_robots.paused", "its program was paused")
-UR_ARM_STOPPED = Code("universal_robots.arm_stopped", "the controller has stopped the arm ({mode})")
-UR_TOOL_CHANGED = Code("universal_robots.tool_changed", "tool or payload were changed during a motion")
-UR_WENT_LOCAL = Code("universal_robots.went_local", "the controller was switched to local control")
-UR_CHANNEL_LOST = Code("universal_robots.channel_lost", "the connection {name} was lost during a motion")
-UR_STATE_OLD = Code("universal_robots.state_old", "the newest state of the controller is too old")
-UR_MOVES = Code("universal_robots.moves", "a motion still runs", "wait for its end, or stop the robot")
-UR_CHANNEL_MISSING = Code(
-    "universal_robots.channel_missing",
-    "the connection {name} to the controller is missing",
-    "the event link.channel_lost says why",
-)
-UR_SOFTWARE = Code(
-    "universal_robots.software",
-    "motion needs PolyScope 5.6 or a later version 5, this is {version}",
-    "move the robot from its own panel",
-)
-UR_STOP_YOUNG = Code(
-    "universal_robots.stop_young",
-    "the protective stop is seen for {seen:.1f} s only; it can be unlocked after {seconds:g} s",
-    "find its cause first",
-)
-UR_NOT_NOW = Code(
-    "universal_robots.recovery_not_now",
-    "{recovery} does not fit the controller's state (safety mode {safety}, robot mode {robot})",
-)
-UR_RECOVERS = Code(
-    "universal_robots.recovers", "the controller has not answered {recovery} yet", "wait for its answer"
-)
-UR_REGISTER = Code(
-    "universal_robots.register",
-    "{name} cannot be used: {problem}",
-    "choose other registers in the site file (universal_robots)",
-)
-HSES_NOT_STARTED = Code("hses.not_started", "the controller has not started it within {seconds:g} s")
-HSES_OTHER_JOB = Code("hses.other_job", "a job runs on the controller", "end it at the controller")
-HSES_ENDED_ELSEWHERE = Code("hses.ended_elsewhere", "it has ended before its target")
-HSES_HELD = Code("hses.held", "it was held")
-HSES_ARM_STOPPED = Code("hses.arm_stopped", "the controller lets no arm move: {state}")
-HSES_TOOL_CHANGED = Code("hses.tool_changed", "the tool was changed during a motion")
-HSES_WENT_LOCAL = Code("hses.went_local", "the controller was switched to local control")
-HSES_CHANNEL_LOST = Code("hses.channel_lost", "the connection {name} was lost during a motion")
-HSES_CHANNEL_MISSING = Code(
-    "hses.channel_missing",
-    "the connection {name} to the controller is missing",
-    "the event link.channel_lost says why",
-)
-HSES_STATE_OLD = Code("hses.state_old", "the newest state of the controller is too old")
-HSES_MOVES = Code("hses.moves", "a motion still runs", "wait for its end, or stop the robot")
-HSES_AXES = Code("hses.axes", "{detail}", "move the robot from its own panel")
-HSES_HELD_MOTION = Code(
-    "hses.held_motion",
-    "a held motion may go on when HOLD ends",
-    "switch the servos off at the robot, as its emergency stop does, then reset the stop",
-)
-FANUC_NOT_CONNECTED = Code(
-    "fanuc.not_connected", "RMI is not connected", "wait for it, or see why in the event link.channel_lost"
-)
-FANUC_MOVES = Code("fanuc.moves", "a motion still runs", "wait for its end, or stop the robot")
-FANUC_STATE_OLD = Code("fanuc.state_old", "the newest state of the controller is too old")
-FANUC_OTHER_PROGRAM = Code(
-    "fanuc.other_program", "another program runs on the controller", "end it at the controller"
-)
-FANUC_EXTRA_AXES = Code(
-    "fanuc.extra_axes",
-    "axis {axes} belongs to no joint of the model and is not at 0, so a motion would move it",
-    "declare it, or move it to 0",
-)
-FANUC_ARM_STOPPED = Code("fanuc.arm_stopped", "the controller does not let the arm move ({activity})")
-FANUC_WENT_LOCAL = Code("fanuc.went_local", "the controller is not in remote control any more")
-FANUC_TOOL_CHANGED = Code("fanuc.tool_changed", "the tool was changed during a motion")
-FANUC_LOST_PROGRAM = Code("fanuc.lost_program", "the gateway's program has ended on the controller")
-FANUC_NO_ANSWER = Code("fanuc.no_answer", "the controller has not answered {name}")
-FANUC_REFUSED = Code("fanuc.refused", "the controller refuses {name}: {problem}")
-FANUC_SYSTEM_FAULT = Code("fanuc.system_fault", "the controller reports a fault during a motion")
-FANUC_CONNECTION_LOST = Code("fanuc.connection_lost", "RMI was disconnected during a motion")
-FANUC_MOVED_BEFORE = Code("fanuc.moved_before", "the arm has moved before its motion was sent")
 STOP_SENT = Code("stop.sent", "stop request {id} is on the controller's socket")
 STOP_NOT_SENT = Code("stop.not_sent", "stop request {id} is latched, but not sent: {cause}")
 STOP_READ_ONLY = Code(
@@ -608,27 +520,11 @@ CONTROLLER_FAULT = Code(
 CONTROLLER_HOLDING = Code("controller.holding", "a motion is on hold", "RESUME it, or cancel it with RESET")
 CONTROLLER_NOT_HOLDING = Code("controller.not_holding", "nothing is on hold", "there is no motion to resume")
 POSITIONS_STALE = Code("positions.stale", "no joint positions for {seconds:g} s")
-JOINTS_UNDECLARED = Code(
-    "joints.undeclared",
-    "its joints are not shown, because the controller sends pulses",
-    "declare pulses_per_degree of each joint in [robot.yaskawa] of the site file",
-)
-AXES_UNDECLARED = Code(
-    "joints.axes_undeclared",
-    "its joints are not shown, because the site file does not say how axis 3 is measured, or how positions "
-    "may be assigned",
-    "declare j23 and assignments in [robot.fanuc] of the site file",
-)
 AXES_EXTRA = Code(
     "joints.axes_extra",
     "axis {axes} of its controller belongs to no joint of the model",
     "put it into the model, or name its number in other_axes of the site file if it neither carries nor "
     "moves the arm",
-)
-BASE_UNDECLARED = Code(
-    "joints.base_undeclared",
-    "its controller moves it on a base ({axes}), which the model does not have: where the arm stands is not "
-    "known",
 )
 JOINTS_NOT_VERIFIED = Code(
     "joints.not_verified",

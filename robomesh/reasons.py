@@ -57,11 +57,13 @@ class Code:
         name: The code: "lease.held".
         problem: Description of the problem with `{parameters}`, which may have a format: `{seconds:g}`.
         advice: What to do about it.
+        chinese: Both in Chinese, of a kind of controllers; the page has that of all other codes.
     """
 
     name: str
     problem: str
     advice: str = ""
+    chinese: str = ""
 
     @property
     def sentence(self) -> str:

@@ -6,11 +6,15 @@ comes as a wheel; it uses no protoc or Node of the machine, so that builds are r
 type check, formatter, linter and what the tests use are installed only where something needs them.
 """
 
+import json
 import os
+import re
+import runpy
 import subprocess
 import sys
 import time
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +29,8 @@ BIOME = MODULES / "@biomejs" / "biome" / "bin" / "biome"
 
 # Schemas and the table that names them: a change there is a change of the page.
 _SCHEMAS = (ROOT / "robomesh" / "topics.py", ROOT / "robomesh" / "schemas" / "robomesh_pb2.py")
+# Reasons that only a kind of controllers has, in both languages.
+_CODES = sorted((ROOT / "controllers").glob("*/codes.py"))
 
 
 class PageBuildError(Exception):
@@ -34,7 +40,7 @@ class PageBuildError(Exception):
 def sources() -> Iterator[Path]:
     """Yield every file that the built page depends on."""
     yield Path(__file__)
-    yield from _SCHEMAS
+    yield from (*_SCHEMAS, *_CODES)
     for name in ("package.json", "package-lock.json", "tsconfig.json", "vite.config.ts"):
         yield PAGE / name
     yield from PAGE.glob("*.html")
@@ -133,21 +139,49 @@ def write_types() -> None:
     if response.error:
         raise PageBuildError(f"protoc-gen-es: {response.error}")
     for file in response.file:
-        path = GENERATED / file.name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if not path.exists() or path.read_text("utf-8") != file.content:
-            path.write_text(file.content, "utf-8")
+        _write(file.name, file.content)
+    _write("reasons-of-kinds.ts", reasons_of_kinds())
+
+
+def _write(name: str, content: str) -> None:
+    path = GENERATED / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not path.exists() or path.read_text("utf-8") != content:
+        path.write_text(content, "utf-8")
+
+
+def reasons_of_kinds() -> str:
+    """Return the module with the reasons of all kinds of controllers: code, English and Chinese."""
+    rows = {}
+    with _importable():
+        # Not imported: their packages import what a build does not have.
+        for file in _CODES:
+            for each in runpy.run_path(str(file)).values():
+                if type(each).__name__ == "Code":
+                    rows[each.name] = (re.sub(r"\{(\w+):[^}]*\}", r"{\1}", each.sentence), each.chinese)
+    pairs = json.dumps([*rows.items()], ensure_ascii=False, indent=1)
+    return (
+        "/** Sentences of reasons that only a kind of controllers has, by code: English, Chinese. */\n"
+        "export const SENTENCES_OF_KINDS: readonly (readonly [string, readonly [string, string]])[] = "
+        f"{pairs};\n"
+    )
 
 
 def _schema_files() -> list[Any]:
     """Return descriptors of the schema files of topics and requests."""
-    sys.path.insert(0, str(ROOT))  # the build has no installed `robomesh`
-    try:
+    with _importable():
         from robomesh import topics
         from robomesh.schemas import robomesh_pb2
+    return [robomesh_pb2.DESCRIPTOR, *(row.schema.DESCRIPTOR.file for row in topics.TOPICS.values())]
+
+
+@contextmanager
+def _importable() -> Iterator[None]:
+    sys.path.insert(0, str(ROOT))  # the build has no installed `robomesh`
+    try:
+        yield
     finally:
         sys.path.remove(str(ROOT))
-    return [robomesh_pb2.DESCRIPTOR, *(row.schema.DESCRIPTOR.file for row in topics.TOPICS.values())]
 
 
 def _with_dependencies(files: Iterable[Any]) -> Iterator[Any]:

@@ -8,6 +8,7 @@ only questions otherwise. The driver reports each answer separately, and never c
 from collections import Counter
 from collections.abc import Callable, Hashable, Mapping, Sequence
 
+from controllers.fanuc import codes as fanuc_codes
 from controllers.fanuc import data, signals
 from controllers.fanuc.assignments import ALARMS, Block, SystemVariable, Variable
 from controllers.fanuc.axes import Axes, FanucSettings, SignalBits, signal_bits
@@ -104,7 +105,7 @@ class SnpxDriver(OnlyReads):
         self.capabilities = Capabilities(
             commands=frozenset(),
             absolute=True,
-            no_joints=None if known else reason_codes.AXES_UNDECLARED(),
+            no_joints=None if known else fanuc_codes.AXES_UNDECLARED(),
             reports_pose=known,
             can_be_moved=True,
             joint_mapping=self._axes.mapping,

@@ -12,6 +12,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from enum import Enum, auto
 from pathlib import Path
 
+from controllers.fanuc import codes as fanuc_codes
 from controllers.fanuc import file_signals, files, ftp, signals
 from controllers.fanuc.axes import Axes, FanucSettings, signal_bits
 from controllers.fanuc.data import Alarm
@@ -130,7 +131,7 @@ class FtpDriver(OnlyReads):
         self.capabilities = Capabilities(
             commands=frozenset(),
             absolute=True,
-            no_joints=None if known else reason_codes.AXES_UNDECLARED(),
+            no_joints=None if known else fanuc_codes.AXES_UNDECLARED(),
             reports_pose=known,
             joint_mapping=self._axes.mapping,
             slow_hz=options.rate_hz,

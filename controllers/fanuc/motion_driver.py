@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from controllers.fanuc import codes as fanuc_codes
 from controllers.fanuc import rmi
 from controllers.fanuc.axes import FanucSettings
 from controllers.fanuc.driver import SNPX, SnpxDriver
@@ -61,7 +62,7 @@ from protocol_gateway.seam import (
     StopEnds,
 )
 from protocol_gateway.seam.hexadecimal import hexadecimal
-from protocol_gateway.seam.one_motion import FIRST_PERCENT, Timers, encode_words, words_of
+from protocol_gateway.seam.one_motion import FIRST_PERCENT, Timers, prepared
 from protocol_gateway.seam.polling import Asked
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
@@ -244,7 +245,7 @@ class FanucMotionDriver(SnpxDriver):
             self._percent = FIRST_PERCENT
             effects = [*super().closed(channel, now_s)]
             if self._phase in _OPEN_MOTION:
-                effects += self._give_up(codes.FANUC_STATE_OLD(), now_s)
+                effects += self._give_up(fanuc_codes.STATE_OLD(), now_s)
             return self._due.with_timer(effects)
         if channel is RMI:
             self._due.pop("connect", None)
@@ -326,7 +327,7 @@ class FanucMotionDriver(SnpxDriver):
         self._due["reopen"] = now_s + _REOPEN_S
         if before in _OPEN_MOTION:
             self._must_rest()
-            return (FateUnknown(codes.FANUC_CONNECTION_LOST()),)
+            return (FateUnknown(fanuc_codes.CONNECTION_LOST()),)
         return ()
 
     def _on_connect(self, answer: Answer, now_s: float) -> Effects:
@@ -354,7 +355,7 @@ class FanucMotionDriver(SnpxDriver):
             case rmi.ABORT if self._abort_open:
                 return self._on_aborted(answer, now_s)
             case rmi.SYSTEM_FAULT if self._phase in _OPEN_MOTION:
-                return self._give_up(codes.FANUC_SYSTEM_FAULT(), now_s)
+                return self._give_up(fanuc_codes.SYSTEM_FAULT(), now_s)
             case rmi.DISCONNECT if self._line is _Line.LEAVING:
                 self._line = _Line.CLOSED
                 self._due.pop("leave", None)
@@ -373,9 +374,9 @@ class FanucMotionDriver(SnpxDriver):
         if (problem := self._problem(now_s, self._motion)) is not None:
             return self._give_up(problem, now_s)
         if now_s - min(self._positions_s, self._status_s) > _BLIND_S:
-            return self._give_up(codes.FANUC_STATE_OLD(), now_s)
+            return self._give_up(fanuc_codes.STATE_OLD(), now_s)
         if self._positions is None or _moved(self._positions, self._motion.start):
-            return self._give_up(codes.FANUC_MOVED_BEFORE(), now_s)
+            return self._give_up(fanuc_codes.MOVED_BEFORE(), now_s)
         if (extra := self._extra_axes()) is not None:
             return self._give_up(extra, now_s)
         self._phase, self._sent_s = _Phase.MOVING, now_s
@@ -399,7 +400,7 @@ class FanucMotionDriver(SnpxDriver):
         if late:
             self._due["initialize" if self._initialize_open else "abort"] = now_s + _LATE_S
             return ()
-        why = codes.FANUC_NO_ANSWER(name=rmi.INITIALIZE)
+        why = fanuc_codes.NO_ANSWER(name=rmi.INITIALIZE)
         fate = (FateUnknown(why),) if self._phase is _Phase.INITIALIZING else ()
         self._phase = _Phase.STOPPING
         # A new session, in which the abort that is owed can be sent.
@@ -441,27 +442,27 @@ class FanucMotionDriver(SnpxDriver):
         """Return the reason to abort the open motion; None: there is no reason."""
         status = self._status
         if status is None:
-            return codes.FANUC_STATE_OLD()
+            return fanuc_codes.STATE_OLD()
         if status.activity not in (Activity.IDLE, Activity.MOVING):
-            return codes.FANUC_ARM_STOPPED(
+            return fanuc_codes.ARM_STOPPED(
                 activity="unknown" if status.activity is None else status.activity.value
             )
         if status.mode is not Mode.REMOTE:
-            return codes.FANUC_WENT_LOCAL()
+            return fanuc_codes.WENT_LOCAL()
         if self._tool != motion.tool:
-            return codes.FANUC_TOOL_CHANGED()
+            return fanuc_codes.TOOL_CHANGED()
         if self._phase is _Phase.MOVING:
             if status.activity is Activity.IDLE and self._asked_s > self._sent_s + _ENDED_S:
-                return codes.FANUC_LOST_PROGRAM()
+                return fanuc_codes.LOST_PROGRAM()
             since_s = max(self._sent_s, self._still[1] if self._still else self._sent_s)
             if now_s - since_s > SILENT_S:
-                return codes.FANUC_NO_ANSWER(name=rmi.JOINT_MOTION)
+                return fanuc_codes.NO_ANSWER(name=rmi.JOINT_MOTION)
         return None
 
     def _watch(self, now_s: float, *, late: bool) -> Effects:
         self._due["watch"] = now_s + _WATCH_S
         if now_s - min(self._positions_s, self._status_s) > _BLIND_S and not late:
-            return self._give_up(codes.FANUC_STATE_OLD(), now_s)
+            return self._give_up(fanuc_codes.STATE_OLD(), now_s)
         return ()
 
     def _give_up(self, why: Reason, now_s: float) -> Effects:
@@ -492,31 +493,31 @@ class FanucMotionDriver(SnpxDriver):
 
     # ----------------------------------------------------------------------- commands
 
-    def encode(self, *commands: ControllerCommand) -> bytes:
-        """Encode commands; at most one motion, as the last one.
+    def prepare(self, *commands: ControllerCommand) -> tuple[ControllerCommand, ...]:
+        """Return commands that can be sent; at most one motion, as the last one.
 
         Raises:
             CommandError: If they cannot be expressed.
         """
-        return encode_words(commands, len(self._axes.used))
+        return prepared(commands, len(self._axes.used))
 
-    def command(self, encoded: bytes, now_s: float) -> Effects:
-        """Send what `encode` returned.
+    def command(self, prepared: Sequence[ControllerCommand], now_s: float) -> Effects:
+        """Send what `prepare` returned.
 
         Raises:
             NotReadyError: If a motion cannot be sent now.
         """
         effects: list[Effect] = []
         percent, resets = self._percent, False
-        for word, value in words_of(encoded):
-            match word:
-                case "stop":
+        for command in prepared:
+            match command:
+                case Stop():
                     effects += self._stop_arm(now_s)
-                case "speed":
-                    percent = value
-                case "move":
-                    effects += self._move(value, percent, now_s)
-                case "reset":
+                case Speed(new_percent):
+                    percent = new_percent
+                case MoveAbsolute(target):
+                    effects += self._move(target, percent, now_s)
+                case Reset():
                     resets = self._line is not _Line.OPEN
         self._percent = percent
         if resets:
@@ -550,25 +551,25 @@ class FanucMotionDriver(SnpxDriver):
         """Return the reason to refuse a motion; None: it can be sent."""
         status = self._status
         if self._phase is not _Phase.NONE:
-            return codes.FANUC_MOVES()
+            return fanuc_codes.MOVES()
         if status is None or self._positions is None:
-            return codes.FANUC_STATE_OLD()
+            return fanuc_codes.STATE_OLD()
         if now_s - min(self._positions_s, self._status_s) > _STATE_VALID_S:
-            return codes.FANUC_STATE_OLD()
+            return fanuc_codes.STATE_OLD()
         match status.mode:
             case None:
                 return codes.CONTROLLER_MODE_UNKNOWN()
             case Mode.LOCAL:
                 return codes.CONTROLLER_LOCAL()
         if status.activity is Activity.MOVING:
-            return codes.FANUC_OTHER_PROGRAM()
+            return fanuc_codes.OTHER_PROGRAM()
         if status.activity is not Activity.IDLE:
-            return codes.FANUC_ARM_STOPPED(
+            return fanuc_codes.ARM_STOPPED(
                 activity="unknown" if status.activity is None else status.activity.value
             )
         if (extra := self._extra_axes()) is not None:
             return extra
-        return None if self._line is _Line.OPEN else codes.FANUC_NOT_CONNECTED()
+        return None if self._line is _Line.OPEN else fanuc_codes.NOT_CONNECTED()
 
     def _extra_axes(self) -> Reason | None:
         """Return the refusal of a motion that would move other axes too; None: there are none.
@@ -576,11 +577,11 @@ class FanucMotionDriver(SnpxDriver):
         The instruction has a value for each axis.
         """
         extra = ", ".join(map(str, self._other_than_joints(self._axes_read)))
-        return codes.FANUC_EXTRA_AXES(axes=extra) if extra else None
+        return fanuc_codes.EXTRA_AXES(axes=extra) if extra else None
 
 
 def _refused(answer: Answer) -> Reason:
-    return codes.FANUC_REFUSED(name=answer.name, problem=answer.problem)
+    return fanuc_codes.REFUSED(name=answer.name, problem=answer.problem)
 
 
 def _moved(here: Sequence[float], there: Sequence[float]) -> bool:

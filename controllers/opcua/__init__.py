@@ -6,6 +6,8 @@ OPCUA = Kind(
     driver="controllers.opcua.driver:OpcUaDriver",
     key="opcua",
     table="controllers.opcua.table:OpcUa",
+    extra="opcua",
+    packages=("asyncua",),
     probe="controllers.opcua.probe:OPCUA",
     simulated="controllers.opcua.simulated.start:OPCUA",
 )

@@ -21,7 +21,7 @@ def _heard(heard: bytes) -> Found | None:
 
 def _examine(url: str) -> Found:
     if is_missing("asyncua"):
-        raise ProbeError(missing("asyncua"))
+        raise ProbeError(missing("asyncua", "opcua"))
     from controllers.opcua.reader.problems import ReadingError
     from controllers.opcua.reader.security import endpoints_of, offers_of
 
@@ -53,7 +53,7 @@ def _examine(url: str) -> Found:
 OPCUA = Probe(
     scheme=_SCHEME,
     listens=(_PORT,),
-    sends=f"the request for its endpoints to {_SCHEME}://HOST:PORT",
+    sends=f"the request for its endpoints to {_SCHEME}://HOST:PORT (it shows the certificate's fingerprint)",
     heard=_heard,
     examine=_examine,
 )

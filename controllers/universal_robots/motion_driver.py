@@ -18,6 +18,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from controllers.universal_robots import codes as ur_codes
 from controllers.universal_robots.dashboard import RECOVERIES, Dashboard
 from controllers.universal_robots.driver import (
     JOINTS,
@@ -55,6 +56,7 @@ from protocol_gateway.seam import (
     MotionImpossible,
     MoveAbsolute,
     Open,
+    Recover,
     Recovery,
     Report,
     Reset,
@@ -65,7 +67,7 @@ from protocol_gateway.seam import (
     Stop,
     StopEnds,
 )
-from protocol_gateway.seam.one_motion import FIRST_PERCENT, Timers, encode_words, words_of
+from protocol_gateway.seam.one_motion import FIRST_PERCENT, Timers, prepared
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.joints import JointType
@@ -260,7 +262,7 @@ class RtdeMotionDriver(RtdeDriver):
         if channel in (SCRIPTS, DASHBOARD):
             effects += self._close_scripts()
         if self._motion is not None and channel in (INPUTS, DASHBOARD, RTDE):
-            effects += self._give_up(codes.UR_CHANNEL_LOST(name=channel.name))
+            effects += self._give_up(ur_codes.CHANNEL_LOST(name=channel.name))
         return effects
 
     def _leave(self, channel: Channel, why: str, now_s: float) -> Effects:
@@ -290,7 +292,7 @@ class RtdeMotionDriver(RtdeDriver):
             if late and now_s < self._motion.sent_s + 2.0 * START_S:
                 self._due["start"] = now_s + _LATE_S
             else:
-                effects += self._give_up(codes.UR_NOT_STARTED(seconds=START_S))
+                effects += self._give_up(ur_codes.NOT_STARTED(seconds=START_S))
         if "beat" in ended and self._motion is not None:
             effects += self._next_beat(now_s, late=late)
         return self._due.with_timer(effects)
@@ -322,7 +324,7 @@ class RtdeMotionDriver(RtdeDriver):
         if dashboard.remote is False:
             effects += self._close_scripts()
             if self._motion is not None:
-                effects += self._give_up(codes.UR_WENT_LOCAL())
+                effects += self._give_up(ur_codes.WENT_LOCAL())
         elif dashboard.remote and dashboard.was_local:
             # Connections from local control stay restricted.
             self._opened.discard(DASHBOARD.name)
@@ -368,7 +370,7 @@ class RtdeMotionDriver(RtdeDriver):
         assert self._motion is not None
         if now_s - self._state_s > _BLIND_S:
             if not late or self._excused_s == self._state_s:
-                return self._give_up(codes.UR_STATE_OLD())
+                return self._give_up(ur_codes.STATE_OLD())
             # Once: what has arrived is read before the next beat.
             self._excused_s = self._state_s
         self._due["beat"] = now_s + _BEAT_S
@@ -416,11 +418,11 @@ class RtdeMotionDriver(RtdeDriver):
             return self._give_up(problem)
         if number != motion.number:
             # Another program may run. If it goes on, the motion is not seen to start in time.
-            return self._give_up(codes.UR_LOST_PROGRAM()) if motion.started else ()
+            return self._give_up(ur_codes.LOST_PROGRAM()) if motion.started else ()
         if state.runtime_state == RuntimeState.PLAYING:
             motion.stopped_s = None
             behind = (self._beat - (beat or 0)) % _LARGEST_NUMBER
-            return self._give_up(codes.UR_LOST_PROGRAM()) if behind > _MOST_BEATS_BEHIND else ()
+            return self._give_up(ur_codes.LOST_PROGRAM()) if behind > _MOST_BEATS_BEHIND else ()
         if state.runtime_state == RuntimeState.STOPPED:
             motion.stopped_s = now_s if motion.stopped_s is None else motion.stopped_s
             if progress == Progress.DONE or now_s - motion.stopped_s >= _ENDED_S:
@@ -456,32 +458,32 @@ class RtdeMotionDriver(RtdeDriver):
 
     # ------------------------------------------------------------------- commands
 
-    def encode(self, *commands: ControllerCommand) -> bytes:
-        """Encode commands; at most one motion, as the last one.
+    def prepare(self, *commands: ControllerCommand) -> tuple[ControllerCommand, ...]:
+        """Return commands that can be sent; at most one motion, as the last one.
 
         Raises:
             CommandError: If they cannot be expressed.
         """
-        return encode_words(commands, JOINTS, RECOVERIES)
+        return prepared(commands, JOINTS, RECOVERIES)
 
-    def command(self, encoded: bytes, now_s: float) -> Effects:
-        """Send what `encode` returned.
+    def command(self, prepared: Sequence[ControllerCommand], now_s: float) -> Effects:
+        """Send what `prepare` returned.
 
         Raises:
             NotReadyError: If a motion or a recovery cannot be sent now.
         """
         effects: list[Effect] = []
         percent = self._percent
-        for word, value in words_of(encoded):
-            match word:
-                case "stop":
+        for command in prepared:
+            match command:
+                case Stop():
                     effects += self._stop()
-                case "speed":
-                    percent = value
-                case "move":
-                    effects += self._move(value, percent, now_s)
-                case "recover":
-                    effects.append(self._recover(Recovery(value), now_s))
+                case Speed(new_percent):
+                    percent = new_percent
+                case MoveAbsolute(target):
+                    effects += self._move(target, percent, now_s)
+                case Recover(recovery):
+                    effects.append(self._recover(recovery, now_s))
                 # A reset clears the gateway's latch only: nothing is sent to the controller.
         self._percent = percent
         return self._due.with_timer(effects)
@@ -523,36 +525,36 @@ class RtdeMotionDriver(RtdeDriver):
         if (obstacle := self._software_obstacle()) is not None:
             return obstacle
         if state is None or now_s - self._state_s > _STATE_VALID_S:
-            return codes.UR_STATE_OLD()
+            return ur_codes.STATE_OLD()
         if self._motion is not None:
-            return codes.UR_MOVES()
+            return ur_codes.MOVES()
         # A program that waits could go on after the recovery.
         if state.runtime_state != RuntimeState.STOPPED:
-            return codes.UR_OTHER_PROGRAM()
+            return ur_codes.OTHER_PROGRAM()
         if DASHBOARD.name not in self._opened:
-            return codes.UR_CHANNEL_MISSING(name=DASHBOARD.name)
+            return ur_codes.CHANNEL_MISSING(name=DASHBOARD.name)
         if self._dashboard.recovery is not None:
-            return codes.UR_RECOVERS(recovery=self._dashboard.recovery.value)
+            return ur_codes.RECOVERS(recovery=self._dashboard.recovery.value)
         match self._mode(now_s):
             case None:
                 return codes.CONTROLLER_MODE_UNKNOWN()
             case Mode.LOCAL:
                 return codes.CONTROLLER_LOCAL()
         if not _fits(recovery, state):
-            return codes.UR_NOT_NOW(
+            return ur_codes.NOT_NOW(
                 recovery=recovery.value,
                 safety=_word(SafetyMode, state.safety_mode),
                 robot=_word(RobotMode, state.robot_mode),
             )
         seen_s = 0.0 if self._protective_s is None else now_s - self._protective_s
         if recovery is Recovery.UNLOCK_PROTECTIVE_STOP and seen_s < UNLOCK_AFTER_S:
-            return codes.UR_STOP_YOUNG(seen=seen_s, seconds=UNLOCK_AFTER_S)
+            return ur_codes.STOP_YOUNG(seen=seen_s, seconds=UNLOCK_AFTER_S)
         return None
 
     def _software_obstacle(self) -> Reason | None:
         """Return why no motion is possible with the controller's software; None: it is, or it is unknown."""
         version = self._reader.controller
-        return None if version is None or _moves_with(version) else codes.UR_SOFTWARE(version=version)
+        return None if version is None or _moves_with(version) else ur_codes.SOFTWARE(version=version)
 
     def _obstacle(self, now_s: float) -> Reason | None:
         """Return why no motion can be sent now; None: it can."""
@@ -560,16 +562,16 @@ class RtdeMotionDriver(RtdeDriver):
         if (obstacle := self._software_obstacle()) is not None:
             return obstacle
         if state is None or version is None or now_s - self._state_s > _STATE_VALID_S:
-            return codes.UR_STATE_OLD()
+            return ur_codes.STATE_OLD()
         if lacks := [name for name in self._registers.outputs if name not in state.registers]:
-            return codes.UR_REGISTER(name=lacks[0], problem="the controller does not have it")
+            return ur_codes.REGISTER(name=lacks[0], problem="the controller does not have it")
         if self._inputs.problem:
-            return codes.UR_REGISTER(name=self._inputs.failed, problem=self._inputs.problem)
+            return ur_codes.REGISTER(name=self._inputs.failed, problem=self._inputs.problem)
         if self._motion is not None:
-            return codes.UR_MOVES()
+            return ur_codes.MOVES()
         # An unknown state of the program, or of the safety system, forbids the motion.
         if state.runtime_state != RuntimeState.STOPPED:
-            return codes.UR_OTHER_PROGRAM()
+            return ur_codes.OTHER_PROGRAM()
         if (stopped := _stopped(state)) is not None:
             return stopped
         match self._mode(now_s):
@@ -578,9 +580,9 @@ class RtdeMotionDriver(RtdeDriver):
             case Mode.LOCAL:
                 return codes.CONTROLLER_LOCAL()
         if not self._inputs.ready:
-            return codes.UR_CHANNEL_MISSING(name=INPUTS.name)
+            return ur_codes.CHANNEL_MISSING(name=INPUTS.name)
         missing = [each.name for each in (SCRIPTS, DASHBOARD) if each.name not in self._opened]
-        return codes.UR_CHANNEL_MISSING(name=missing[0]) if missing else None
+        return ur_codes.CHANNEL_MISSING(name=missing[0]) if missing else None
 
 
 def _moves_with(version: ControllerVersion) -> bool:
@@ -610,9 +612,9 @@ def _tool(state: ControllerState) -> object:
 def _stopped(state: ControllerState) -> Reason | None:
     """Return why the controller does not let the arm move; None: it does."""
     if state.safety_mode not in _MAY_MOVE:
-        return codes.UR_ARM_STOPPED(mode=_word(SafetyMode, state.safety_mode))
+        return ur_codes.ARM_STOPPED(mode=_word(SafetyMode, state.safety_mode))
     if state.robot_mode != RobotMode.RUNNING:
-        return codes.UR_ARM_STOPPED(mode=_word(RobotMode, state.robot_mode))
+        return ur_codes.ARM_STOPPED(mode=_word(RobotMode, state.robot_mode))
     return None
 
 
@@ -625,8 +627,8 @@ def _problem(state: ControllerState, motion: _Motion) -> Reason | None:
     if (stopped := _stopped(state)) is not None:
         return stopped
     if state.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING):
-        return codes.UR_PAUSED()
-    return codes.UR_TOOL_CHANGED() if _tool(state) != motion.tool else None
+        return ur_codes.PAUSED()
+    return ur_codes.TOOL_CHANGED() if _tool(state) != motion.tool else None
 
 
 def rtde_driver(joint_types: Sequence[JointType], codes: Mapping[int, str], **given: Any) -> RtdeDriver:

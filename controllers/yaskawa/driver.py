@@ -6,6 +6,7 @@ question: positions and status of different answers are never combined.
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 
+from controllers.yaskawa import codes as hses_codes
 from controllers.yaskawa import data as payloads
 from controllers.yaskawa import signals
 from controllers.yaskawa.axes import Axes, YaskawaSettings, instance_of
@@ -97,7 +98,7 @@ class HsesDriver(OnlyReads):
         self.capabilities = Capabilities(
             commands=frozenset(),
             absolute=True,
-            no_joints=reason_codes.JOINTS_UNDECLARED() if self._axes is None else None,
+            no_joints=hses_codes.JOINTS_UNDECLARED() if self._axes is None else None,
             reports_pose=self._pose is not None,
             can_be_moved=settings.group[0] == "R",
             joint_mapping="" if self._axes is None else self._axes.mapping,
@@ -266,7 +267,7 @@ class HsesDriver(OnlyReads):
         named = {each: name for each, name in enumerate(self._names) if name} or moved
         why = None
         if base := ", ".join(filter(None, self._base_names)):
-            why = reason_codes.BASE_UNDECLARED(axes=base)
+            why = hses_codes.BASE_UNDECLARED(axes=base)
         elif extra := ", ".join(name for each, name in named.items() if each not in known):
             why = reason_codes.AXES_EXTRA(axes=extra)
         if why == self._undeclared:

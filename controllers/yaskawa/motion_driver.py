@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from controllers.yaskawa import codes as hses_codes
 from controllers.yaskawa import commands
 from controllers.yaskawa import data as payloads
 from controllers.yaskawa.axes import YaskawaSettings, instance_of
@@ -56,7 +57,7 @@ from protocol_gateway.seam import (
     Stop,
     StopEnds,
 )
-from protocol_gateway.seam.one_motion import FIRST_PERCENT, Timers, encode_words, words_of
+from protocol_gateway.seam.one_motion import FIRST_PERCENT, Timers, prepared
 from protocol_gateway.seam.polling import Polling, Regular
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
@@ -225,7 +226,7 @@ class HsesMotionDriver(HsesDriver):
             self._due.pop("ask", None)
         if self._motion is None:
             return ()
-        return self._give_up(codes.HSES_CHANNEL_LOST(name=channel.name), now_s)
+        return self._give_up(hses_codes.CHANNEL_LOST(name=channel.name), now_s)
 
     def skipped(self, channel: Channel, now_s: float) -> Effects:
         """Go on: each datagram is whole."""
@@ -391,13 +392,13 @@ class HsesMotionDriver(HsesDriver):
         if (problem := _stopped(status)) is not None:
             return self._give_up(problem, now_s)
         if status.second & HELD:
-            return self._give_up(codes.HSES_HELD(), now_s)
+            return self._give_up(hses_codes.HELD(), now_s)
         if mode_of(status) is not Mode.REMOTE:
-            return self._give_up(codes.HSES_WENT_LOCAL(), now_s)
+            return self._give_up(hses_codes.WENT_LOCAL(), now_s)
         if now_s - self._place_s > _BLIND_S:
-            return self._give_up(codes.HSES_STATE_OLD(), now_s)
+            return self._give_up(hses_codes.STATE_OLD(), now_s)
         if self._place is not None and self._place.tool != motion.tool:
-            return self._give_up(codes.HSES_TOOL_CHANGED(), now_s)
+            return self._give_up(hses_codes.TOOL_CHANGED(), now_s)
         arrived = known and _near(self._joint_positions, motion.target, self._arrived_by)
         if not arrived:
             motion.arrived_s = None
@@ -406,7 +407,7 @@ class HsesMotionDriver(HsesDriver):
         if running:
             motion.started, motion.quiet_s = True, None
             if motion.arrived_s is not None and now_s - motion.arrived_s > _OTHERS_S:
-                return self._give_up(codes.HSES_OTHER_JOB(), now_s)
+                return self._give_up(hses_codes.OTHER_JOB(), now_s)
             return ()
         motion.started = motion.started or moved
         motion.quiet_s = now_s if motion.quiet_s is None else motion.quiet_s
@@ -414,9 +415,9 @@ class HsesMotionDriver(HsesDriver):
             self._motion, self._unfinished = None, False
             return ()
         if motion.started and now_s - motion.quiet_s >= _ENDED_S:
-            return self._give_up(codes.HSES_ENDED_ELSEWHERE(), now_s)
+            return self._give_up(hses_codes.ENDED_ELSEWHERE(), now_s)
         if not motion.started and now_s - motion.sent_s >= START_S:
-            return self._give_up(codes.HSES_NOT_STARTED(seconds=START_S), now_s)
+            return self._give_up(hses_codes.NOT_STARTED(seconds=START_S), now_s)
         return ()
 
     def _motion_answered(self, answer: Answer, now_s: float) -> Effects:
@@ -490,40 +491,39 @@ class HsesMotionDriver(HsesDriver):
 
     # ---------------------------------------------------------------------- commands
 
-    def encode(self, *commands: ControllerCommand) -> bytes:
-        """Encode commands; at most one motion, as the last one.
+    def prepare(self, *commands: ControllerCommand) -> tuple[ControllerCommand, ...]:
+        """Return commands that can be sent; at most one motion, as the last one.
 
         Raises:
             CommandError: If they cannot be expressed.
         """
-        return encode_words(commands, len(self._arrived_by))
+        return prepared(commands, len(self._arrived_by))
 
-    def command(self, encoded: bytes, now_s: float) -> Effects:
-        """Send what `encode` returned.
+    def command(self, prepared: Sequence[ControllerCommand], now_s: float) -> Effects:
+        """Send what `prepare` returned.
 
         Raises:
             NotReadyError: If a motion cannot be sent now, or HOLD cannot end now.
         """
         effects: list[Effect] = []
         percent = self._percent
-        words = words_of(encoded)
         # Raise every refusal before the state changes: all commands are sent, or none.
-        names = {word for word, _ in words}
-        if "reset" in names and (obstacle := self._reset_obstacle(now_s)) is not None:
+        kinds = {type(each) for each in prepared}
+        if Reset in kinds and (obstacle := self._reset_obstacle(now_s)) is not None:
             raise NotReadyError(obstacle)
-        if "move" in names and (obstacle := self._obstacle(now_s, resets="reset" in names)) is not None:
+        if MoveAbsolute in kinds and (obstacle := self._obstacle(now_s, resets=Reset in kinds)) is not None:
             raise NotReadyError(obstacle)
-        targets = [self._pulses(value) for word, value in words if word == "move"]
-        for word, value in words:
-            match word:
-                case "stop":
+        pulses = [self._pulses(each.positions) for each in prepared if isinstance(each, MoveAbsolute)]
+        for command in prepared:
+            match command:
+                case Stop():
                     effects += self._stop(now_s)
-                case "reset":
+                case Reset():
                     effects += self._reset(now_s)
-                case "speed":
-                    percent = value
-                case "move":
-                    effects += self._move(value, targets[0], percent, now_s)
+                case Speed(new_percent):
+                    percent = new_percent
+                case MoveAbsolute(target):
+                    effects += self._move(target, pulses[0], percent, now_s)
         self._percent = percent
         return self._due.with_timer(effects)
 
@@ -548,10 +548,10 @@ class HsesMotionDriver(HsesDriver):
             return None
         state = self._state
         if state is None or not self._fresh(now_s) or self._state_s < self._hold_sent_s:
-            return codes.HSES_STATE_OLD()
+            return hses_codes.STATE_OLD()
         held = state.second & Status2.HELD_BY_COMMAND
         if held and self._unfinished and state.second & Status2.SERVO_ON:
-            return codes.HSES_HELD_MOTION()
+            return hses_codes.HELD_MOTION()
         return None
 
     def _reset(self, now_s: float) -> Effects:
@@ -575,7 +575,7 @@ class HsesMotionDriver(HsesDriver):
         assert self._axes is not None
         pulses = self._axes.pulses(np.array(target, dtype=float))
         if any(abs(each) > commands.LONGEST_NUMBER for each in pulses):
-            raise NotReadyError(codes.HSES_AXES(detail="the target has more pulses than a motion can hold"))
+            raise NotReadyError(hses_codes.AXES(detail="the target has more pulses than a motion can hold"))
         return pulses
 
     def _move(self, target: Sequence[float], pulses: Sequence[int], percent: float, now_s: float) -> Effects:
@@ -595,37 +595,37 @@ class HsesMotionDriver(HsesDriver):
         """
         missing = [each.name for each in (HSES, STOP, MOTION) if each.name not in self._opened]
         if missing:
-            return codes.HSES_CHANNEL_MISSING(name=missing[0])
+            return hses_codes.CHANNEL_MISSING(name=missing[0])
         state, place = self._state, self._place
         if state is None or place is None or not self._fresh(now_s) or now_s - self._place_s > _FRESH_S:
-            return codes.HSES_STATE_OLD()
+            return hses_codes.STATE_OLD()
         if (extra := self._other_axes(place)) is not None:
             return extra
         if place.tool > _LAST_TOOL:
             detail = f"the controller reports tool {place.tool}; 0 to {_LAST_TOOL} are right"
-            return codes.HSES_AXES(detail=detail)
+            return hses_codes.AXES(detail=detail)
         if self._motion is not None:
-            return codes.HSES_MOVES()
+            return hses_codes.MOVES()
         if state.second & HELD or (self._wants_hold and not resets):
             return codes.CONTROLLER_HOLDING()
         if mode_of(state) is not Mode.REMOTE:
             return codes.CONTROLLER_LOCAL()
         if (stopped := _stopped(state)) is not None:
             return stopped
-        return codes.HSES_OTHER_JOB() if state.first & Status1.RUNNING else None
+        return hses_codes.OTHER_JOB() if state.first & Status1.RUNNING else None
 
     def _other_axes(self, place: Position) -> Reason | None:
         """Return why a motion may move, or leave out, an axis that is not the model's; None: it does not."""
         assert self._axes is not None
         if not self._names or self._has_base is None:
-            return codes.HSES_AXES(detail="which axes the controller has is not known yet")
+            return hses_codes.AXES(detail="which axes the controller has is not known yet")
         if self._has_base:
-            return codes.HSES_AXES(detail=f"{self._group} has a base, which the motion would move too")
+            return hses_codes.AXES(detail=f"{self._group} has a base, which the motion would move too")
         used = self._axes.used
         named = [name for each, name in enumerate(self._names) if name and each not in used]
         moved = [str(each + 1) for each, at in enumerate(place.axes) if at and each not in used]
         if extra := ", ".join(named or moved):
-            return codes.HSES_AXES(detail=f"axis {extra} belongs to no joint of the model")
+            return hses_codes.AXES(detail=f"axis {extra} belongs to no joint of the model")
         return None
 
 
@@ -637,9 +637,9 @@ def _near(here: Sequence[float], there: Sequence[float], within: Sequence[float]
 def _stopped(status: Status) -> Reason | None:
     """Return why the controller does not let the arm move; None: it does."""
     if status.second & (Status2.ALARM | Status2.ERROR):
-        return codes.HSES_ARM_STOPPED(state="an alarm or error is active")
+        return hses_codes.ARM_STOPPED(state="an alarm or error is active")
     if not status.second & Status2.SERVO_ON:
-        return codes.HSES_ARM_STOPPED(state="the servos are off")
+        return hses_codes.ARM_STOPPED(state="the servos are off")
     return None
 
 

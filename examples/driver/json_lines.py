@@ -105,17 +105,17 @@ class JsonLines:
         refusals = sum(isinstance(event, Refused) for event in events)
         return (Report(events, units=len(lines) - malformed, refusals=refusals),)
 
-    def encode(self, *commands: ControllerCommand) -> bytes:
-        """Encode commands as one line.
+    def prepare(self, *commands: ControllerCommand) -> bytes:
+        """Return commands as one line.
 
         Raises:
             CommandError: If the controller does not have one.
         """
         return json.dumps({"do": [_word(command) for command in commands]}).encode() + b"\n"
 
-    def command(self, encoded: bytes, now_s: float) -> Effects:
+    def command(self, prepared: bytes, now_s: float) -> Effects:
         """Send a line."""
-        return (Send(LINES, encoded),)
+        return (Send(LINES, prepared),)
 
     def _events(self, line: bytes) -> list[ControllerEvent]:
         offset, self._offset = self._offset, self._offset + len(line) + 1

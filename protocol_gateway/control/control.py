@@ -45,7 +45,7 @@ class Ports:
 
     Attributes:
         latch: File that keeps the latched stop and its number across a restart.
-        send: Writes a unit to the controller's socket immediately, or raises LinkError.
+        send: Writes what was prepared to the controller's socket immediately, or raises LinkError.
         controller: Returns the current state of the controller.
         publish: Publishes the state of lease, stop and program.
         confirm_set_up: Takes tool, payload and frame as they are now for right.
@@ -56,7 +56,7 @@ class Ports:
     audit_trail: AuditTrail
     latch: LatchFile
     journal: Journal
-    send: Callable[[bytes], None]
+    send: Callable[[object], None]
     controller: Callable[[], Controller]
     publish: Callable[[], None]
     confirm_set_up: Callable[[], None] = lambda: None

@@ -90,7 +90,7 @@ class Send:
         urgent: It is a stop, which must be latched and audited whatever happens to its unit.
     """
 
-    unit: bytes
+    unit: object
     urgent: bool = False
 
 

@@ -64,17 +64,17 @@ class RobotAuthority:
 
     Args:
         authority: State of lease and stop at the start.
-        encode: Encodes commands as one unit; raises CommandError.
+        prepare: Returns what is sent of commands, all or none; raises CommandError.
         orphan: Operator of a motion that may still run from before the gateway was killed; empty: none.
     """
 
     def __init__(
-        self, authority: Authority, joints: Joints, encode: Callable[..., bytes], *, orphan: str = ""
+        self, authority: Authority, joints: Joints, prepare: Callable[..., object], *, orphan: str = ""
     ) -> None:
         self._authority = authority
         self._program: RunningProgram | None = None
         self._joints = joints
-        self._encode = encode
+        self._prepare = prepare
         self._orphan = orphan
         self._last_unit_s = float("-inf")  # when the newest unit of commands was sent
         self._disobeyed_reported_s = 0.0
@@ -243,7 +243,7 @@ class RobotAuthority:
     def _send_stop_unit(self) -> Effects[Reason | None]:
         """Send the stop unit; return the reason of a failure."""
         try:
-            unit = self._encode(Stop())
+            unit = self._prepare(Stop())
         except CommandError as error:
             return codes.STOP_SENT_LATER(error.reason)
         problem = yield effects.Send(unit, urgent=True)
@@ -334,7 +334,7 @@ class RobotAuthority:
         unit, finding = None, Finding(start=None if command.program is None else command.program.start)
         if problem is None and sends:
             try:
-                unit = self._encode(*controller_commands(command.requests, seen.controller, self._joints))
+                unit = self._prepare(*controller_commands(command.requests, seen.controller, self._joints))
             except CommandError as error:
                 problem = not_sent(error.reason)
         if problem is None and command.program is None:
@@ -351,7 +351,7 @@ class RobotAuthority:
         return answer
 
     def _write_and_send(
-        self, command: events.CommandsRequested, unit: bytes | None, finding: Finding
+        self, command: events.CommandsRequested, unit: object, finding: Finding
     ) -> Effects[Answer]:
         warning = finding.warning
         if any(request.command == _C.RESET for request in command.requests):
@@ -378,7 +378,7 @@ class RobotAuthority:
             yield reports.check_warning(command.names, finding)
         return Answer(True, f"{text}; mind: {warning}", warning)
 
-    def _book(self, command: events.CommandsRequested, unit: bytes | None, seen: Seen) -> Effects[str]:
+    def _book(self, command: events.CommandsRequested, unit: object, seen: Seen) -> Effects[str]:
         """Apply commands after their unit was sent; return the answer's text."""
         now_s, controller = seen.now.monotonic_s, seen.controller
         isolated = now_s - self._last_unit_s >= motion_owner.ANSWERED_WITHIN_S
@@ -474,7 +474,7 @@ class RobotAuthority:
     def _send_for_jog(self, requests: Sequence[CommandRequest], seen: Seen) -> Effects[Reason | None]:
         """Send commands of a jog as one unit, and apply them; return why they were not sent."""
         try:
-            unit = self._encode(*map(controller_command, requests))
+            unit = self._prepare(*map(controller_command, requests))
         except CommandError as error:
             return error.reason
         problem: Reason | None = yield effects.Send(unit)

@@ -225,8 +225,8 @@ class ControllerLink:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
 
-    def send(self, encoded: bytes) -> None:
-        """Send what the driver's `encode` returned to the controller immediately.
+    def send(self, prepared: object) -> None:
+        """Send what the driver's `prepare` returned to the controller immediately.
 
         On return the operating system has all of it. After an error it has not, and it will not be sent
         later. Works on a SILENT link too, so that a stop can be tried.
@@ -239,7 +239,7 @@ class ControllerLink:
         now = self._now()
         failure: LinkError | None = None
         sent = False
-        for effect in self._driver.command(encoded, now.monotonic_s):
+        for effect in self._driver.command(prepared, now.monotonic_s):
             if not isinstance(effect, Send):
                 self._perform(effect, now)
                 continue

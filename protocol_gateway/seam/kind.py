@@ -45,6 +45,8 @@ class Kind:
         key: Key of a robot's table in the site file; empty: there is none.
         table: Name of the table's model, a `Table`; empty: the table is passed on unchanged.
         datagrams: The site file's `controller` is udp://HOST:PORT.
+        extra: Extra of robomesh that brings what it needs; empty: it needs no more.
+        packages: Modules that the extra brings.
         probe: Name of its `controllers.probing.Probe`; empty: `robomesh probe` does not know it.
         simulated: Name of its `Simulated` controller; empty: it has none.
     """
@@ -53,6 +55,8 @@ class Kind:
     key: str = "driver"
     table: str = ""
     datagrams: bool = False
+    extra: str = ""
+    packages: tuple[str, ...] = ()
     probe: str = ""
     simulated: str = ""
 

@@ -1,8 +1,7 @@
-"""Common part of drivers that send one motion at a time: the words of their commands, and their timers."""
+"""Common part of drivers that send one motion at a time: the check of their commands, and their timers."""
 
-import json
+import math
 from collections.abc import Collection, Sequence
-from typing import Any
 
 from protocol_gateway.errors import CommandError
 from protocol_gateway.seam.commands import (
@@ -21,10 +20,10 @@ FIRST_PERCENT = 25.0
 """Speed of motions until an operator sets another one; it is sent with each motion."""
 
 
-def encode_words(
+def prepared(
     commands: Sequence[ControllerCommand], joints: int, recoveries: Collection[Recovery] = ()
-) -> bytes:
-    """Encode commands for `words_of`; at most one motion, as the last one; a stop or a recovery alone.
+) -> tuple[ControllerCommand, ...]:
+    """Return commands that can be sent: at most one motion, as the last one; a stop or a recovery alone.
 
     Args:
         joints: Number of the robot's joints.
@@ -33,7 +32,6 @@ def encode_words(
     Raises:
         CommandError: If they cannot be expressed.
     """
-    words: list[tuple[str, object]] = []
     for place, command in enumerate(commands):
         match command:
             case Stop() | Recover() if len(commands) > 1:
@@ -44,26 +42,21 @@ def encode_words(
                     raise CommandError(codes.COMMAND_VALUES(count=len(positions), joints=joints))
                 if place != len(commands) - 1:
                     raise CommandError("a motion must be the last command: the controller queues none")
-                words.append(("move", positions))
+                _check_finite(*positions)
             case Speed(percent):
-                words.append(("speed", percent))
-            case Stop():
-                words.append(("stop", None))
-            case Reset():
-                words.append(("reset", None))
+                _check_finite(percent)
+            case Stop() | Reset():
+                pass
             case Recover(recovery) if recovery in recoveries:
-                words.append(("recover", recovery.value))
+                pass
             case _:
                 raise CommandError(f"this controller has no {type(command).__name__}")
-    try:
-        return json.dumps(words, allow_nan=False).encode()
-    except ValueError:
-        raise CommandError("numbers must be finite") from None
+    return tuple(commands)
 
 
-def words_of(encoded: bytes) -> list[tuple[str, Any]]:
-    """Return the words "move", "speed", "stop", "reset", "recover" of encoded commands, with their values."""
-    return [(word, value) for word, value in json.loads(encoded)]
+def _check_finite(*numbers: float) -> None:
+    if not all(map(math.isfinite, numbers)):
+        raise CommandError("numbers must be finite")
 
 
 class Timers(dict[str, float]):

@@ -1,5 +1,7 @@
 """The commands of a driver that has none."""
 
+from typing import Any
+
 from protocol_gateway.errors import CommandError
 from protocol_gateway.seam.commands import ControllerCommand
 from protocol_gateway.seam.effects import Effects
@@ -7,9 +9,9 @@ from robomesh import reason_codes
 
 
 class OnlyReads:
-    """Base of drivers that only read: they refuse to encode a command, and send none."""
+    """Base of drivers that only read: they refuse each command, and send none."""
 
-    def encode(self, *commands: ControllerCommand) -> bytes:
+    def prepare(self, *commands: ControllerCommand) -> Any:
         """Refuse: nothing is ever commanded.
 
         Raises:
@@ -17,6 +19,6 @@ class OnlyReads:
         """
         raise CommandError(reason_codes.READS_ONLY())
 
-    def command(self, encoded: bytes, now_s: float) -> Effects:
+    def command(self, prepared: Any, now_s: float) -> Effects:
         """Send nothing."""
         return ()

@@ -1,6 +1,6 @@
 """The methods of a driver."""
 
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from protocol_gateway.seam.capabilities import Capabilities, StopEnds
 from protocol_gateway.seam.commands import ControllerCommand
@@ -80,16 +80,19 @@ class Driver(Protocol):
         """Do what the timer was set for."""
         ...
 
-    def encode(self, *commands: ControllerCommand) -> bytes:
-        """Encode commands that the controller executes in order, all or none.
+    def prepare(self, *commands: ControllerCommand) -> Any:
+        """Return what `command` takes, for commands that the controller executes in order, all or none.
+
+        It changes nothing. The gateway writes its audit entry afterwards, and then sends exactly this. `Stop`
+        can be prepared at any time.
 
         Raises:
             CommandError: If the protocol cannot express them (wrong joint count, number not finite).
         """
         ...
 
-    def command(self, encoded: bytes, now_s: float) -> Effects:
-        """Send what `encode` returned.
+    def command(self, prepared: Any, now_s: float) -> Effects:
+        """Send what `prepare` returned.
 
         Raises:
             NotReadyError: If the driver sends nothing now; never for `Stop`.

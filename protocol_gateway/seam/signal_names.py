@@ -1,7 +1,7 @@
 """Names of signals that all drivers share, and their units: a program reads every vendor's robots alike.
 
 docs/signals.md explains them. A value for which no name fits gets one that begins with the protocol's name:
-"rtde.tool_mode".
+"PROTOCOL.tool_mode".
 """
 
 import re

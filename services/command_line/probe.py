@@ -34,8 +34,8 @@ def probes() -> Mapping[str, Probe]:
 _HELP = f"""Show which protocol a controller's port speaks.
 
 It contacts this port only, listens for 2 s before it sends, and sends nothing but
-{", ".join(each.sends for each in probes().values() if each.sends)}. Of an OPC UA server it shows the
-certificate's fingerprint. Exit status 1: no protocol that robomesh reads.
+{", ".join(each.sends for each in probes().values() if each.sends)}. Exit status 1: no protocol that
+robomesh reads.
 """
 
 

@@ -63,14 +63,11 @@ class Robot(BaseModel):
         pose: Pose of its base in the site's frame.
         cell: Name of its cell; empty: alone in its cell. Robots of one cell are checked against each other.
         controller: `simulated`: `robomesh up` starts a simulator; otherwise `tcp://HOST:PORT`, or
-            `udp://HOST:PORT` with the protocol `hses`.
+            `udp://HOST:PORT` if the protocol uses datagrams.
         ports: Ports of the controller's other interfaces, where they are not the usual ones, as in
             `{ primary = 30011 }`.
-        protocol: The controller's protocol: `unit` (docs/controllers.md), `rtde` for a controller of
-            Universal Robots (docs/controllers/universal-robots.md), `hses` for one of Yaskawa
-            (docs/controllers/yaskawa.md), `snpx` for one of FANUC (docs/controllers/fanuc.md),
-            `fanuc-ftp` to read one without SNPX once a second, `opcua` to read an OPC UA server
-            (docs/controllers/opcua.md), or that of an installed driver (docs/controllers/own-driver.md).
+        protocol: The controller's protocol: `unit`, that of a vendor (docs/controllers.md lists them), or
+            that of an installed driver (docs/controllers/own-driver.md).
         driver: Settings of an installed driver (docs/controllers/own-driver.md), which it gets unchanged.
         codes: Type codes of a controller that sends numbers, as in
             `{ 2 = "ABSOLUTE.DEG", 101 = "COMMAND:home" }`; they replace the default codes. Empty: the gateway
@@ -89,7 +86,7 @@ class Robot(BaseModel):
         floor: The floor of its cell: its height [mm], a table, or `false` for none. In a cell of several
             robots one robot's key applies to all.
         stop_proven: The stop was tried on this controller (docs/safety.md); otherwise the robot is read-only.
-            `true` with the protocol `unit`; with others what was tried, as in `{ driver = "rtde",
+            `true` with the protocol `unit`; with others what was tried, as in `{ driver = "...",
             means = "...", software = "5.12.4", date = 2026-11-26 }`. Absent: `true` for a simulated
             controller, else `false`.
         verified: File of `robomesh robot verify --out`: the model's joints were compared with this
@@ -151,7 +148,7 @@ class Robot(BaseModel):
         if not isinstance(proven, bool | dict | StopTrial | None):
             raise ValueError(
                 "should be true, false, or what was tried, as in "
-                '{ driver = "rtde", means = "...", software = "5.12.4", date = 2026-11-26 }'
+                '{ driver = "...", means = "...", software = "5.12.4", date = 2026-11-26 }'
             )
         return proven
 

@@ -128,7 +128,7 @@ class Bench:
         self.driver._noted(StatusReceived(Activity.IDLE, Mode.REMOTE), self.now_s, self.now_s)
         target = tuple(each + 0.1 for each in HERE)
         try:
-            effects = self.driver.command(self.driver.encode(MoveAbsolute(target)), self.now_s)
+            effects = self.driver.command(self.driver.prepare(MoveAbsolute(target)), self.now_s)
         except NotReadyError:
             # The arm has not rested for long enough since a stop.
             self.now_s += 1.0

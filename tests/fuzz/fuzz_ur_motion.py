@@ -523,7 +523,7 @@ class Bench:
         recovers = recover is not None and self._may_recover(recover)
         may = (allowed or MoveAbsolute not in kinds) and (recovers or recover is None)
         try:
-            effects = self.driver.command(self.driver.encode(*commands), self.now_s)
+            effects = self.driver.command(self.driver.prepare(*commands), self.now_s)
         except NotReadyError as error:
             if may:
                 raise Wrong(f"refuses {commands}: {error}") from None

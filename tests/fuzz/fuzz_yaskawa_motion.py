@@ -328,7 +328,7 @@ class Bench:
         allowed = self._may_move()
         kinds = [type(each) for each in commands]
         try:
-            effects = self.driver.command(self.driver.encode(*commands), self.now_s)
+            effects = self.driver.command(self.driver.prepare(*commands), self.now_s)
         except NotReadyError as error:
             if Stop in kinds or (MoveAbsolute in kinds and Reset not in kinds and allowed):
                 raise Wrong(f"refuses {commands}: {error}") from None

@@ -44,7 +44,8 @@ DRIVERS = {
 FUZZERS = ("ur_motion", "yaskawa", "yaskawa_motion", "snpx", "rmi", "fanuc_ftp", "opcua")
 SUITES = ("test_conformance.py", "test_conformance_of_motion.py")
 TOLD = ("started", "opened", "received", "skipped", "closed", "timer_ended", "controlled", "stop_ends_now")
-COMMANDS = ("encode", "command")
+COMMANDS = ("prepare", "command")
+_NEW_NAMES = {"encode": "prepare"}
 # The fuzz program of RMI gives its driver a state in this way.
 BESIDE = ("_noted",)
 
@@ -146,7 +147,7 @@ def _recorded(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
             error = raised
         self.told = 0
         self.timer_s = timer_after(answer, self.timer_s, ended=name == "timer_ended")
-        came = came_of(answer, error)
+        came = came_of(answer if name != "prepare" else prepared_as(answer), error)
         pickle.dump(Call(name, tuple(map(plain, given)), came, self.timer_s), file)
         if error is not None:
             raise error
@@ -176,7 +177,7 @@ def constants() -> dict[tuple[str, str], float | str]:
         (each.__name__, name): value
         for each in modules()
         for name, value in vars(each).items()
-        if name.isupper() and type(value) in (float, str)
+        if name.isupper() and type(value) in (int, float, str)
     }
 
 
@@ -223,19 +224,26 @@ def timer_after(answer: Any, before_s: float | None, *, ended: bool) -> float | 
     return timer_s
 
 
+def prepared_as(answer: Any) -> Any:
+    """Return what a driver has prepared, in plain words unless it is bytes."""
+    return answer if isinstance(answer, bytes | None) else repr(answer)
+
+
 def came_of(answer: Any, error: Exception | None) -> Any:
     """Return effects, a value or an error in plain words."""
     if error is not None:
         return (type(error).__name__, str(error))
     if not isinstance(answer, list | tuple):
-        return answer if isinstance(answer, bytes | None) else repr(answer)
+        return answer if isinstance(answer, bytes | str | None) else repr(answer)
     return [_effect(each) for each in answer if not isinstance(each, SetTimer)]
 
 
 def _effect(effect: Any) -> Any:
     match effect:
         case Open(channel, port, settings):
-            return ("open", repr(channel), port, settings)
+            # A program may be in another folder now.
+            shown = re.sub(r"program='[\w.]*\.(\w+\.\w+)'", r"program='\1'", repr(channel))
+            return ("open", shown, port, settings)
         case Close(channel, why):
             return ("close", channel.name, why)
         case Send(channel, data, alternative):
@@ -299,6 +307,7 @@ def difference(recorded: Iterator[Any]) -> tuple[str, int]:
     if (says := facts(driver)) != (was := next(recorded)):
         return f"{test}\n  was {was}\n  is  {says}", 0
     channels: dict[str, Any] = {}
+    prepared: dict[Any, Any] = {}
     timer_s: float | None = None
     place = 0
     for place, call in enumerate(recorded):
@@ -308,12 +317,19 @@ def difference(recorded: Iterator[Any]) -> tuple[str, int]:
         for each in filter(_is_channel, call.given):
             channels[each[1]] = channels.get(each[1]) or channel(each[1])
         given = [channels[each[1]] if _is_channel(each) else each for each in call.given]
+        if call.name == "command":
+            given[0] = prepared.get(given[0], given[0])
         error: Exception | None = None
         answer: Any = None
         try:
-            answer = getattr(driver, call.name)(*given)
+            answer = getattr(driver, _NEW_NAMES.get(call.name, call.name))(*given)
         except Exception as raised:
             error = raised
+        if call.name == "prepare" and error is None:
+            answer = prepared_as(answer)
+        elif call.name == "encode" and error is None and isinstance(call.came, bytes):
+            # It was bytes of any form then, and is what the driver prepares now.
+            prepared[call.came], answer = answer, call.came
         for each in answer if isinstance(answer, list | tuple) else ():
             if isinstance(each, Open):
                 # OPC UA's is new for each driver.

@@ -20,6 +20,7 @@ RESULTS = ROOT / ".long"
 LONGEST_S = 3600.0
 _SUITE, _QUICK = "./dev test", "./dev test --quick"
 _COMMANDS = ".venv/bin/python -m tests.long.documented_commands"
+_WITHOUT = ".venv/bin/python -m tests.long.without"
 _BARE = "python3,python3-pip,git,ca-certificates"
 # What the README names, and a user without rights cannot install.
 _PACKAGES = "chromium fonts-noto-cjk libatomic1 libegl1 libgl1 libgomp1"
@@ -62,6 +63,7 @@ PARTS = {
     ),
     "python-3.12": Part((_QUICK,), python="3.12"),
     "python-3.13": Part((_QUICK,), python="3.13"),
+    "without-kinds": Part((f"./dev run pytest --version && {_WITHOUT}",)),
     "python-3.14": Part((_QUICK, _COMMANDS), debian="testing"),
     "first-hour": Part(
         (f"./dev run true && {_COMMANDS}",), debian="bookworm", user="newcomer", read_only_home=True

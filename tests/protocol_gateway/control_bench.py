@@ -47,7 +47,7 @@ class ControlBench:
 
     def restart(self, orphan=""):
         """Begin with no lease and no stop, as after a start of the gateway."""
-        self.robot_authority = RobotAuthority(Authority(), self.joints, self.driver.encode, orphan=orphan)
+        self.robot_authority = RobotAuthority(Authority(), self.joints, self.driver.prepare, orphan=orphan)
         self.control = Control(self.robot_authority, self.ports)
 
     def changed(self):

@@ -260,11 +260,11 @@ def test_a_command_with_two_ways_needs_one_of_them(alternative, ways, arrives):
 
 def test_a_driver_refuses_a_command_and_reports_an_unknown_fate():
     def not_now(encoded):
-        raise NotReadyError(codes.UR_MOVES())
+        raise NotReadyError(codes.OTHER(detail="a motion still runs"))
 
     async def main():
         async with controller() as reads:
-            why = codes.UR_PAUSED()
+            why = codes.OTHER(detail="its program was paused")
             driver = Driver(started=(Open(READ),), command=not_now, received=(STATE, FateUnknown(why)))
             async with link(driver, reads.port) as (arm_link, seen):
                 _, writer = await reads.next()
@@ -281,7 +281,7 @@ def test_a_driver_refuses_a_command_and_reports_an_unknown_fate():
 def test_what_ends_a_motion_is_sent_however_many_questions_were_sent():
     async def main():
         async with controller() as reads:
-            effects = (Send(READ, b"end"), FateUnknown(codes.UR_PAUSED()))
+            effects = (Send(READ, b"end"), FateUnknown(codes.OTHER(detail="its program was paused")))
             driver = Driver(started=(Open(READ),), received=effects)
             driver.requests_a_second = 0.0
             async with link(driver, reads.port) as (_, seen):

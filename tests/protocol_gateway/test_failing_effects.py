@@ -120,7 +120,7 @@ class Bench:
     def __init__(self, clock, send_error):
         self.clock = clock
         self.ports = FailingPorts(send_error)
-        encode = UnitDriver(JOINTS.types).encode
+        encode = UnitDriver(JOINTS.types).prepare
         ports = Ports(
             audit_trail=self.ports,
             latch=self.ports,

@@ -76,7 +76,7 @@ def test_joints_are_proven_for_one_robot_model_and_software(changes, software, c
 def test_a_controller_without_a_pose_to_compare_with_has_nothing_to_prove():
     bare = proofs(Capabilities(commands=COMMANDS), verified=None)
     assert (bare.joints_sha256, bare.joints_unproven("")) == ("", None)
-    undeclared = replace(READS, no_joints=codes.JOINTS_UNDECLARED())
+    undeclared = replace(READS, no_joints=codes.OTHER(detail="undeclared"))
     assert proofs(undeclared, verified=None).joints_unproven("") is None
 
 

@@ -47,7 +47,7 @@ class Bench:
     """
 
     def __init__(self):
-        self.robot_authority = RobotAuthority(Authority(), JOINTS, UnitDriver(JOINTS.types).encode)
+        self.robot_authority = RobotAuthority(Authority(), JOINTS, UnitDriver(JOINTS.types).prepare)
         self.seen = SEEN
         self.performed = []
         self.during = {}

@@ -124,7 +124,7 @@ def test_an_installed_driver_is_a_protocol_of_the_site_file_and_gets_its_table(t
     for text, words in (
         (SITE.format("json-lines", "simulated"), "has no simulator: name its address"),
         (SITE.format("unit", "tcp://10.0.0.7:5000") + "driver = { limit = 1 }\n", "an installed driver"),
-        (SITE.format("jsonlines", "tcp://10.0.0.7:5000"), "'unit' or 'rtde' or"),
+        (SITE.format("jsonlines", "tcp://10.0.0.7:5000"), "'unit' or '"),
     ):
         path.write_text(text)
         with pytest.raises(SiteFileError, match=words):
@@ -188,9 +188,9 @@ def test_the_example_reports_what_it_can_read_and_names_what_it_cannot(installed
         )
         assert report.units == 0, wrong
         assert all(isinstance(each, MalformedReceived) for each in report.events)
-    assert driver.encode(MoveAbsolute((0.5, 1.0)), Stop()) == b'{"do": [{"to": [0.5, 1.0]}, "stop"]}\n'
+    assert driver.prepare(MoveAbsolute((0.5, 1.0)), Stop()) == b'{"do": [{"to": [0.5, 1.0]}, "stop"]}\n'
     with pytest.raises(CommandError, match="has no Hold"):
-        driver.encode(Hold())
+        driver.prepare(Hold())
     with pytest.raises(GatewaySettingsError, match="'limits' is unknown"):
         make((JointType.ROTARY,), {}, relay=None, options={"limits": 1})
 

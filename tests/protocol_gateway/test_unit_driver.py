@@ -48,7 +48,7 @@ def driver(**settings) -> UnitDriver:
 
 @pytest.mark.parametrize(("command", "data"), COMMANDS)
 def test_commands_are_encoded_in_the_papers_words_and_units(command, data):
-    assert driver().encode(command) == data
+    assert driver().prepare(command) == data
 
 
 @pytest.mark.parametrize(
@@ -66,8 +66,8 @@ def test_a_controller_of_codes_needs_a_code_for_stop(codes, can_stop):
 
 def test_commands_are_encoded_in_the_site_files_codes():
     coded = driver(codes={2: "ABSOLUTE.DEG", 102: "COMMAND:stop"})
-    assert coded.encode(Stop()) == b"1#102@"
-    assert coded.encode(MoveAbsolute((0.0, 0.0))) == b"1#2*0.00;0.00@"
+    assert coded.prepare(Stop()) == b"1#102@"
+    assert coded.prepare(MoveAbsolute((0.0, 0.0))) == b"1#2*0.00;0.00@"
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_commands_are_encoded_in_the_site_files_codes():
 )
 def test_an_inexpressible_command_is_refused(command):
     with pytest.raises(CommandError):
-        driver().encode(command)
+        driver().prepare(command)
 
 
 def test_positions_are_si_with_velocities_and_time():
@@ -165,5 +165,5 @@ def test_any_bytes_give_events_but_no_invented_joints(data):
 @given(st.lists(st.floats(-360, 360), min_size=2, max_size=2).map(tuple))
 def test_positions_survive_a_round_trip(positions):
     fresh = driver()
-    (joints,) = fresh.read(fresh.encode(MoveAbsolute(positions))).events
+    (joints,) = fresh.read(fresh.prepare(MoveAbsolute(positions))).events
     assert joints.positions == pytest.approx(positions, abs=1e-10)

@@ -123,7 +123,7 @@ def test_a_controller_of_fanuc_with_two_groups_is_two_robots():
     ("robot", "problem"),
     [
         ({"controller": "udp://10.0.0.7:60008"}, "protocol 'snpx' needs tcp://10.0.0.7:60008"),
-        ({"protocol": "rtde", "fanuc": {}}, "fanuc needs the protocol 'snpx' or 'fanuc-ftp'"),
+        ({"protocol": "rtde", "fanuc": {}}, "fanuc needs the protocol 'fanuc-ftp' or 'snpx'"),
         ({"fanuc": {"user": "li"}}, "fanuc.user needs the protocol 'fanuc-ftp'"),
         ({"fanuc": {"rate": 0.5}}, "fanuc.rate 0.5: with the protocol 'snpx' 1 to 100 is right"),
         ({"fanuc": {"j23": 2}}, "Input should be -1, 0 or 1"),

@@ -1,8 +1,11 @@
 """The page has a sentence in each language for every reason of the table."""
 
 import re
+import runpy
 from ast import literal_eval
 from pathlib import Path
+
+import pytest
 
 from robomesh import reason_codes
 from robomesh.reasons import Code
@@ -15,6 +18,9 @@ ROWS = {
     for code, english, chinese in ROW.findall(SENTENCES.read_text("utf-8"))
 }
 TABLE = {each.name: each for each in vars(reason_codes).values() if isinstance(each, Code)}
+
+
+KINDS = sorted((SENTENCES.parents[3] / "controllers").glob("*/codes.py"))
 
 
 def parameters(sentence):
@@ -38,3 +44,13 @@ def test_its_chinese_has_the_same_parameters():
     for name, (english, chinese) in ROWS.items():
         assert parameters(chinese) == parameters(english), name
         assert re.search("[\u4e00-\u9fff]", chinese) or re.fullmatch(r"(\{\w+\}|[：，])+", chinese), name
+
+
+@pytest.mark.parametrize("file", KINDS, ids=lambda file: file.parent.name)
+def test_a_kind_s_own_reasons_have_chinese_with_the_same_parameters(file):
+    codes = [each for each in runpy.run_path(str(file)).values() if isinstance(each, Code)]
+    assert codes
+    for each in codes:
+        assert each.name not in TABLE, each.name
+        assert parameters(each.chinese) == each.parameters, each.name
+        assert re.search("[\u4e00-\u9fff]", each.chinese), each.name

@@ -15,7 +15,7 @@ def _prepare(
     if is_missing("asyncua"):
         from controllers.simulated.errors import SimulatorError
 
-        raise SimulatorError(missing("asyncua"))
+        raise SimulatorError(missing("asyncua", "opcua"))
     from controllers.opcua.simulated.service import OpcUaSimulatorSettings, serve_opcua
 
     settings = OpcUaSimulatorSettings(**common, path=path)

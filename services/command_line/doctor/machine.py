@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from protocol_gateway.kinds import own_kinds
 from robomesh.errors import UnavailableError
 from robomesh.extras import ADDED_IN_CHECKOUT, install_command, is_missing
 from robomesh.listen_address import reachable, split_address
@@ -31,7 +32,7 @@ _EXTRAS = {
     **{name: row.packages for name, row in SERVICES.items() if name != "router"},
     "simulator": ("ruckig",),
     "keys": ("cryptography",),
-    "opcua": ("asyncua",),
+    **{each.extra: each.packages for each in own_kinds().values() if each.extra},
     "foxglove": ("foxglove",),
     "ros2": ("rosbags",),
     "plots": ("matplotlib",),

@@ -85,7 +85,7 @@ def test_nothing_is_opened_but_snpx_without_control():
 def test_targets_undo_what_reading_does(target, j23, reversed_, zero):
     settings = replace(SETTINGS, j23=j23, reversed=tuple(reversed_), zero=zero)
     driver = ready(settings)
-    driver.command(driver.encode(Speed(50.0), MoveAbsolute(tuple(target))), 1.0)
+    driver.command(driver.prepare(Speed(50.0), MoveAbsolute(tuple(target))), 1.0)
     (line,) = sent(driver.received(SESSION, INITIALIZED, 1.1))
     packet = json.loads(line)
     assert list(packet) == [
@@ -101,7 +101,7 @@ def test_targets_undo_what_reading_does(target, j23, reversed_, zero):
 
 def test_a_motion_is_sent_once_and_ends_with_an_abort():
     driver = ready()
-    assert sent(driver.command(driver.encode(MoveAbsolute(HERE)), 1.0)) == [rmi.initialize(1)]
+    assert sent(driver.command(driver.prepare(MoveAbsolute(HERE)), 1.0)) == [rmi.initialize(1)]
     assert len(sent(driver.received(SESSION, INITIALIZED, 1.1))) == 1
     assert not sent(driver.received(SESSION, INITIALIZED, 1.2))
     assert sent(driver.received(SESSION, DONE, 1.3)) == [rmi.abort()]
@@ -110,8 +110,8 @@ def test_a_motion_is_sent_once_and_ends_with_an_abort():
 
 def test_a_stop_before_the_motion_was_sent_discards_it():
     driver = ready()
-    driver.command(driver.encode(MoveAbsolute(HERE)), 1.0)
-    assert sent(driver.command(driver.encode(Stop()), 1.05)) == [rmi.abort()]
+    driver.command(driver.prepare(MoveAbsolute(HERE)), 1.0)
+    assert sent(driver.command(driver.prepare(Stop()), 1.05)) == [rmi.abort()]
     # The controller aborted before it created the program, so a second abort ends the program.
     driver.received(SESSION, ABORTED, 1.06)
     assert sent(driver.received(SESSION, INITIALIZED, 1.1)) == [rmi.abort()]
@@ -126,7 +126,7 @@ def activity(driver, now_s, joints=HERE):
 def test_a_stop_of_an_arm_at_rest_does_not_make_it_move():
     driver = ready()
     activity(driver, 1.5)
-    driver.command(driver.encode(Stop()), 1.6)
+    driver.command(driver.prepare(Stop()), 1.6)
     # The abort is not answered yet.
     assert activity(driver, 1.61) is Activity.IDLE
     driver.received(SESSION, ABORTED, 1.62)
@@ -136,9 +136,9 @@ def test_a_stop_of_an_arm_at_rest_does_not_make_it_move():
 def test_a_stop_of_a_motion_that_has_not_begun_is_proven_by_rest_after_it():
     driver = ready()
     activity(driver, 1.5)
-    driver.command(driver.encode(MoveAbsolute(HERE)), 1.5)
+    driver.command(driver.prepare(MoveAbsolute(HERE)), 1.5)
     driver.received(SESSION, INITIALIZED, 1.6)
-    driver.command(driver.encode(Stop()), 1.61)
+    driver.command(driver.prepare(Stop()), 1.61)
     driver.received(SESSION, ABORTED, 1.62)
     assert activity(driver, 1.65) is Activity.MOVING
     assert activity(driver, 1.9, (*HERE[:5], 0.7)) is Activity.MOVING
@@ -150,12 +150,12 @@ def test_a_stop_of_a_motion_that_has_not_begun_is_proven_by_rest_after_it():
 def test_a_stop_that_was_not_delivered_is_sent_later_unless_a_reset_was_accepted(resets):
     driver = ready()
     driver.closed(SESSION, 1.0)
-    driver.command(driver.encode(Stop()), 1.1)
+    driver.command(driver.prepare(Stop()), 1.1)
     if len(resets) == 2:
         with pytest.raises(NotReadyError):
-            driver.command(driver.encode(*resets), 1.2)
+            driver.command(driver.prepare(*resets), 1.2)
     elif resets:
-        driver.command(driver.encode(*resets), 1.2)
+        driver.command(driver.prepare(*resets), 1.2)
     driver.timer_ended(10.0)
     driver.opened(RMI, 10.1)
     driver.received(RMI, CONNECTED, 10.2)
@@ -176,18 +176,18 @@ def test_a_stop_that_was_not_delivered_is_sent_later_unless_a_reset_was_accepted
 def test_a_state_that_forbids_motion(status, code):
     driver = ready(status=status)
     with pytest.raises(NotReadyError) as refused:
-        driver.command(driver.encode(MoveAbsolute(HERE)), 1.0)
+        driver.command(driver.prepare(MoveAbsolute(HERE)), 1.0)
     assert refused.value.reason.code == code
 
 
 def test_an_old_state_and_an_extra_axis_forbid_motion():
     driver = ready()
     with pytest.raises(NotReadyError) as refused:
-        driver.command(driver.encode(MoveAbsolute(HERE)), 1.8)
+        driver.command(driver.prepare(MoveAbsolute(HERE)), 1.8)
     assert refused.value.reason.code == "fanuc.state_old"
     driver._axes_read = (*[10.0] * 6, 0.5, 0.0, 0.0)
     with pytest.raises(NotReadyError) as refused:
-        driver.command(driver.encode(MoveAbsolute(HERE)), 1.0)
+        driver.command(driver.prepare(MoveAbsolute(HERE)), 1.0)
     assert refused.value.reason.code == "fanuc.extra_axes"
 
 
@@ -202,7 +202,7 @@ def test_an_old_state_and_an_extra_axis_forbid_motion():
 )
 def test_what_cannot_be_expressed_is_refused(commands):
     with pytest.raises(CommandError):
-        ready().encode(*commands)
+        ready().prepare(*commands)
 
 
 @pytest.mark.parametrize(

@@ -381,7 +381,7 @@ def test_nothing_is_ever_commanded():
     assert not driver.capabilities.commands
     assert driver.capabilities.slow_hz == 1.0
     with pytest.raises(CommandError):
-        driver.encode(Stop())
+        driver.prepare(Stop())
     assert driver.command(b"DELE x", NOW_S) == ()
 
 

@@ -505,7 +505,7 @@ def test_it_refuses_codes_every_command_and_settings_of_another_model():
         with pytest.raises(GatewaySettingsError):
             Stepped(**wrong)
     with pytest.raises(CommandError, match="only reads"):
-        Stepped().driver.encode(MoveAbsolute((0.0,) * 6))
+        Stepped().driver.prepare(MoveAbsolute((0.0,) * 6))
 
 
 # ------------------------------------------------------------------- in a gateway

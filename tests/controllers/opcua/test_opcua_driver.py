@@ -426,7 +426,7 @@ def test_driver_commands_nothing_and_sends_nothing():
     assert not told.driver.capabilities.commands
     assert told.driver.requests_a_second == 0.0
     with pytest.raises(CommandError):
-        told.driver.encode(MoveAbsolute((0.0, 0.0)))
+        told.driver.prepare(MoveAbsolute((0.0, 0.0)))
     effects = itertools.chain(
         told.driver.command(b"x", NOW_S), told.driver.timer_ended(NOW_S), told.driver.skipped(OPCUA, NOW_S)
     )

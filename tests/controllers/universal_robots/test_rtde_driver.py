@@ -297,7 +297,7 @@ def test_it_refuses_other_robots_codes_and_every_command():
     with pytest.raises(GatewaySettingsError, match="codes"):
         RtdeDriver(SIX, {2: "ABSOLUTE.DEG"})
     with pytest.raises(CommandError, match="only reads"):
-        driver().encode(MoveAbsolute((0.0,) * 6))
+        driver().prepare(MoveAbsolute((0.0,) * 6))
 
 
 # ------------------------------------------------------------------- in a gateway

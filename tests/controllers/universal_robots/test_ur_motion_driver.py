@@ -1,6 +1,5 @@
 """Driver that moves an arm of Universal Robots, event by event, without I/O."""
 
-import json
 import random
 import struct
 
@@ -133,7 +132,7 @@ class Arm:
         return self.receive(RTDE, package(PackageType.DATA, data))
 
     def command(self, *commands):
-        return self._do(self.driver.command(self.driver.encode(*commands), self.now_s))
+        return self._do(self.driver.command(self.driver.prepare(*commands), self.now_s))
 
     def wait(self, seconds, *, states=True):
         """Let time pass: states come 125 times a second, and timers end."""
@@ -208,7 +207,7 @@ def test_capabilities_say_what_it_can_do():
 )
 def test_what_it_cannot_send_is_refused(commands, text):
     with pytest.raises(CommandError, match=text):
-        Arm().driver.encode(*commands)
+        Arm().driver.prepare(*commands)
 
 
 def test_a_script_has_finite_numbers_only():
@@ -495,7 +494,7 @@ def test_an_answer_next_to_other_bytes_is_none(line):
 @pytest.mark.parametrize("first", [Stop(), Recover(Recovery.CLOSE_SAFETY_POPUP)])
 def test_a_stop_and_a_recovery_are_sent_alone(first):
     with pytest.raises(CommandError, match="alone"):
-        Arm().driver.encode(first, MoveAbsolute(TARGET))
+        Arm().driver.prepare(first, MoveAbsolute(TARGET))
 
 
 def test_a_refused_stop_is_an_alarm_only_while_a_program_runs():
@@ -550,10 +549,6 @@ def test_unknown_bytes_move_nothing_and_raise_nothing():
         assert all(
             not isinstance(event, JointsReceived) for r in flat(arm.effects, Report) for event in r.events
         )
-
-
-def test_its_own_commands_are_json():
-    assert json.loads(Arm().driver.encode(Speed(10.0), Reset())) == [["speed", 10.0], ["reset", None]]
 
 
 def test_inputs_that_are_used_exist():
@@ -656,7 +651,7 @@ def test_a_recovery_is_refused_while_a_program_runs_or_waits_and_without_state_o
         arm.command(Recover(UNLOCK))
     assert b"unlock" not in arm.sent["dashboard"]
     with pytest.raises(CommandError, match="Recover"):
-        arm.driver.encode(Recover(Recovery.SERVO_ON))
+        arm.driver.prepare(Recover(Recovery.SERVO_ON))
 
 
 def test_a_refused_recovery_is_reported_with_the_controller_s_words():

@@ -7,6 +7,7 @@ import struct
 
 import pytest
 
+from controllers.yaskawa import codes as hses_codes
 from controllers.yaskawa.axes import YaskawaSettings
 from controllers.yaskawa.data import Status
 from controllers.yaskawa.driver import HSES, HsesDriver, activity_of, mode_of
@@ -400,7 +401,7 @@ def test_axes_that_the_site_file_declares_are_no_others_but_a_base_always_is():
     assert arm.give(0x74, names("SLURBTE")) == []
     # The second question is for the base.
     (event,) = arm.give(0x74, names("X"))
-    assert event == AxesUndeclared(codes.BASE_UNDECLARED(axes="X"))
+    assert event == AxesUndeclared(hses_codes.BASE_UNDECLARED(axes="X"))
 
 
 def test_a_question_without_an_answer_is_asked_again_although_it_is_asked_once():
@@ -419,7 +420,7 @@ def test_it_refuses_codes_every_command_and_settings_of_another_model():
     with pytest.raises(GatewaySettingsError, match="7 values, but the model has 6 joints"):
         Stepped(pulses_per_degree=(1.0,) * 7)
     with pytest.raises(CommandError, match="only reads"):
-        Stepped().driver.encode(MoveAbsolute((0.0,) * 6))
+        Stepped().driver.prepare(MoveAbsolute((0.0,) * 6))
 
 
 # ------------------------------------------------------------------- in a gateway

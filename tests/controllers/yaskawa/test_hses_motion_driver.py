@@ -66,7 +66,7 @@ class Stepped:
 def test_hold_is_repeated_to_the_controller_whose_stop_it_was_only(later, again):
     stepped = Stepped()
     stepped.connect("A")
-    stop = stepped.sent(stepped.driver.command(stepped.driver.encode(Stop()), stepped.now_s))
+    stop = stepped.sent(stepped.driver.command(stepped.driver.prepare(Stop()), stepped.now_s))
     assert [(command(each.data), each.channel) for each in stop] == [(HOLD, STOP), (HOLD, HSES)]
     assert stepped.holds() >= 10
     for channel in (HSES, STOP):
@@ -125,7 +125,7 @@ class Answered(Stepped):
         self.now_s = end_s
 
     def command(self, *commands):
-        self.do(self.driver.command(self.driver.encode(*commands), self.now_s))
+        self.do(self.driver.command(self.driver.prepare(*commands), self.now_s))
 
     def activities(self, seconds):
         self.events = []
@@ -155,7 +155,7 @@ def test_a_motion_that_is_refused_leaves_hold_as_it_was():
 
 def test_a_stop_is_sent_alone():
     with pytest.raises(CommandError, match="alone"):
-        Answered().driver.encode(Stop(), NEAR)
+        Answered().driver.prepare(Stop(), NEAR)
 
 
 @pytest.mark.parametrize("lost", [None, 0.06, 0.11, 0.16, 0.21])

@@ -1,11 +1,13 @@
 // Why a request is refused, control ended or a motion is not checked: reasons of the mesh in the page's language.
 
+import { SENTENCES_OF_KINDS } from "../gen/reasons-of-kinds";
 import type { Reason } from "../gen/robomesh_pb";
 import { isSaid } from "./stop-words";
 import { inLanguage, language, t } from "./texts";
 
 /** Sentences by code, English and Chinese, with the parameters of robomesh/reason_codes.py; {cause}: the causes. */
 const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]> = new Map([
+  ...SENTENCES_OF_KINDS,
   [
     "request.busy",
     [
@@ -732,139 +734,6 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
       "发送停止所需的连接已断开，此时无法停止机器人：请恢复事件 link.channel_lost 指出的连接",
     ],
   ],
-  [
-    "universal_robots.not_started",
-    ["the controller has not started its program within {seconds} s", "控制器未在 {seconds} 秒内启动运动程序"],
-  ],
-  [
-    "universal_robots.other_program",
-    [
-      "another program runs or waits on the controller: end it at the controller",
-      "控制器上有其他程序正在运行或暂停：请在控制器上结束该程序",
-    ],
-  ],
-  [
-    "universal_robots.lost_program",
-    ["the program that runs on the controller is not the gateway's", "控制器上运行的不是网关的程序"],
-  ],
-  ["universal_robots.paused", ["its program was paused", "运动程序被暂停"]],
-  ["universal_robots.arm_stopped", ["the controller has stopped the arm ({mode})", "控制器已停止机械臂（{mode}）"]],
-  ["universal_robots.tool_changed", ["tool or payload were changed during a motion", "运动期间工具或负载被更改"]],
-  ["universal_robots.went_local", ["the controller was switched to local control", "控制器已切换到本地控制"]],
-  ["universal_robots.channel_lost", ["the connection {name} was lost during a motion", "运动期间连接 {name} 断开"]],
-  ["universal_robots.state_old", ["the newest state of the controller is too old", "控制器的最新状态已过时"]],
-  [
-    "universal_robots.moves",
-    ["a motion still runs: wait for its end, or stop the robot", "上一个运动仍在进行：请等待其结束，或停止机器人"],
-  ],
-  [
-    "universal_robots.channel_missing",
-    [
-      "the connection {name} to the controller is missing: the event link.channel_lost says why",
-      "与控制器的连接 {name} 断开：原因见事件 link.channel_lost",
-    ],
-  ],
-  [
-    "universal_robots.software",
-    [
-      "motion needs PolyScope 5.6 or a later version 5, this is {version}: move the robot from its own panel",
-      "运动需要 PolyScope 5.6 或更高的 5.x 版本，当前为 {version}：请用示教器移动机器人",
-    ],
-  ],
-  [
-    "universal_robots.stop_young",
-    [
-      "the protective stop is seen for {seen} s only; it can be unlocked after {seconds} s: find its cause first",
-      "保护性停止仅出现 {seen} 秒；{seconds} 秒后才能解锁：请先查明原因",
-    ],
-  ],
-  [
-    "universal_robots.recovery_not_now",
-    [
-      "{recovery} does not fit the controller's state (safety mode {safety}, robot mode {robot})",
-      "{recovery} 与控制器状态不符（安全模式 {safety}，机器人模式 {robot}）",
-    ],
-  ],
-  [
-    "universal_robots.recovers",
-    ["the controller has not answered {recovery} yet: wait for its answer", "控制器尚未回答 {recovery}：请等待其回答"],
-  ],
-  [
-    "universal_robots.register",
-    [
-      "{name} cannot be used: {problem}: choose other registers in the site file (universal_robots)",
-      "{name} 无法使用：{problem}：请在站点文件（universal_robots）中选择其他寄存器",
-    ],
-  ],
-  ["hses.not_started", ["the controller has not started it within {seconds} s", "控制器未在 {seconds} 秒内开始运动"]],
-  [
-    "hses.other_job",
-    ["a job runs on the controller: end it at the controller", "控制器上有作业正在运行：请在控制器上结束该作业"],
-  ],
-  ["hses.ended_elsewhere", ["it has ended before its target", "运动在到达目标前结束"]],
-  ["hses.held", ["it was held", "运动被暂停"]],
-  ["hses.arm_stopped", ["the controller lets no arm move: {state}", "控制器不允许机械臂运动：{state}"]],
-  ["hses.tool_changed", ["the tool was changed during a motion", "运动期间工具被更改"]],
-  ["hses.went_local", ["the controller was switched to local control", "控制器已切换到本地控制"]],
-  ["hses.channel_lost", ["the connection {name} was lost during a motion", "运动期间连接 {name} 断开"]],
-  [
-    "hses.channel_missing",
-    [
-      "the connection {name} to the controller is missing: the event link.channel_lost says why",
-      "与控制器的连接 {name} 断开：原因见事件 link.channel_lost",
-    ],
-  ],
-  ["hses.state_old", ["the newest state of the controller is too old", "控制器的最新状态已过时"]],
-  [
-    "hses.moves",
-    ["a motion still runs: wait for its end, or stop the robot", "上一个运动仍在进行：请等待其结束，或停止机器人"],
-  ],
-  ["hses.axes", ["{detail}: move the robot from its own panel", "{detail}：请用示教器移动机器人"]],
-  [
-    "hses.held_motion",
-    [
-      "a held motion may go on when HOLD ends: switch the servos off at the robot, as its emergency stop does, then reset the stop",
-      "HOLD 结束后，被暂停的运动可能继续：请在机器人处关闭伺服（例如按下急停），然后复位停止",
-    ],
-  ],
-  [
-    "fanuc.not_connected",
-    [
-      "RMI is not connected: wait for it, or see why in the event link.channel_lost",
-      "RMI 未连接：请等待连接，或在事件 link.channel_lost 中查看原因",
-    ],
-  ],
-  [
-    "fanuc.moves",
-    ["a motion still runs: wait for its end, or stop the robot", "上一个运动仍在进行：请等待其结束，或停止机器人"],
-  ],
-  ["fanuc.state_old", ["the newest state of the controller is too old", "控制器的最新状态已过时"]],
-  [
-    "fanuc.other_program",
-    [
-      "another program runs on the controller: end it at the controller",
-      "控制器上正在运行其他程序：请在控制器上结束它",
-    ],
-  ],
-  [
-    "fanuc.extra_axes",
-    [
-      "axis {axes} belongs to no joint of the model and is not at 0, so a motion would move it: declare it, or move it to 0",
-      "轴 {axes} 不属于模型的任何关节且不在 0 位，运动会带动它：请声明该轴，或将其移到 0 位",
-    ],
-  ],
-  [
-    "fanuc.arm_stopped",
-    ["the controller does not let the arm move ({activity})", "控制器不允许机械臂运动（{activity}）"],
-  ],
-  ["fanuc.went_local", ["the controller is not in remote control any more", "控制器已不再处于远程控制"]],
-  ["fanuc.tool_changed", ["the tool was changed during a motion", "运动期间工具被更改"]],
-  ["fanuc.lost_program", ["the gateway's program has ended on the controller", "网关的程序已在控制器上结束"]],
-  ["fanuc.no_answer", ["the controller has not answered {name}", "控制器未应答 {name}"]],
-  ["fanuc.refused", ["the controller refuses {name}: {problem}", "控制器拒绝 {name}：{problem}"]],
-  ["fanuc.system_fault", ["the controller reports a fault during a motion", "控制器在运动期间报告故障"]],
-  ["fanuc.connection_lost", ["RMI was disconnected during a motion", "运动期间 RMI 连接断开"]],
-  ["fanuc.moved_before", ["the arm has moved before its motion was sent", "机械臂在运动发出之前已移动"]],
   ["stop.sent", ["stop request {id} is on the controller's socket", "停止 {id} 已发送给控制器"]],
   ["stop.not_sent", ["stop request {id} is latched, but not sent: {cause}", "停止 {id} 已锁定，但未送达：{cause}"]],
   [
@@ -916,31 +785,10 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ["controller.not_holding", ["nothing is on hold: there is no motion to resume", "没有处于保持的运动可继续"]],
   ["positions.stale", ["no joint positions for {seconds} s", "{seconds} 秒未收到关节位置"]],
   [
-    "joints.undeclared",
-    [
-      "its joints are not shown, because the controller sends pulses: declare pulses_per_degree of each joint in [robot.yaskawa] of the site file",
-      "控制器发送的是脉冲，因此不显示关节：请在站点文件的 [robot.yaskawa] 中声明每个关节的 pulses_per_degree",
-    ],
-  ],
-  [
     "joints.axes_extra",
     [
       "axis {axes} of its controller belongs to no joint of the model: put it into the model, or name its number in other_axes of the site file if it neither carries nor moves the arm",
       "控制器的轴 {axes} 不属于模型的任何关节：请将其加入模型；若该轴既不承载也不移动机械臂，请将其编号写入站点文件的 other_axes",
-    ],
-  ],
-  [
-    "joints.base_undeclared",
-    [
-      "its controller moves it on a base ({axes}), which the model does not have: where the arm stands is not known",
-      "控制器用基座轴（{axes}）移动该机械臂，而模型中没有该基座：机械臂所在位置未知",
-    ],
-  ],
-  [
-    "joints.axes_undeclared",
-    [
-      "its joints are not shown, because the site file does not say how axis 3 is measured, or how positions may be assigned: declare j23 and assignments in [robot.fanuc] of the site file",
-      "站点文件没有说明第 3 轴如何计量，或允许怎样分配位置数据，因此不显示关节：请在站点文件的 [robot.fanuc] 中声明 j23 和 assignments",
     ],
   ],
   [
@@ -2476,6 +2324,11 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
     ],
   ],
 ] as const);
+
+const OF_KINDS: ReadonlySet<string> = new Set(SENTENCES_OF_KINDS.map(([code]) => code));
+
+/** Return whether only one kind of controllers has a code. */
+export const isOfKind = (code: string): boolean => OF_KINDS.has(code);
 
 /** Chinese for parameters that are words of a program. */
 const WORDS: Readonly<Record<string, string>> = {

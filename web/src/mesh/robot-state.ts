@@ -12,7 +12,7 @@ import {
   Capabilities_Stops as Stops,
 } from "../gen/robomesh_pb";
 import { stampWhen } from "../i18n/format";
-import { reasonsText, reasonText } from "../i18n/reasons";
+import { isOfKind, reasonsText, reasonText } from "../i18n/reasons";
 import { operatorText } from "../i18n/stop-words";
 import type { TextName } from "../i18n/texts";
 import { t } from "../i18n/texts";
@@ -160,7 +160,7 @@ export function whyNoMotion(state: ControllerState | undefined): string {
   if (state.readOnly) {
     const causes = state.linkReasons.flatMap((reason) => reason.causes);
     // A controller's own obstacle; the others are about proofs.
-    const own = causes.find(({ code }) => /^(joints|universal_robots)\.|^robot\.motion_off$/.test(code));
+    const own = causes.find(({ code }) => /^joints\.|^robot\.motion_off$/.test(code) || isOfKind(code));
     if (own) return t("no_motion_reason", { text: reasonText(own, own.text) });
     return causes.some(({ code }) => code === READS_ONLY) ? t("reads_only_text") : t("read_only_text");
   }

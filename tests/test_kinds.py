@@ -1,0 +1,50 @@
+"""Kinds of controllers: nothing below them names one, and everything else runs without any of them."""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from protocol_gateway.errors import GatewaySettingsError
+from protocol_gateway.kinds import kind_of, own_kinds
+
+ROOT = Path(__file__).parents[1]
+# Names of vendors, of their protocols, and of what reads them.
+NAMES = re.compile(
+    r"universal.?robots|yaskawa|motoman|fanuc|karel|\brtde\b|\bhses\b|\bsnpx\b|opc.?ua|asyncua", re.IGNORECASE
+)
+BELOW = ("robomesh", "robots", "renderer", "protocol_gateway", "web/src")
+
+
+def test_nothing_below_the_kinds_names_one():
+    named = [
+        f"{file.relative_to(ROOT)}: {found[0]}"
+        for folder in BELOW
+        for ending in ("py", "ts", "tsx", "proto", "css")
+        for file in sorted((ROOT / folder).rglob(f"*.{ending}"))
+        if not {"gen", "node_modules"} & {*file.parts} and (found := NAMES.search(file.read_text("utf-8")))
+    ]
+    assert named == []
+
+
+def test_every_kind_has_all_its_parts():
+    kinds = own_kinds()
+    assert "unit" in kinds
+    for each in kinds.values():
+        assert each.driver_maker
+        assert each.simulated_controller
+        assert each.probe
+
+
+def test_a_kind_whose_folder_is_missing_is_no_protocol(monkeypatch):
+    others = own_kinds().keys() - {"snpx", "fanuc-ftp"}
+    own_kinds.cache_clear()
+    # As if it were not there: Python's own sign for it.
+    monkeypatch.setitem(sys.modules, "controllers.fanuc", None)
+    try:
+        assert own_kinds().keys() == others
+        with pytest.raises(GatewaySettingsError, match="unknown protocol 'snpx'; known: unit"):
+            kind_of("snpx")
+    finally:
+        own_kinds.cache_clear()
