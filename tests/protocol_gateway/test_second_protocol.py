@@ -195,29 +195,42 @@ def test_the_example_reports_what_it_can_read_and_names_what_it_cannot(installed
         make((JointType.ROTARY,), {}, relay=None, options={"limits": 1})
 
 
+OLD = """
+import logging
+logging.basicConfig()
+from protocol_gateway.kinds import driver_maker
+from protocol_gateway.seam import Stop
+driver = driver_maker("json-lines")((), {}, relay=None, options=None)
+print(driver.command(driver.prepare(Stop()), 0.0)[0].data)
+"""
+
+
 @pytest.mark.slow
-def test_a_driver_that_imports_the_old_names_runs_with_a_warning_that_says_the_new_ones(tmp_path):
+def test_a_driver_with_the_old_names_runs_with_warnings_that_say_the_new_ones(installed, tmp_path):
     old = (
         (EXAMPLE / "json_lines.py")
         .read_text()
         .replace("protocol_gateway.seam", "protocol_gateway.drivers.driver")
     )
-    (tmp_path / "json_lines.py").write_text(
-        old + "\nfrom protocol_gateway.drivers.only_reads import OnlyReads\n"
+    old = (
+        old.replace("def prepare(", "def encode(")
+        + "\nfrom protocol_gateway.drivers.only_reads import OnlyReads\n"
     )
+    (tmp_path / "packages" / "json_lines.py").write_text(old)
+    path = [str(tmp_path / "packages"), *(each for each in sys.path if each != str(EXAMPLE))]
     done = subprocess.run(
-        [sys.executable, "-c", "import json_lines; print(json_lines.JsonLines((), {}).started(0.0))"],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join((str(tmp_path), *sys.path))},
+        [sys.executable, "-c", OLD],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(path)},
         capture_output=True,
         text=True,
         check=True,
     )
-    assert "Open(channel" in done.stdout
+    assert done.stdout == 'b\'{"do": ["stop"]}\\n\'\n'
     assert (
         "FutureWarning: protocol_gateway.drivers will be gone: import from protocol_gateway.seam"
         in done.stderr
     )
+    assert "of the package robomesh-json-lines, has encode, which is prepare now" in done.stderr
 
 
 KIND = """
