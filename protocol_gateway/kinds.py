@@ -121,6 +121,10 @@ def _created(maker: DriverMaker, whose: str, *given: Any, **named: Any) -> Drive
 def _with_new_names(driver: Any, whose: str) -> Driver:
     """Return a driver, with a warning and new names of its methods if it has old ones."""
     if not hasattr(driver, "prepare"):
-        logger.warning("%s has encode, which is prepare now: docs/controllers/own-driver.md", whose)
-        driver.prepare = driver.encode
+        logger.warning(
+            "%s has encode, which is prepare now, and no names of timers: docs/controllers/own-driver.md",
+            whose,
+        )
+        driver.prepare, old = driver.encode, driver.timer_ended
+        driver.timer_ended = lambda ended, now_s: old(now_s)
     return cast("Driver", driver)

@@ -124,7 +124,7 @@ class UnitDriver:
         """Do nothing: the link connects again."""
         return ()
 
-    def timer_ended(self, now_s: float) -> Effects:
+    def timer_ended(self, ended: Mapping[str, float], now_s: float) -> Effects:
         """Do nothing: no timer is set."""
         return ()
 

@@ -174,7 +174,7 @@ class SnpxDriver(OnlyReads):
         self._stop()
         return (SetTimer(None),)
 
-    def timer_ended(self, now_s: float) -> Effects:
+    def timer_ended(self, ended: Mapping[str, float], now_s: float) -> Effects:
         """Ask the next question, or give up an answer that did not come."""
         return self._go_on(now_s)
 

@@ -218,7 +218,7 @@ class FtpDriver(OnlyReads):
         self._ended = True
         return (Close(FILE), *self._finish(now_s))
 
-    def timer_ended(self, now_s: float) -> Effects:
+    def timer_ended(self, ended: Mapping[str, float], now_s: float) -> Effects:
         """Read the next file, give one up that did not come, or connect again."""
         if self._waits:
             self._waits = False

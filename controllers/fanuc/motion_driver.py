@@ -53,6 +53,7 @@ from protocol_gateway.seam import (
     Report,
     Reset,
     Send,
+    SetTimer,
     Severity,
     Signal,
     SignalsReceived,
@@ -62,7 +63,7 @@ from protocol_gateway.seam import (
     StopEnds,
 )
 from protocol_gateway.seam.hexadecimal import hexadecimal
-from protocol_gateway.seam.one_motion import FIRST_PERCENT, Timers, prepared
+from protocol_gateway.seam.one_motion import FIRST_PERCENT, prepared
 from protocol_gateway.seam.polling import Asked
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
@@ -99,6 +100,10 @@ class _Line(Enum):
     OPEN = auto()
     LEAVING = auto()
     LOST = auto()
+
+
+# Timers of a session.
+_OF_SESSION = ("connect", "join", "leave", "initialize", "abort", "again", "watch")
 
 
 class _Phase(Enum):
@@ -168,7 +173,8 @@ class FanucMotionDriver(SnpxDriver):
     def _forget(self) -> None:
         self._line = _Line.CLOSED
         self._lines = LineStream()
-        self._due = Timers("snpx")
+        # RMI is connected again later, after a refusal.
+        self._retries_later = False
         self._phase = _Phase.NONE
         self._motion: _Motion | None = None
         self._sent_s = float("-inf")
@@ -190,36 +196,35 @@ class FanucMotionDriver(SnpxDriver):
         """Connect to SNPX, and to RMI if a stop is pending."""
         self._forget()
         self._running = True
-        return self._due.with_timer((*super().started(now_s), *self._settle(now_s)))
+        return (*super().started(now_s), *self._settle(now_s))
 
     def controlled(self, taken: bool, now_s: float) -> Effects:
         """Connect to RMI while the robot is controlled."""
         self._controlled, self._percent = taken, FIRST_PERCENT
-        return self._due.with_timer(self._settle(now_s))
+        return self._settle(now_s)
 
     def opened(self, channel: Channel, now_s: float) -> Effects:
         """Greet."""
         if channel is SNPX:
-            return self._due.with_timer(super().opened(channel, now_s))
+            return super().opened(channel, now_s)
         self._lines = LineStream()
         if channel is RMI:
-            self._due["connect"] = now_s + ANSWER_S
-            return self._due.with_timer((Send(RMI, rmi.connect()),))
+            return (SetTimer(now_s + ANSWER_S, "connect"), Send(RMI, rmi.connect()))
         if self._line is not _Line.JOINING:
             # The port of an earlier session, after this one was lost.
             return (Close(SESSION),)
         self._line = _Line.OPEN
-        self._due.pop("join", None)
+        joined = SetTimer(None, "join")
         if self._stop_owed:
             self._phase = _Phase.STOPPING
-            return self._due.with_timer(self._abort(now_s))
-        return self._due.with_timer(self._settle(now_s))
+            return (joined, *self._abort(now_s))
+        return (joined, *self._settle(now_s))
 
     def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
         """Take the next bytes."""
         if channel is SNPX:
             effects = [*super().received(channel, data, now_s)]
-            return self._due.with_timer((*effects, *self._follow(now_s)))
+            return (*effects, *self._follow(now_s))
         effects = []
         for line in self._lines.receive(data):
             try:
@@ -230,13 +235,13 @@ class FanucMotionDriver(SnpxDriver):
                 effects += self._on_connect(answer, now_s) if channel is RMI else self._on(answer, now_s)
         if self._lines.broken:
             effects += self._leave(channel, "its lines are too long", now_s)
-        return self._due.with_timer((*effects, *self._settle(now_s)))
+        return (*effects, *self._settle(now_s))
 
     def skipped(self, channel: Channel, now_s: float) -> Effects:
         """Read SNPX on; connect RMI again, which cannot be read from its middle."""
         if channel is SNPX:
-            return self._due.with_timer(super().skipped(channel, now_s))
-        return self._due.with_timer(self._leave(channel, "it sent far too much", now_s))
+            return super().skipped(channel, now_s)
+        return self._leave(channel, "it sent far too much", now_s)
 
     def closed(self, channel: Channel, now_s: float) -> Effects:
         """Handle a lost connection."""
@@ -246,22 +251,21 @@ class FanucMotionDriver(SnpxDriver):
             effects = [*super().closed(channel, now_s)]
             if self._phase in _OPEN_MOTION:
                 effects += self._give_up(fanuc_codes.STATE_OLD(), now_s)
-            return self._due.with_timer(effects)
+            return effects
         if channel is RMI:
-            self._due.pop("connect", None)
-            return self._due.with_timer(())
+            return (SetTimer(None, "connect"),)
         if self._line in (_Line.OPEN, _Line.LEAVING):
-            return self._due.with_timer(self._lost(now_s))
-        return self._due.with_timer(())
+            return self._lost(now_s)
+        return ()
 
-    def timer_ended(self, now_s: float) -> Effects:
+    def timer_ended(self, ended: Mapping[str, float], now_s: float) -> Effects:
         """Handle the timers that have expired."""
         effects: list[Effect] = []
-        ended = self._due.ended(now_s)
         # A late gateway has unread messages.
         late = now_s - min(ended.values(), default=now_s) > _LATE_S
-        if "snpx" in ended:
-            effects += super().timer_ended(now_s)
+        self._retries_later = self._retries_later and "retry" not in ended
+        if "" in ended:
+            effects += super().timer_ended(ended, now_s)
         if "reopen" in ended and self._line is _Line.LOST:
             self._line = _Line.CLOSED
             effects += [Close(RMI), Close(SESSION)]
@@ -278,7 +282,7 @@ class FanucMotionDriver(SnpxDriver):
             effects += self._abort(now_s)
         if "watch" in ended and self._phase in _OPEN_MOTION:
             effects += self._watch(now_s, late=late)
-        return self._due.with_timer((*effects, *self._settle(now_s)))
+        return (*effects, *self._settle(now_s))
 
     # ------------------------------------------------------------------- connections
 
@@ -288,7 +292,7 @@ class FanucMotionDriver(SnpxDriver):
             return ()
         wanted = self._controlled or self._stop_owed or self._phase is not _Phase.NONE
         if wanted and self._line is _Line.CLOSED:
-            if "retry" in self._due:
+            if self._retries_later:
                 return ()
             self._line = _Line.CONNECTING
             return (Open(RMI, rmi.PORT),)
@@ -296,49 +300,45 @@ class FanucMotionDriver(SnpxDriver):
             return ()
         if self._line in (_Line.CONNECTING, _Line.JOINING):
             self._line = _Line.CLOSED
-            for name in ("connect", "join"):
-                self._due.pop(name, None)
-            return (Close(RMI), Close(SESSION))
+            return (SetTimer(None, "connect"), SetTimer(None, "join"), Close(RMI), Close(SESSION))
         if self._line is _Line.OPEN:
             self._line = _Line.LEAVING
-            self._due["leave"] = now_s + _LEAVE_S
-            return (Send(SESSION, rmi.disconnect()),)
+            return (SetTimer(now_s + _LEAVE_S, "leave"), Send(SESSION, rmi.disconnect()))
         return ()
 
     def _leave(self, channel: Channel, why: str, now_s: float) -> Effects:
         """Close an unusable connection and schedule a retry."""
-        effects = [*self._lost(now_s), Close(channel, why)]
-        self._line = _Line.CLOSED
-        self._due.pop("reopen", None)
-        self._due["retry"] = now_s + _RETRY_S
-        return effects
+        self._line, self._retries_later = _Line.CLOSED, True
+        timers = (SetTimer(None, "reopen"), SetTimer(now_s + _RETRY_S, "retry"))
+        return (*timers, *self._given_up(), Close(channel, why))
 
     def _lost(self, now_s: float) -> Effects:
-        """Handle a lost connection: RMI_MOVE may continue."""
+        """Handle a lost connection."""
+        self._line = _Line.LOST
+        # Before the channel connects to the old session's port again.
+        return (SetTimer(now_s + _REOPEN_S, "reopen"), *self._given_up())
+
+    def _given_up(self) -> Effects:
+        """Forget what the session had open: RMI_MOVE may continue."""
         before = self._phase
         if before is not _Phase.NONE:
             self._stop_owed = True
-        for name in ("connect", "join", "leave", "initialize", "abort", "again", "watch"):
-            self._due.pop(name, None)
+        effects: list[Effect] = [SetTimer(None, name) for name in _OF_SESSION]
         self._initialize_open = self._abort_open = False
         self._phase, self._motion = _Phase.NONE, None
-        self._line = _Line.LOST
-        # Before the channel connects to the old session's port again.
-        self._due["reopen"] = now_s + _REOPEN_S
         if before in _OPEN_MOTION:
             self._must_rest()
-            return (FateUnknown(fanuc_codes.CONNECTION_LOST()),)
-        return ()
+            effects.append(FateUnknown(fanuc_codes.CONNECTION_LOST()))
+        return effects
 
     def _on_connect(self, answer: Answer, now_s: float) -> Effects:
         if answer.name != rmi.CONNECT or self._line is not _Line.CONNECTING:
             return ()
-        self._due.pop("connect", None)
         if answer.error:
             return self._leave(RMI, answer.problem, now_s)
         self._line = _Line.JOINING
-        self._due["join"] = now_s + _JOIN_S
-        return (Close(RMI), Open(SESSION, answer.port))
+        timers = (SetTimer(None, "connect"), SetTimer(now_s + _JOIN_S, "join"))
+        return (*timers, Close(RMI), Open(SESSION, answer.port))
 
     # ------------------------------------------------------------------------ answers
 
@@ -346,25 +346,23 @@ class FanucMotionDriver(SnpxDriver):
         """Handle a message of the session."""
         match answer.name:
             case rmi.INITIALIZE if self._initialize_open:
-                return self._on_initialized(answer, now_s)
+                return (SetTimer(None, "initialize"), *self._on_initialized(answer, now_s))
             case rmi.JOINT_MOTION if self._phase is _Phase.MOVING and answer.sequence == rmi.FIRST_SEQUENCE:
                 if answer.error:
                     return self._give_up(_refused(answer), now_s)
                 self._phase, self._motion = _Phase.ENDING, None
                 return self._abort(now_s)
             case rmi.ABORT if self._abort_open:
-                return self._on_aborted(answer, now_s)
+                return (SetTimer(None, "abort"), *self._on_aborted(answer, now_s))
             case rmi.SYSTEM_FAULT if self._phase in _OPEN_MOTION:
                 return self._give_up(fanuc_codes.SYSTEM_FAULT(), now_s)
             case rmi.DISCONNECT if self._line is _Line.LEAVING:
                 self._line = _Line.CLOSED
-                self._due.pop("leave", None)
-                return (Close(SESSION),)
+                return (SetTimer(None, "leave"), Close(SESSION))
         return ()
 
     def _on_initialized(self, answer: Answer, now_s: float) -> Effects:
         self._initialize_open = False
-        self._due.pop("initialize", None)
         if self._phase is not _Phase.INITIALIZING:
             # Stopped during the initialization: an earlier abort has not ended this program.
             return () if self._abort_open else self._abort(now_s)
@@ -384,22 +382,19 @@ class FanucMotionDriver(SnpxDriver):
 
     def _on_aborted(self, answer: Answer, now_s: float) -> Effects:
         self._abort_open = False
-        self._due.pop("abort", None)
         if answer.error == rmi.WAIT_FOR_COMMAND:
-            self._due["again"] = now_s + _AGAIN_S
-            return ()
+            return (SetTimer(now_s + _AGAIN_S, "again"),)
         if answer.error and answer.error not in rmi.NOT_RUNNING:
-            self._due["again"] = now_s + _LEAVE_S
             text = f"the controller has not ended RMI_MOVE: {answer.problem}"
-            return (Report([AlarmReceived(Severity.ERROR, text)], 0),)
+            report = Report([AlarmReceived(Severity.ERROR, text)], 0)
+            return (SetTimer(now_s + _LEAVE_S, "again"), report)
         if not self._initialize_open:
             self._phase, self._stop_owed = _Phase.NONE, False
         return ()
 
     def _unanswered(self, now_s: float, *, late: bool) -> Effects:
         if late:
-            self._due["initialize" if self._initialize_open else "abort"] = now_s + _LATE_S
-            return ()
+            return (SetTimer(now_s + _LATE_S, "initialize" if self._initialize_open else "abort"),)
         why = fanuc_codes.NO_ANSWER(name=rmi.INITIALIZE)
         fate = (FateUnknown(why),) if self._phase is _Phase.INITIALIZING else ()
         self._phase = _Phase.STOPPING
@@ -460,10 +455,9 @@ class FanucMotionDriver(SnpxDriver):
         return None
 
     def _watch(self, now_s: float, *, late: bool) -> Effects:
-        self._due["watch"] = now_s + _WATCH_S
         if now_s - min(self._positions_s, self._status_s) > _BLIND_S and not late:
             return self._give_up(fanuc_codes.STATE_OLD(), now_s)
-        return ()
+        return (SetTimer(now_s + _WATCH_S, "watch"),)
 
     def _give_up(self, why: Reason, now_s: float) -> Effects:
         """End the motion, and have a stop latched."""
@@ -475,11 +469,11 @@ class FanucMotionDriver(SnpxDriver):
         if self._phase is not _Phase.NONE or not at_rest:
             self._must_rest()
         self._motion = None
-        self._due.pop("watch", None)
+        watched = SetTimer(None, "watch")
         if self._line is not _Line.OPEN:
-            return ()
+            return (watched,)
         self._phase = _Phase.STOPPING
-        return () if self._abort_open else self._abort(now_s)
+        return (watched,) if self._abort_open else (watched, *self._abort(now_s))
 
     def _must_rest(self) -> None:
         """Report a moving arm until it has rested from now on: the motion may still begin."""
@@ -487,9 +481,8 @@ class FanucMotionDriver(SnpxDriver):
 
     def _abort(self, now_s: float) -> Effects:
         self._abort_open = True
-        self._due["abort"] = now_s + ANSWER_S
-        self._due.pop("again", None)
-        return (Send(SESSION, rmi.abort()),)
+        timers = (SetTimer(now_s + ANSWER_S, "abort"), SetTimer(None, "again"))
+        return (*timers, Send(SESSION, rmi.abort()))
 
     # ----------------------------------------------------------------------- commands
 
@@ -524,7 +517,7 @@ class FanucMotionDriver(SnpxDriver):
             # It clears the gateway's latch only, and cancels a stop that was not delivered: after the motion
             # beside it, which may be refused.
             self._stop_owed = False
-        return self._due.with_timer((*effects, *self._settle(now_s)))
+        return (*effects, *self._settle(now_s))
 
     def _stop_arm(self, now_s: float) -> Effects:
         """Abort the motion immediately."""
@@ -544,8 +537,8 @@ class FanucMotionDriver(SnpxDriver):
         instruction = rmi.joint_motion(rmi.FIRST_SEQUENCE, axes, percent=speed)
         self._motion = _Motion(instruction, self._positions, self._tool)
         self._phase, self._initialize_open = _Phase.INITIALIZING, True
-        self._due |= {"initialize": now_s + ANSWER_S, "watch": now_s + _WATCH_S}
-        return (Send(SESSION, rmi.initialize(self._settings.group)),)
+        timers = (SetTimer(now_s + ANSWER_S, "initialize"), SetTimer(now_s + _WATCH_S, "watch"))
+        return (*timers, Send(SESSION, rmi.initialize(self._settings.group)))
 
     def _obstacle(self, now_s: float) -> Reason | None:
         """Return the reason to refuse a motion; None: it can be sent."""

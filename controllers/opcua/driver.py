@@ -135,7 +135,7 @@ class OpcUaDriver(OnlyReads):
         self._begin()
         return ()
 
-    def timer_ended(self, now_s: float) -> Effects:
+    def timer_ended(self, ended: Mapping[str, float], now_s: float) -> Effects:
         """Do nothing: no timer is set."""
         return ()
 

@@ -206,7 +206,7 @@ class RtdeDriver(OnlyReads):
         """Do nothing: the link connects again."""
         return ()
 
-    def timer_ended(self, now_s: float) -> Effects:
+    def timer_ended(self, ended: Mapping[str, float], now_s: float) -> Effects:
         """Connect again after a failure."""
         left, self._left = self._left, {}
         return tuple(left.values())

@@ -61,13 +61,14 @@ from protocol_gateway.seam import (
     Report,
     Reset,
     Send,
+    SetTimer,
     Severity,
     Speed,
     StatusReceived,
     Stop,
     StopEnds,
 )
-from protocol_gateway.seam.one_motion import FIRST_PERCENT, Timers, prepared
+from protocol_gateway.seam.one_motion import FIRST_PERCENT, prepared
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.joints import JointType
@@ -163,7 +164,6 @@ class RtdeMotionDriver(RtdeDriver):
         self._possible: bool | None = None
         self._scripts_wanted = False
         self._reopen: list[Open] = []
-        self._due = Timers("retry")
         self._state: ControllerState | None = None
         self._state_s = self._excused_s = float("-inf")
         self._motion: _Motion | None = None
@@ -179,7 +179,7 @@ class RtdeMotionDriver(RtdeDriver):
         self._dashboard.opened()
         unanswered = self._recoveries()
         self._forget()
-        return self._due.with_timer((*unanswered, *super().started(now_s), _OPEN_DASHBOARD))
+        return (*unanswered, *super().started(now_s), _OPEN_DASHBOARD)
 
     def controlled(self, taken: bool, now_s: float) -> Effects:
         """Begin with a low speed."""
@@ -191,23 +191,22 @@ class RtdeMotionDriver(RtdeDriver):
         self._opened.add(channel.name)
         if channel is DASHBOARD:
             self._dashboard.opened()
-            self._due["ask"] = now_s + _ASK_S
-            return self._due.with_timer((Send(DASHBOARD, self._dashboard.ask(now_s)),))
+            return (SetTimer(now_s + _ASK_S, "ask"), Send(DASHBOARD, self._dashboard.ask(now_s)))
         if channel is INPUTS:
-            return self._due.with_timer((Send(INPUTS, self._inputs.connected()),))
+            return (Send(INPUTS, self._inputs.connected()),)
         if channel is SCRIPTS:
             return ()
-        return self._due.with_timer(super().opened(channel, now_s))
+        return super().opened(channel, now_s)
 
     def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
         """Take the next bytes; what the interface of scripts sends is not needed."""
         if channel is DASHBOARD:
-            return self._due.with_timer(self._answered(data, now_s))
+            return self._answered(data, now_s)
         if channel is INPUTS:
-            return self._due.with_timer(self._inputs_received(data, now_s))
+            return self._inputs_received(data, now_s)
         if channel is SCRIPTS:
             return ()
-        return self._due.with_timer(super().received(channel, data, now_s))
+        return super().received(channel, data, now_s)
 
     def _states(self, data: bytes, now_s: float) -> Effects:
         before, effects = self._reader.controller, super()._states(data, now_s)
@@ -233,7 +232,7 @@ class RtdeMotionDriver(RtdeDriver):
         """Connect again: the stream cannot be read from its middle."""
         if channel is SCRIPTS:
             return ()
-        return self._due.with_timer(self._leave(channel, "it sent far too much", now_s))
+        return self._leave(channel, "it sent far too much", now_s)
 
     def closed(self, channel: Channel, now_s: float) -> Effects:
         """Give a motion up that needs the connection."""
@@ -241,7 +240,7 @@ class RtdeMotionDriver(RtdeDriver):
         if channel.name in self._opened:
             self._opened.discard(channel.name)
             effects += self._lost(channel)
-        return self._due.with_timer(effects)
+        return effects
 
     def _lost(self, channel: Channel) -> Effects:
         """Handle the end of a connection."""
@@ -254,8 +253,7 @@ class RtdeMotionDriver(RtdeDriver):
             self._inputs.disconnected()
         if channel is DASHBOARD:
             self._dashboard.opened()
-            self._due.pop("ask", None)
-            effects += self._recoveries()
+            effects += (SetTimer(None, "ask"), *self._recoveries())
         if channel is SCRIPTS:
             # The controller closes it when it changes to local control: the mode must be asked again.
             self._dashboard.remote = None
@@ -271,17 +269,15 @@ class RtdeMotionDriver(RtdeDriver):
         if channel not in (DASHBOARD, INPUTS):
             return (*self._lost(channel), *super()._leave(channel, why, now_s))
         self._reopen.append(_OPEN_DASHBOARD if channel is DASHBOARD else _OPEN_INPUTS)
-        self._due["reopen"] = now_s + _RETRY_S
-        return (*self._lost(channel), Close(channel, why))
+        return (SetTimer(now_s + _RETRY_S, "reopen"), *self._lost(channel), Close(channel, why))
 
-    def timer_ended(self, now_s: float) -> Effects:
+    def timer_ended(self, ended: Mapping[str, float], now_s: float) -> Effects:
         """Beat, ask, and look for what has not happened."""
         effects: list[Effect] = []
-        ended = self._due.ended(now_s)
         # A late gateway has unread messages.
         late = now_s - min(ended.values(), default=now_s) > _LATE_S
-        if "retry" in ended:
-            effects += super().timer_ended(now_s)
+        if "" in ended:
+            effects += super().timer_ended(ended, now_s)
         if "reopen" in ended:
             effects += self._reopen
             self._reopen = []
@@ -290,25 +286,25 @@ class RtdeMotionDriver(RtdeDriver):
             effects += self._next_question(now_s)
         if "start" in ended and self._motion is not None and not self._motion.started:
             if late and now_s < self._motion.sent_s + 2.0 * START_S:
-                self._due["start"] = now_s + _LATE_S
+                effects.append(SetTimer(now_s + _LATE_S, "start"))
             else:
                 effects += self._give_up(ur_codes.NOT_STARTED(seconds=START_S))
         if "beat" in ended and self._motion is not None:
             effects += self._next_beat(now_s, late=late)
-        return self._due.with_timer(effects)
+        return effects
 
     # ------------------------------------------------------------------ dashboard
 
     def _next_question(self, now_s: float) -> Effects:
-        self._due["ask"] = now_s + _ASK_S
+        later = SetTimer(now_s + _ASK_S, "ask")
         dashboard = self._dashboard
         if dashboard.recovery is not None:
             if now_s - dashboard.recovery_s < _RECOVERY_WITHIN_S:
-                return ()
+                return (later,)
         elif dashboard.asked_s is None:
-            return (Send(DASHBOARD, dashboard.ask(now_s)),)
+            return (later, Send(DASHBOARD, dashboard.ask(now_s)))
         elif now_s - dashboard.asked_s < _ANSWER_WITHIN_S:
-            return ()
+            return (later,)
         return self._leave(DASHBOARD, "it does not answer", now_s)
 
     def _answered(self, data: bytes, now_s: float) -> Effects:
@@ -373,8 +369,7 @@ class RtdeMotionDriver(RtdeDriver):
                 return self._give_up(ur_codes.STATE_OLD())
             # Once: what has arrived is read before the next beat.
             self._excused_s = self._state_s
-        self._due["beat"] = now_s + _BEAT_S
-        return (self._written(self._motion.number),)
+        return (SetTimer(now_s + _BEAT_S, "beat"), self._written(self._motion.number))
 
     def _written(self, go: int, *, alternative: bool = False) -> Send:
         """Return the effect that writes the permission and the next beat."""
@@ -486,7 +481,7 @@ class RtdeMotionDriver(RtdeDriver):
                     effects.append(self._recover(recovery, now_s))
                 # A reset clears the gateway's latch only: nothing is sent to the controller.
         self._percent = percent
-        return self._due.with_timer(effects)
+        return effects
 
     def _stop(self) -> Effects:
         """End permission and beats, and the program itself, by the connections that are there."""
@@ -511,8 +506,8 @@ class RtdeMotionDriver(RtdeDriver):
             registers=self._registers,
         )
         self._motion = _Motion(self._number, now_s, _tool(self._state))
-        self._due |= {"beat": now_s + _BEAT_S, "start": now_s + START_S}
-        return (self._written(self._number), Send(SCRIPTS, script))
+        timers = (SetTimer(now_s + _BEAT_S, "beat"), SetTimer(now_s + START_S, "start"))
+        return (*timers, self._written(self._number), Send(SCRIPTS, script))
 
     def _recover(self, recovery: Recovery, now_s: float) -> Send:
         if (obstacle := self._recovery_obstacle(recovery, now_s)) is not None:

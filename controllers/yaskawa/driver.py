@@ -163,7 +163,7 @@ class HsesDriver(OnlyReads):
         self._polling = Polling((), ())
         return (SetTimer(None),)
 
-    def timer_ended(self, now_s: float) -> Effects:
+    def timer_ended(self, ended: Mapping[str, float], now_s: float) -> Effects:
         """Ask the next question, or give up an answer that did not come."""
         return self._go_on(now_s)
 

@@ -50,6 +50,7 @@ from protocol_gateway.seam import (
     Report,
     Reset,
     Send,
+    SetTimer,
     Severity,
     SoftwareReceived,
     Speed,
@@ -57,7 +58,7 @@ from protocol_gateway.seam import (
     Stop,
     StopEnds,
 )
-from protocol_gateway.seam.one_motion import FIRST_PERCENT, Timers, prepared
+from protocol_gateway.seam.one_motion import FIRST_PERCENT, prepared
 from protocol_gateway.seam.polling import Polling, Regular
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
@@ -156,7 +157,6 @@ class HsesMotionDriver(HsesDriver):
 
     def _forget(self) -> None:
         self._opened: set[str] = set()
-        self._due = Timers("read")
         self._stop_polling: Polling[Read] = Polling((), ())
         self._number = 0
         self._hold_number = _FIRST_HOLD
@@ -184,7 +184,7 @@ class HsesMotionDriver(HsesDriver):
     def started(self, now_s: float) -> Effects:
         """Open the sockets."""
         self._forget()
-        return self._due.with_timer((*super().started(now_s), Open(STOP), Open(MOTION)))
+        return (*super().started(now_s), Open(STOP), Open(MOTION))
 
     def controlled(self, taken: bool, now_s: float) -> Effects:
         """Begin with a low speed."""
@@ -196,16 +196,14 @@ class HsesMotionDriver(HsesDriver):
         self._opened.add(channel.name)
         if channel is HSES:
             self._same = not self._software
-            return self._due.with_timer(super().opened(channel, now_s))
+            return super().opened(channel, now_s)
         if channel is STOP:
             self._has_base = None
             regular = [Regular(STATUS, _STATUS_S), Regular(self._base_axes, _BASE_EACH_S)]
             self._stop_polling = Polling(regular, (STATUS, self._base_axes), numbers=_FIRST_HOLD)
             self._answered_s = now_s
-            self._due["blind"] = now_s + _BLIND_S
-            effects: list[Effect] = [*self._ask(now_s)]
-            return self._due.with_timer(effects)
-        return self._due.with_timer(())
+            return (SetTimer(now_s + _BLIND_S, "blind"), *self._ask(now_s))
+        return ()
 
     def closed(self, channel: Channel, now_s: float) -> Effects:
         """Give a motion up that needs the connection."""
@@ -213,41 +211,40 @@ class HsesMotionDriver(HsesDriver):
         if channel.name in self._opened:
             self._opened.discard(channel.name)
             effects += self._lost(channel, now_s)
-        return self._due.with_timer(effects)
+        return effects
 
     def _lost(self, channel: Channel, now_s: float) -> Effects:
         if channel is HSES:
             # The next connection may reach another controller, where no speed was set.
             self._percent, self._place, self._joint_positions = FIRST_PERCENT, None, ()
             self._still_since = None
+        effects: list[Effect] = []
         if channel is STOP:
             self._stop_polling, self._state = Polling((), ()), None
-            self._due.pop("blind", None)
-            self._due.pop("ask", None)
-        if self._motion is None:
-            return ()
-        return self._give_up(hses_codes.CHANNEL_LOST(name=channel.name), now_s)
+            effects += (SetTimer(None, "blind"), SetTimer(None, "ask"))
+        if self._motion is not None:
+            effects += self._give_up(hses_codes.CHANNEL_LOST(name=channel.name), now_s)
+        return effects
 
     def skipped(self, channel: Channel, now_s: float) -> Effects:
         """Go on: each datagram is whole."""
-        return self._due.with_timer(super().skipped(channel, now_s) if channel is HSES else ())
+        return super().skipped(channel, now_s) if channel is HSES else ()
 
     def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
         """Take an answer."""
         if channel is HSES:
-            return self._due.with_timer(super().received(channel, data, now_s))
+            return super().received(channel, data, now_s)
         try:
             answer = decode(data)
         except ValueError:
             return ()
         if channel is MOTION:
-            return self._due.with_timer(self._motion_answered(answer, now_s))
-        return self._due.with_timer(self._stop_answered(answer, now_s))
+            return self._motion_answered(answer, now_s)
+        return self._stop_answered(answer, now_s)
 
-    def timer_ended(self, now_s: float) -> Effects:
+    def timer_ended(self, ended: Mapping[str, float], now_s: float) -> Effects:
         """Ask, repeat HOLD, and look for what has not happened."""
         effects: list[Effect] = []
-        ended = self._due.ended(now_s)
         if "hold" in ended:
             effects += self._keep_hold(now_s)
         if "ask" in ended and STOP.name in self._opened:
@@ -256,9 +253,9 @@ class HsesMotionDriver(HsesDriver):
             effects += self._look(now_s)
         if "reopen" in ended:
             effects.append(Open(STOP))
-        if "read" in ended:
-            effects += super().timer_ended(now_s)
-        return self._due.with_timer(effects)
+        if "" in ended:
+            effects += super().timer_ended(ended, now_s)
+        return effects
 
     # ------------------------------------------------------------ the channel of the stop
 
@@ -266,20 +263,18 @@ class HsesMotionDriver(HsesDriver):
         before = self._stop_polling.asked
         asked = self._stop_polling.next_question(now_s)
         wake_s = self._stop_polling.wake_s()
-        if wake_s is not None:
-            self._due["ask"] = wake_s
-        if asked is None or asked is before:
-            return ()
-        return (Send(STOP, asked.read.encode(asked.number)),)
+        effects: list[Effect] = [] if wake_s is None else [SetTimer(wake_s, "ask")]
+        if asked is not None and asked is not before:
+            effects.append(Send(STOP, asked.read.encode(asked.number)))
+        return effects
 
     def _look(self, now_s: float) -> Effects:
         """Open the socket of the stop again if nothing answers on it."""
         if now_s - self._answered_s < _BLIND_S:
-            self._due["blind"] = self._answered_s + _BLIND_S
-            return ()
+            return (SetTimer(self._answered_s + _BLIND_S, "blind"),)
         self._opened.discard(STOP.name)
-        self._due["reopen"] = now_s + _REOPEN_S
-        return (*self._lost(STOP, now_s), Close(STOP, "nothing answers"))
+        again = SetTimer(now_s + _REOPEN_S, "reopen")
+        return (again, *self._lost(STOP, now_s), Close(STOP, "nothing answers"))
 
     def _stop_answered(self, answer: Answer, now_s: float) -> Effects:
         if answer.service == commands.WRITE_SINGLE:
@@ -313,14 +308,13 @@ class HsesMotionDriver(HsesDriver):
         """Report once that HOLD, or its end, was refused."""
         if answer.number != self._hold_number or not answer.status or answer.busy:
             return ()
-        if self._wants_hold:
-            self._due["hold"] = now_s + _REFUSED_S
+        effects: list[Effect] = [SetTimer(now_s + _REFUSED_S, "hold")] if self._wants_hold else []
         if self._refused_hold == answer.error:
-            return ()
+            return effects
         self._refused_hold = answer.error
         what = "HOLD" if self._wants_hold else "the end of HOLD"
         text = f"the controller refuses {what}: {answer.error}"
-        return (Report([AlarmReceived(Severity.ERROR, text, f"{answer.added_status:04X}")], 0),)
+        return [*effects, Report([AlarmReceived(Severity.ERROR, text, f"{answer.added_status:04X}")], 0)]
 
     # ------------------------------------------------------------------------ HOLD
 
@@ -332,8 +326,10 @@ class HsesMotionDriver(HsesDriver):
             self._release_sent_s = now_s
             return [Send(STOP, datagram)]
         self._hold_sent_s = now_s
-        self._due["hold"] = now_s + _REPEAT_S
-        effects: list[Effect] = [Send(STOP, datagram, alternative=True)]
+        effects: list[Effect] = [
+            SetTimer(now_s + _REPEAT_S, "hold"),
+            Send(STOP, datagram, alternative=True),
+        ]
         if HSES.name in self._opened:
             effects.append(Send(HSES, datagram, alternative=True))
         return effects
@@ -348,16 +344,16 @@ class HsesMotionDriver(HsesDriver):
         """Send HOLD again unless the controller is known to be on HOLD, or in local control."""
         if not self._wants_hold:
             return []
-        self._due["hold"] = now_s + _REPEAT_S
+        later: list[Effect] = [SetTimer(now_s + _REPEAT_S, "hold")]
         if not self._same:
             # It may be another controller, for which no stop was proven.
-            return []
+            return later
         if self._fresh(now_s) and self._state is not None and self._state_s >= self._hold_sent_s:
             if self._state.second & Status2.HELD_BY_COMMAND:
-                return []
+                return later
             if self._refused_hold and mode_of(self._state) is not Mode.REMOTE:
-                return []
-        return self._hold(now_s, on=True) if self._opened & {STOP.name, HSES.name} else []
+                return later
+        return self._hold(now_s, on=True) if self._opened & {STOP.name, HSES.name} else later
 
     def _fresh(self, now_s: float) -> bool:
         """Return whether the newest status is new enough to act on."""
@@ -525,7 +521,7 @@ class HsesMotionDriver(HsesDriver):
                 case MoveAbsolute(target):
                     effects += self._move(target, pulses[0], percent, now_s)
         self._percent = percent
-        return self._due.with_timer(effects)
+        return effects
 
     def _stop(self, now_s: float) -> Effects:
         if self._motion is not None or not self._at_rest(now_s):
@@ -559,12 +555,12 @@ class HsesMotionDriver(HsesDriver):
         if not self._wants_hold and not self._set_hold:
             return ()
         self._wants_hold = False
-        self._due.pop("hold", None)
+        no_more = SetTimer(None, "hold")
         if self._state is None or not self._state.second & Status2.HELD_BY_COMMAND:
             self._set_hold = False
-            return ()
+            return (no_more,)
         self._refused_hold = ""
-        return self._hold(now_s, on=False)
+        return (no_more, *self._hold(now_s, on=False))
 
     def _pulses(self, target: Sequence[float]) -> Sequence[int]:
         """Return the pulses of a target.

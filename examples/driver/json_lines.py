@@ -91,7 +91,7 @@ class JsonLines:
         """Do nothing: the gateway connects again."""
         return ()
 
-    def timer_ended(self, now_s: float) -> Effects:
+    def timer_ended(self, ended: Mapping[str, float], now_s: float) -> Effects:
         """Do nothing: no timer is set."""
         return ()
 

@@ -29,6 +29,7 @@ from protocol_gateway.link.flood import EventDispatcher, FloodDetector
 from protocol_gateway.link.health import Arrivals, LinkHealth, LossCounter, Questions, ResponseTimer
 from protocol_gateway.link.plausibility import Plausibility
 from protocol_gateway.link.status import LinkState, LinkStatus
+from protocol_gateway.link.timers import Timers
 from protocol_gateway.link.timestamping import Received, Timestamper
 from protocol_gateway.seam import (
     Carries,
@@ -151,6 +152,8 @@ class ControllerLink:
         self._in_a_hurry: set[str] = set()
         self._failed: asyncio.Future[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
+        self._timers = Timers()
+        self._timer_s = 0.0
         self._ran: Callable[[object, float], None] = LoopTurns().ran
         self._is_controlled = False
         self._unasked = UnaskedSends(driver.requests_a_second)
@@ -217,7 +220,8 @@ class ControllerLink:
             await self._failed
         finally:
             self._failed.cancel()
-            self._set_timer(None)
+            self._timers.clear()
+            self._wait_for_timers()
             # The driver does not hear of these ends, so it opens nothing.
             self._channels.clear()
             tasks = [*self._tasks.values()]
@@ -296,8 +300,9 @@ class ControllerLink:
                 self._report(effect, now)
             case Send():
                 self._send_unasked(effect, now.monotonic_s, counted=counted)
-            case SetTimer(at_s):
-                self._set_timer(at_s)
+            case SetTimer():
+                self._timers.set(effect)
+                self._wait_for_timers()
             case Open():
                 self._open(effect)
             case Close(channel, why):
@@ -325,17 +330,25 @@ class ControllerLink:
         self._counts["units_sent"] += 1
         self._counts["bytes_sent"] += len(effect.data)
 
-    def _set_timer(self, at_s: float | None) -> None:
+    def _wait_for_timers(self) -> None:
+        """Wait for the first of the driver's timers."""
+        at_s = self._timers.next_s
         if self._timer is not None:
+            if at_s == self._timer_s:
+                return
             self._timer.cancel()
             self._timer = None
         if at_s is not None:
-            self._timer = self._later(max(0.0, at_s - self._monotonic_s()), self._end_timer)
+            self._timer_s = at_s
+            self._timer = self._later(max(0.0, at_s - self._monotonic_s()), self._end_timers)
 
-    def _end_timer(self) -> None:
+    def _end_timers(self) -> None:
         self._timer = None
         now_s = self._monotonic_s()
-        self._tell(self._driver.timer_ended(now_s))
+        # The loop's clock may be a little before ours.
+        ended = self._timers.take(max(now_s, self._timer_s))
+        self._tell(self._driver.timer_ended(ended, now_s))
+        self._wait_for_timers()
         self._ran(self, now_s)
 
     def _open(self, effect: Open) -> None:

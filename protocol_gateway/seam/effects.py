@@ -89,9 +89,10 @@ class Send:
 
 @dataclass(frozen=True, slots=True)
 class SetTimer:
-    """Call `timer_ended` at a time [s]; it replaces the timer before. None: clear the timer."""
+    """Call `timer_ended` at a time [s]; it replaces the timer of this name. None: clear it."""
 
     at_s: float | None
+    name: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Common part of drivers that send one motion at a time: the check of their commands, and their timers."""
+"""Check of the commands of drivers that send one motion at a time."""
 
 import math
 from collections.abc import Collection, Sequence
@@ -13,7 +13,6 @@ from protocol_gateway.seam.commands import (
     Speed,
     Stop,
 )
-from protocol_gateway.seam.effects import Effects, SetTimer
 from robomesh import reason_codes as codes
 
 FIRST_PERCENT = 25.0
@@ -57,37 +56,3 @@ def prepared(
 def _check_finite(*numbers: float) -> None:
     if not all(map(math.isfinite, numbers)):
         raise CommandError("numbers must be finite")
-
-
-class Timers(dict[str, float]):
-    """Times at which something is due [s], by name, as the single timer of a driver.
-
-    Args:
-        base: Name of the timer that the reading driver below sets.
-    """
-
-    def __init__(self, base: str) -> None:
-        self._base = base
-        self._set_s: float | None = None
-
-    def ended(self, now_s: float) -> dict[str, float]:
-        """Remove and return the times that have come; the driver's timer has ended."""
-        self._set_s = None
-        return {name: self.pop(name) for name, at_s in [*self.items()] if at_s <= now_s}
-
-    def with_timer(self, effects: Effects) -> Effects:
-        """Return effects with one timer for all that is due, if its time has changed.
-
-        It is the first effect, because a stop that follows from the others may set another timer.
-        """
-        for effect in effects:
-            if isinstance(effect, SetTimer):
-                self.pop(self._base, None)
-                if effect.at_s is not None:
-                    self[self._base] = effect.at_s
-        others = tuple(effect for effect in effects if not isinstance(effect, SetTimer))
-        at_s = min(self.values(), default=None)
-        if at_s == self._set_s:
-            return others
-        self._set_s = at_s
-        return (SetTimer(at_s), *others)

@@ -1,5 +1,6 @@
 """The methods of a driver."""
 
+from collections.abc import Mapping
 from typing import Any, Protocol, runtime_checkable
 
 from protocol_gateway.seam.capabilities import Capabilities, StopEnds
@@ -76,8 +77,12 @@ class Driver(Protocol):
         """Note that a connection has ended, or that an attempt to connect failed."""
         ...
 
-    def timer_ended(self, now_s: float) -> Effects:
-        """Do what the timer was set for."""
+    def timer_ended(self, ended: Mapping[str, float], now_s: float) -> Effects:
+        """Do what timers were set for.
+
+        Args:
+            ended: Names of the timers of which the time has come, with that time [s].
+        """
         ...
 
     def prepare(self, *commands: ControllerCommand) -> Any:

@@ -139,13 +139,13 @@ class Bench:
             elif self._is_quiet() and self._timer_s is not None:
                 self.now_s = max(self.now_s, self._timer_s)
                 self._timer_s = None
-                self._perform(self.driver.timer_ended(self.now_s))
+                self._perform(self.driver.timer_ended({}, self.now_s))
             else:
                 break
         if chance.random() < 0.005 and self._timer_s is not None:
             # Nothing comes in time.
             self.now_s = max(self.now_s, self._timer_s)
-            self._perform(self.driver.timer_ended(self.now_s))
+            self._perform(self.driver.timer_ended({}, self.now_s))
         if self._connected and not self._ended and self._file and chance.random() < 0.8:
             self._for_file = True
             right = [each.encode("latin-1") for each in FILES[self._file]]

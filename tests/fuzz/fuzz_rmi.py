@@ -22,6 +22,7 @@ if __name__ == "__main__":
 from controllers.fanuc.axes import FanucSettings
 from controllers.fanuc.motion_driver import RMI, SESSION, FanucMotionDriver
 from protocol_gateway.errors import NotReadyError
+from protocol_gateway.link.timers import Timers
 from protocol_gateway.seam import (
     Activity,
     Effects,
@@ -32,6 +33,7 @@ from protocol_gateway.seam import (
     Open,
     Report,
     Send,
+    SetTimer,
     StatusReceived,
 )
 from robots.joints import JointType
@@ -117,9 +119,17 @@ class Bench:
         self._counts = counts
         self._rest = b""
         self._old: list[bytes] = []
-        self.driver.started(0.0)
-        self.driver.controlled(True, 0.0)
-        self.driver.opened(RMI, 0.0)
+        self._timers = Timers()
+        self._timed(self.driver.started(0.0))
+        self._timed(self.driver.controlled(True, 0.0))
+        self._timed(self.driver.opened(RMI, 0.0))
+
+    def _timed(self, effects: Effects) -> Effects:
+        """Set the timers that effects name; return the effects."""
+        for each in effects:
+            if isinstance(each, SetTimer):
+                self._timers.set(each)
+        return effects
 
     def _move(self) -> None:
         """Command a motion with a fresh state."""
@@ -128,7 +138,7 @@ class Bench:
         self.driver._noted(StatusReceived(Activity.IDLE, Mode.REMOTE), self.now_s, self.now_s)
         target = tuple(each + 0.1 for each in HERE)
         try:
-            effects = self.driver.command(self.driver.prepare(MoveAbsolute(target)), self.now_s)
+            effects = self._timed(self.driver.command(self.driver.prepare(MoveAbsolute(target)), self.now_s))
         except NotReadyError:
             # The arm has not rested for long enough since a stop.
             self.now_s += 1.0
@@ -167,7 +177,7 @@ class Bench:
         *lines, self._rest = (self._rest + data).split(b"\r\n")
         long = any(len(each) > 4096 for each in (*lines, self._rest))
         found = [self._strict(each) for each in lines]
-        effects = self.driver.received(channel, data, self.now_s)
+        effects = self._timed(self.driver.received(channel, data, self.now_s))
         return self._compare(effects, [each for each in found if each is not None], long)
 
     def _compare(self, effects: Effects, found: list[dict[str, Any]], long: bool) -> str:
@@ -221,14 +231,15 @@ class Bench:
     def _go_on(self, long: bool) -> str:
         if self.state == "joined":
             self._rest, self.state = b"", "idle"
-            self.driver.opened(SESSION, self.now_s)
+            self._timed(self.driver.opened(SESSION, self.now_s))
         elif long or self.driver._line.name in ("CLOSED", "LOST"):
             # It was left, or FRC_Connect was refused: another connection.
             self.__init__(self._counts)  # type: ignore[misc]
-        elif self.state == "aborting" and "again" in self.driver._due:
-            self.now_s = self.driver._due["again"]
-            sent = [each for each in self.driver.timer_ended(self.now_s) if isinstance(each, Send)]
-            if "initialize" not in self.driver._due and self.driver._line.name == "CLOSED":
+        elif self.state == "aborting" and "again" in self._timers:
+            self.now_s = self._timers["again"]
+            effects = self._timed(self.driver.timer_ended(self._timers.take(self.now_s), self.now_s))
+            sent = [each for each in effects if isinstance(each, Send)]
+            if "initialize" not in self._timers and self.driver._line.name == "CLOSED":
                 # An initialization that was given up was not answered in time.
                 self.__init__(self._counts)  # type: ignore[misc]
             elif [each.data for each in sent] != [ABORT]:
@@ -236,7 +247,7 @@ class Bench:
         elif self.state == "idle" and self.driver._initialize_open:
             # An initialization that was given up is answered at last.
             answer = b'{"Command": "FRC_Initialize", "ErrorID": 0}\r\n'
-            self.driver.received(SESSION, answer, self.now_s)
+            self._timed(self.driver.received(SESSION, answer, self.now_s))
             self.state, self._given_up = "aborting", self.driver._initialize_open
         return ""
 

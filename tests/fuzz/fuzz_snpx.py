@@ -131,7 +131,7 @@ class Bench:
                 self._begin()
                 continue
             self.now_s = max(self.now_s, self._timer_s)
-            self.perform(self.driver.timer_ended(self.now_s))
+            self.perform(self.driver.timer_ended({}, self.now_s))
         kind = chance.random()
         if kind < 0.05 and self._old:
             return chance.choice(self._old)
@@ -139,7 +139,7 @@ class Bench:
             # The answer is lost.
             self.now_s = self._asked_s + TIMEOUT_S + 0.001
             self._question = b""
-            self.perform(self.driver.timer_ended(self.now_s))
+            self.perform(self.driver.timer_ended({}, self.now_s))
             return self.next_bytes(chance)
         right = self._right()
         if self._question == bytes(56) or self._question[31] == 0x80 or self._question[42] == 0x4F:

@@ -36,6 +36,7 @@ from controllers.universal_robots.settings import MotionSettings, UniversalRobot
 from controllers.universal_robots.state import OUTPUTS
 from protocol_gateway.errors import NotReadyError
 from protocol_gateway.link.link import UnaskedSends
+from protocol_gateway.link.timers import Timers
 from protocol_gateway.seam import (
     Activity,
     Channel,
@@ -334,7 +335,7 @@ class Bench:
         # What happens next: bytes, and connections that open, without data.
         self._coming: list[tuple[float, int, Channel, bytes | None]] = []
         self._last_s: Counter[str] = Counter()
-        self._timer_s = self._state_s = math.inf
+        self._timers, self._state_s = Timers(), math.inf
         self._data_s = self.now_s
         self.opened: set[str] = set()
         self._scripts = False
@@ -430,14 +431,12 @@ class Bench:
         """Let time pass until bytes arrive; return them with their channel."""
         while True:
             coming_s = self._coming[0][0] if self._coming else math.inf
-            now_s = self.now_s = max(
-                self.now_s + 1e-6, min(coming_s, self._timer_s, self._act_s, self._data_s)
-            )
-            if self._timer_s <= now_s:
+            timer_s = min(self._timers.values(), default=math.inf)
+            now_s = self.now_s = max(self.now_s + 1e-6, min(coming_s, timer_s, self._act_s, self._data_s))
+            if timer_s <= now_s:
                 late = self._chance.random() < 0.03
                 self.now_s += 0.1 * self._chance.random() if late else 0.0
-                self._timer_s = math.inf
-                self._perform(self.driver.timer_ended(self.now_s))
+                self._perform(self.driver.timer_ended(self._timers.take(self.now_s), self.now_s))
             elif coming_s <= now_s:
                 _, _, channel, data = heapq.heappop(self._coming)
                 if data is not None:
@@ -702,8 +701,6 @@ class Bench:
             went_local: The newest answer of the dashboard says so.
             commanded, recovery: Commands whose effects they are.
         """
-        if any(isinstance(each, SetTimer) for each in effects[1:]):
-            raise Wrong("a timer that is not the first effect replaces that of a stop")
         events = [event for each in effects if isinstance(each, Report) for event in each.events]
         self._counts.update(type(event).__name__ for event in events)
         joints = [each.positions for each in events if isinstance(each, JointsReceived)]
@@ -717,6 +714,7 @@ class Bench:
             if isinstance(effect, Close):
                 self._forget(effect.channel)
         now_s = self.now_s
+        of_stop: set[str] = set()
         for effect in effects:
             match effect:
                 case Send(channel, data):
@@ -724,15 +722,19 @@ class Bench:
                         raise Wrong("sends more than it declares, so the link drops it")
                     self._check_sent(channel, data, commanded, recovery)
                     self._carry(channel, data)
-                case SetTimer(at_s):
-                    self._timer_s = math.inf if at_s is None else at_s
+                case SetTimer(_, name):
+                    if name in of_stop:
+                        raise Wrong(f"the timer {name!r} replaces that of a stop")
+                    self._timers.set(effect)
                 case Open(channel):
                     self._forget(channel)
                     self._later(now_s + 0.05 * self._chance.random(), channel, None)
                 case FateUnknown(why):
                     self._counts[why.code] += 1
+                    before = {**self._timers}
                     # As the gateway does, while it performs the effects.
                     self.command(Stop())
+                    of_stop |= {name for name, at_s in self._timers.items() if before.get(name) != at_s}
                 case _:
                     pass
         found = [(each.recovery, each.accepted) for each in events if isinstance(each, RecoverAnswered)]

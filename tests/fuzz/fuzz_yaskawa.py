@@ -109,7 +109,7 @@ class Bench:
         """Return an answer to the open question, or another datagram; a question is open then."""
         while not self._question:
             self.now_s = max(self.now_s, self._timer_s)
-            self.perform(self.driver.timer_ended(self.now_s))
+            self.perform(self.driver.timer_ended({}, self.now_s))
         kind = chance.random()
         if kind < 0.05 and self._old:
             return chance.choice(self._old)
@@ -117,7 +117,7 @@ class Bench:
             # The answer is lost.
             self.now_s = self._asked_s + TIMEOUT_S + 0.001
             self._question = b""
-            self.perform(self.driver.timer_ended(self.now_s))
+            self.perform(self.driver.timer_ended({}, self.now_s))
             return self.next_bytes(chance)
         number, command = self._question[11], self._question[24]
         right = [answer_datagram(number, READS[command], data) for data in DATA[command]]

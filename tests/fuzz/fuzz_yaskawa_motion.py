@@ -28,6 +28,7 @@ from controllers.yaskawa.driver import HSES
 from controllers.yaskawa.motion_driver import MOTION, STOP, HsesMotionDriver
 from protocol_gateway.errors import NotReadyError
 from protocol_gateway.link.link import UnaskedSends
+from protocol_gateway.link.timers import Timers
 from protocol_gateway.seam import (
     Activity,
     Channel,
@@ -210,7 +211,7 @@ class Bench:
         self._begin()
 
     def _begin(self) -> None:
-        self._coming, self._timer_s = [], math.inf
+        self._coming, self._timers = [], Timers()
         self.opened: set[str] = set()
         self._questions: dict[str, tuple[bytes, float]] = {}
         self._status: tuple[int, int, float] | None = None
@@ -261,12 +262,12 @@ class Bench:
         """Let time pass until a datagram arrives; return it with its channel."""
         while True:
             coming_s = self._coming[0][0] if self._coming else math.inf
-            self.now_s = max(self.now_s + 1e-6, min(coming_s, self._timer_s, self._act_s))
-            if self._timer_s <= self.now_s:
+            timer_s = min(self._timers.values(), default=math.inf)
+            self.now_s = max(self.now_s + 1e-6, min(coming_s, timer_s, self._act_s))
+            if timer_s <= self.now_s:
                 late = self._chance.random() < 0.05
                 self.now_s += 0.1 * self._chance.random() if late else 0.0
-                self._timer_s = math.inf
-                self._perform(self.driver.timer_ended(self.now_s))
+                self._perform(self.driver.timer_ended(self._timers.take(self.now_s), self.now_s))
                 self._check_hold()
             elif coming_s <= self.now_s:
                 _, _, channel, data = heapq.heappop(self._coming)
@@ -464,8 +465,6 @@ class Bench:
             commanded: Commands whose effects they are.
             closed: Channel that has closed.
         """
-        if any(isinstance(each, SetTimer) for each in effects[1:]):
-            raise Wrong("a timer that is not the first effect replaces that of a stop")
         events = [event for each in effects if isinstance(each, Report) for event in each.events]
         self._counts.update(type(event).__name__ for event in events)
         found = [each.positions for each in events if isinstance(each, JointsReceived)]
@@ -479,6 +478,7 @@ class Bench:
             self._begin_hold(fate=True)
             self._require_hold(effects)
         now_s = self.now_s
+        of_stop: set[str] = set()
         for effect in effects:
             match effect:
                 case Send(channel, data):
@@ -486,8 +486,10 @@ class Bench:
                     if not (commanded or fates or self._unasked.allowed(now_s)):
                         raise Wrong("sends more than it declares, so the link drops it")
                     self._carry(channel, data)
-                case SetTimer(at_s):
-                    self._timer_s = math.inf if at_s is None else at_s
+                case SetTimer(_, name):
+                    if name in of_stop:
+                        raise Wrong(f"the timer {name!r} replaces that of a stop")
+                    self._timers.set(effect)
                 case Open(channel):
                     self._cut_off(channel)
                     self._later(self.now_s + 0.1 * self._chance.random(), channel, None)
@@ -495,8 +497,10 @@ class Bench:
                     self._cut_off(channel)
                 case FateUnknown(why):
                     self._counts[why.code] += 1
+                    before = {**self._timers}
                     # As the gateway does, while it performs the effects.
                     self.command(Stop())
+                    of_stop |= {name for name, at_s in self._timers.items() if before.get(name) != at_s}
                 case _:
                     pass
 

@@ -27,6 +27,7 @@ from typing import Any, NamedTuple
 if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[2])
 
+from protocol_gateway.link.timers import Timers
 from protocol_gateway.seam import Channel, Close, FateUnknown, Open, Report, Send, SetTimer
 
 ROOT = Path(__file__).parents[2]
@@ -120,7 +121,7 @@ def _created(name: str, create: Callable[..., None], folder: Path) -> Callable[.
             return
         path = folder / f"{name}-{os.getpid()}-{next(_numbers)}.gz"
         self.transcript = gzip.open(path, "wb", compresslevel=1)  # noqa: SIM115
-        self.told, self.timer_s = 0, None
+        self.told, self.timers = 0, Timers()
         given = (name, tuple(joint_types), dict(codes), named.get("options"))
         changed = {each: value for each, value in constants().items() if value != _CONSTANTS.get(each, value)}
         pickle.dump((*given, changed, os.environ.get("PYTEST_CURRENT_TEST", "")), self.transcript)
@@ -146,9 +147,11 @@ def _recorded(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
         except Exception as raised:
             error = raised
         self.told = 0
-        self.timer_s = timer_after(answer, self.timer_s, ended=name == "timer_ended")
+        if name == "timer_ended":
+            self.timers.take(given[-1])
+        perform(self.timers, answer)
         came = came_of(answer if name != "prepare" else prepared_as(answer), error)
-        pickle.dump(Call(name, tuple(map(plain, given)), came, self.timer_s), file)
+        pickle.dump(Call(name, tuple(map(plain, given)), came, self.timers.next_s), file)
         if error is not None:
             raise error
         return answer
@@ -215,13 +218,11 @@ def plain(given: Any) -> Any:
     return ("channel", given.name) if hasattr(given, "carries") else given
 
 
-def timer_after(answer: Any, before_s: float | None, *, ended: bool) -> float | None:
-    """Return when the next timer ends after effects."""
-    timer_s = None if ended else before_s
-    for each in answer if isinstance(answer, list | tuple) else ():
+def perform(timers: Timers, effects: Any) -> None:
+    """Set and clear timers by effects."""
+    for each in effects if isinstance(effects, list | tuple) else ():
         if isinstance(each, SetTimer):
-            timer_s = each.at_s
-    return timer_s
+            timers.set(each)
 
 
 def prepared_as(answer: Any) -> Any:
@@ -308,7 +309,7 @@ def difference(recorded: Iterator[Any]) -> tuple[str, int]:
         return f"{test}\n  was {was}\n  is  {says}", 0
     channels: dict[str, Any] = {}
     prepared: dict[Any, Any] = {}
-    timer_s: float | None = None
+    timers, forgotten_s = Timers(), None
     place = 0
     for place, call in enumerate(recorded):
         if call.name == "number":
@@ -317,6 +318,11 @@ def difference(recorded: Iterator[Any]) -> tuple[str, int]:
         for each in filter(_is_channel, call.given):
             channels[each[1]] = channels.get(each[1]) or channel(each[1])
         given = [channels[each[1]] if _is_channel(each) else each for each in call.given]
+        if call.name == "timer_ended":
+            # Once they had no names.
+            given = [timers.take(given[-1]), given[-1]]
+        if call.name == "started":
+            timers.clear()
         if call.name == "command":
             given[0] = prepared.get(given[0], given[0])
         error: Exception | None = None
@@ -325,6 +331,7 @@ def difference(recorded: Iterator[Any]) -> tuple[str, int]:
             answer = getattr(driver, _NEW_NAMES.get(call.name, call.name))(*given)
         except Exception as raised:
             error = raised
+        effects = answer
         if call.name == "prepare" and error is None:
             answer = prepared_as(answer)
         elif call.name == "encode" and error is None and isinstance(call.came, bytes):
@@ -334,7 +341,12 @@ def difference(recorded: Iterator[Any]) -> tuple[str, int]:
             if isinstance(each, Open):
                 # OPC UA's is new for each driver.
                 channels[each.channel.name] = each.channel
-        timer_s = timer_after(answer, timer_s, ended=call.name == "timer_ended")
+        perform(timers, effects)
+        if call.name == "started" and timers.next_s is None:
+            # Of the version before named timers, it was recorded as if it went on.
+            forgotten_s = call.timer_s
+        went_on = timers.next_s is None and call.timer_s == forgotten_s
+        timer_s = call.timer_s if went_on else timers.next_s
         is_now = Call(call.name, call.given, came_of(answer, error), timer_s)
         if is_now != call:
             return f"{test} call {place}: {call.name}{call.given}\n  was {call}\n  is  {is_now}", place

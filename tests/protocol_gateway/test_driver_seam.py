@@ -64,7 +64,7 @@ class Driver:
     def closed(self, channel, now_s):
         return self._tell("closed", channel)
 
-    def timer_ended(self, now_s):
+    def timer_ended(self, ended, now_s):
         return self._tell("timer_ended", now_s)
 
     def command(self, encoded, now_s):

@@ -201,21 +201,21 @@ logging.basicConfig()
 from protocol_gateway.kinds import driver_maker
 from protocol_gateway.seam import Stop
 driver = driver_maker("json-lines")((), {}, relay=None, options=None)
-print(driver.command(driver.prepare(Stop()), 0.0)[0].data)
+print(driver.command(driver.prepare(Stop()), 0.0)[0].data, driver.timer_ended({}, 0.0))
 """
 
 
 @pytest.mark.slow
 def test_a_driver_with_the_old_names_runs_with_warnings_that_say_the_new_ones(installed, tmp_path):
-    old = (
-        (EXAMPLE / "json_lines.py")
-        .read_text()
-        .replace("protocol_gateway.seam", "protocol_gateway.drivers.driver")
-    )
-    old = (
-        old.replace("def prepare(", "def encode(")
-        + "\nfrom protocol_gateway.drivers.only_reads import OnlyReads\n"
-    )
+    old = (EXAMPLE / "json_lines.py").read_text()
+    for new, name in (
+        ("protocol_gateway.seam", "protocol_gateway.drivers.driver"),
+        ("def prepare(", "def encode("),
+        ("ended: Mapping[str, float], ", ""),
+    ):
+        assert new in old
+        old = old.replace(new, name)
+    old += "\nfrom protocol_gateway.drivers.only_reads import OnlyReads\n"
     (tmp_path / "packages" / "json_lines.py").write_text(old)
     path = [str(tmp_path / "packages"), *(each for each in sys.path if each != str(EXAMPLE))]
     done = subprocess.run(
@@ -225,7 +225,7 @@ def test_a_driver_with_the_old_names_runs_with_warnings_that_say_the_new_ones(in
         text=True,
         check=True,
     )
-    assert done.stdout == 'b\'{"do": ["stop"]}\\n\'\n'
+    assert done.stdout == 'b\'{"do": ["stop"]}\\n\' ()\n'
     assert (
         "FutureWarning: protocol_gateway.drivers will be gone: import from protocol_gateway.seam"
         in done.stderr

@@ -156,7 +156,7 @@ def test_a_stop_that_was_not_delivered_is_sent_later_unless_a_reset_was_accepted
             driver.command(driver.prepare(*resets), 1.2)
     elif resets:
         driver.command(driver.prepare(*resets), 1.2)
-    driver.timer_ended(10.0)
+    driver.timer_ended({"reopen": 10.0}, 10.0)
     driver.opened(RMI, 10.1)
     driver.received(RMI, CONNECTED, 10.2)
     assert sent(driver.opened(SESSION, 10.3)) == ([] if len(resets) == 1 else [rmi.abort()])

@@ -115,7 +115,7 @@ class Stepped:
     def wait(self):
         """Go on to the timer's end."""
         self.now_s = max(self.now_s, self.timer_s)
-        self.perform(self.driver.timer_ended(self.now_s))
+        self.perform(self.driver.timer_ended({}, self.now_s))
 
     def connect(self):
         """Answer PASV, and open the connection for the file; return its name."""
@@ -173,7 +173,7 @@ def test_password_is_sent_only_when_it_is_asked_for():
     assert refused.closed == ["it refuses the user li: 530 Login incorrect."]
     # Not again and again: a controller may lock the user.
     assert refused.timer_s == NOW_S + 30
-    assert refused.driver.timer_ended(NOW_S + 30) == (Open(FTP),)
+    assert refused.driver.timer_ended({}, NOW_S + 30) == (Open(FTP),)
 
 
 def test_joints_are_of_one_file_and_of_the_time_of_its_reading():
@@ -336,7 +336,7 @@ def test_reply_that_does_not_fit_ends_the_connection_with_its_reason(replies, wh
     it.say("220 x", "230 y")
     assert len(it.sent) == sent
     assert it.timer_s >= it.now_s + 5
-    assert it.driver.timer_ended(it.timer_s) == (Open(FTP),)
+    assert it.driver.timer_ended({}, it.timer_s) == (Open(FTP),)
 
 
 def test_file_that_does_not_come_is_lost_and_ends_the_connection():

@@ -148,7 +148,7 @@ class Stepped:
         """Answer the open question as a healthy robot does, or wait for the timer."""
         if len(self.sent) == self.answered:
             self.now_s = max(self.now_s, self.timer_s)
-            self.perform(self.driver.timer_ended(self.now_s))
+            self.perform(self.driver.timer_ended({}, self.now_s))
             return
         self.answered = len(self.sent)
         self.answer(self.memory() if data is None else data)
@@ -465,7 +465,7 @@ def test_a_lost_answer_is_counted_and_the_next_question_follows():
     arm.until("position")
     sent = len(arm.sent)
     assert arm.timer_s - arm.now_s == pytest.approx(TIMEOUT_S)
-    arm.perform(arm.driver.timer_ended(arm.timer_s))
+    arm.perform(arm.driver.timer_ended({}, arm.timer_s))
     assert arm.reports[-1].lost == 1
     assert len(arm.sent) == sent + 1
 
@@ -476,7 +476,7 @@ def test_a_connection_that_does_not_begin_asks_nothing_more(steps):
     for _ in range(steps):
         arm.step()
     sent = len(arm.sent)
-    arm.perform(arm.driver.timer_ended(arm.timer_s))
+    arm.perform(arm.driver.timer_ended({}, arm.timer_s))
     assert arm.reports[-1].lost == 1
     assert (len(arm.sent), arm.timer_s) == (sent, None)
     arm.open()

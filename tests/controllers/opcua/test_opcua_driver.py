@@ -428,7 +428,9 @@ def test_driver_commands_nothing_and_sends_nothing():
     with pytest.raises(CommandError):
         told.driver.prepare(MoveAbsolute((0.0, 0.0)))
     effects = itertools.chain(
-        told.driver.command(b"x", NOW_S), told.driver.timer_ended(NOW_S), told.driver.skipped(OPCUA, NOW_S)
+        told.driver.command(b"x", NOW_S),
+        told.driver.timer_ended({}, NOW_S),
+        told.driver.skipped(OPCUA, NOW_S),
     )
     assert not [each for each in effects if isinstance(each, Send)]
 

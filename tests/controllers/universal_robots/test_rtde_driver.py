@@ -243,7 +243,7 @@ def test_a_controller_without_positions_is_left_and_tried_again_later():
     assert close == Close(RTDE, "the controller has no field actual_q")
     assert isinstance(timer, SetTimer)
     assert timer.at_s > NOW_S + 1.0
-    assert arm.timer_ended(timer.at_s) == (Open(RTDE),)
+    assert arm.timer_ended({}, timer.at_s) == (Open(RTDE),)
 
 
 def message(kind, payload):
@@ -288,7 +288,7 @@ def test_a_broken_stream_of_alarms_is_left_alone_and_the_states_go_on():
     assert isinstance(report_.events[0], MalformedReceived)
     assert close.channel is PRIMARY
     assert report(arm.received(RTDE, data(), NOW_S)).units == 1
-    assert arm.timer_ended(timer.at_s) == (Open(PRIMARY, 30011),)
+    assert arm.timer_ended({}, timer.at_s) == (Open(PRIMARY, 30011),)
 
 
 def test_it_refuses_other_robots_codes_and_every_command():

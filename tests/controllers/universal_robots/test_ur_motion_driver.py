@@ -21,6 +21,7 @@ from controllers.universal_robots.simulated.fields import INPUTS as INPUT_TYPES
 from controllers.universal_robots.simulated.fields import OFFERED
 from protocol_gateway.errors import CommandError, NotReadyError
 from protocol_gateway.kinds import driver_maker
+from protocol_gateway.link.timers import Timers
 from protocol_gateway.seam import (
     Activity,
     AlarmReceived,
@@ -66,7 +67,7 @@ class Arm:
         )
         self.effects = []
         self.sent = {channel.name: bytearray() for channel in (RTDE, PRIMARY, DASHBOARD, INPUTS, SCRIPTS)}
-        self.timer_s = None
+        self.timers = Timers()
         self.registers = {}
         self.runtime, self.safety, self.tool = 1, 1, (0.0,) * 6
         self._do(self.driver.started(self.now_s))
@@ -87,7 +88,7 @@ class Arm:
             if isinstance(effect, Send):
                 self.sent[effect.channel.name] += effect.data
             if isinstance(effect, SetTimer):
-                self.timer_s = effect.at_s
+                self.timers.set(effect)
         return effects
 
     def receive(self, channel, data):
@@ -142,19 +143,17 @@ class Arm:
             self.now_s += 0.008
             if states:
                 effects += self.state()
-            if self.timer_s is not None and self.timer_s <= self.now_s:
-                self.timer_s = None
-                effects += self._do(self.driver.timer_ended(self.now_s))
+            if self.timers and self.timers.next_s <= self.now_s:
+                effects += self._do(self.driver.timer_ended(self.timers.take(self.now_s), self.now_s))
         return effects
 
     def late(self, seconds, *, states=True):
         """Let time pass on a busy machine: each timer ends 60 ms late."""
         end_s, effects = self.now_s + seconds, []
         while True:
-            if self.timer_s is not None:
-                self.now_s = max(self.now_s, self.timer_s) + 0.06
-                self.timer_s = None
-                effects += self._do(self.driver.timer_ended(self.now_s))
+            if self.timers:
+                self.now_s = max(self.now_s, self.timers.next_s) + 0.06
+                effects += self._do(self.driver.timer_ended(self.timers.take(self.now_s), self.now_s))
             if states:
                 effects += self.state()
             if self.now_s >= end_s:
@@ -582,8 +581,8 @@ def in_state(seconds=6.0, *, remote=True, **state):
     while arm.now_s < end_s:
         arm.now_s += 0.1
         arm.state(**state)
-        if arm.timer_s is not None and arm.timer_s <= arm.now_s:
-            arm._do(arm.driver.timer_ended(arm.now_s))
+        if arm.timers and arm.timers.next_s <= arm.now_s:
+            arm._do(arm.driver.timer_ended(arm.timers.take(arm.now_s), arm.now_s))
         if arm.sent["dashboard"].count(b"is in remote control") > answered:
             answered += 1
             arm.answer(remote)

@@ -104,7 +104,7 @@ class Stepped:
         """Answer the open question as a healthy robot does, or wait for the timer."""
         if len(self.sent) == self.answered:
             self.now_s = max(self.now_s, self.timer_s)
-            self.perform(self.driver.timer_ended(self.now_s))
+            self.perform(self.driver.timer_ended({}, self.now_s))
             return
         self.answered = len(self.sent)
         _, command, instance, _, _ = self.question
@@ -373,7 +373,7 @@ def test_a_lost_answer_is_counted_and_the_next_question_follows():
     arm.until(0x75)
     sent, number = len(arm.sent), arm.question[0]
     assert arm.timer_s - arm.now_s == pytest.approx(TIMEOUT_S)
-    arm.perform(arm.driver.timer_ended(arm.timer_s))
+    arm.perform(arm.driver.timer_ended({}, arm.timer_s))
     assert arm.reports[-1].lost == 1
     assert len(arm.sent) == sent + 1
     assert arm.question[0] == number + 1
@@ -409,7 +409,7 @@ def test_a_question_without_an_answer_is_asked_again_although_it_is_asked_once()
     arm.until(0x89)
     arm.answered = len(arm.sent)
     arm.now_s += 0.5  # the answer is lost
-    arm.perform(arm.driver.timer_ended(arm.now_s))
+    arm.perform(arm.driver.timer_ended({}, arm.now_s))
     (event,) = arm.give(0x89, HEALTHY[0x89])
     assert isinstance(event, SoftwareReceived)
 

@@ -7,6 +7,7 @@ import pytest
 from controllers.yaskawa.motion_driver import HSES, STOP, HsesMotionDriver
 from controllers.yaskawa.motion_driver import MOTION as MOTIONS
 from protocol_gateway.errors import CommandError, NotReadyError
+from protocol_gateway.link.timers import Timers
 from protocol_gateway.seam import (
     Activity,
     MoveAbsolute,
@@ -37,27 +38,31 @@ class Stepped:
     def __init__(self):
         self.driver = HsesMotionDriver((JointType.ROTARY,) * 6, {}, options=MOTION)
         self.now_s = 100.0
-        self.driver.started(self.now_s)
+        self.timers = Timers()
+        self.sent(self.driver.started(self.now_s))
 
     def sent(self, effects):
+        for each in effects:
+            if isinstance(each, SetTimer):
+                self.timers.set(each)
         return [each for each in effects if isinstance(each, Send)]
 
     def connect(self, version=None):
         """Open both sockets; answer which software the controller has."""
         sent = self.sent(self.driver.opened(HSES, self.now_s))
-        self.driver.opened(STOP, self.now_s)
+        self.sent(self.driver.opened(STOP, self.now_s))
         while version is not None and command(sent[-1].data) != 0x89:
             self.now_s += 0.31
-            sent = self.sent(self.driver.timer_ended(self.now_s)) or sent
+            sent = self.sent(self.driver.timer_ended(self.timers.take(self.now_s), self.now_s)) or sent
         if version is not None:
-            self.driver.received(HSES, answer(sent[-1].data, software(version)), self.now_s)
+            self.sent(self.driver.received(HSES, answer(sent[-1].data, software(version)), self.now_s))
 
     def holds(self, seconds=2.0):
         """Return the number of HOLD within some time."""
         end_s, found = self.now_s + seconds, 0
         while self.now_s < end_s:
             self.now_s += 0.05
-            effects = self.sent(self.driver.timer_ended(self.now_s))
+            effects = self.sent(self.driver.timer_ended(self.timers.take(self.now_s), self.now_s))
             found += sum(command(each.data) == HOLD for each in effects)
         return found
 
@@ -84,7 +89,7 @@ class Answered(Stepped):
         self.names = b"".join(bytes((each, 0, 0, 0)) for each in b"SLURBT\0\0")
         for name, value in given.items():
             setattr(self, name, value)
-        self.timer_s, self.events, self.written = None, [], []
+        self.events, self.written = [], []
         for channel in (HSES, STOP, MOTIONS):
             self.do(self.driver.opened(channel, self.now_s))
         self.run(2.0)
@@ -92,7 +97,7 @@ class Answered(Stepped):
     def do(self, effects):
         for effect in effects:
             if isinstance(effect, SetTimer):
-                self.timer_s = effect.at_s
+                self.timers.set(effect)
             if isinstance(effect, Report):
                 self.events += effect.events
             if isinstance(effect, Send) and effect.data[29] not in (1, 0x0E):
@@ -119,9 +124,9 @@ class Answered(Stepped):
     def run(self, seconds):
         """Let time pass."""
         end_s = self.now_s + seconds
-        while self.timer_s is not None and self.timer_s <= end_s:
-            self.now_s, self.timer_s = max(self.now_s, self.timer_s) + 1e-6, None
-            self.do(self.driver.timer_ended(self.now_s))
+        while self.timers and self.timers.next_s <= end_s:
+            self.now_s = max(self.now_s, self.timers.next_s) + 1e-6
+            self.do(self.driver.timer_ended(self.timers.take(self.now_s), self.now_s))
         self.now_s = end_s
 
     def command(self, *commands):
