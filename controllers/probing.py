@@ -62,7 +62,7 @@ class Probe:
         ports: Ports at which it is asked.
         listens: Ports at which `heard` looks; None: any.
         asks: The question, for tcp and udp.
-        sends: What is sent, for the help: "the RTDE version to port 30004".
+        sends: The question, for the help: "the RTDE version to port 30004".
         knows: Returns whether what was heard is certainly of this kind, so that no more is awaited.
         heard: Returns what bytes mean that a port sent unasked; None: they are of another kind.
         examine: For another scheme: returns the result for an address that sends nothing unasked.
@@ -102,5 +102,5 @@ def ask(connection: socket.socket, asked: Asked) -> Found:
 
 
 def nothing_known(heard: bytes, what: str) -> Found:
-    """Return that an answer is none of a kind."""
+    """Return that an answer is of no kind."""
     return Found(text=f"it {'answers something unknown' if heard else 'answers nothing'} to {what}")

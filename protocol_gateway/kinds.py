@@ -1,7 +1,7 @@
 """The kinds of controllers by the site file's `protocol`: those of robomesh, and of installed packages.
 
-Both are entry points of the group `robomesh.drivers` (docs/controllers/own-driver.md). Only the drivers that
-a site uses are imported.
+Both are entry points of the group `robomesh.drivers` (docs/controllers/own-driver.md). Of packages, only
+those that a site file names are imported.
 """
 
 import logging
@@ -9,11 +9,13 @@ import sys
 from collections.abc import Mapping
 from functools import cache, lru_cache, partial
 from importlib.metadata import EntryPoint, distribution, entry_points
+from inspect import signature
 from typing import Any, cast
 
 from protocol_gateway.errors import GatewaySettingsError, ProtocolGatewayError
-from protocol_gateway.seam import Capabilities, Driver
+from protocol_gateway.seam import Capabilities, ControllerCommand, Driver, Effects
 from protocol_gateway.seam.kind import DriverMaker, Kind
+from protocol_gateway.seam.table import Table
 
 logger = logging.getLogger(__name__)
 
@@ -32,6 +34,10 @@ def own_kinds() -> Mapping[str, Kind]:
         except ModuleNotFoundError as error:
             if error.name is None or not each.module.startswith(error.name):
                 raise
+    if not kinds:
+        raise GatewaySettingsError(
+            "robomesh's own kinds of controllers are not found: install robomesh again"
+        )
     return kinds
 
 
@@ -53,44 +59,62 @@ def kind_of(protocol: str) -> Kind:
     Raises:
         GatewaySettingsError: If no package, or more than one, has it, or it cannot be imported.
     """
-    return own_kinds().get(protocol) or _installed(protocol, tuple(sys.path))
+    if (own := own_kinds().get(protocol)) is not None:
+        return own
+    kind, problem = _installed(protocol, tuple(sys.path))
+    if kind is None:
+        raise GatewaySettingsError(problem)
+    return kind
 
 
 def driver_maker(protocol: str) -> DriverMaker:
     """Return the factory of a protocol's drivers.
 
     Raises:
-        GatewaySettingsError: As `kind_of`.
+        GatewaySettingsError: As `kind_of`; or if the driver cannot be imported.
     """
-    return kind_of(protocol).driver_maker
+    kind = kind_of(protocol)
+    if protocol in own_kinds():
+        return kind.driver_maker
+    whose = f"protocol {protocol!r}: its driver, of the package {_packages(protocol)[0]},"
+    try:
+        return partial(_created, kind.driver_maker, whose)
+    except (Exception, SystemExit) as error:
+        raise GatewaySettingsError(f"{whose} cannot be imported: {error}") from error
+
+
+def extra_of(module: str) -> str | None:
+    """Return the extra of robomesh that brings a kind's module; None: it is of no kind."""
+    return next((kind.extra for kind in own_kinds().values() if module in kind.packages), None)
 
 
 @lru_cache
-def _installed(protocol: str, path: tuple[str, ...]) -> Kind:
-    """Return the kind of an installed package; the cache is for one path of Python's modules."""
-    found = {
-        (_package(each), each.value): each
-        for each in entry_points(group=ENTRY_POINTS, name=protocol)
-        if not _is_own(each)
-    }
-    if len(found) > 1:
+def _installed(protocol: str, path: tuple[str, ...]) -> tuple[Kind | None, str]:
+    """Return the kind of an installed package, or the problem with it, for one path of Python's modules."""
+    packages = _packages(protocol)
+    if not packages:
+        return None, f"unknown protocol {protocol!r}; known: {', '.join(protocols())}"
+    if len(packages) > 1:
         # Which of them is first depends on the file system, and may be another one tomorrow.
-        packages = ", ".join(sorted(package for package, _ in found))
-        raise GatewaySettingsError(
-            f"protocol {protocol!r}: several packages have it: remove all but one of {packages}"
-        )
-    for (package, _), each in found.items():
-        try:
-            given = each.load()
-            kind = given if isinstance(given, Kind) else Kind(driver=given)
-            maker, _ = kind.driver_maker, kind.table_model
-        except (Exception, SystemExit) as error:
-            raise GatewaySettingsError(
-                f"protocol {protocol!r}: its driver, of the package {package}, cannot be imported: {error}"
-            ) from error
-        whose = f"protocol {protocol!r}: its driver, of the package {package},"
-        return Kind(**{**vars(kind), "driver": partial(_created, maker, whose)})
-    raise GatewaySettingsError(f"unknown protocol {protocol!r}; known: {', '.join(protocols())}")
+        both = ", ".join(packages)
+        return None, f"protocol {protocol!r}: several packages have it: remove all but one of {both}"
+    entry = next(each for each in entry_points(group=ENTRY_POINTS, name=protocol) if not _is_own(each))
+    try:
+        given = entry.load()
+        kind = given if isinstance(given, Kind) else Kind(driver=given)
+        if kind.table and not issubclass(kind.table_model or object, Table):
+            raise TypeError(f"{kind.table} is no Table")
+    except (Exception, SystemExit) as error:
+        whose = f"protocol {protocol!r}: its driver, of the package {packages[0]},"
+        return None, f"{whose} cannot be imported: {error}"
+    # Of a package's kind, only these two parts are used.
+    return Kind(driver=kind.driver, table=kind.table), ""
+
+
+def _packages(protocol: str) -> list[str]:
+    """Return the packages that have a protocol."""
+    found = [each for each in entry_points(group=ENTRY_POINTS, name=protocol) if not _is_own(each)]
+    return sorted({_package(each) for each in found})
 
 
 def _is_own(each: EntryPoint) -> bool:
@@ -118,13 +142,32 @@ def _created(maker: DriverMaker, whose: str, *given: Any, **named: Any) -> Drive
         raise GatewaySettingsError(f"{whose} cannot be created: {error}") from error
 
 
+class _OldDriver:
+    """A driver that was written before `prepare`, or before timers had names."""
+
+    def __init__(self, driver: Any) -> None:
+        self._driver = driver
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._driver, name)
+
+    def prepare(self, *commands: ControllerCommand) -> Any:
+        """Return what its `command` takes."""
+        encode = getattr(self._driver, "encode", None) or self._driver.prepare
+        return encode(*commands)
+
+    def timer_ended(self, ended: Mapping[str, float], now_s: float) -> Effects:
+        """Call its method, which knows one timer."""
+        return cast("Effects", self._driver.timer_ended(now_s))
+
+
 def _with_new_names(driver: Any, whose: str) -> Driver:
     """Return a driver, with a warning and new names of its methods if it has old ones."""
-    if not hasattr(driver, "prepare"):
-        logger.warning(
-            "%s has encode, which is prepare now, and no names of timers: docs/controllers/own-driver.md",
-            whose,
-        )
-        driver.prepare, old = driver.encode, driver.timer_ended
-        driver.timer_ended = lambda ended, now_s: old(now_s)
-    return cast("Driver", driver)
+    if hasattr(driver, "prepare") and len(signature(driver.timer_ended).parameters) > 1:
+        return cast("Driver", driver)
+    logger.warning(
+        "%s has old methods: encode is prepare now, and timer_ended gets names of timers: "
+        "docs/controllers/own-driver.md",
+        whose,
+    )
+    return cast("Driver", _OldDriver(driver))

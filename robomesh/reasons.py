@@ -1,7 +1,7 @@
 """Reasons for refused requests, ended leases and unchecked motions.
 
 A reason is a code with parameters for programs and translations, and one English sentence for people. All
-codes and sentences are in `robomesh.reason_codes`.
+codes and sentences are in `robomesh.reason_codes`, and in `controllers.<kind>.codes`.
 
 A refusal is an error reply: its payload is the sentence, its encoding is `text/plain;<parameters>`. The
 parameters are a query string (`code=lease.held&holder=li`). A cause follows with the prefix `cause.`

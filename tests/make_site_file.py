@@ -27,7 +27,8 @@ FILE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "site-file.m
 
 _HEAD = """# Site file
 
-Generated from the models in `services/site_file/` by `tests/make_site_file.py`; do not edit.
+Generated from the models in `services/site_file/` and `controllers/*/table.py` by
+`tests/make_site_file.py`; do not edit.
 
 `robomesh up site.toml` starts the services of a site file. Without a file it starts the site `demo`. An
 unknown key is an error. Lengths are in millimetres and angles in degrees. A path is relative to the site

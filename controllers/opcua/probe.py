@@ -5,7 +5,6 @@ import logging
 
 from controllers import probing
 from controllers.probing import Found, Probe, ProbeError
-from robomesh.extras import is_missing, missing
 
 _SCHEME, _PORT = "opc.tcp", 4840
 
@@ -20,8 +19,6 @@ def _heard(heard: bytes) -> Found | None:
 
 
 def _examine(url: str) -> Found:
-    if is_missing("asyncua"):
-        raise ProbeError(missing("asyncua", "opcua"))
     from controllers.opcua.reader.problems import ReadingError
     from controllers.opcua.reader.security import endpoints_of, offers_of
 

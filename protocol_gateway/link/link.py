@@ -291,6 +291,9 @@ class ControllerLink:
         now = now or self._now()
         # The end of a motion that the driver gives up is always sent.
         gives_up = FateUnknown in map(type, effects)
+        # Timers first: a stop that follows from the others may set the same ones.
+        if gives_up:
+            effects = sorted(effects, key=lambda each: not isinstance(each, SetTimer))
         for effect in effects:
             self._perform(effect, now, counted=not gives_up)
 

@@ -89,7 +89,10 @@ class Send:
 
 @dataclass(frozen=True, slots=True)
 class SetTimer:
-    """Call `timer_ended` at a time [s]; it replaces the timer of this name. None: clear it."""
+    """Call `timer_ended` at a time [s]; it replaces the timer of this name. None: clear it.
+
+    With `FateUnknown`, timers are set before the other effects, because the stop may set them too.
+    """
 
     at_s: float | None
     name: str = ""

@@ -17,6 +17,7 @@ from controllers.probing import Found, Probe, ProbeError
 from protocol_gateway.kinds import own_kinds
 from protocol_gateway.seam.kind import named
 from robomesh.errors import ListenError
+from robomesh.extras import is_missing, missing
 from robomesh.listen_address import split_address
 from robomesh.texts import one_line
 from services.command_line.options import Json, command_group
@@ -76,10 +77,11 @@ def examine(address: str) -> Found:
     known = [each for each in probes().values() if each.scheme == scheme]
     if scheme == "udp":
         return _examine_udp(host, port, known)
-    others = [each for each in probes().values() if each.scheme != scheme]
+    others = [each for each in probes().values() if each.scheme not in (scheme, "udp")]
     taken = {number for each in others for number in (*each.ports, *(each.listens or ()))}
     if scheme != "tcp" and port in taken:
         raise ProbeError(f"{address}: this port has another protocol: probe tcp://{host}:{port}")
+    _require_packages(scheme)
     try:
         with socket.create_connection((host, port), timeout=probing.ANSWER_S) as connection:
             heard = probing.listen(connection, probing.LISTEN_S, _is_known)
@@ -95,6 +97,18 @@ def examine(address: str) -> Found:
     if examined is not None and not heard:
         return examined(address)
     return replace(_meaning(heard, port), received_bytes=len(heard))
+
+
+def _require_packages(scheme: str) -> None:
+    """Look for the packages of the kinds with a scheme.
+
+    Raises:
+        ProbeError: If one is not installed.
+    """
+    for name, kind in own_kinds().items():
+        for package in kind.packages if name in probes() and probes()[name].scheme == scheme else ():
+            if is_missing(package):
+                raise ProbeError(missing(package, kind.extra))
 
 
 def _split(address: str) -> tuple[str, str, int]:
@@ -142,8 +156,10 @@ def _examine_udp(host: str, port: int, known: list[Probe]) -> Found:
         with socket.socket(family[0], socket.SOCK_DGRAM) as endpoint:
             endpoint.settimeout(probing.ANSWER_S)
             endpoint.connect(family[4])
-            return probing.ask(endpoint, asked)
+            endpoint.send(asked.question)
+            answer = endpoint.recv(probing.MOST_BYTES)
     except TimeoutError:
         raise ProbeError(f"{where}: no answer within {probing.ANSWER_S:g} s") from None
     except OSError as error:
         raise ProbeError(f"{where}: {_reason(error)}") from None
+    return replace(asked.meaning(answer), sent=asked.sent, received_bytes=len(answer))

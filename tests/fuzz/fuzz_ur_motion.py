@@ -714,7 +714,10 @@ class Bench:
             if isinstance(effect, Close):
                 self._forget(effect.channel)
         now_s = self.now_s
-        of_stop: set[str] = set()
+        for effect in effects:
+            # As the link does: a stop in the same effects may set the same timers.
+            if isinstance(effect, SetTimer):
+                self._timers.set(effect)
         for effect in effects:
             match effect:
                 case Send(channel, data):
@@ -722,19 +725,13 @@ class Bench:
                         raise Wrong("sends more than it declares, so the link drops it")
                     self._check_sent(channel, data, commanded, recovery)
                     self._carry(channel, data)
-                case SetTimer(_, name):
-                    if name in of_stop:
-                        raise Wrong(f"the timer {name!r} replaces that of a stop")
-                    self._timers.set(effect)
                 case Open(channel):
                     self._forget(channel)
                     self._later(now_s + 0.05 * self._chance.random(), channel, None)
                 case FateUnknown(why):
                     self._counts[why.code] += 1
-                    before = {**self._timers}
                     # As the gateway does, while it performs the effects.
                     self.command(Stop())
-                    of_stop |= {name for name, at_s in self._timers.items() if before.get(name) != at_s}
                 case _:
                     pass
         found = [(each.recovery, each.accepted) for each in events if isinstance(each, RecoverAnswered)]

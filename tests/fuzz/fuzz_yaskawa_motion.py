@@ -478,7 +478,10 @@ class Bench:
             self._begin_hold(fate=True)
             self._require_hold(effects)
         now_s = self.now_s
-        of_stop: set[str] = set()
+        for effect in effects:
+            # As the link does: a stop in the same effects may set the same timers.
+            if isinstance(effect, SetTimer):
+                self._timers.set(effect)
         for effect in effects:
             match effect:
                 case Send(channel, data):
@@ -486,10 +489,6 @@ class Bench:
                     if not (commanded or fates or self._unasked.allowed(now_s)):
                         raise Wrong("sends more than it declares, so the link drops it")
                     self._carry(channel, data)
-                case SetTimer(_, name):
-                    if name in of_stop:
-                        raise Wrong(f"the timer {name!r} replaces that of a stop")
-                    self._timers.set(effect)
                 case Open(channel):
                     self._cut_off(channel)
                     self._later(self.now_s + 0.1 * self._chance.random(), channel, None)
@@ -497,10 +496,8 @@ class Bench:
                     self._cut_off(channel)
                 case FateUnknown(why):
                     self._counts[why.code] += 1
-                    before = {**self._timers}
                     # As the gateway does, while it performs the effects.
                     self.command(Stop())
-                    of_stop |= {name for name, at_s in self._timers.items() if before.get(name) != at_s}
                 case _:
                     pass
 

@@ -208,7 +208,7 @@ def facts(driver: Any) -> str:
 
 
 def ordered(text: str) -> str:
-    """Return a text whose sets have one order, and whose classes have no module."""
+    """Return a text with its sets in one order, and its classes without modules."""
     text = re.sub(r"<class '[\w.]*\.(\w+)'>", r"\1", text)
     return re.sub(r"\{([^{}]*)\}", lambda each: "{" + ", ".join(sorted(each[1].split(", "))) + "}", text)
 
@@ -301,7 +301,7 @@ def replay(folder: Path) -> bool:
 
 
 def difference(recorded: Iterator[Any]) -> tuple[str, int]:
-    """Return the first difference of a driver from its transcript, empty if there is none, and the calls."""
+    """Return the first difference of a driver from its transcript, or an empty text, and the calls."""
     name, joint_types, codes, options, changed, test = next(recorded)
     set_constants(changed)
     driver = getattr(import_module(DRIVERS[name]), name)(joint_types, codes, options=options)

@@ -1,6 +1,6 @@
 """The tests of the core without each kind of controllers in turn: `python -m tests.long.without`.
 
-In a copy of its own, because it deletes folders: a kind's, and that of its tests. Tests elsewhere that import
+In a copy, because it deletes folders: a kind's, and that of its tests. Tests elsewhere that import
 the kind are left out, and counted.
 """
 

@@ -13,6 +13,7 @@ import pytest
 from controllers.unit.simulated.service import Settings as SimulatorSettings
 from controllers.unit.simulated.service import serve as simulate
 from protocol_gateway.gateway import RobotSettings, Settings, serve
+from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
@@ -93,7 +94,14 @@ class GatewaySite:
     async def home(self):
         """Acquire control and home, and wait until the motion has demonstrably ended."""
         await self.lease(A.ACQUIRE, ttl_s=5)
-        await self.command(C.HOME)
+        while True:
+            try:
+                await self.command(C.HOME)
+                break
+            except RefusedError as error:
+                # A busy machine took longer than a second for it.
+                if error.code != codes.COMMAND_WAITED.name:
+                    raise
         await until(lambda: self.controller.homed == STATE.YES)
         await until(lambda: self.controller.activity in (STATE.IDLE, STATE.ACTIVITY_UNKNOWN))
         await self.units(3)

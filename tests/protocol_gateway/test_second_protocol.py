@@ -202,6 +202,14 @@ from protocol_gateway.kinds import driver_maker
 from protocol_gateway.seam import Stop
 driver = driver_maker("json-lines")((), {}, relay=None, options=None)
 print(driver.command(driver.prepare(Stop()), 0.0)[0].data, driver.timer_ended({}, 0.0))
+from protocol_gateway.drivers.only_reads import OnlyReads
+from protocol_gateway.kinds import _with_new_names
+class Reads(OnlyReads):
+    __slots__ = ()
+    def timer_ended(self, now_s):
+        return [now_s]
+reads = _with_new_names(Reads(), "it")
+print(reads.timer_ended({"": 1.0}, 2.0))
 """
 
 
@@ -225,12 +233,12 @@ def test_a_driver_with_the_old_names_runs_with_warnings_that_say_the_new_ones(in
         text=True,
         check=True,
     )
-    assert done.stdout == 'b\'{"do": ["stop"]}\\n\' ()\n'
+    assert done.stdout == 'b\'{"do": ["stop"]}\\n\' ()\n[2.0]\n'
     assert (
         "FutureWarning: protocol_gateway.drivers will be gone: import from protocol_gateway.seam"
         in done.stderr
     )
-    assert "of the package robomesh-json-lines, has encode, which is prepare now" in done.stderr
+    assert "of the package robomesh-json-lines, has old methods: encode is prepare now" in done.stderr
 
 
 KIND = """

@@ -194,12 +194,20 @@ def test_late_joiners_receive_the_events_of_an_arm_near_a_post(mesh):
         near = np.radians([-36.87, 15.0, -30.0, 0.0, 0.0])
         assert 0 < outside_clearance(BUILT, "left", near, {}).distance_m < 0.01
         async with cell_service(mesh) as (gateway, monitor), publishing(gateway, {"left": HOME}) as poses:
+
+            async def kept():
+                return (await last_value(monitor, "robomesh/hall/left/events/kinematics")).events
+
+            async def reported(code):
+                while code not in [event.code for event in await kept()]:
+                    await asyncio.sleep(0.05)
+
             await until(monitor, "kinematics", lambda m: m.HasField("clearance"))
             poses["left"] = near
-            await until(monitor, "events/kinematics", lambda m: m.code == "kinematics.clearance.stop")
+            await reported("kinematics.clearance.stop")
             poses["left"] = HOME
-            await until(monitor, "events/kinematics", lambda m: m.code == "kinematics.clearance.stop.over")
-            events = (await last_value(monitor, "robomesh/hall/left/events/kinematics")).events
+            await reported("kinematics.clearance.stop.over")
+            events = await kept()
             found = [(event.severity, event.code) for event in events if "clearance" in event.code]
             assert found == [
                 (schema.Event.WARNING, "kinematics.clearance.warning"),

@@ -244,6 +244,16 @@ def test_what_cannot_be_probed_is_named(address, words):
         examine(address)
 
 
+def test_a_silent_udp_port_is_named(monkeypatch):
+    monkeypatch.setattr(probing, "ANSWER_S", 0.3)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
+        silent.bind(("127.0.0.1", 0))
+        port = silent.getsockname()[1]
+        at_ports(monkeypatch, hses={"ports": (port,)})
+        with pytest.raises(ProbeError, match=rf"udp://127\.0\.0\.1:{port}: no answer within 0.3 s"):
+            examine(f"udp://127.0.0.1:{port}")
+
+
 def test_a_closed_port_is_named():
     with pytest.raises(ProbeError, match="Connection refused"):
         examine(f"tcp://127.0.0.1:{free_port()}")

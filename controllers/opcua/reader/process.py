@@ -21,7 +21,7 @@ from robomesh.extras import missing
 try:
     from asyncua import ua
 except ImportError:
-    raise SystemExit(missing("asyncua")) from None
+    raise SystemExit(missing("asyncua", "opcua")) from None
 
 from controllers.opcua import facts
 from controllers.opcua.facts import Found, Reading, Values, encode
