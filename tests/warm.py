@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import termios
+import threading
 import time
 import tty
 from pathlib import Path
@@ -34,6 +35,8 @@ _PAUSE_S = 0.4
 _LINES = 200
 _forks = multiprocessing.get_context("forkserver")
 _forks.set_forkserver_preload([*_LOADED])
+# A start looks at all children, also at one that another thread is closing.
+_children = threading.Lock()
 
 
 def run(arguments: tuple[str, ...], *, timeout_s: float, text: str) -> subprocess.CompletedProcess[str]:
@@ -52,14 +55,16 @@ def run(arguments: tuple[str, ...], *, timeout_s: float, text: str) -> subproces
         given.seek(0)
         paths = tuple(f"/proc/{os.getpid()}/fd/{file.fileno()}" for file in (given, out, errors))
         process = _forks.Process(target=_command, args=(arguments, paths, str(Path.cwd()), dict(os.environ)))
-        process.start()
+        with _children:
+            process.start()
         process.join(timeout_s)
         if process.exitcode is None:
             process.kill()
             process.join()
             raise subprocess.TimeoutExpired(["robomesh", *arguments], timeout_s, _read(out), _read(errors))
         status = process.exitcode
-        process.close()
+        with _children:
+            process.close()
         return subprocess.CompletedProcess(["robomesh", *arguments], status, _read(out), _read(errors))
 
 
@@ -87,7 +92,8 @@ def on_terminal(
         size = {"COLUMNS": str(columns), "LINES": str(_LINES)}
         environment = {**os.environ, "TERM": "xterm-256color", **size}
         process = _forks.Process(target=_command, args=(arguments, (path,) * 3, str(Path.cwd()), environment))
-        process.start()
+        with _children:
+            process.start()
         received, deadline, interrupted = b"", time.monotonic() + timeout_s, not until
         while process.exitcode is None or select.select([ours], [], [], 0)[0]:
             wait_s = 0.02 if interrupted else _PAUSE_S
@@ -102,7 +108,8 @@ def on_terminal(
                 process.join()
                 raise subprocess.TimeoutExpired(["robomesh", *arguments], timeout_s, received)
         status = process.exitcode
-        process.close()
+        with _children:
+            process.close()
         return status or 0, received
     finally:
         os.close(ours)
