@@ -420,6 +420,8 @@ def test_ctrl_c_waits_until_what_moves_is_stopped_and_what_is_recorded_is_closed
 
 def test_ctrl_c_again_ends_a_site_that_still_waits(tmp_path):
     with running_site(tmp_path, services=["recorder"]) as running:
+        # One that has just been started has nothing to close, and is not waited for.
+        wait_until(lambda: running.command("alive", "test/recorder").returncode == 0)
         children = running.children()
         kill(children["recorder"], signal.SIGSTOP)
         os.killpg(running.process.pid, signal.SIGINT)
