@@ -9,6 +9,7 @@ import os
 import re
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -80,6 +81,8 @@ def main(names: list[str]) -> None:
     if debians and (os.geteuid() != 0 or shutil.which("mmdebstrap") is None):
         sys.exit(f"dev: {debians[0]} needs root and mmdebstrap: apt-get install mmdebstrap")
     RESULTS.mkdir(exist_ok=True)
+    # A shell's background ignores Ctrl-C, and so would every command of a part.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     for name in wanted:
         result = run(name, PARTS[name])
         (RESULTS / f"{name}.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
