@@ -48,6 +48,7 @@ class How:
 
 
 # In the order in which they are typed.
+_BUILD = ".tools/bin/uv build --wheel --build-constraint requirements.lock --out-dir dist"
 COMMANDS = {
     "git clone ADDRESS robomesh": How(not_here="the checkout in which this runs"),
     "./dev up": How(not_here="runs during all others"),
@@ -98,7 +99,10 @@ COMMANDS = {
         typed=("./dev run python -m tests.soak.recorder_kills --times 5",)
     ),
     "./dev run true": How(),
-    ".tools/bin/uv build --wheel --build-constraint requirements.lock --out-dir dist": How(),
+    # The home cannot be written, and uv itself has its cache there.
+    _BUILD: How(
+        typed=(f"env UV_CACHE_DIR=dist/cache {_BUILD}",),
+    ),
     "./dev run python web/build_page.py --format": How(),
     "./dev test tests/robots/test_dh.py -k base": How(says="passed"),
     "./dev test tests/robots": How(says="passed"),
