@@ -102,9 +102,7 @@ def simulate(
         str,
         typer.Option(
             metavar="HOST:PORT",
-            show_default=", ".join(
-                f"{name}: {each.listen}" for name, each in simulated_controllers().items()
-            ),
+            show_default=_ADDRESSES,
         ),
     ] = "",
     demo: Annotated[bool, typer.Option(help="Move until the first command.")] = False,
