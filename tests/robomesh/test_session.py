@@ -169,6 +169,7 @@ def test_list_arrives_complete_before_later_messages_without_duplicates(mesh):
             publisher = gateway.declare_publisher("site", "arm", "events")
             for number in range(150):
                 publisher.put(schema.Event(code=str(number)))
+            await answered(monitor, publisher.key)
             subscription = monitor.subscribe("robomesh/site/arm/events", newest=1000)
             for number in range(150, 200):
                 publisher.put(schema.Event(code=str(number)))
@@ -188,6 +189,7 @@ def test_the_last_list_is_returned_although_messages_follow_it(mesh):
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
             publisher = gateway.declare_publisher("site", "arm", "events")
             publisher.put(schema.Event(code="first"))
+            await answered(monitor, publisher.key)
 
             async def flood():
                 while True:
