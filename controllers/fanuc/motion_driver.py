@@ -9,8 +9,8 @@
 
 RMI is connected while the robot is controlled, and to deliver a stop. A motion:
 
-    none --command--> initializing --answer--> moving --answer--> ending --answer to FRC_Abort--> none
-          FRC_Initialize        the instruction        FRC_Abort
+    NONE --command--> SENT --answer--> RUNS --answer--> ENDING --answer to FRC_Abort--> NONE
+          FRC_Initialize   the instruction    FRC_Abort
 
 Between motions nothing of the gateway is in the controller, so a program that runs then is another one. While
 a motion is open, no question is sent by RMI, because the controller refuses a command before it has answered
@@ -63,8 +63,9 @@ from protocol_gateway.seam import (
     StopEnds,
 )
 from protocol_gateway.seam.hexadecimal import hexadecimal
-from protocol_gateway.seam.one_motion import FIRST_PERCENT, prepared
+from protocol_gateway.seam.one_motion import FIRST_PERCENT, OneMotion, Phase, prepared
 from protocol_gateway.seam.polling import Asked
+from protocol_gateway.seam.rest import Rest
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.joints import JointType
@@ -86,7 +87,8 @@ _LEAVE_S = 1.0
 _REOPEN_S = 0.05
 _AGAIN_S = 0.05
 _ENDED_S = 0.3
-_STILL_S, _STILL_RAD = 0.5, 1e-3
+# [rad] or [m]
+_STILL = 1e-3
 _RMI_SENDS_HZ = 20.0
 _TOOL = Signal("tool.number")
 
@@ -106,32 +108,21 @@ class _Line(Enum):
 _OF_SESSION = ("connect", "join", "leave", "initialize", "abort", "again", "watch")
 
 
-class _Phase(Enum):
-    """State of the motion."""
-
-    NONE = auto()
-    INITIALIZING = auto()
-    MOVING = auto()
-    ENDING = auto()
-    STOPPING = auto()
-
-
-_OPEN_MOTION = frozenset({_Phase.INITIALIZING, _Phase.MOVING})
-
-
-@dataclass(frozen=True)
-class _Motion:
-    """The motion that was commanded.
+@dataclass
+class _Sent:
+    """What is remembered of a motion that was commanded.
 
     Attributes:
         instruction: Its message.
         start: Positions that it was checked from [rad] or [m].
         tool: Number of the active tool then.
+        sent_s: Time of its message [s].
     """
 
     instruction: bytes
     start: tuple[float, ...]
     tool: object
+    sent_s: float = float("-inf")
 
 
 class FanucMotionDriver(SnpxDriver):
@@ -175,18 +166,15 @@ class FanucMotionDriver(SnpxDriver):
         self._lines = LineStream()
         # RMI is connected again later, after a refusal.
         self._retries_later = False
-        self._phase = _Phase.NONE
-        self._motion: _Motion | None = None
-        self._sent_s = float("-inf")
+        self._motion: OneMotion[_Sent] = OneMotion()
         self._initialize_open = self._abort_open = False
         self._percent = FIRST_PERCENT
-        self._rests_after_stop = True
+        self._rest = Rest([_STILL] * len(self._axes.used))
         self._forget_state()
 
     def _forget_state(self) -> None:
-        self._positions: tuple[float, ...] | None = None
-        self._positions_s = self._status_s = self._asked_s = float("-inf")
-        self._still: tuple[tuple[float, ...], float] | None = None
+        self._rest.forget()
+        self._status_s = self._asked_s = float("-inf")
         self._status: StatusReceived | None = None
         self._tool: object = None
 
@@ -216,7 +204,7 @@ class FanucMotionDriver(SnpxDriver):
         self._line = _Line.OPEN
         joined = SetTimer(None, "join")
         if self._stop_owed:
-            self._phase = _Phase.STOPPING
+            self._motion.leave()
             return (joined, *self._abort(now_s))
         return (joined, *self._settle(now_s))
 
@@ -249,7 +237,7 @@ class FanucMotionDriver(SnpxDriver):
             self._forget_state()
             self._percent = FIRST_PERCENT
             effects = [*super().closed(channel, now_s)]
-            if self._phase in _OPEN_MOTION:
+            if self._motion.sent:
                 effects += self._give_up(fanuc_codes.STATE_OLD(), now_s)
             return effects
         if channel is RMI:
@@ -280,7 +268,7 @@ class FanucMotionDriver(SnpxDriver):
             effects += self._unanswered(now_s, late=late)
         if "again" in ended and self._line is _Line.OPEN and not self._abort_open:
             effects += self._abort(now_s)
-        if "watch" in ended and self._phase in _OPEN_MOTION:
+        if "watch" in ended and self._motion.sent:
             effects += self._watch(now_s, late=late)
         return (*effects, *self._settle(now_s))
 
@@ -290,7 +278,7 @@ class FanucMotionDriver(SnpxDriver):
         """Connect to RMI or disconnect."""
         if not self._running:
             return ()
-        wanted = self._controlled or self._stop_owed or self._phase is not _Phase.NONE
+        wanted = self._controlled or self._stop_owed or self._motion.phase is not Phase.NONE
         if wanted and self._line is _Line.CLOSED:
             if self._retries_later:
                 return ()
@@ -320,14 +308,13 @@ class FanucMotionDriver(SnpxDriver):
 
     def _given_up(self) -> Effects:
         """Forget what the session had open: RMI_MOVE may continue."""
-        before = self._phase
-        if before is not _Phase.NONE:
-            self._stop_owed = True
+        was_open = self._motion.sent is not None
+        self._stop_owed |= self._motion.phase is not Phase.NONE
         effects: list[Effect] = [SetTimer(None, name) for name in _OF_SESSION]
         self._initialize_open = self._abort_open = False
-        self._phase, self._motion = _Phase.NONE, None
-        if before in _OPEN_MOTION:
-            self._must_rest()
+        self._motion.end()
+        if was_open:
+            self._rest.prove_again()
             effects.append(FateUnknown(fanuc_codes.CONNECTION_LOST()))
         return effects
 
@@ -344,17 +331,18 @@ class FanucMotionDriver(SnpxDriver):
 
     def _on(self, answer: Answer, now_s: float) -> Effects:
         """Handle a message of the session."""
+        runs = self._motion.phase is Phase.RUNS
         match answer.name:
             case rmi.INITIALIZE if self._initialize_open:
                 return (SetTimer(None, "initialize"), *self._on_initialized(answer, now_s))
-            case rmi.JOINT_MOTION if self._phase is _Phase.MOVING and answer.sequence == rmi.FIRST_SEQUENCE:
+            case rmi.JOINT_MOTION if runs and answer.sequence == rmi.FIRST_SEQUENCE:
                 if answer.error:
                     return self._give_up(_refused(answer), now_s)
-                self._phase, self._motion = _Phase.ENDING, None
+                self._motion.arrive()
                 return self._abort(now_s)
             case rmi.ABORT if self._abort_open:
                 return (SetTimer(None, "abort"), *self._on_aborted(answer, now_s))
-            case rmi.SYSTEM_FAULT if self._phase in _OPEN_MOTION:
+            case rmi.SYSTEM_FAULT if self._motion.sent:
                 return self._give_up(fanuc_codes.SYSTEM_FAULT(), now_s)
             case rmi.DISCONNECT if self._line is _Line.LEAVING:
                 self._line = _Line.CLOSED
@@ -363,22 +351,22 @@ class FanucMotionDriver(SnpxDriver):
 
     def _on_initialized(self, answer: Answer, now_s: float) -> Effects:
         self._initialize_open = False
-        if self._phase is not _Phase.INITIALIZING:
+        if (motion := self._motion.sent) is None:
             # Stopped during the initialization: an earlier abort has not ended this program.
             return () if self._abort_open else self._abort(now_s)
         if answer.error:
             return self._give_up(_refused(answer), now_s)
-        assert self._motion is not None
-        if (problem := self._problem(now_s, self._motion)) is not None:
+        if (problem := self._problem(now_s, motion)) is not None:
             return self._give_up(problem, now_s)
-        if now_s - min(self._positions_s, self._status_s) > _BLIND_S:
+        if now_s - min(self._rest.positions_s, self._status_s) > _BLIND_S:
             return self._give_up(fanuc_codes.STATE_OLD(), now_s)
-        if self._positions is None or _moved(self._positions, self._motion.start):
+        if not self._rest.near(motion.start):
             return self._give_up(fanuc_codes.MOVED_BEFORE(), now_s)
         if (extra := self._extra_axes()) is not None:
             return self._give_up(extra, now_s)
-        self._phase, self._sent_s = _Phase.MOVING, now_s
-        return (Send(SESSION, self._motion.instruction),)
+        self._motion.begin()
+        motion.sent_s = now_s
+        return (Send(SESSION, motion.instruction),)
 
     def _on_aborted(self, answer: Answer, now_s: float) -> Effects:
         self._abort_open = False
@@ -389,15 +377,16 @@ class FanucMotionDriver(SnpxDriver):
             report = Report([AlarmReceived(Severity.ERROR, text)], 0)
             return (SetTimer(now_s + _LEAVE_S, "again"), report)
         if not self._initialize_open:
-            self._phase, self._stop_owed = _Phase.NONE, False
+            self._motion.end()
+            self._stop_owed = False
         return ()
 
     def _unanswered(self, now_s: float, *, late: bool) -> Effects:
         if late:
             return (SetTimer(now_s + _LATE_S, "initialize" if self._initialize_open else "abort"),)
         why = fanuc_codes.NO_ANSWER(name=rmi.INITIALIZE)
-        fate = (FateUnknown(why),) if self._phase is _Phase.INITIALIZING else ()
-        self._phase = _Phase.STOPPING
+        fate = (FateUnknown(why),) if self._motion.sent else ()
+        self._motion.leave()
         # A new session, in which the abort that is owed can be sent.
         return (*self._leave(SESSION, "it does not answer", now_s), *fate)
 
@@ -411,29 +400,23 @@ class FanucMotionDriver(SnpxDriver):
     def _noted(self, event: ControllerEvent, asked_s: float, now_s: float) -> ControllerEvent:
         match event:
             case JointsReceived(positions):
-                self._positions, self._positions_s = positions, now_s
-                if self._still is None or _moved(positions, self._still[0]):
-                    self._still = positions, now_s
+                self._rest.at(positions, now_s)
             case SignalsReceived(values):
                 self._tool = next((value for signal, value in values if signal == _TOOL), self._tool)
             case StatusReceived():
                 self._status, self._status_s, self._asked_s = event, now_s, asked_s
-                still = self._still is not None and now_s - self._still[1] >= _STILL_S
-                ended = self._phase in (_Phase.NONE, _Phase.STOPPING)
-                at_rest = ended and event.activity is not Activity.MOVING
-                self._rests_after_stop = self._rests_after_stop or (at_rest and still)
-                if event.activity is Activity.IDLE and not (at_rest and self._rests_after_stop):
-                    return replace(event, activity=Activity.MOVING)
+                runs = self._motion.phase not in (Phase.NONE, Phase.LEFT)
+                return replace(event, activity=self._rest.reported(event.activity, now_s, runs=runs))
         return event
 
     def _follow(self, now_s: float) -> Effects:
         """Check the open motion against the newest state; abort it after an error."""
-        if self._phase not in _OPEN_MOTION or self._motion is None:
+        if self._motion.sent is None:
             return ()
-        problem = self._problem(now_s, self._motion)
+        problem = self._problem(now_s, self._motion.sent)
         return () if problem is None else self._give_up(problem, now_s)
 
-    def _problem(self, now_s: float, motion: _Motion) -> Reason | None:
+    def _problem(self, now_s: float, motion: _Sent) -> Reason | None:
         """Return the reason to abort the open motion; None: there is no reason."""
         status = self._status
         if status is None:
@@ -446,16 +429,16 @@ class FanucMotionDriver(SnpxDriver):
             return fanuc_codes.WENT_LOCAL()
         if self._tool != motion.tool:
             return fanuc_codes.TOOL_CHANGED()
-        if self._phase is _Phase.MOVING:
-            if status.activity is Activity.IDLE and self._asked_s > self._sent_s + _ENDED_S:
+        if self._motion.phase is Phase.RUNS:
+            if status.activity is Activity.IDLE and self._asked_s > motion.sent_s + _ENDED_S:
                 return fanuc_codes.LOST_PROGRAM()
-            since_s = max(self._sent_s, self._still[1] if self._still else self._sent_s)
+            since_s = max(motion.sent_s, self._rest.since_s or motion.sent_s)
             if now_s - since_s > SILENT_S:
                 return fanuc_codes.NO_ANSWER(name=rmi.JOINT_MOTION)
         return None
 
     def _watch(self, now_s: float, *, late: bool) -> Effects:
-        if now_s - min(self._positions_s, self._status_s) > _BLIND_S and not late:
+        if now_s - min(self._rest.positions_s, self._status_s) > _BLIND_S and not late:
             return self._give_up(fanuc_codes.STATE_OLD(), now_s)
         return (SetTimer(now_s + _WATCH_S, "watch"),)
 
@@ -466,18 +449,13 @@ class FanucMotionDriver(SnpxDriver):
     def _end(self, now_s: float) -> Effects:
         """Abort the program of the gateway."""
         at_rest = self._status is not None and self._status.activity is Activity.IDLE
-        if self._phase is not _Phase.NONE or not at_rest:
-            self._must_rest()
-        self._motion = None
+        if self._motion.phase is not Phase.NONE or not at_rest:
+            self._rest.prove_again()
         watched = SetTimer(None, "watch")
         if self._line is not _Line.OPEN:
             return (watched,)
-        self._phase = _Phase.STOPPING
+        self._motion.leave()
         return (watched,) if self._abort_open else (watched, *self._abort(now_s))
-
-    def _must_rest(self) -> None:
-        """Report a moving arm until it has rested from now on: the motion may still begin."""
-        self._rests_after_stop, self._still = False, None
 
     def _abort(self, now_s: float) -> Effects:
         self._abort_open = True
@@ -531,23 +509,23 @@ class FanucMotionDriver(SnpxDriver):
     def _move(self, target: Sequence[float], percent: float, now_s: float) -> Effects:
         if (obstacle := self._obstacle(now_s)) is not None:
             raise NotReadyError(obstacle)
-        assert self._positions is not None
+        assert self._rest.positions is not None
         speed = max(1, int(self._settings.speed_percent * percent / 100.0))
         axes = self._axes.values(np.array(target))
         instruction = rmi.joint_motion(rmi.FIRST_SEQUENCE, axes, percent=speed)
-        self._motion = _Motion(instruction, self._positions, self._tool)
-        self._phase, self._initialize_open = _Phase.INITIALIZING, True
+        self._motion.send(_Sent(instruction, self._rest.positions, self._tool))
+        self._initialize_open = True
         timers = (SetTimer(now_s + ANSWER_S, "initialize"), SetTimer(now_s + _WATCH_S, "watch"))
         return (*timers, Send(SESSION, rmi.initialize(self._settings.group)))
 
     def _obstacle(self, now_s: float) -> Reason | None:
         """Return the reason to refuse a motion; None: it can be sent."""
         status = self._status
-        if self._phase is not _Phase.NONE:
+        if self._motion.phase is not Phase.NONE:
             return fanuc_codes.MOVES()
-        if status is None or self._positions is None:
+        if status is None or self._rest.positions is None:
             return fanuc_codes.STATE_OLD()
-        if now_s - min(self._positions_s, self._status_s) > _STATE_VALID_S:
+        if now_s - min(self._rest.positions_s, self._status_s) > _STATE_VALID_S:
             return fanuc_codes.STATE_OLD()
         match status.mode:
             case None:
@@ -575,10 +553,6 @@ class FanucMotionDriver(SnpxDriver):
 
 def _refused(answer: Answer) -> Reason:
     return fanuc_codes.REFUSED(name=answer.name, problem=answer.problem)
-
-
-def _moved(here: Sequence[float], there: Sequence[float]) -> bool:
-    return any(abs(a - b) > _STILL_RAD for a, b in zip(here, there, strict=True))
 
 
 def fanuc_driver(joint_types: Sequence[JointType], codes: Mapping[int, str], **given: Any) -> SnpxDriver:

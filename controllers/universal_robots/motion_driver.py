@@ -15,7 +15,7 @@ the beats end, so that the controller stops the arm, and the gateway latches a s
 
 import secrets
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from controllers.universal_robots import codes as ur_codes
@@ -25,7 +25,6 @@ from controllers.universal_robots.driver import (
     OUTPUT_FIELDS,
     RTDE,
     RtdeDriver,
-    activity_of,
     status_of,
 )
 from controllers.universal_robots.inputs import InputsWriter
@@ -42,7 +41,6 @@ from controllers.universal_robots.settings import UniversalRobotsSettings
 from controllers.universal_robots.state import ControllerState
 from protocol_gateway.errors import NotReadyError
 from protocol_gateway.seam import (
-    Activity,
     AlarmReceived,
     Capabilities,
     Carries,
@@ -68,7 +66,8 @@ from protocol_gateway.seam import (
     Stop,
     StopEnds,
 )
-from protocol_gateway.seam.one_motion import FIRST_PERCENT, prepared
+from protocol_gateway.seam.one_motion import FIRST_PERCENT, OneMotion, Phase, prepared
+from protocol_gateway.seam.rest import Rest
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.joints import JointType
@@ -96,7 +95,7 @@ _RETRY_S = 2.0
 _MOST_BEATS_BEHIND = 13
 # A program may have ended before its last registers are seen.
 _ENDED_S = 0.05
-_STILL_S, _STILL_RAD = 0.5, 1e-3
+_STILL_RAD = 1e-3
 _LARGEST_NUMBER = 2**30
 _MAY_MOVE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
 _NO_MOTION = 0
@@ -104,13 +103,12 @@ _FAULTS = frozenset({SafetyMode.VIOLATION, SafetyMode.FAULT})
 
 
 @dataclass
-class _Motion:
-    """A motion that was sent, until it has ended or was given up."""
+class _Sent:
+    """What is remembered of a motion that was sent."""
 
     number: int
     sent_s: float
     tool: object
-    started: bool = False
     stopped_s: float | None = None
 
 
@@ -166,10 +164,9 @@ class RtdeMotionDriver(RtdeDriver):
         self._reopen: list[Open] = []
         self._state: ControllerState | None = None
         self._state_s = self._excused_s = float("-inf")
-        self._motion: _Motion | None = None
+        self._motion: OneMotion[_Sent] = OneMotion()
         self._percent = FIRST_PERCENT
-        self._rests_after_stop = True
-        self._still: tuple[tuple[float, ...], float] | None = None
+        self._rest = Rest([_STILL_RAD] * JOINTS)
         self._protective_s: float | None = None
 
     # ----------------------------------------------------------------- channels
@@ -248,7 +245,7 @@ class RtdeMotionDriver(RtdeDriver):
         if channel is RTDE:
             # The next connection may reach another controller, where no speed was set.
             self._percent, self._state, self._protective_s = FIRST_PERCENT, None, None
-            self._still = None
+            self._rest.forget()
         if channel is INPUTS:
             self._inputs.disconnected()
         if channel is DASHBOARD:
@@ -259,7 +256,7 @@ class RtdeMotionDriver(RtdeDriver):
             self._dashboard.remote = None
         if channel in (SCRIPTS, DASHBOARD):
             effects += self._close_scripts()
-        if self._motion is not None and channel in (INPUTS, DASHBOARD, RTDE):
+        if self._motion.sent and channel in (INPUTS, DASHBOARD, RTDE):
             effects += self._give_up(ur_codes.CHANNEL_LOST(name=channel.name))
         return effects
 
@@ -284,13 +281,14 @@ class RtdeMotionDriver(RtdeDriver):
         # First, because FateUnknown sends a stop immediately, and answers have the order of the commands.
         if "ask" in ended and DASHBOARD.name in self._opened:
             effects += self._next_question(now_s)
-        if "start" in ended and self._motion is not None and not self._motion.started:
-            if late and now_s < self._motion.sent_s + 2.0 * START_S:
+        motion = self._motion
+        if "start" in ended and motion.sent and motion.phase is Phase.SENT:
+            if late and now_s < motion.sent.sent_s + 2.0 * START_S:
                 effects.append(SetTimer(now_s + _LATE_S, "start"))
             else:
                 effects += self._give_up(ur_codes.NOT_STARTED(seconds=START_S))
-        if "beat" in ended and self._motion is not None:
-            effects += self._next_beat(now_s, late=late)
+        if "beat" in ended and motion.sent:
+            effects += self._next_beat(motion.sent.number, now_s, late=late)
         return effects
 
     # ------------------------------------------------------------------ dashboard
@@ -319,7 +317,7 @@ class RtdeMotionDriver(RtdeDriver):
             return (*effects, *self._leave(DASHBOARD, "its answers do not fit", now_s))
         if dashboard.remote is False:
             effects += self._close_scripts()
-            if self._motion is not None:
+            if self._motion.sent:
                 effects += self._give_up(ur_codes.WENT_LOCAL())
         elif dashboard.remote and dashboard.was_local:
             # Connections from local control stay restricted.
@@ -362,14 +360,13 @@ class RtdeMotionDriver(RtdeDriver):
             effects += self._leave(INPUTS, f"{self._inputs.failed}: {self._inputs.problem}", now_s)
         return effects
 
-    def _next_beat(self, now_s: float, *, late: bool) -> Effects:
-        assert self._motion is not None
+    def _next_beat(self, number: int, now_s: float, *, late: bool) -> Effects:
         if now_s - self._state_s > _BLIND_S:
             if not late or self._excused_s == self._state_s:
                 return self._give_up(ur_codes.STATE_OLD())
             # Once: what has arrived is read before the next beat.
             self._excused_s = self._state_s
-        return (SetTimer(now_s + _BEAT_S, "beat"), self._written(self._motion.number))
+        return (SetTimer(now_s + _BEAT_S, "beat"), self._written(number))
 
     def _written(self, go: int, *, alternative: bool = False) -> Send:
         """Return the effect that writes the permission and the next beat."""
@@ -379,23 +376,10 @@ class RtdeMotionDriver(RtdeDriver):
     # --------------------------------------------------------------------- motion
 
     def _status(self, state: ControllerState, now_s: float) -> StatusReceived:
-        still = self._note_stillness(state, now_s)
-        activity = activity_of(state)
-        if not self._rests_after_stop:
-            self._rests_after_stop = activity is not Activity.MOVING and still
-            if activity is Activity.IDLE and not still:
-                activity = Activity.MOVING
+        self._rest.at(state.positions, now_s)
         status = status_of(state)
-        return StatusReceived(activity, self._mode(now_s), status.homed, None, status.controller_time_s)
-
-    def _note_stillness(self, state: ControllerState, now_s: float) -> bool:
-        """Return whether every joint has been still for _STILL_S."""
-        if self._still is None or any(
-            abs(here - there) > _STILL_RAD
-            for here, there in zip(state.positions, self._still[0], strict=True)
-        ):
-            self._still = state.positions, now_s
-        return now_s - self._still[1] >= _STILL_S
+        activity = self._rest.reported(status.activity, now_s)
+        return replace(status, activity=activity, mode=self._mode(now_s))
 
     def _follow(self, state: ControllerState, now_s: float) -> Effects:
         """Follow the motion by a state; give it up if anything is not as expected."""
@@ -404,16 +388,19 @@ class RtdeMotionDriver(RtdeDriver):
             self._protective_s = None
         elif self._protective_s is None:
             self._protective_s = now_s
-        motion = self._motion
-        if motion is None:
+        if (motion := self._motion.sent) is None:
+            if state.runtime_state == RuntimeState.STOPPED:
+                self._motion.end()
             return ()
         number, progress, beat = (state.registers.get(name) for name in self._registers.outputs)
-        motion.started = motion.started or number == motion.number
+        if number == motion.number:
+            self._motion.begin()
         if (problem := _problem(state, motion)) is not None:
             return self._give_up(problem)
         if number != motion.number:
             # Another program may run. If it goes on, the motion is not seen to start in time.
-            return self._give_up(ur_codes.LOST_PROGRAM()) if motion.started else ()
+            begun = self._motion.phase is Phase.RUNS
+            return self._give_up(ur_codes.LOST_PROGRAM()) if begun else ()
         if state.runtime_state == RuntimeState.PLAYING:
             motion.stopped_s = None
             behind = (self._beat - (beat or 0)) % _LARGEST_NUMBER
@@ -426,7 +413,7 @@ class RtdeMotionDriver(RtdeDriver):
 
     def _ended(self, progress: int | None) -> Effects:
         """End the motion after the end of its program."""
-        self._motion = None
+        self._motion.end()
         effects: list[Effect] = [self._written(_NO_MOTION)] if self._inputs.ready else []
         if progress != Progress.DONE:
             text = "the program of a motion has ended before its target"
@@ -445,11 +432,8 @@ class RtdeMotionDriver(RtdeDriver):
 
     def _may_move_yet(self) -> None:
         """Note that the arm may still move after the end of a motion, until it was seen at rest."""
-        if self._motion is not None:
-            # The arm may have moved since the newest state.
-            self._still = None
-        self._motion = None
-        self._rests_after_stop = False
+        self._rest.prove_again(moved=self._motion.sent is not None)
+        self._motion.leave()
 
     # ------------------------------------------------------------------- commands
 
@@ -505,7 +489,7 @@ class RtdeMotionDriver(RtdeDriver):
             acceleration=self._acceleration,
             registers=self._registers,
         )
-        self._motion = _Motion(self._number, now_s, _tool(self._state))
+        self._motion.send(_Sent(self._number, now_s, _tool(self._state)))
         timers = (SetTimer(now_s + _BEAT_S, "beat"), SetTimer(now_s + START_S, "start"))
         return (*timers, self._written(self._number), Send(SCRIPTS, script))
 
@@ -521,7 +505,7 @@ class RtdeMotionDriver(RtdeDriver):
             return obstacle
         if state is None or now_s - self._state_s > _STATE_VALID_S:
             return ur_codes.STATE_OLD()
-        if self._motion is not None:
+        if self._motion.sent:
             return ur_codes.MOVES()
         # A program that waits could go on after the recovery.
         if state.runtime_state != RuntimeState.STOPPED:
@@ -562,7 +546,7 @@ class RtdeMotionDriver(RtdeDriver):
             return ur_codes.REGISTER(name=lacks[0], problem="the controller does not have it")
         if self._inputs.problem:
             return ur_codes.REGISTER(name=self._inputs.failed, problem=self._inputs.problem)
-        if self._motion is not None:
+        if self._motion.sent:
             return ur_codes.MOVES()
         # An unknown state of the program, or of the safety system, forbids the motion.
         if state.runtime_state != RuntimeState.STOPPED:
@@ -617,7 +601,7 @@ def _word(kind: type[RobotMode] | type[SafetyMode], mode: int | None) -> str:
     return "unknown" if mode is None else name_of(kind, mode).lower().replace("_", " ")
 
 
-def _problem(state: ControllerState, motion: _Motion) -> Reason | None:
+def _problem(state: ControllerState, motion: _Sent) -> Reason | None:
     """Return why a motion must not go on; None: it may."""
     if (stopped := _stopped(state)) is not None:
         return stopped

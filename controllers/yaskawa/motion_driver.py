@@ -18,6 +18,7 @@ All are sockets to the same port, so each has its own numbers and answers. UDP l
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum, auto
 from typing import Any
 
 import numpy as np
@@ -58,8 +59,9 @@ from protocol_gateway.seam import (
     Stop,
     StopEnds,
 )
-from protocol_gateway.seam.one_motion import FIRST_PERCENT, prepared
+from protocol_gateway.seam.one_motion import FIRST_PERCENT, OneMotion, Phase, prepared
 from protocol_gateway.seam.polling import Polling, Regular
+from protocol_gateway.seam.rest import Rest, near
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.joints import JointType
@@ -70,7 +72,6 @@ STOP_MEANS = "HOLD, kept until RESET"
 
 START_S = 1.0
 """Time within which a motion must be seen to have started."""
-STILL_S = 0.5
 _STATUS_S = 0.1
 _FRESH_S = 0.6
 _BLIND_S = 1.0
@@ -89,14 +90,21 @@ _NO_SUCH_GROUP, _NO_SUCH_GROUP_ADDED = 0x28, frozenset({0xA001, 0xB008})
 _LAST_TOOL = 63
 
 
+class _Hold(Enum):
+    """HOLD of this driver: none, wanted until RESET, and ending, until the status shows that it has ended."""
+
+    NONE = auto()
+    WANTED = auto()
+    ENDING = auto()
+
+
 @dataclass
-class _Motion:
-    """A motion that was sent, until it has ended or was given up.
+class _Sent:
+    """What is remembered of a motion that was sent.
 
     Attributes:
         answered: The controller has accepted it.
         refused: The controller has refused it, or a copy of it.
-        started: It was seen to run, or the arm to move.
         quiet_s: Since then no motion runs; None: one runs.
         arrived_s: Since then the arm is at the target; None: it is not.
     """
@@ -109,7 +117,6 @@ class _Motion:
     answered: bool = False
     refused: Refused | None = None
     refused_s: float = 0.0
-    started: bool = False
     quiet_s: float | None = None
     arrived_s: float | None = None
 
@@ -137,8 +144,8 @@ class HsesMotionDriver(HsesDriver):
             text = f"yaskawa motion: a robot, R1 to R8, can be moved, not {options.group}"
             raise GatewaySettingsError(text)
         self._robot = instance_of(options.group)
-        self._still_by = tuple(_STILL[each] for each in joint_types)
-        self._arrived_by = tuple(_ARRIVED[each] for each in joint_types)
+        self._still_within = tuple(_STILL[each] for each in joint_types)
+        self._arrived_within = tuple(_ARRIVED[each] for each in joint_types)
         reading = self.capabilities
         self.capabilities = Capabilities(
             commands=frozenset({MoveAbsolute, Speed, Stop, Reset}),
@@ -165,16 +172,13 @@ class HsesMotionDriver(HsesDriver):
         self._state: Status | None = None
         self._state_s = self._answered_s = float("-inf")
         self._place: Position | None = None
-        self._joint_positions: tuple[float, ...] = ()
-        self._place_s = float("-inf")
-        self._still_since: tuple[tuple[float, ...], float] | None = None
-        self._motion: _Motion | None = None
+        # A stop may end in HOLD, in an alarm, or with the servos off.
+        self._rest = Rest(self._still_within, frozenset(Activity))
+        # At first a motion of an earlier gateway may go on when HOLD ends.
+        self._motion: OneMotion[_Sent] = OneMotion(Phase.LEFT)
         self._percent = FIRST_PERCENT
         self._has_base: bool | None = None
-        # HOLD is wanted; it was set by this driver; something of the gateway's may go on when it ends.
-        self._wants_hold = self._set_hold = False
-        self._unfinished = True
-        self._rests_after_stop = True
+        self._hold = _Hold.NONE
         # Software of the controller; whether that behind the present socket is known to be the same.
         self._software = ""
         self._same = True
@@ -216,13 +220,13 @@ class HsesMotionDriver(HsesDriver):
     def _lost(self, channel: Channel, now_s: float) -> Effects:
         if channel is HSES:
             # The next connection may reach another controller, where no speed was set.
-            self._percent, self._place, self._joint_positions = FIRST_PERCENT, None, ()
-            self._still_since = None
+            self._percent, self._place = FIRST_PERCENT, None
+            self._rest.forget()
         effects: list[Effect] = []
         if channel is STOP:
             self._stop_polling, self._state = Polling((), ()), None
             effects += (SetTimer(None, "blind"), SetTimer(None, "ask"))
-        if self._motion is not None:
+        if self._motion.sent:
             effects += self._give_up(hses_codes.CHANNEL_LOST(name=channel.name), now_s)
         return effects
 
@@ -308,17 +312,17 @@ class HsesMotionDriver(HsesDriver):
         """Report once that HOLD, or its end, was refused."""
         if answer.number != self._hold_number or not answer.status or answer.busy:
             return ()
-        effects: list[Effect] = [SetTimer(now_s + _REFUSED_S, "hold")] if self._wants_hold else []
+        effects: list[Effect] = [SetTimer(now_s + _REFUSED_S, "hold")] if self._hold is _Hold.WANTED else []
         if self._refused_hold == answer.error:
             return effects
         self._refused_hold = answer.error
-        what = "HOLD" if self._wants_hold else "the end of HOLD"
+        what = "HOLD" if self._hold is _Hold.WANTED else "the end of HOLD"
         text = f"the controller refuses {what}: {answer.error}"
         return [*effects, Report([AlarmReceived(Severity.ERROR, text, f"{answer.added_status:04X}")], 0)]
 
     # ------------------------------------------------------------------------ HOLD
 
-    def _hold(self, now_s: float, *, on: bool) -> list[Effect]:
+    def _send_hold(self, now_s: float, *, on: bool) -> list[Effect]:
         """Return the effects that send HOLD or its end now."""
         self._hold_number = max((self._hold_number + 1) % _NUMBERS, _FIRST_HOLD)
         datagram = commands.hold(self._hold_number, on=on)
@@ -342,7 +346,7 @@ class HsesMotionDriver(HsesDriver):
 
     def _keep_hold(self, now_s: float) -> list[Effect]:
         """Send HOLD again unless the controller is known to be on HOLD, or in local control."""
-        if not self._wants_hold:
+        if self._hold is not _Hold.WANTED:
             return []
         later: list[Effect] = [SetTimer(now_s + _REPEAT_S, "hold")]
         if not self._same:
@@ -353,7 +357,7 @@ class HsesMotionDriver(HsesDriver):
                 return later
             if self._refused_hold and mode_of(self._state) is not Mode.REMOTE:
                 return later
-        return self._hold(now_s, on=True) if self._opened & {STOP.name, HSES.name} else later
+        return self._send_hold(now_s, on=True) if self._opened & {STOP.name, HSES.name} else later
 
     def _fresh(self, now_s: float) -> bool:
         """Return whether the newest status is new enough to act on."""
@@ -367,23 +371,27 @@ class HsesMotionDriver(HsesDriver):
         running, held = status.first & Status1.RUNNING, status.second & HELD
         if status.second & Status2.HELD_BY_COMMAND:
             self._refused_hold = ""
-        if self._motion is not None:
-            return self._follow(self._motion, status, asked_s, now_s)
+        if self._motion.sent:
+            return self._follow(self._motion.sent, status, asked_s, now_s)
         settled = asked_s > max(self._release_sent_s, self._hold_sent_s)
-        if settled and not running and not held and not self._wants_hold:
-            self._unfinished = self._set_hold = False
+        if settled and not running and not held and self._hold is not _Hold.WANTED:
+            self._hold = _Hold.NONE
+            self._motion.end()
         return ()
 
-    def _follow(self, motion: _Motion, status: Status, asked_s: float, now_s: float) -> Effects:
+    def _follow(self, motion: _Sent, status: Status, asked_s: float, now_s: float) -> Effects:
         if asked_s < motion.sent_s:
             return ()
         running = bool(status.first & Status1.RUNNING)
-        known = self._place_s > motion.sent_s
-        moved = known and not _near(self._joint_positions, motion.start, self._arrived_by)
-        if motion.refused is not None and not (motion.answered or motion.started or running or moved):
-            if min(asked_s, self._place_s) <= motion.refused_s:
+        here_s, here = self._rest.positions_s, self._rest.positions
+        if here is None or here_s <= motion.sent_s:
+            here = None
+        moved = here is not None and not near(here, motion.start, self._arrived_within)
+        begun = self._motion.phase is Phase.RUNS
+        if motion.refused is not None and not (motion.answered or begun or running or moved):
+            if min(asked_s, here_s) <= motion.refused_s:
                 return ()
-            self._motion = None
+            self._motion.leave()
             return (Report([motion.refused], 0),)
         if (problem := _stopped(status)) is not None:
             return self._give_up(problem, now_s)
@@ -391,33 +399,35 @@ class HsesMotionDriver(HsesDriver):
             return self._give_up(hses_codes.HELD(), now_s)
         if mode_of(status) is not Mode.REMOTE:
             return self._give_up(hses_codes.WENT_LOCAL(), now_s)
-        if now_s - self._place_s > _BLIND_S:
+        if now_s - here_s > _BLIND_S:
             return self._give_up(hses_codes.STATE_OLD(), now_s)
         if self._place is not None and self._place.tool != motion.tool:
             return self._give_up(hses_codes.TOOL_CHANGED(), now_s)
-        arrived = known and _near(self._joint_positions, motion.target, self._arrived_by)
+        arrived = here is not None and near(here, motion.target, self._arrived_within)
         if not arrived:
             motion.arrived_s = None
         elif motion.arrived_s is None:
             motion.arrived_s = now_s
+        if running or moved:
+            self._motion.begin()
         if running:
-            motion.started, motion.quiet_s = True, None
+            motion.quiet_s = None
             if motion.arrived_s is not None and now_s - motion.arrived_s > _OTHERS_S:
                 return self._give_up(hses_codes.OTHER_JOB(), now_s)
             return ()
-        motion.started = motion.started or moved
+        begun = self._motion.phase is Phase.RUNS
         motion.quiet_s = now_s if motion.quiet_s is None else motion.quiet_s
-        if arrived and (motion.answered or motion.started):
-            self._motion, self._unfinished = None, False
+        if arrived and (motion.answered or begun):
+            self._motion.end()
             return ()
-        if motion.started and now_s - motion.quiet_s >= _ENDED_S:
+        if begun and now_s - motion.quiet_s >= _ENDED_S:
             return self._give_up(hses_codes.ENDED_ELSEWHERE(), now_s)
-        if not motion.started and now_s - motion.sent_s >= START_S:
+        if not begun and now_s - motion.sent_s >= START_S:
             return self._give_up(hses_codes.NOT_STARTED(seconds=START_S), now_s)
         return ()
 
     def _motion_answered(self, answer: Answer, now_s: float) -> Effects:
-        motion = self._motion
+        motion = self._motion.sent
         late = motion is None or motion.number != answer.number or motion.answered
         if motion is None or late or answer.service != commands.WRITE_ALL:
             return ()
@@ -431,15 +441,19 @@ class HsesMotionDriver(HsesDriver):
 
     def _give_up(self, why: Reason, now_s: float) -> Effects:
         """Set HOLD, and have a stop latched."""
-        # The arm may have moved since the newest position.
-        self._still_since = None
-        self._stop_now()
-        return (*self._hold(now_s, on=True), FateUnknown(why))
+        self._stop_now(moved=True)
+        return (*self._send_hold(now_s, on=True), FateUnknown(why))
 
-    def _stop_now(self) -> None:
-        self._motion = None
-        self._wants_hold = self._set_hold = True
-        self._rests_after_stop = False
+    def _stop_now(self, *, moved: bool) -> None:
+        """Want HOLD, and a proof of rest.
+
+        Args:
+            moved: The arm may have moved since the newest position.
+        """
+        self._rest.prove_again(moved=moved)
+        if moved:
+            self._motion.leave()
+        self._hold = _Hold.WANTED
         self._refused_hold = ""
 
     # ----------------------------------------------------------------------- answers
@@ -451,26 +465,21 @@ class HsesMotionDriver(HsesDriver):
         ]
 
     def _proven(self, status: StatusReceived, now_s: float) -> StatusReceived:
-        """Return a status that says "moves" after a stop until every joint was still for STILL_S."""
-        runs = self._state is not None and self._state.first & Status1.RUNNING
-        if status.activity is Activity.IDLE and (runs or self._motion is not None):
-            # Of two statuses on two sockets, the later one may be the older one.
-            return replace(status, activity=Activity.MOVING)
-        if self._rests_after_stop or status.activity in (None, Activity.MOVING):
-            return status
-        since = self._still_since
+        """Return a status that says "moves" after a stop until rest is proven."""
+        # Of two statuses on two sockets, the later one may be the older one.
+        runs = self._motion.sent is not None
+        runs |= self._state is not None and bool(self._state.first & Status1.RUNNING)
         # Up to the newest position, because later motion is unknown.
-        if since is not None and self._place_s - since[1] >= STILL_S and now_s - self._place_s < _FRESH_S:
-            self._rests_after_stop = True
-            return status
-        return replace(status, activity=Activity.MOVING)
+        at_s = self._rest.positions_s
+        until_s = at_s if now_s - at_s < _FRESH_S else float("-inf")
+        return replace(status, activity=self._rest.reported(status.activity, until_s, runs=runs))
 
     def _on_system(self, system: payloads.System) -> list[ControllerEvent]:
         events = super()._on_system(system)
         for each in events:
             if isinstance(each, SoftwareReceived):
                 if self._software not in ("", each.version):
-                    self._wants_hold = self._set_hold = False
+                    self._hold = _Hold.NONE
                 self._software, self._same = each.version, True
         return events
 
@@ -478,11 +487,8 @@ class HsesMotionDriver(HsesDriver):
         events = super()._joints(position, now_s)
         for each in events:
             if isinstance(each, JointsReceived):
-                self._place, self._joint_positions, self._place_s = position, each.positions, now_s
-                if self._still_since is None or not _near(
-                    each.positions, self._still_since[0], self._still_by
-                ):
-                    self._still_since = each.positions, now_s
+                self._place = position
+                self._rest.at(each.positions, now_s)
         return events
 
     # ---------------------------------------------------------------------- commands
@@ -493,7 +499,7 @@ class HsesMotionDriver(HsesDriver):
         Raises:
             CommandError: If they cannot be expressed.
         """
-        return prepared(commands, len(self._arrived_by))
+        return prepared(commands, len(self._arrived_within))
 
     def command(self, prepared: Sequence[ControllerCommand], now_s: float) -> Effects:
         """Send what `prepare` returned.
@@ -524,43 +530,40 @@ class HsesMotionDriver(HsesDriver):
         return effects
 
     def _stop(self, now_s: float) -> Effects:
-        if self._motion is not None or not self._at_rest(now_s):
-            self._unfinished = True
-            self._still_since = None
-        self._stop_now()
-        return self._hold(now_s, on=True)
+        self._stop_now(moved=self._motion.sent is not None or not self._at_rest(now_s))
+        return self._send_hold(now_s, on=True)
 
     def _at_rest(self, now_s: float) -> bool:
         """Return whether nothing runs and nothing is held, except by a stop before."""
         if not self._fresh(now_s) or self._state is None:
             return False
-        ours = self._set_hold and not self._unfinished
+        ours = self._hold is not _Hold.NONE and self._motion.phase is Phase.NONE
         held = self._state.second & HELD and not ours
         return not self._state.first & Status1.RUNNING and not held
 
     def _reset_obstacle(self, now_s: float) -> Reason | None:
         """Return why HOLD cannot end now: the state is not known, or something may go on; None: it can."""
-        if not self._wants_hold and not self._set_hold:
+        if self._hold is _Hold.NONE:
             return None
         state = self._state
         if state is None or not self._fresh(now_s) or self._state_s < self._hold_sent_s:
             return hses_codes.STATE_OLD()
         held = state.second & Status2.HELD_BY_COMMAND
-        if held and self._unfinished and state.second & Status2.SERVO_ON:
+        if held and self._motion.phase is not Phase.NONE and state.second & Status2.SERVO_ON:
             return hses_codes.HELD_MOTION()
         return None
 
     def _reset(self, now_s: float) -> Effects:
         """End HOLD if this driver has set it."""
-        if not self._wants_hold and not self._set_hold:
+        if self._hold is _Hold.NONE:
             return ()
-        self._wants_hold = False
+        self._hold = _Hold.ENDING
         no_more = SetTimer(None, "hold")
         if self._state is None or not self._state.second & Status2.HELD_BY_COMMAND:
-            self._set_hold = False
+            self._hold = _Hold.NONE
             return (no_more,)
         self._refused_hold = ""
-        return (no_more, *self._hold(now_s, on=False))
+        return (no_more, *self._send_hold(now_s, on=False))
 
     def _pulses(self, target: Sequence[float]) -> Sequence[int]:
         """Return the pulses of a target.
@@ -576,10 +579,10 @@ class HsesMotionDriver(HsesDriver):
 
     def _move(self, target: Sequence[float], pulses: Sequence[int], percent: float, now_s: float) -> Effects:
         assert self._place is not None
+        assert self._rest.positions is not None
         self._number = (self._number + 1) % _NUMBERS
         tool = self._place.tool
-        self._motion = _Motion(self._number, now_s, self._joint_positions, tuple(target), tool)
-        self._unfinished = True
+        self._motion.send(_Sent(self._number, now_s, self._rest.positions, tuple(target), tool))
         datagram = commands.motion(self._number, robot=self._robot, percent=percent, pulses=pulses, tool=tool)
         return (Send(MOTION, datagram),)
 
@@ -592,17 +595,17 @@ class HsesMotionDriver(HsesDriver):
         missing = [each.name for each in (HSES, STOP, MOTION) if each.name not in self._opened]
         if missing:
             return hses_codes.CHANNEL_MISSING(name=missing[0])
-        state, place = self._state, self._place
-        if state is None or place is None or not self._fresh(now_s) or now_s - self._place_s > _FRESH_S:
+        state, place, place_s = self._state, self._place, self._rest.positions_s
+        if state is None or place is None or not self._fresh(now_s) or now_s - place_s > _FRESH_S:
             return hses_codes.STATE_OLD()
         if (extra := self._other_axes(place)) is not None:
             return extra
         if place.tool > _LAST_TOOL:
             detail = f"the controller reports tool {place.tool}; 0 to {_LAST_TOOL} are right"
             return hses_codes.AXES(detail=detail)
-        if self._motion is not None:
+        if self._motion.sent:
             return hses_codes.MOVES()
-        if state.second & HELD or (self._wants_hold and not resets):
+        if state.second & HELD or (self._hold is _Hold.WANTED and not resets):
             return codes.CONTROLLER_HOLDING()
         if mode_of(state) is not Mode.REMOTE:
             return codes.CONTROLLER_LOCAL()
@@ -623,11 +626,6 @@ class HsesMotionDriver(HsesDriver):
         if extra := ", ".join(named or moved):
             return hses_codes.AXES(detail=f"axis {extra} belongs to no joint of the model")
         return None
-
-
-def _near(here: Sequence[float], there: Sequence[float], within: Sequence[float]) -> bool:
-    """Return whether all joints are near others."""
-    return all(abs(a - b) <= most for a, b, most in zip(here, there, within, strict=True))
 
 
 def _stopped(status: Status) -> Reason | None:

@@ -781,7 +781,7 @@ class Bench:
                 f"gives {motion} up for {fates}, a strict reading does for {allowed} at {self._state}"
             )
         ended = right == ("ended",) and not fates
-        if (self.driver._motion is None) != bool(fates or ended):
+        if (self.driver._motion.sent is None) != bool(fates or ended):
             raise Wrong(f"{motion} has ended: {not ended}, {fates}, at {self._state}")
         if not fates and not ended:
             return

@@ -559,7 +559,7 @@ class Bench:
         late = not motion.begun and self.now_s > motion.sent_s + LATEST_S
         if len(fates) != bool(right or late) or not {*fates} <= {*right}:
             raise Wrong(f"gives {motion} up for {fates}, a strict reading does for {right}: {self._status}")
-        if self.driver._motion is not None and not fates:
+        if self.driver._motion.sent is not None and not fates:
             return
         if refused:
             seen_s = min(asked_s, self._place_s)

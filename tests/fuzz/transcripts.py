@@ -17,7 +17,7 @@ import re
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import wraps
 from importlib import import_module
@@ -139,6 +139,8 @@ def _recorded(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
         if name == "started" and hasattr(self, "_number"):
             # A number that is chosen by chance.
             pickle.dump(Call("number", (self._number,), None, None), file)
+        if name == "started":
+            self.timers.clear()
         self.told = 1
         error: Exception | None = None
         answer: Any = None
@@ -148,7 +150,7 @@ def _recorded(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
             error = raised
         self.told = 0
         if name == "timer_ended":
-            self.timers.take(given[-1])
+            take_ended(self.timers, given)
         perform(self.timers, answer)
         came = came_of(answer if name != "prepare" else prepared_as(answer), error)
         pickle.dump(Call(name, tuple(map(plain, given)), came, self.timers.next_s), file)
@@ -223,6 +225,13 @@ def perform(timers: Timers, effects: Any) -> None:
     for each in effects if isinstance(effects, list | tuple) else ():
         if isinstance(each, SetTimer):
             timers.set(each)
+
+
+def take_ended(timers: Timers, given: Sequence[Any]) -> dict[str, float]:
+    """Take the timers that a call of `timer_ended` is given; once they had no names."""
+    if len(given) == 1:
+        return timers.take(given[0])
+    return {name: timers.pop(name) for name in given[0] if name in timers}
 
 
 def prepared_as(answer: Any) -> Any:
@@ -319,8 +328,7 @@ def difference(recorded: Iterator[Any]) -> tuple[str, int]:
             channels[each[1]] = channels.get(each[1]) or channel(each[1])
         given = [channels[each[1]] if _is_channel(each) else each for each in call.given]
         if call.name == "timer_ended":
-            # Once they had no names.
-            given = [timers.take(given[-1]), given[-1]]
+            given = [take_ended(timers, given), given[-1]]
         if call.name == "started":
             timers.clear()
         if call.name == "command":
