@@ -2,12 +2,14 @@
 
 import argparse
 import random
+import re
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple, NoReturn, Protocol
 
 WARM_UP = 20_000
@@ -198,3 +200,39 @@ def rss_mib() -> float:
     """Return the memory of this process now."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * 4096 / 2**20
+
+
+# ------------------------------------------------------------------ short runs, as tests
+
+
+def assert_strict(program: ModuleType, least: Mapping[str, int]) -> None:
+    """Run a program for a short time.
+
+    Args:
+        least: How often each of these must happen, at least.
+    """
+    counts: Counter[str] = Counter()
+    done, finding = program.fuzz(20_000, 3, counts)
+    assert finding is None, finding
+    assert done >= 20_000
+    assert not {each: counts[each] for each, number in least.items() if counts[each] < number}
+
+
+def assert_found(program: ModuleType, problem: str) -> None:
+    """Run a program with a driver that has a fault.
+
+    Args:
+        problem: Pattern of a part of what it must find.
+    """
+    _, finding = program.fuzz(20_000, 2, Counter())
+    assert finding is not None
+    assert re.search(problem, finding.problem)
+
+
+def no_problem(*given: object) -> None:
+    """Find no reason against a motion."""
+
+
+def broken(*given: object) -> None:
+    """Fail as a programming error does."""
+    raise ZeroDivisionError

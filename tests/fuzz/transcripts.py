@@ -42,7 +42,15 @@ DRIVERS = {
     "OpcUaDriver": "controllers.opcua.driver",
     "UnitDriver": "protocol_gateway.unit_driver",
 }
-FUZZERS = ("ur_motion", "yaskawa", "yaskawa_motion", "snpx", "rmi", "fanuc_ftp", "opcua")
+FUZZERS = (
+    "universal_robots.fuzz_ur_motion",
+    "yaskawa.fuzz_hses",
+    "yaskawa.fuzz_hses_motion",
+    "fanuc.fuzz_snpx",
+    "fanuc.fuzz_rmi",
+    "fanuc.fuzz_ftp",
+    "opcua.fuzz_opcua",
+)
 SUITES = ("test_conformance.py", "test_conformance_of_motion.py")
 TOLD = ("started", "opened", "received", "skipped", "closed", "timer_ended", "controlled", "stop_ends_now")
 COMMANDS = ("prepare", "command")
@@ -79,7 +87,7 @@ def main() -> None:
     for name in FUZZERS:
         code = (
             "import collections; from tests.fuzz import transcripts; transcripts.record_here(); "
-            f"from tests.fuzz.fuzz_{name} import fuzz; "
+            f"from tests.controllers.{name} import fuzz; "
             f"print({name!r}, fuzz({arguments.inputs}, 1, collections.Counter()))"
         )
         subprocess.run([sys.executable, "-c", code], env=environment, cwd=ROOT, check=True)

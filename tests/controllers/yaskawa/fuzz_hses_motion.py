@@ -1,6 +1,6 @@
 """Broken answers of Yaskawa's controllers by HSES, to the driver that moves the arm.
 
-    python tests/fuzz/fuzz_yaskawa_motion.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
+    python tests/controllers/yaskawa/fuzz_hses_motion.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
 A simulated network changes, doubles, delays, reorders and loses the answers on three sockets, which also
 close. The controller is held, faulted and switched to local control at random, and motions, stops and resets
@@ -21,7 +21,7 @@ from functools import partial
 from pathlib import Path
 
 if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[2])
+    sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.yaskawa.axes import YaskawaSettings
 from controllers.yaskawa.driver import HSES
@@ -51,7 +51,7 @@ from protocol_gateway.seam import (
 )
 from protocol_gateway.seam.pendant_text import text
 from robots.joints import JointType
-from tests.fuzz.fuzz_yaskawa import (
+from tests.controllers.yaskawa.fuzz_hses import (
     BUSY,
     DATA,
     READS,

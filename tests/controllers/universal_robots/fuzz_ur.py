@@ -1,6 +1,6 @@
 """Broken messages of Universal Robots' controllers: RTDE and the primary interface.
 
-    python tests/fuzz/fuzz_universal_robots.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
+    python tests/controllers/universal_robots/fuzz_ur.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
 Real messages, changed at random, some in one input, cut into pieces anywhere. They may cause no exception and
 no leak. States and alarms must equal those of a strict parser that is independent of the gateway's. Anything
@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[2])
+    sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.universal_robots.primary import Alarm, PrimaryStream, SafetyModeChanged
 from controllers.universal_robots.rtde_reader import RtdeReader

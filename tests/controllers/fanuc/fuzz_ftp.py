@@ -1,6 +1,6 @@
 """Broken files and replies of FANUC's controllers by FTP.
 
-    python tests/fuzz/fuzz_fanuc_ftp.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
+    python tests/controllers/fanuc/fuzz_ftp.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
 Files and replies to the driver's own commands, changed at random, doubled, cut, out of order and without an
 end. They may cause no exception and no leak. Joints, poses and alarms must be those of a strict reading that
@@ -18,7 +18,7 @@ from functools import partial
 from pathlib import Path
 
 if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[2])
+    sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.fanuc.axes import FanucSettings
 from controllers.fanuc.ftp_driver import FILE, FTP, FtpDriver

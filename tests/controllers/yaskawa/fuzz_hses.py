@@ -1,6 +1,6 @@
 """Broken answers of Yaskawa's controllers by HSES.
 
-    python tests/fuzz/fuzz_yaskawa.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
+    python tests/controllers/yaskawa/fuzz_hses.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
 Answers to the driver's own questions, changed at random, doubled, late and in the wrong order. They may cause
 no exception and no leak. Joints, alarms and activities must be those of a strict reading that is independent
@@ -15,7 +15,7 @@ from collections import Counter, deque
 from pathlib import Path
 
 if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[2])
+    sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.yaskawa.axes import YaskawaSettings
 from controllers.yaskawa.driver import HSES, HsesDriver

@@ -1,6 +1,7 @@
 """Broken messages of Universal Robots' controllers, to the driver that moves the arm.
 
-    python tests/fuzz/fuzz_ur_motion.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
+    python tests/controllers/universal_robots/fuzz_ur_motion.py [--inputs N] [--seconds S] [--seed N]
+        [--keep FOLDER]
 
 States by RTDE, lines of the dashboard and answers about inputs are changed at random, doubled, left out and
 cut as TCP may; connections close. The controller is paused, stopped and switched to local control at random,
@@ -23,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[2])
+    sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.universal_robots.driver import PRIMARY, RTDE
 from controllers.universal_robots.motion_driver import (
@@ -60,8 +61,8 @@ from protocol_gateway.seam import (
     Stop,
 )
 from robots.joints import JointType
-from tests.fuzz.fuzz_universal_robots import PRIMARY as PRIMARY_MESSAGES
-from tests.fuzz.fuzz_universal_robots import TOKENS, rtde_package, strict_packages
+from tests.controllers.universal_robots.fuzz_ur import PRIMARY as PRIMARY_MESSAGES
+from tests.controllers.universal_robots.fuzz_ur import TOKENS, rtde_package, strict_packages
 from tests.fuzz.fuzzing import Finding, Wrong, campaign, changed, cut, near, step
 
 NEW_BENCH_EACH = 5000

@@ -1,6 +1,6 @@
 """Broken lines of the process that reads OPC UA.
 
-    python tests/fuzz/fuzz_opcua.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
+    python tests/controllers/opcua/fuzz_opcua.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
 Lines of a server's items and values, changed at random, cut and in the wrong order. They may cause no
 exception and no leak. Joints and stops must be those of a strict reading that is independent of the
@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[2])
+    sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.opcua.driver import OPCUA, OpcUaDriver
 from controllers.opcua.settings import OpcUaSettings

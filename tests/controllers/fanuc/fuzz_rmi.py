@@ -1,6 +1,6 @@
 """Broken answers of FANUC's controllers by RMI.
 
-    python tests/fuzz/fuzz_rmi.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
+    python tests/controllers/fanuc/fuzz_rmi.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
 Answers to the driver's own messages, changed at random, doubled, late and cut. They may cause no exception
 and no leak. A motion may be sent once, and only after an answer that a strict reading, which is independent
@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[2])
+    sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.fanuc.axes import FanucSettings
 from controllers.fanuc.motion_driver import RMI, SESSION, FanucMotionDriver

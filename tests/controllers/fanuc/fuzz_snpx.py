@@ -1,6 +1,6 @@
 """Broken answers of FANUC's controllers by SNPX.
 
-    python tests/fuzz/fuzz_snpx.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
+    python tests/controllers/fanuc/fuzz_snpx.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
 Answers to the driver's own questions, changed at random, doubled, late, cut, and from the tables of other
 clients. They may cause no exception and no leak. Joints, alarms and activities must be those of a strict
@@ -18,7 +18,7 @@ from collections import Counter, deque
 from pathlib import Path
 
 if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[2])
+    sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.fanuc.axes import FanucSettings
 from controllers.fanuc.driver import SNPX, SnpxDriver
