@@ -220,3 +220,9 @@ def test_doctor_distinguishes_a_running_site_from_another_program(router: str) -
     assert found["router's tcp/192.0.2.1:7447"].text == "192.0.2.1:7447 is not this machine's address now"
     assert not found["console's address"].ok
     assert f"process {os.getpid()} " in found["console's address"].text
+
+
+def test_an_option_of_a_simulated_controller_can_be_repeated():
+    codes = ["2=ABSOLUTE.DEG", "101=COMMAND:home"]
+    given = [word for code in codes for word in ("--code", code)]
+    assert command("simulate").make_context("simulate", given).params["code"] == codes

@@ -61,7 +61,7 @@ def _own_options(simulated: Simulated) -> Sequence[inspect.Parameter]:
 def _option(parameter: inspect.Parameter, protocols: list[str]) -> inspect.Parameter:
     kind, option = get_args(parameter.annotation)
     assert isinstance(option, Option)
-    repeated = kind is Sequence[str]
+    repeated = kind == Sequence[str]  # two aliases are equal, not the same
     of = f"with {' and '.join(protocols)}."
     typed = typer.Option(
         metavar=option.metavar,
