@@ -1,25 +1,28 @@
 """The kinds of controllers by the site file's `protocol`: those of robomesh, and of installed packages.
 
 Both are entry points of the group `robomesh.drivers` (docs/controllers/own-driver.md). Of packages, only
-those that a site file names are imported.
+those are imported that a site file or `robomesh simulate` names; `robomesh probe` imports all.
 """
 
 import logging
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache, lru_cache, partial
 from importlib.metadata import EntryPoint, distribution, entry_points
 from inspect import signature
-from typing import Any, cast
+from typing import Any, Literal, TypeVar, cast
 
 from protocol_gateway.errors import GatewaySettingsError, ProtocolGatewayError
 from protocol_gateway.seam import Capabilities, ControllerCommand, Driver, Effects
-from protocol_gateway.seam.kind import DriverMaker, Kind
+from protocol_gateway.seam.kind import DriverMaker, Kind, named
 from protocol_gateway.seam.table import Table
 
 logger = logging.getLogger(__name__)
 
 ENTRY_POINTS = "robomesh.drivers"
+
+_Part = TypeVar("_Part")
 
 
 @cache
@@ -76,16 +79,46 @@ def driver_maker(protocol: str) -> DriverMaker:
     kind = kind_of(protocol)
     if protocol in own_kinds():
         return kind.driver_maker
-    whose = f"protocol {protocol!r}: its driver, of the package {_packages(protocol)[0]},"
+    whose = f"protocol {protocol!r}: its driver, of the package {kind.distribution},"
     try:
         return partial(_created, kind.driver_maker, whose)
     except (Exception, SystemExit) as error:
         raise GatewaySettingsError(f"{whose} cannot be imported: {error}") from error
 
 
-def extra_of(module: str) -> str | None:
-    """Return the extra of robomesh that brings a kind's module; None: it is of no kind."""
-    return next((kind.extra for kind in own_kinds().values() if module in kind.packages), None)
+def part_of(protocol: str, part: Literal["probe", "simulated"], wanted: type[_Part]) -> _Part | None:
+    """Return a part of the kind with a protocol; None: it has none.
+
+    Args:
+        wanted: The type of the part.
+
+    Raises:
+        GatewaySettingsError: As `kind_of`; or if a package's part cannot be imported, or has another type.
+    """
+    kind = kind_of(protocol)
+    name: str = getattr(kind, part)
+    if not name:
+        return None
+    try:
+        found = named(name)
+        if isinstance(found, wanted):
+            return found
+        problem = f"is of the type {type(found).__name__}"
+    except (Exception, SystemExit) as error:
+        if protocol in own_kinds():
+            raise
+        problem = f"cannot be imported: {error}"
+    raise GatewaySettingsError(
+        f"protocol {protocol!r}: {part} = {name!r}, of the package {kind.distribution}, {problem}; "
+        f"'module:name' of a {wanted.__module__}.{wanted.__name__} is right"
+    )
+
+
+def kind_with(module: str) -> Kind | None:
+    """Return the kind that needs a module, of robomesh or of an imported package; None: there is none."""
+    used = [each.name for each in entry_points(group=ENTRY_POINTS) if each.module in sys.modules]
+    kinds = [*own_kinds().values(), *(_installed(each, tuple(sys.path))[0] for each in used)]
+    return next((kind for kind in kinds if kind is not None and module in kind.packages), None)
 
 
 @lru_cache
@@ -101,14 +134,13 @@ def _installed(protocol: str, path: tuple[str, ...]) -> tuple[Kind | None, str]:
     entry = next(each for each in entry_points(group=ENTRY_POINTS, name=protocol) if not _is_own(each))
     try:
         given = entry.load()
-        kind = given if isinstance(given, Kind) else Kind(driver=given)
+        kind = given if isinstance(given, Kind) else Kind(driver=given, datagrams=None)
         if kind.table and not issubclass(kind.table_model or object, Table):
             raise TypeError(f"{kind.table} is no Table")
     except (Exception, SystemExit) as error:
         whose = f"protocol {protocol!r}: its driver, of the package {packages[0]},"
         return None, f"{whose} cannot be imported: {error}"
-    # Of a package's kind, only these two parts are used.
-    return Kind(driver=kind.driver, table=kind.table), ""
+    return replace(kind, key="driver", distribution=packages[0]), ""
 
 
 def _packages(protocol: str) -> list[str]:

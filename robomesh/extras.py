@@ -37,18 +37,23 @@ def is_missing(module: str) -> bool:
     return find_spec(module) is None
 
 
-def missing(module: str, extra: str = "") -> str:
+def missing(module: str, extra: str = "", distribution: str = "robomesh") -> str:
     """Return a sentence on a missing module, with the command that installs it.
 
     Args:
         extra: The extra that brings it; empty: as in the table.
+        distribution: The distribution that has the extra; another one than robomesh may need none.
     """
-    command = install_command(extra or EXTRAS[module])
+    if distribution == "robomesh":
+        extra = extra or EXTRAS[module]
+    command = install_command(extra, distribution)
     return f"this needs the package {module}, which is not installed: {command}"
 
 
-def install_command(extra: str) -> str:
-    """Return the command that installs an extra."""
+def install_command(extra: str, distribution: str = "robomesh") -> str:
+    """Return the command that installs an extra of a distribution; empty: the distribution."""
+    if distribution != "robomesh":
+        return f"pip install '{distribution}[{extra}]'" if extra else f"pip install {distribution}"
     if _CHECKOUT and extra in ADDED_IN_CHECKOUT:
         return f"./dev add {extra}"
     return f"pip install 'robomesh[{extra}]'"

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from controllers.probing import Probe
 from protocol_gateway.errors import GatewaySettingsError
-from protocol_gateway.kinds import kind_of, own_kinds
+from protocol_gateway.kinds import kind_of, own_kinds, part_of
+from protocol_gateway.seam.simulated import Simulated
 
 ROOT = Path(__file__).parents[1]
 # Names of vendors, of their protocols, and of what reads them.
@@ -31,10 +33,10 @@ def test_nothing_below_the_kinds_names_one():
 def test_every_kind_has_all_its_parts():
     kinds = own_kinds()
     assert "unit" in kinds
-    for each in kinds.values():
+    for protocol, each in kinds.items():
         assert each.driver_maker
-        assert each.simulated_controller
-        assert each.probe
+        assert part_of(protocol, "simulated", Simulated)
+        assert part_of(protocol, "probe", Probe)
 
 
 def test_a_kind_whose_folder_is_missing_is_no_protocol(monkeypatch):

@@ -6,7 +6,6 @@ from importlib import import_module
 from typing import Protocol, cast
 
 from protocol_gateway.seam.protocol import Driver
-from protocol_gateway.seam.simulated import Simulated
 from protocol_gateway.seam.table import Table
 from robots.joints import JointType
 
@@ -42,23 +41,26 @@ class Kind:
 
     Attributes:
         driver: `DriverMaker` of its drivers, or the name of one.
-        key: Key of a robot's table in the site file; empty: there is none.
+        key: Key of a robot's table in the site file; empty: there is none. For a package the key is always
+            "driver".
         table: Name of the table's model, a `Table`; empty: the table is passed on unchanged.
-        datagrams: The site file's `controller` is udp://HOST:PORT.
-        extra: Extra of robomesh that brings what it needs; empty: it needs no more.
+        datagrams: The site file's `controller` is udp://HOST:PORT, otherwise tcp://HOST:PORT; None: either.
+        extra: Extra of the distribution that brings what it needs; empty: it needs no more.
         packages: Modules that the extra brings.
         probe: Name of its `controllers.probing.Probe`; empty: `robomesh probe` does not know it.
-        simulated: Name of its `Simulated` controller; empty: it has none.
+        simulated: Name of its `Simulated` controller (`protocol_gateway.seam.simulated`); empty: it has none.
+        distribution: Name of the package that gives it; robomesh sets it.
     """
 
     driver: DriverMaker | str
     key: str = "driver"
     table: str = ""
-    datagrams: bool = False
+    datagrams: bool | None = False
     extra: str = ""
     packages: tuple[str, ...] = ()
     probe: str = ""
     simulated: str = ""
+    distribution: str = "robomesh"
 
     @property
     def driver_maker(self) -> DriverMaker:
@@ -69,11 +71,6 @@ class Kind:
     def table_model(self) -> type[Table] | None:
         """Model of its table; None: it has none."""
         return cast("type[Table]", named(self.table)) if self.table else None
-
-    @property
-    def simulated_controller(self) -> Simulated | None:
-        """Its simulated controller; None: it has none."""
-        return cast("Simulated", named(self.simulated)) if self.simulated else None
 
 
 def named(name: str) -> object:

@@ -51,12 +51,14 @@ def run(arguments: list[str]) -> int:
         discard(sys.stdout)
         return 0
     except ModuleNotFoundError as error:
-        from protocol_gateway.kinds import extra_of
+        from protocol_gateway.kinds import kind_with
 
         # `cv2.typing` comes with `cv2`.
         module = (error.name or "").partition(".")[0]
-        if extra := EXTRAS.get(module) or extra_of(module):
-            return _failed(missing(module, extra))
+        if module in EXTRAS:
+            return _failed(missing(module))
+        if kind := kind_with(module):
+            return _failed(missing(module, kind.extra, kind.distribution))
         return _failed_ourselves(error)
     except ImportError as error:
         if str(error).startswith("libgomp.so.1:"):  # Pinocchio's wheel lacks it

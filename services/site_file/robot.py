@@ -228,11 +228,15 @@ class Robot(BaseModel):
                 raise ValueError(f"{key} needs the protocol {needed}, this robot's is {self.protocol!r}")
         kind = self.kind
         if self.simulated and not kind.simulated:
+            try:
+                kind_of(self.protocol)
+            except GatewaySettingsError as error:
+                raise ValueError(str(error)) from None
             raise ValueError(f"controller: protocol {self.protocol!r} has no simulator: name its address")
         if self.table is not None:
             self.table.check(self.declared)
-        if own is not None and not self.simulated:
-            scheme = "udp" if own.datagrams else "tcp"
+        if kind.datagrams is not None and not self.simulated:
+            scheme = "udp" if kind.datagrams else "tcp"
             if not self.controller.startswith(f"{scheme}://"):
                 raise ValueError(
                     f"controller {self.controller}: protocol {self.protocol!r} needs "
@@ -247,7 +251,7 @@ class Robot(BaseModel):
             return kind_of(self.protocol)
         except GatewaySettingsError:
             # The gateway says why the package's driver cannot be used.
-            return Kind(driver="")
+            return Kind(driver="", datagrams=None)
 
     @property
     def table(self) -> Table | None:
@@ -303,7 +307,7 @@ class Robot(BaseModel):
     def simulated_options(self, joint_types: Sequence[JointType]) -> object:
         """Return the driver's settings before a simulated controller."""
         table = self.table
-        return None if table is None else table.simulated_options(self.declared, joint_types)
+        return self.options if table is None else table.simulated_options(self.declared, joint_types)
 
     @property
     def simulated(self) -> bool:

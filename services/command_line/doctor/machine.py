@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from protocol_gateway.kinds import own_kinds
+from protocol_gateway.errors import GatewaySettingsError
+from protocol_gateway.kinds import driver_maker, kind_of, own_kinds, part_of
+from protocol_gateway.seam.simulated import Simulated
 from robomesh.errors import UnavailableError
 from robomesh.extras import ADDED_IN_CHECKOUT, install_command, is_missing
 from robomesh.listen_address import reachable, split_address
@@ -64,7 +66,7 @@ def run(site_file: Path | None = None, as_json: bool = False) -> None:
     from services.site_file.site import load
 
     site = load(site_file)
-    checks = (_python, _extras, _open_gl, _page, partial(_addresses, site), _disk)
+    checks = (_python, _extras, partial(_drivers, site), _open_gl, _page, partial(_addresses, site), _disk)
     findings = [finding for check in checks for finding in check()]
     if as_json:
         rows = [{"what": each.what, "ok": each.ok, "text": each.text, "mend": each.fix} for each in findings]
@@ -92,6 +94,24 @@ def _extras() -> list[Finding]:
             text = f"not installed; {fix} installs it"
         findings.append(Finding(f"{'part' if rare else 'role'} {extra}", rare or not missing, text, fix))
     return findings
+
+
+def _drivers(site: "Site") -> Iterator[Finding]:
+    """Yield whether the site's drivers of packages can be used."""
+    for protocol in sorted({robot.protocol for robot in site.robot} - own_kinds().keys()):
+        what, fix = f"protocol {protocol}", "correct the package, or install it again"
+        try:
+            kind = kind_of(protocol)
+            if missing := [module for module in kind.packages if is_missing(module)]:
+                install = install_command(kind.extra, kind.distribution)
+                yield Finding(what, False, f"no {', '.join(missing)}", install)
+                continue
+            driver_maker(protocol)
+            part_of(protocol, "simulated", Simulated)
+        except GatewaySettingsError as error:
+            yield Finding(what, False, str(error), fix)
+        else:
+            yield Finding(what, True, f"the package {kind.distribution} is installed")
 
 
 def _open_gl() -> list[Finding]:

@@ -1,20 +1,23 @@
-"""`robomesh simulate`: its options are those of all kinds of controllers."""
+"""`robomesh simulate`: its options are those of robomesh's own kinds, and of the package that it names."""
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from enum import StrEnum
-from functools import cache
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
+from typer.core import TyperCommand
+from typer.main import get_command
 
 from controllers.simulated.fault_table import FAULTS
-from protocol_gateway.kinds import own_kinds
+from protocol_gateway.errors import GatewaySettingsError
+from protocol_gateway.kinds import is_known, kind_of, own_kinds, part_of, protocols
 from protocol_gateway.seam.simulated import Common, Option, Simulated
 from robomesh import service
 from robomesh.endpoints import DEFAULT_ROUTER
 from robomesh.keys import check_name
+from services.command_line.connection_options import offer_keys
 from services.command_line.options import Connect, SiteFile, command_group
 from services.command_line.output import print_line
 from services.command_line.site.controllers import ControllerError
@@ -24,21 +27,64 @@ from services.site_file import site as site_file
 if TYPE_CHECKING:
     from controllers.simulated.fault_requests import Mesh
 
-app = command_group()
+
+def _own() -> Mapping[str, Simulated]:
+    """Return robomesh's own simulated controllers by protocol."""
+    found = {protocol: part_of(protocol, "simulated", Simulated) for protocol in own_kinds()}
+    return {protocol: each for protocol, each in found.items() if each is not None}
 
 
-@cache
-def simulated_controllers() -> Mapping[str, Simulated]:
-    """Return the simulated controllers by protocol."""
-    return {
-        name: found for name, kind in own_kinds().items() if (found := kind.simulated_controller) is not None
-    }
+def _controller(protocol: str) -> Simulated:
+    """Return the simulated controller of a protocol.
+
+    Raises:
+        ControllerError: If it has none.
+    """
+    if (found := part_of(protocol, "simulated", Simulated)) is None:
+        raise ControllerError(f"--protocol {protocol}: this protocol has no simulated controller")
+    return found
 
 
-def _with_options_of_kinds(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of all kinds, each with the protocols that have it in its help."""
+class _OfPackage(TyperCommand):
+    """The command, with the options of a package's simulated controller if the arguments name it."""
+
+    def make_context(self, info_name: str | None, args: list[str], *given: Any, **named: Any) -> Any:
+        protocol = _protocol(args)
+        if protocol in own_kinds() or not is_known(protocol):
+            return super().make_context(info_name, args, *given, **named)
+        # The package's is first, because an option of several kinds is that of the first one.
+        simulated = {protocol: _controller(protocol), **_own()}
+        try:
+            command: Any = get_command(_app(TyperCommand, simulated))
+        except Exception as error:
+            raise GatewaySettingsError(
+                f"protocol {protocol!r}: the options of its simulated controller, of the package "
+                f"{kind_of(protocol).distribution}, cannot be used: {error}"
+            ) from error
+        return offer_keys(command).make_context(info_name, args, *given, **named)
+
+
+def _protocol(arguments: Sequence[str]) -> str:
+    """Return the last protocol that arguments name; without one the first of robomesh's own."""
+    found = _FIRST
+    for word, following in zip(arguments, (*arguments[1:], ""), strict=True):
+        option, _, value = word.partition("=")
+        if option == "--protocol":
+            found = value or following
+    return found
+
+
+def _app(command: type[TyperCommand], simulated: Mapping[str, Simulated]) -> typer.Typer:
+    """Return an app of `simulate` with the options of simulated controllers."""
+    found = command_group()
+    found.command(cls=command)(_with_options(simulate, simulated))
+    return found
+
+
+def _with_options(command: Callable[..., None], controllers: Mapping[str, Simulated]) -> Callable[..., None]:
+    """Give a command the options of simulated controllers; the help of each names its protocols."""
     parameters: dict[str, tuple[inspect.Parameter, list[str]]] = {}
-    for protocol, simulated in simulated_controllers().items():
+    for protocol, simulated in controllers.items():
         for each in _own_options(simulated):
             parameters.setdefault(each.name, (each, []))[1].append(protocol)
     common = [
@@ -47,10 +93,15 @@ def _with_options_of_kinds(command: Callable[..., None]) -> Callable[..., None]:
         if each.kind is not inspect.Parameter.VAR_KEYWORD
     ]
     every = [*common, *(_option(*each) for each in parameters.values())]
+
+    @wraps(command)
+    def with_options(**given: Any) -> None:
+        command(**given)
+
     signature = inspect.Signature([each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in every])
-    command.__signature__ = signature  # type: ignore[attr-defined]
-    command.__annotations__ = {each.name: each.annotation for each in every}
-    return command
+    with_options.__signature__ = signature  # type: ignore[attr-defined]
+    with_options.__annotations__ = {each.name: each.annotation for each in every}
+    return with_options
 
 
 def _own_options(simulated: Simulated) -> Sequence[inspect.Parameter]:
@@ -76,18 +127,19 @@ def _option(parameter: inspect.Parameter, protocols: list[str]) -> inspect.Param
     )
 
 
-_Protocol: Any = StrEnum("_Protocol", [(name, name) for name in simulated_controllers()])  # type: ignore[misc]
-_FIRST = next(iter(_Protocol))
-_ADDRESSES = ", ".join(f"{name}: {each.listen}" for name, each in simulated_controllers().items())
+_FIRST = next(iter(_own()))
+_ADDRESSES = ", ".join(f"{name}: {each.listen}" for name, each in _own().items())
+_OF_PACKAGES = ", ".join(each for each in protocols() if each not in own_kinds())
 
 
-@app.command()
-@_with_options_of_kinds
 def simulate(
     protocol: Annotated[
-        _Protocol,
+        str,
         typer.Option(
-            help="; ".join(f"{name}: {each.text}" for name, each in simulated_controllers().items()) + ".",
+            metavar="NAME",
+            help="; ".join(f"{name}: {each.text}" for name, each in _own().items())
+            + (f"; of packages, each with options of its own: {_OF_PACKAGES}." if _OF_PACKAGES else "."),
+            autocompletion=lambda: list(protocols()),
         ),
     ] = _FIRST,
     robot: Annotated[
@@ -124,7 +176,7 @@ def simulate(
 ) -> None:
     """Run a simulated controller of any kind that a site file's `protocol` can name."""
     service.log_to_stderr()
-    simulated = simulated_controllers()[protocol]
+    simulated = _controller(protocol)
     common = Common(
         robot=robot or simulated.robot,
         listen=listen or simulated.listen,
@@ -133,7 +185,10 @@ def simulate(
         insecure=insecure,
         mesh=_faults_mesh(for_, site, connect),
     )
-    own = {each.name: of_kinds[each.name] or each.default for each in _own_options(simulated)}
+    own = {
+        each.name: each.default if of_kinds[each.name] is None else of_kinds[each.name]
+        for each in _own_options(simulated)
+    }
     service.run_until_signalled(simulated.prepare(common, **own)(print_line))
 
 
@@ -159,3 +214,6 @@ def _faults_mesh(faults_for: str, site: Path | None, connect: str) -> "Mesh | No
         robot=check_name(robot_name, "robot"),
         session=session_settings(site_file.load(site), connect, "simulator"),
     )
+
+
+app = _app(_OfPackage, _own())

@@ -12,6 +12,8 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from protocol_gateway.kinds import part_of
+from protocol_gateway.seam.simulated import Simulated
 from robomesh import service
 from robomesh.client.connection import addresses
 from robomesh.keys import robot_key
@@ -126,11 +128,10 @@ def _simulator(robot: Robot, site: str, attach: tuple[str, ...]) -> tuple[Progra
     port = _free_port()
     demo = ("--demo",) if robot.demo else ()
     codes = (option for code, type_ in robot.codes.items() for option in ("--code", f"{code}={type_}"))
-    kind = robot.kind
-    simulated = kind.simulated_controller
-    assert simulated is not None
+    simulated = part_of(robot.protocol, "simulated", Simulated)
+    assert simulated is not None  # the site file was checked
     started = simulated.started(robot.table, _free_port)
-    controller = f"{'udp' if kind.datagrams else 'tcp'}://127.0.0.1:{port}"
+    controller = f"{'udp' if robot.kind.datagrams else 'tcp'}://127.0.0.1:{port}"
     controller += "".join(f",{name}={at}" for name, at in started.ports)
     protocol = ("--protocol", robot.protocol, *started.options)
     for_ = ("--for", f"{site}/{robot.name}", *attach)
