@@ -206,7 +206,9 @@ def test_a_simulated_controller_of_a_package_has_its_own_options(lines, capsys, 
 
 def test_the_help_of_a_packages_protocol_has_its_options(lines, capsys):
     assert run(["simulate", "--protocol=lines", "--help"]) == 0
-    assert "Lines a second" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "Lines a second" in shown
+    assert "[default: (127.0.0.1:7000)]" in shown
     assert run(["simulate", "--help"]) == 0
     assert "Lines a second" not in capsys.readouterr().out
 

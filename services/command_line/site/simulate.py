@@ -53,14 +53,17 @@ class _OfPackage(TyperCommand):
         if protocol in own_kinds() or not is_known(protocol):
             return super().make_context(info_name, args, *given, **named)
         # The package's is first, because an option of several kinds is that of the first one.
-        simulated = {protocol: _controller(protocol), **_own()}
+        simulated = _controller(protocol)
         try:
-            command: Any = get_command(_app(TyperCommand, simulated))
+            command: Any = get_command(_app(TyperCommand, {protocol: simulated, **_own()}))
         except Exception as error:
             raise GatewaySettingsError(
                 f"protocol {protocol!r}: the options of its simulated controller, of the package "
                 f"{kind_of(protocol).distribution}, cannot be used: {error}"
             ) from error
+        for each in command.params:
+            if each.name in ("robot", "listen"):
+                each.show_default = getattr(simulated, each.name)
         return offer_keys(command).make_context(info_name, args, *given, **named)
 
 
