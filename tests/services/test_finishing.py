@@ -37,8 +37,11 @@ def submit(finisher, path):
 
 def worker_process():
     """Return the worker process of this process, or None."""
-    children = psutil.Process().children()
-    return next((each for each in children if "robomesh.recordings.reindex" in each.cmdline()), None)
+    for each in psutil.Process().children():
+        with contextlib.suppress(psutil.NoSuchProcess):  # it has ended meanwhile
+            if "robomesh.recordings.reindex" in each.cmdline():
+                return each
+    return None
 
 
 def test_job_of_a_killed_worker_fails_and_the_next_job_is_done(tmp_path):
