@@ -1,4 +1,4 @@
-"""Kinds of controllers: nothing below them names one, and everything else runs without any of them."""
+"""Kinds of controllers: only their folders name them, and everything else runs without any of them."""
 
 import re
 import sys
@@ -16,13 +16,13 @@ ROOT = Path(__file__).parents[1]
 NAMES = re.compile(
     r"universal.?robots|yaskawa|motoman|fanuc|karel|\brtde\b|\bhses\b|\bsnpx\b|opc.?ua|asyncua", re.IGNORECASE
 )
-BELOW = ("robomesh", "robots", "renderer", "protocol_gateway", "web/src")
+OUTSIDE = ("robomesh", "robots", "renderer", "protocol_gateway", "services", "web/src")
 
 
-def test_nothing_below_the_kinds_names_one():
+def test_nothing_outside_the_kinds_names_one():
     named = [
         f"{file.relative_to(ROOT)}: {found[0]}"
-        for folder in BELOW
+        for folder in OUTSIDE
         for ending in ("py", "ts", "tsx", "proto", "css")
         for file in sorted((ROOT / folder).rglob(f"*.{ending}"))
         if not {"gen", "node_modules"} & {*file.parts} and (found := NAMES.search(file.read_text("utf-8")))

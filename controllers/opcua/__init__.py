@@ -8,6 +8,7 @@ OPCUA = Kind(
     table="controllers.opcua.table:OpcUa",
     extra="opcua",
     packages=("asyncua",),
+    certificate="controllers.opcua.certificate:make_own",
     probe="controllers.opcua.probe:OPCUA",
     simulated="controllers.opcua.simulated.start:OPCUA",
 )

@@ -47,6 +47,9 @@ class Kind:
         datagrams: The site file's `controller` is udp://HOST:PORT, otherwise tcp://HOST:PORT; None: either.
         extra: Extra of the distribution that brings what it needs; empty: it needs no more.
         packages: Modules that the extra brings.
+        certificate: Name of the function behind `robomesh keys KEY FILE.pem`, which makes the gateway's own
+            certificate for a lifetime and returns lines to print; empty: none is needed. Of robomesh's own
+            kinds only.
         probe: Name of its `controllers.probing.Probe`; empty: `robomesh probe` does not know it.
         simulated: Name of its `Simulated` controller (`protocol_gateway.seam.simulated`); empty: it has none.
         distribution: Name of the package that gives it; robomesh sets it.
@@ -58,6 +61,7 @@ class Kind:
     datagrams: bool | None = False
     extra: str = ""
     packages: tuple[str, ...] = ()
+    certificate: str = ""
     probe: str = ""
     simulated: str = ""
     distribution: str = "robomesh"

@@ -4,13 +4,15 @@ A command imports the authority when it runs: only what changes keys needs the p
 """
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 
+from protocol_gateway.kinds import own_kinds
+from protocol_gateway.seam.kind import Kind, named
 from robomesh.topic_schema import Role
 from robots.bounded_toml import read_toml
 from services.command_line.local_time import time_text
@@ -152,22 +154,23 @@ def accept(
     print_line(f'site {site} admits us: connect = ["{site}"] under [router] in the site file links to it')
 
 
-@app.command()
-def opcua(
-    file: Annotated[Path, typer.Argument(metavar="FILE.pem", help="A new file.")],
-    days: Annotated[float, typer.Option(metavar="N", min=1, max=7300, help="Validity.")] = 1825.0,
-) -> None:
-    """Make the gateway's own certificate for OPC UA servers.
+def _add_command_of(kind: Kind) -> None:
+    """Add the command that makes the certificate which a kind of controllers needs."""
+    make = cast("Callable[[Path, timedelta], Sequence[str]]", named(kind.certificate))
 
-    FILE.pem holds the private key; FILE.der is for the server's list of trusted clients.
-    """
-    from services.pki.authority import now
-    from services.pki.opcua import make
+    def command(
+        file: Annotated[Path, typer.Argument(metavar="FILE.pem", help="A new file.")],
+        days: Annotated[float, typer.Option(metavar="N", min=1, max=7300, help="Validity.")] = 1825.0,
+    ) -> None:
+        for line in make(file, timedelta(days=days)):
+            print_line(line)
 
-    made = make(file, now(), timedelta(days=days))
-    print_line(f'{file}: write certificate = "{file}" below [robot.opcua]')
-    print_line(f"{made.public}: let the server trust it; {made.uri}, until {made.expires:%Y-%m-%d}")
-    print_line(f"  fingerprint sha256:{made.fingerprint}")
+    app.command(kind.key, help=make.__doc__)(command)
+
+
+for _kind in own_kinds().values():
+    if _kind.certificate:
+        _add_command_of(_kind)
 
 
 @app.command()

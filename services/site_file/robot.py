@@ -98,8 +98,7 @@ class Robot(BaseModel):
             are for installed drivers: no driver of robomesh has them.
         stale_after_s: The stale time [s]: without a unit of the controller for this long, the robot's state
             is stale; without joint positions for this long, the gateway refuses motion. It reconnects after
-            twice this time, at least 4 s. Absent: 1 s, with the protocol `fanuc-ftp` the time of three
-            positions.
+            twice this time, at least 4 s. Absent: 1 s, or the time of three positions where they are rarer.
         demo: The simulator moves the arm until the first command.
         legacy_clients: Address for programs that use the unit protocol; absent: they cannot connect.
     """

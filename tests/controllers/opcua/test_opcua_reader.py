@@ -13,6 +13,7 @@ import psutil
 import pytest
 
 import controllers.opcua.reader as reader
+from controllers.opcua.certificate import make
 from controllers.opcua.driver import OPCUA, OpcUaDriver
 from controllers.opcua.facts import Found, Values, decode
 from controllers.opcua.reader import process
@@ -22,7 +23,6 @@ from controllers.opcua.reader.session import ALLOWED, OnlyReads
 from controllers.opcua.settings import OpcUaJoint, OpcUaSettings, OpcUaSignal, to_text
 from protocol_gateway.seam import JointsReceived
 from robots.joints import JointType
-from services.pki.opcua import make
 from tests.conftest import run
 from tests.controllers.opcua.companion_server import companion_server
 from tests.protocol_gateway.gateway_site import until
