@@ -1,6 +1,9 @@
 """Reasons that only this kind has: code, sentence, advice, and both in Chinese for the page."""
 
+from protocol_gateway.seam import motion_codes as shared
 from robomesh.reasons import Code
+
+_of_kind = shared.of_kind("fanuc")
 
 NOT_CONNECTED = Code(
     "fanuc.not_connected",
@@ -8,15 +11,8 @@ NOT_CONNECTED = Code(
     "wait for it, or see why in the event link.channel_lost",
     chinese="RMI 未连接：请等待连接，或在事件 link.channel_lost 中查看原因",
 )
-MOVES = Code(
-    "fanuc.moves",
-    "a motion still runs",
-    "wait for its end, or stop the robot",
-    chinese="上一个运动仍在进行：请等待其结束，或停止机器人",
-)
-STATE_OLD = Code(
-    "fanuc.state_old", "the newest state of the controller is too old", chinese="控制器的最新状态已过时"
-)
+MOVES = _of_kind(shared.MOVES)
+STATE_OLD = _of_kind(shared.STATE_OLD)
 OTHER_PROGRAM = Code(
     "fanuc.other_program",
     "another program runs on the controller",
@@ -37,9 +33,7 @@ ARM_STOPPED = Code(
 WENT_LOCAL = Code(
     "fanuc.went_local", "the controller is not in remote control any more", chinese="控制器已不再处于远程控制"
 )
-TOOL_CHANGED = Code(
-    "fanuc.tool_changed", "the tool was changed during a motion", chinese="运动期间工具被更改"
-)
+TOOL_CHANGED = _of_kind(shared.TOOL_CHANGED)
 LOST_PROGRAM = Code(
     "fanuc.lost_program",
     "the gateway's program has ended on the controller",

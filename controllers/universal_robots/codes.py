@@ -1,6 +1,9 @@
 """Reasons that only this kind has: code, sentence, advice, and both in Chinese for the page."""
 
+from protocol_gateway.seam import motion_codes as shared
 from robomesh.reasons import Code
+
+_of_kind = shared.of_kind("universal_robots")
 
 NOT_STARTED = Code(
     "universal_robots.not_started",
@@ -29,33 +32,11 @@ TOOL_CHANGED = Code(
     "tool or payload were changed during a motion",
     chinese="运动期间工具或负载被更改",
 )
-WENT_LOCAL = Code(
-    "universal_robots.went_local",
-    "the controller was switched to local control",
-    chinese="控制器已切换到本地控制",
-)
-CHANNEL_LOST = Code(
-    "universal_robots.channel_lost",
-    "the connection {name} was lost during a motion",
-    chinese="运动期间连接 {name} 断开",
-)
-STATE_OLD = Code(
-    "universal_robots.state_old",
-    "the newest state of the controller is too old",
-    chinese="控制器的最新状态已过时",
-)
-MOVES = Code(
-    "universal_robots.moves",
-    "a motion still runs",
-    "wait for its end, or stop the robot",
-    chinese="上一个运动仍在进行：请等待其结束，或停止机器人",
-)
-CHANNEL_MISSING = Code(
-    "universal_robots.channel_missing",
-    "the connection {name} to the controller is missing",
-    "the event link.channel_lost says why",
-    chinese="与控制器的连接 {name} 断开：原因见事件 link.channel_lost",
-)
+WENT_LOCAL = _of_kind(shared.WENT_LOCAL)
+CHANNEL_LOST = _of_kind(shared.CHANNEL_LOST)
+STATE_OLD = _of_kind(shared.STATE_OLD)
+MOVES = _of_kind(shared.MOVES)
+CHANNEL_MISSING = _of_kind(shared.CHANNEL_MISSING)
 SOFTWARE = Code(
     "universal_robots.software",
     "motion needs PolyScope 5.6 or a later version 5, this is {version}",

@@ -1,6 +1,9 @@
 """Reasons that only this kind has: code, sentence, advice, and both in Chinese for the page."""
 
+from protocol_gateway.seam import motion_codes as shared
 from robomesh.reasons import Code
+
+_of_kind = shared.of_kind("hses")
 
 NOT_STARTED = Code(
     "hses.not_started",
@@ -20,28 +23,12 @@ HELD = Code("hses.held", "it was held", chinese="运动被暂停")
 ARM_STOPPED = Code(
     "hses.arm_stopped", "the controller lets no arm move: {state}", chinese="控制器不允许机械臂运动：{state}"
 )
-TOOL_CHANGED = Code("hses.tool_changed", "the tool was changed during a motion", chinese="运动期间工具被更改")
-WENT_LOCAL = Code(
-    "hses.went_local", "the controller was switched to local control", chinese="控制器已切换到本地控制"
-)
-CHANNEL_LOST = Code(
-    "hses.channel_lost", "the connection {name} was lost during a motion", chinese="运动期间连接 {name} 断开"
-)
-CHANNEL_MISSING = Code(
-    "hses.channel_missing",
-    "the connection {name} to the controller is missing",
-    "the event link.channel_lost says why",
-    chinese="与控制器的连接 {name} 断开：原因见事件 link.channel_lost",
-)
-STATE_OLD = Code(
-    "hses.state_old", "the newest state of the controller is too old", chinese="控制器的最新状态已过时"
-)
-MOVES = Code(
-    "hses.moves",
-    "a motion still runs",
-    "wait for its end, or stop the robot",
-    chinese="上一个运动仍在进行：请等待其结束，或停止机器人",
-)
+TOOL_CHANGED = _of_kind(shared.TOOL_CHANGED)
+WENT_LOCAL = _of_kind(shared.WENT_LOCAL)
+CHANNEL_LOST = _of_kind(shared.CHANNEL_LOST)
+CHANNEL_MISSING = _of_kind(shared.CHANNEL_MISSING)
+STATE_OLD = _of_kind(shared.STATE_OLD)
+MOVES = _of_kind(shared.MOVES)
 AXES = Code(
     "hses.axes", "{detail}", "move the robot from its own panel", chinese="{detail}：请用示教器移动机器人"
 )
