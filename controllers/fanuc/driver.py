@@ -7,6 +7,7 @@ only questions otherwise. The driver reports each answer separately, and never c
 
 from collections import Counter
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import replace
 
 from controllers.fanuc import codes as fanuc_codes
 from controllers.fanuc import data, signals
@@ -26,7 +27,6 @@ from controllers.fanuc.srtp import (
     Question,
     Read,
 )
-from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.seam import (
     Activity,
     AlarmReceived,
@@ -38,24 +38,22 @@ from protocol_gateway.seam import (
     Effect,
     Effects,
     JointsReceived,
-    MalformedReceived,
     Mode,
-    Open,
     Report,
-    Send,
     SetTimer,
     Severity,
     SoftwareReceived,
     StatusReceived,
     homed_by_nature,
 )
-from protocol_gateway.seam.hexadecimal import hexadecimal
-from protocol_gateway.seam.only_reads import OnlyReads
+from protocol_gateway.seam.only_reads import check_no_type_codes
 from protocol_gateway.seam.pendant_text import text
 from protocol_gateway.seam.polling import Asked, Polling, Regular
+from protocol_gateway.seam.polling_reader import PollingReader, malformed
 from robomesh import reason_codes
 from robots.joints import JointType
 
+# Port 60008 or 18245 of a controller.
 SNPX = Channel(name="snpx", carries=Carries.READING)
 TIMEOUT_S = 1.0
 """Time after which an answer is lost: %R gets slower while programs run."""
@@ -72,14 +70,14 @@ _PROOFS = 3
 _MOST_ALARMS = 100
 
 
-class SnpxDriver(OnlyReads):
+class SnpxDriver(PollingReader[Question, Answer]):
     """Driver of SNPX (`protocol_gateway.seam.Driver`).
 
     Raises:
         GatewaySettingsError: If the settings do not fit the model, or there are type codes.
     """
 
-    ports: frozenset[str] = frozenset()
+    channel = SNPX
 
     def __init__(
         self,
@@ -89,8 +87,7 @@ class SnpxDriver(OnlyReads):
         relay: Callable[[bytes, bool, Hashable], None] | None = None,
         options: object = None,
     ) -> None:
-        if codes:
-            raise GatewaySettingsError("protocol 'snpx' has no type codes: remove codes")
+        check_no_type_codes("snpx", codes)
         settings = options if isinstance(options, FanucSettings) else FanucSettings()
         self._settings = settings
         self._table = settings.table
@@ -143,40 +140,13 @@ class SnpxDriver(OnlyReads):
 
     # -------------------------------------------------------------------------- seam
 
-    def started(self, now_s: float) -> Effects:
-        """Open the site file's port, which is 60008 or 18245 on a controller."""
-        return (Open(SNPX),)
-
-    def opened(self, channel: Channel, now_s: float) -> Effects:
-        """Begin with the first packet of a connection."""
-        self._begin()
-        return self._go_on(now_s)
-
-    def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
-        """Report answers, and ask the next question that is due."""
-        effects: list[Effect] = []
-        for answer in self._stream.receive(data):
-            if isinstance(answer, ValueError):
-                effects.append(Report([_malformed(data, str(answer))], 0))
-                continue
-            asked = self._polling.take(answer, now_s)
-            if asked is not None:
-                effects.append(self._report(asked, answer, data, now_s))
-        return (*effects, *self._go_on(now_s))
+    def _answers(self, data: bytes) -> Sequence[Answer | ValueError]:
+        return self._stream.receive(data)
 
     def skipped(self, channel: Channel, now_s: float) -> Effects:
         """Read on with the answer to the next question."""
         self._stream = AnswerStream()
-        return self._go_on(now_s)
-
-    def closed(self, channel: Channel, now_s: float) -> Effects:
-        """Ask no more until the next connection."""
-        self._stop()
-        return (SetTimer(None),)
-
-    def timer_ended(self, ended: Mapping[str, float], now_s: float) -> Effects:
-        """Ask the next question, or give up an answer that did not come."""
-        return self._go_on(now_s)
+        return super().skipped(channel, now_s)
 
     def _stop(self) -> None:
         self._polling = Polling((), ())
@@ -187,36 +157,19 @@ class SnpxDriver(OnlyReads):
             # A connection without its begin is of no use: the link finds it silent, and connects again.
             self._stop()
             return (SetTimer(None), Report([], 0, lost=1))
-        lost = self._polling.lost
-        asked = self._polling.next_question(now_s)
-        effects: list[Effect] = [SetTimer(self._polling.wake_s())]
-        if asked is not None and asked is not before:
-            effects.insert(0, Send(SNPX, asked.read.encode(asked.number)))
-        if lost := self._polling.lost - lost:
-            effects.append(Report([], 0, lost=lost))
-        return effects
+        return super()._go_on(now_s)
 
     # ----------------------------------------------------------------------- answers
 
-    def _report(self, asked: Asked[Question], answer: Answer, packet: bytes, now_s: float) -> Report:
+    def _report(self, asked: Asked[Question], answer: Answer, received: bytes, now_s: float) -> Report:
         if answer.busy and asked.read in self._setup:
             # An incomplete begin is useless: the link finds the connection silent, and connects again.
             self._stop()
-        if answer.busy:
-            # Not a sign that the state is received: a controller that is always busy is silent.
-            return Report([], 1, refusals=1, asked_s=asked.at_s)
-        question = asked.read
-        if answer.refused:
-            return Report(self._refusal(question, answer, packet), 1, refusals=1, asked_s=asked.at_s)
-        if not isinstance(question, Read):
-            return Report([], 1, refusals=1, asked_s=asked.at_s)
-        try:
-            events = self._events(question, answer.read(question), now_s)
-        except ValueError as error:
-            return Report([_malformed(packet, str(error))], 0)
-        return Report(events, 1, asked_s=asked.at_s)
+        report = super()._report(asked, answer, received, now_s)
+        # Only what is read is a sign that the state is received.
+        return report if isinstance(asked.read, Read) else replace(report, refusals=1)
 
-    def _refusal(self, question: Question, answer: Answer, packet: bytes) -> list[ControllerEvent]:
+    def _refusal(self, question: Question, answer: Answer, received: bytes) -> list[ControllerEvent]:
         """Report once for each connection that the controller does not do what was asked."""
         if isinstance(question, Assign):
             self._refused |= {question.assignment.variable}
@@ -231,9 +184,12 @@ class SnpxDriver(OnlyReads):
         if question in self._complaints:
             return []
         self._complaints.add(question)
-        return [_malformed(packet, f"the controller refuses {what}: {answer.error}")]
+        return [malformed(received, f"the controller refuses {what}: {answer.error}")]
 
-    def _events(self, question: Read, words: bytes, now_s: float) -> list[ControllerEvent]:
+    def _events(self, question: Question, answer: Answer, now_s: float) -> list[ControllerEvent]:
+        if not isinstance(question, Read):
+            return []
+        words = answer.read(question)
         block = self._blocks.get(question)
         if block is not None:
             return self._of_block(question, block, words, now_s)
@@ -272,18 +228,18 @@ class SnpxDriver(OnlyReads):
                 "all; give each connection its own, or let an operator enter the assignments "
                 "(docs/controllers/fanuc.md); the gateway sends no more of them until it is restarted"
             )
-            return [_malformed(words, advice)]
+            return [malformed(words, advice)]
         if question in self._complaints:
             return []
         self._complaints.add(question)
         what = "the assignments at the pendant are not those of docs/controllers/fanuc.md"
-        return [_malformed(words, f"{what}: words from %R{question.first + 1}")]
+        return [malformed(words, f"{what}: words from %R{question.first + 1}")]
 
     def _on_position(self, words: bytes, now_s: float) -> list[ControllerEvent]:
         position = data.position(words)
         events: list[ControllerEvent] = []
         if position.axes is None and not self._invalid:
-            events.append(_malformed(words, "the controller reports no valid, finite joint position"))
+            events.append(malformed(words, "the controller reports no valid, finite joint position"))
         self._invalid = position.axes is None
         self._axes_read = position.axes or ()
         if position.axes is not None and self._settings.j23 is not None:
@@ -385,7 +341,3 @@ def alarm_of(alarm: Alarm) -> AlarmReceived:
         severity = Severity.ERROR
     text = "; ".join(filter(None, (alarm.full_message, alarm.cause)))
     return AlarmReceived(severity, text, alarm.number)
-
-
-def _malformed(received: bytes, reason: str) -> MalformedReceived:
-    return MalformedReceived(0, hexadecimal(received), reason)

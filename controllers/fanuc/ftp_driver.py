@@ -38,7 +38,7 @@ from protocol_gateway.seam import (
     SetTimer,
     SoftwareReceived,
 )
-from protocol_gateway.seam.only_reads import OnlyReads
+from protocol_gateway.seam.only_reads import OnlyReads, check_no_type_codes
 from protocol_gateway.seam.polling import Polling, Regular
 from protocol_gateway.secret_file import read_password
 from robomesh import reason_codes
@@ -118,8 +118,7 @@ class FtpDriver(OnlyReads):
         options: FanucSettings,
         password: str = "",
     ) -> None:
-        if codes:
-            raise GatewaySettingsError("protocol 'fanuc-ftp' has no type codes: remove codes")
+        check_no_type_codes("fanuc-ftp", codes)
         self._settings = options
         try:
             self._user, self._password = ftp.user(options.user), ftp.password(password)

@@ -17,7 +17,6 @@ from controllers.opcua.joints import (
     check_declared,
 )
 from controllers.opcua.settings import OpcUaSettings, to_text
-from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.seam import (
     Activity,
     AlarmReceived,
@@ -37,7 +36,7 @@ from protocol_gateway.seam import (
     SoftwareReceived,
     StatusReceived,
 )
-from protocol_gateway.seam.only_reads import OnlyReads
+from protocol_gateway.seam.only_reads import OnlyReads, check_no_type_codes
 from robomesh.texts import one_line
 from robots.joints import JointType
 
@@ -78,8 +77,7 @@ class OpcUaDriver(OnlyReads):
         relay: Callable[[bytes, bool, Hashable], None] | None = None,
         options: object = None,
     ) -> None:
-        if codes:
-            raise GatewaySettingsError("protocol 'opcua' has no type codes: remove codes")
+        check_no_type_codes("opcua", codes)
         self._settings = options if isinstance(options, OpcUaSettings) else OpcUaSettings()
         self._joint_types = joint_types
         check_declared(self._settings.joints, joint_types)

@@ -51,7 +51,7 @@ from protocol_gateway.seam import (
     StatusReceived,
     homed_by_nature,
 )
-from protocol_gateway.seam.only_reads import OnlyReads
+from protocol_gateway.seam.only_reads import OnlyReads, check_no_type_codes
 from robots.joints import JointType
 
 RTDE = Channel(name="rtde", carries=Carries.READING)
@@ -114,8 +114,7 @@ class RtdeDriver(OnlyReads):
                 f"protocol 'rtde': a robot of Universal Robots has {JOINTS} rotary joints, this model has "
                 f"{len(joint_types)} joints: choose its own model"
             )
-        if codes:
-            raise GatewaySettingsError("protocol 'rtde' has no type codes: remove codes")
+        check_no_type_codes("rtde", codes)
         self._settings = (
             options if isinstance(options, UniversalRobotsSettings) else UniversalRobotsSettings()
         )

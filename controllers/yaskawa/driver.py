@@ -12,7 +12,6 @@ from controllers.yaskawa import signals
 from controllers.yaskawa.axes import Axes, YaskawaSettings, instance_of
 from controllers.yaskawa.data import HELD, Alarm, DataType, Position, Status, Status1, Status2
 from controllers.yaskawa.hses import Answer, Command, Read, Service, decode
-from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.seam import (
     Activity,
     AlarmReceived,
@@ -21,28 +20,22 @@ from protocol_gateway.seam import (
     Carries,
     Channel,
     ControllerEvent,
-    Effect,
-    Effects,
     JointsReceived,
-    MalformedReceived,
     Mode,
-    Open,
-    Report,
-    Send,
-    SetTimer,
     Severity,
     SoftwareReceived,
     StatusReceived,
     homed_by_nature,
 )
-from protocol_gateway.seam.hexadecimal import hexadecimal
-from protocol_gateway.seam.only_reads import OnlyReads
-from protocol_gateway.seam.polling import Asked, Polling, Regular
+from protocol_gateway.seam.only_reads import check_no_type_codes
+from protocol_gateway.seam.polling import Polling, Regular
+from protocol_gateway.seam.polling_reader import PollingReader, malformed
 from protocol_gateway.seam.signal_names import of_joints
 from robomesh import reason_codes
 from robomesh.reasons import Reason
 from robots.joints import JointType
 
+# Port 10040 of a controller.
 HSES = Channel(name="hses", carries=Carries.READING, datagrams=True)
 STATUS = Read(Command.STATUS, 1)
 JOB = Read(Command.JOB, 1)
@@ -59,14 +52,14 @@ _ALARMS_EACH_S = 1.0
 _SOME_PULSES = 10
 
 
-class HsesDriver(OnlyReads):
+class HsesDriver(PollingReader[Read, Answer]):
     """Driver of HSES (`protocol_gateway.seam.Driver`).
 
     Raises:
         GatewaySettingsError: If the settings do not fit the model, or there are type codes.
     """
 
-    ports: frozenset[str] = frozenset()
+    channel = HSES
 
     def __init__(
         self,
@@ -76,8 +69,7 @@ class HsesDriver(OnlyReads):
         relay: Callable[[bytes, bool, Hashable], None] | None = None,
         options: object = None,
     ) -> None:
-        if codes:
-            raise GatewaySettingsError("protocol 'hses' has no type codes: remove codes")
+        check_no_type_codes("hses", codes)
         settings = options if isinstance(options, YaskawaSettings) else YaskawaSettings()
         self._group, instance = settings.group, instance_of(settings.group)
         self._position = Read(Command.POSITION, instance)
@@ -130,91 +122,39 @@ class HsesDriver(OnlyReads):
         self._next_round_s = self._next_tool_s = 0.0
         self._tool: int | None = None
 
-    # -------------------------------------------------------------------------- seam
-
-    def started(self, now_s: float) -> Effects:
-        """Open the site file's port, which is 10040 on a controller."""
-        return (Open(HSES),)
-
-    def opened(self, channel: Channel, now_s: float) -> Effects:
-        """Begin to ask; the answers of a previous socket do not arrive at this one."""
-        self._begin()
-        return self._go_on(now_s)
-
-    def received(self, channel: Channel, data: bytes, now_s: float) -> Effects:
-        """Report an answer, and ask the next question that is due."""
-        effects: list[Effect] = []
-        try:
-            answer = decode(data)
-        except ValueError as error:
-            effects.append(Report([_malformed(data, str(error))], 0))
-        else:
-            asked = self._polling.take(answer, now_s)
-            if asked is not None:
-                effects.append(self._report(asked, answer, data, now_s))
-        return (*effects, *self._go_on(now_s))
-
-    def skipped(self, channel: Channel, now_s: float) -> Effects:
-        """Go on: each datagram is whole."""
-        return self._go_on(now_s)
-
-    def closed(self, channel: Channel, now_s: float) -> Effects:
-        """Ask no more until the next socket."""
-        self._polling = Polling((), ())
-        return (SetTimer(None),)
-
-    def timer_ended(self, ended: Mapping[str, float], now_s: float) -> Effects:
-        """Ask the next question, or give up an answer that did not come."""
-        return self._go_on(now_s)
-
-    def _go_on(self, now_s: float) -> Sequence[Effect]:
-        before, lost = self._polling.asked, self._polling.lost
-        asked = self._polling.next_question(now_s)
-        effects: list[Effect] = [SetTimer(self._polling.wake_s())]
-        if asked is not None and asked is not before:
-            effects.insert(0, Send(HSES, asked.read.encode(asked.number)))
-        if lost := self._polling.lost - lost:
-            effects.append(Report([], 0, lost=lost))
-        return effects
-
     # ----------------------------------------------------------------------- answers
 
-    def _report(self, asked: Asked[Read], answer: Answer, datagram: bytes, now_s: float) -> Report:
-        if answer.busy:
-            # Not a sign that the state is received: a controller that is always busy is silent.
-            return Report([], 1, refusals=1, asked_s=asked.at_s)
-        if answer.status:
-            return Report(self._refusal(asked.read, answer, datagram), 1, refusals=1, asked_s=asked.at_s)
+    def _answers(self, data: bytes) -> tuple[Answer | ValueError]:
         try:
-            events = self._events(asked.read, answer.data, now_s)
+            return (decode(data),)
         except ValueError as error:
-            return Report([_malformed(datagram, str(error))], 0)
-        return Report(events, 1, asked_s=asked.at_s)
+            return (error,)
 
-    def _refusal(self, read: Read, answer: Answer, datagram: bytes) -> list[ControllerEvent]:
+    def _refusal(self, question: Read, answer: Answer, received: bytes) -> list[ControllerEvent]:
         """Report once that the controller does not answer a question that is needed."""
-        needed = read in (self._position, STATUS)
+        needed = question in (self._position, STATUS)
         if answer.unsupported and not needed:
-            self._polling.drop(read)
-        if not needed or read in self._refused:
+            self._polling.drop(question)
+        if not needed or question in self._refused:
             return []
-        self._refused.add(read)
-        of = f"the position of {self._group}" if read is self._position else "the status"
-        return [_malformed(datagram, f"the controller refuses to report {of}: {answer.error}")]
+        self._refused.add(question)
+        of = f"the position of {self._group}" if question is self._position else "the status"
+        return [malformed(received, f"the controller refuses to report {of}: {answer.error}")]
 
-    def _events(self, read: Read, data: bytes, now_s: float) -> list[ControllerEvent]:
-        match read.command:
-            case Command.POSITION if read == self._pose:
+    def _events(self, question: Read, answer: Answer, now_s: float) -> list[ControllerEvent]:
+        data = answer.data
+        match question.command:
+            case Command.POSITION if question == self._pose:
                 return self._tool_pose(payloads.position(data))
             case Command.POSITION:
                 return self._joints(payloads.position(data), now_s)
             case Command.STATUS:
                 return self._status(payloads.status(data), now_s)
             case Command.ALARM:
-                return self._alarm(read.instance, payloads.alarm(data))
+                return self._alarm(question.instance, payloads.alarm(data))
             case Command.SYSTEM:
                 return self._on_system(payloads.system(data))
-            case Command.AXES if read == self._base_axes:
+            case Command.AXES if question == self._base_axes:
                 self._base_names = payloads.axis_names(data)
                 return self._look_for_axes({})
             case Command.AXES:
@@ -225,7 +165,7 @@ class HsesDriver(OnlyReads):
             case Command.TORQUE if self._axes is not None:
                 return [signals.of_torques(self._loads, self._axes.used, payloads.torques(data))]
             case Command.IO:
-                return [signals.of_io(self._io[read], payloads.io_byte(data))]
+                return [signals.of_io(self._io[question], payloads.io_byte(data))]
             case _:
                 return []
 
@@ -340,7 +280,3 @@ def alarm_of(alarm: Alarm) -> AlarmReceived:
     number = f"{alarm.code:04d}"
     text = f"{number} [{alarm.sub_code}] {alarm.name}".rstrip()
     return AlarmReceived(Severity.ERROR, text, number)
-
-
-def _malformed(datagram: bytes, reason: str) -> MalformedReceived:
-    return MalformedReceived(0, hexadecimal(datagram), reason)

@@ -109,6 +109,11 @@ class Answer:
         return self.added_status in _BUSY
 
     @property
+    def refused(self) -> bool:
+        """True if the controller does not do what was asked for."""
+        return self.status != 0
+
+    @property
     def unsupported(self) -> bool:
         """True if the controller does not have what was asked for."""
         return self.status in _STATUS_TEXTS or self.added_status in _UNSUPPORTED

@@ -1,8 +1,9 @@
-"""The commands of a driver that has none."""
+"""Parts of drivers that only read."""
 
+from collections.abc import Mapping
 from typing import Any
 
-from protocol_gateway.errors import CommandError
+from protocol_gateway.errors import CommandError, GatewaySettingsError
 from protocol_gateway.seam.commands import ControllerCommand
 from protocol_gateway.seam.effects import Effects
 from robomesh import reason_codes
@@ -22,3 +23,9 @@ class OnlyReads:
     def command(self, prepared: Any, now_s: float) -> Effects:
         """Send nothing."""
         return ()
+
+
+def check_no_type_codes(protocol: str, codes: Mapping[int, str]) -> None:
+    """Raise GatewaySettingsError if the site file declares type codes."""
+    if codes:
+        raise GatewaySettingsError(f"protocol '{protocol}' has no type codes: remove codes")

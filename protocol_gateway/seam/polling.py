@@ -35,6 +35,11 @@ class Answered(Protocol[R_contra]):
         """True if the controller has no time now for the question."""
         ...
 
+    @property
+    def refused(self) -> bool:
+        """True if the controller does not do what was asked for."""
+        ...
+
     def answers(self, read: R_contra) -> bool:
         """Return whether it can be the answer to a question with its number."""
         ...
