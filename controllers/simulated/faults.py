@@ -5,6 +5,7 @@ from the first client's connection, a requested one from now. Their effects are 
 """
 
 import itertools
+import logging
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -12,6 +13,10 @@ from dataclasses import dataclass, replace
 from controllers.simulated.errors import FaultError
 from controllers.simulated.fault_table import COPIES, FAULTS
 from robomesh import reason_codes as codes
+
+logger = logging.getLogger(__name__)
+
+_DROP_EACH_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -66,6 +71,7 @@ class Faults:
         self.known = known
         self._waiting = [parse_fault(text, known=known) for text in texts]
         self._spans: dict[str, Span] = {}
+        self._dropped_s = 0.0
 
     def first_client(self, now_s: float) -> None:
         """Start the time of the waiting faults; later calls have no effect."""
@@ -97,6 +103,25 @@ class Faults:
         return frozenset(
             name for name, span in self._spans.items() if 0.0 <= now_s - span.begin_s < span.length_s
         )
+
+    def changes(
+        self, before: frozenset[str], now_s: float
+    ) -> tuple[frozenset[str], frozenset[str], frozenset[str]]:
+        """Return the active faults, and which have begun and ended since others were; log these."""
+        active = self.active(now_s)
+        begun, ended = active - before, before - active
+        for name in begun:
+            logger.warning("fault: %s, %s", name, FAULTS[name].effect)
+        for name in ended:
+            logger.warning("fault %s is over", name)
+        return active, begun, ended
+
+    def drops(self, now_s: float) -> bool:
+        """Return whether the fault "drop" closes all connections now, which it does each second."""
+        if "drop" not in self.active(now_s) or now_s - self._dropped_s < _DROP_EACH_S:
+            return False
+        self._dropped_s = now_s
+        return True
 
 
 # ------------------------------------------------------------------------ effects

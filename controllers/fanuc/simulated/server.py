@@ -16,7 +16,6 @@ from controllers.fanuc.simulated.memory import DELIVERED, AssignmentTable, Entry
 from controllers.fanuc.simulated.messages import Packet, PacketStream
 from controllers.fanuc.srtp import COMMANDS, LONGEST_TEXT, Area, Service
 from controllers.simulated import faults as effects
-from controllers.simulated.fault_table import FAULTS
 from controllers.simulated.faults import Faults
 
 logger = logging.getLogger(__name__)
@@ -30,7 +29,6 @@ MOST_CLIENTS = 4
 """As delivered: $SNPX_PARAM.$NUM_FRIF."""
 
 _TICK_S = 0.01
-_DROP_EACH_S = 1.0
 _HOLD_BACK_S = 2.0
 _PAUSE_S = 0.001
 _LONGEST_BUFFER_BYTES = 4 * 1024 * 1024
@@ -79,7 +77,6 @@ class SnpxServer:
         self.clients: set[Connected] = set()
         self.active: frozenset[str] = frozenset()
         self.questions = 0
-        self._dropped_s = 0.0
 
     def new_client(self) -> "Client":
         """Return the protocol of a connection."""
@@ -105,21 +102,14 @@ class SnpxServer:
 
     def apply_faults(self, now_s: float) -> None:
         """Update the active faults, and apply their effects on the controller."""
-        before, self.active = self.active, self._faults.active(now_s)
-        for name in self.active - before:
-            logger.warning("fault: %s, %s", name, FAULTS[name].effect)
-            if name == "fault":
-                self.controller.raise_alarm(*_ALARM, now_s)
-            if name == "restart":
-                self.controller = self._boot(True)
-            if name in ("restart", "refuse"):
-                self.close()
-        for name in before - self.active:
-            logger.warning("fault %s is over", name)
-            if name == "fault":
-                self.controller.reset(now_s)
-        if "drop" in self.active and now_s - self._dropped_s >= _DROP_EACH_S:
-            self._dropped_s = now_s
+        self.active, begun, ended = self._faults.changes(self.active, now_s)
+        if "fault" in begun:
+            self.controller.raise_alarm(*_ALARM, now_s)
+        if "restart" in begun:
+            self.controller = self._boot(True)
+        if "fault" in ended:
+            self.controller.reset(now_s)
+        if begun & {"restart", "refuse"} or self._faults.drops(now_s):
             self.close()
 
     def close(self) -> None:

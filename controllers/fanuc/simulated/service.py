@@ -2,8 +2,6 @@
 
 import asyncio
 import contextlib
-import logging
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -18,43 +16,36 @@ from controllers.fanuc.simulated.rmi_server import RmiServer
 from controllers.fanuc.simulated.server import SNPX_FAULTS, SnpxServer
 from controllers.simulated.demo import demo_tour
 from controllers.simulated.errors import SimulatorError
-from controllers.simulated.fault_requests import Mesh, answer_requests
 from controllers.simulated.faults import Faults
+from controllers.simulated.serving import (
+    SimulatorSettings,
+    cannot_listen,
+    listen,
+    run,
+    warn_beyond_loopback,
+)
 from protocol_gateway.errors import GatewaySettingsError
-from robomesh.errors import ListenError
-from robomesh.listen_address import check_reach, split_address
+from robomesh.listen_address import split_address
 from robots.description import load
 from robots.joints import JointType, joints_of
 
-logger = logging.getLogger(__name__)
+_BECAUSE = "these protocols have no TLS"
 
 
 @dataclass(frozen=True, kw_only=True)
-class SnpxSettings:
-    """Settings of a simulated controller of FANUC's kind.
+class SnpxSettings(SimulatorSettings):
+    """Settings of a simulated controller of FANUC's kind, with at most eight joints.
 
     Attributes:
-        robot: A library robot, or a path to a robot.toml or URDF, of at most eight joints.
-        listen: `HOST:PORT`; a real controller has 60008; port 0 takes a free one.
         fanuc: As in the site file; undeclared: as `with_defaults` says.
         rmi: `HOST:PORT` of RMI; a real controller has 16001, and then sessions have 16002, here otherwise any
             free one. Empty: it has no RMI.
         shared: All connections have one table of assignments.
-        demo: A program runs and moves the arm.
-        faults: Faults in the syntax of `controllers.simulated.faults`, of `SNPX_FAULTS`.
-        insecure: May listen beyond loopback; this protocol has no TLS.
-        mesh: Where to answer fault requests; None to stay off the mesh.
     """
 
-    robot: str = "puma560"
-    listen: str = "127.0.0.1:0"
     rmi: str = ""
     fanuc: FanucSettings | None = None
     shared: bool = False
-    demo: bool = False
-    faults: tuple[str, ...] = ()
-    insecure: bool = False
-    mesh: Mesh | None = None
 
 
 def with_defaults(declared: FanucSettings | None, joint_types: tuple[JointType, ...]) -> FanucSettings:
@@ -92,7 +83,7 @@ async def serve_snpx(settings: SnpxSettings, *, ready: Callable[[FanucPorts], No
     """
     addresses = [settings.listen, *([settings.rmi] if settings.rmi else ())]
     for address in addresses:
-        _warn_beyond_loopback(address, settings.insecure)
+        warn_beyond_loopback(address, insecure=settings.insecure, because=_BECAUSE)
     faults = Faults(settings.faults, known=SNPX_FAULTS)
     server = _server(settings, faults)
     rmi = RmiServer(server)
@@ -105,38 +96,21 @@ async def serve_snpx(settings: SnpxSettings, *, ready: Callable[[FanucPorts], No
         listeners.callback(rmi.close)
         ports = []
         for each, address in zip(made, addresses, strict=True):
-            listening = await _listen(each, address)
+            listening = await listen(each, address)
             listeners.callback(listening.close)
             ports.append(listening.sockets[0].getsockname()[1])
         found = FanucPorts(*ports)
         rmi.session_port = found.session
         if ready is not None:
             ready(found)
-        async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(server.run())
-            tasks.create_task(rmi.run())
-            if settings.mesh is not None:
-                tasks.create_task(answer_requests(settings.mesh, faults))
+        await run(server.run(), rmi.run(), mesh=settings.mesh, faults=faults)
 
 
 @dataclass(frozen=True, kw_only=True)
-class FtpSettings:
-    """Settings of a simulated controller of FANUC's kind that is read by FTP.
+class FtpSettings(SimulatorSettings):
+    """Settings of a simulated controller of FANUC's kind that is read by FTP; `fanuc` as for SNPX."""
 
-    Attributes:
-        listen: `HOST:PORT`; a real controller has 21; port 0 takes a free one.
-        faults: Faults in the syntax of `controllers.simulated.faults`, of `FTP_FAULTS`.
-
-    The others are those of `SnpxSettings`.
-    """
-
-    robot: str = "puma560"
-    listen: str = "127.0.0.1:0"
     fanuc: FanucSettings | None = None
-    demo: bool = False
-    faults: tuple[str, ...] = ()
-    insecure: bool = False
-    mesh: Mesh | None = None
 
 
 async def serve_ftp(settings: FtpSettings, *, ready: Callable[[int], None] | None = None) -> None:
@@ -150,7 +124,7 @@ async def serve_ftp(settings: FtpSettings, *, ready: Callable[[int], None] | Non
         SimulatorError: If a setting is invalid.
         DescriptionError: If the robot is unknown.
     """
-    _warn_beyond_loopback(settings.listen, settings.insecure)
+    warn_beyond_loopback(settings.listen, insecure=settings.insecure, because=_BECAUSE)
     faults = Faults(settings.faults, known=FTP_FAULTS)
     controlled = _server(SnpxSettings(robot=settings.robot, fanuc=settings.fanuc, demo=settings.demo), faults)
     server = FtpServer(controlled)
@@ -158,36 +132,13 @@ async def serve_ftp(settings: FtpSettings, *, ready: Callable[[int], None] | Non
     try:
         listening = await asyncio.start_server(server.serve, host, port)
     except OSError as error:
-        raise _cannot_listen(settings.listen, error) from None
+        raise cannot_listen(settings.listen, error) from None
     async with contextlib.AsyncExitStack() as listeners:
         listeners.callback(controlled.close)
         listeners.callback(listening.close)
         if ready is not None:
             ready(listening.sockets[0].getsockname()[1])
-        async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(controlled.run())
-            if settings.mesh is not None:
-                tasks.create_task(answer_requests(settings.mesh, faults))
-
-
-def _warn_beyond_loopback(address: str, insecure: bool) -> None:
-    remedy = "listen on 127.0.0.1, or take the risk with --insecure: these protocols have no TLS"
-    host, _ = split_address(address)
-    if warning := check_reach("the simulator", host, secured=False, insecure=insecure, remedy=remedy):
-        logger.warning("%s", warning)
-
-
-def _cannot_listen(address: str, error: OSError) -> ListenError:
-    reason = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
-    return ListenError(f"the simulator cannot listen on {address}: {reason.lower()}")
-
-
-async def _listen(made: Callable[[], asyncio.Protocol], address: str) -> asyncio.Server:
-    host, port = split_address(address)
-    try:
-        return await asyncio.get_running_loop().create_server(made, host, port)
-    except OSError as error:
-        raise _cannot_listen(address, error) from None
+        await run(controlled.run(), mesh=settings.mesh, faults=faults)
 
 
 def _server(settings: SnpxSettings, faults: Faults) -> SnpxServer:

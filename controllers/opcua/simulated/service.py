@@ -2,7 +2,6 @@
 
 import asyncio
 import logging
-import os
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,15 +13,11 @@ from asyncua import Server, ua
 from controllers.opcua.simulated.address_space import LINEAR, ROTARY, AddressSpace
 from controllers.opcua.simulated.controller import OpcUaController
 from controllers.simulated.demo import demo_tour
-from controllers.simulated.fault_requests import Mesh, answer_requests
-from controllers.simulated.fault_table import FAULTS
 from controllers.simulated.faults import Faults
-from robomesh.errors import ListenError
-from robomesh.listen_address import check_reach, split_address
+from controllers.simulated.serving import SimulatorSettings, cannot_listen, run, warn_beyond_loopback
+from robomesh.listen_address import split_address
 from robots.description import load
 from robots.joints import JointType, joints_of
-
-logger = logging.getLogger(__name__)
 
 OPCUA_FAULTS = (
     *("freeze", "garbage", "drop", "jump", "corrupt", "local", "fault", "mute"),
@@ -32,31 +27,14 @@ OPCUA_FAULTS = (
 
 _TICK_S = 0.04
 _STATUS_EACH_S = 0.2
-_DROP_EACH_S = 1.0
 _NAME = "Arm"
 
 
 @dataclass(frozen=True, kw_only=True)
-class OpcUaSimulatorSettings:
-    """Settings of a simulated controller with OPC UA.
+class OpcUaSimulatorSettings(SimulatorSettings):
+    """Settings of a simulated controller with OPC UA; `path` is that of the server's address."""
 
-    Attributes:
-        robot: A library robot, or a path to a robot.toml or URDF.
-        listen: `HOST:PORT`; most controllers have 4840; port 0 takes a free one.
-        path: Path of the server's address.
-        demo: A program moves the arm.
-        faults: Faults in the syntax of `controllers.simulated.faults`, of `OPCUA_FAULTS`.
-        insecure: May listen beyond loopback; this server has no security.
-        mesh: Where to answer fault requests; None to stay off the mesh.
-    """
-
-    robot: str = "puma560"
-    listen: str = "127.0.0.1:0"
     path: str = ""
-    demo: bool = False
-    faults: tuple[str, ...] = ()
-    insecure: bool = False
-    mesh: Mesh | None = None
 
 
 async def serve_opcua(
@@ -72,12 +50,8 @@ async def serve_opcua(
         SimulatorError: If a setting is invalid.
         DescriptionError: If the robot is unknown.
     """
+    warn_beyond_loopback(settings.listen, insecure=settings.insecure, because="this server has no security")
     host, port = split_address(settings.listen)
-    remedy = "listen on 127.0.0.1, or take the risk with --insecure: this server has no security"
-    if warning := check_reach(
-        "the simulator", host, secured=False, insecure=settings.insecure, remedy=remedy
-    ):
-        logger.warning("%s", warning)
     # The library reports each lost connection as an error.
     logging.getLogger("asyncua").setLevel(logging.CRITICAL)
     faults = Faults(settings.faults, known=OPCUA_FAULTS)
@@ -86,10 +60,7 @@ async def serve_opcua(
     try:
         if ready is not None:
             ready(port)
-        async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(simulator.run())
-            if settings.mesh is not None:
-                tasks.create_task(answer_requests(settings.mesh, faults))
+        await run(simulator.run(), mesh=settings.mesh, faults=faults)
     finally:
         await simulator.stop()
 
@@ -110,7 +81,7 @@ class _Simulator:
         self._controller = boot(False)
         self._active: frozenset[str] = frozenset()
         self._written: dict[str, tuple[object, int]] = {}
-        self._next_status_s = self._next_drop_s = 0.0
+        self._next_status_s = 0.0
         self._garbage = False
         self._listens = False
 
@@ -143,10 +114,7 @@ class _Simulator:
         try:
             await self._server.start()
         except OSError as error:
-            reason = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
-            raise ListenError(
-                f"the simulator cannot listen on {self._host}:{self._port}: {reason.lower()}"
-            ) from None
+            raise cannot_listen(f"{self._host}:{self._port}", error) from None
         self._listens = True
         self._port = self._sockets.sockets[0].getsockname()[1]
         return self._port
@@ -181,18 +149,14 @@ class _Simulator:
     async def _apply_faults(self, now_s: float) -> None:
         if self._listens and self._transports:
             self._faults.first_client(now_s)
-        before, self._active = self._active, self._faults.active(now_s)
-        for name in self._active - before:
-            logger.warning("fault: %s, %s", name, FAULTS[name].effect)
-            if name == "fault":
-                self._controller.protective_stop(now_s)
-            if name == "restart":
-                self._controller = self._boot(True)
-        for name in before - self._active:
-            logger.warning("fault %s is over", name)
-            if name == "fault":
-                self._controller.go_on(now_s)
-        if "freeze" in self._active | before:
+        self._active, begun, ended = self._faults.changes(self._active, now_s)
+        if "fault" in begun:
+            self._controller.protective_stop(now_s)
+        if "restart" in begun:
+            self._controller = self._boot(True)
+        if "fault" in ended:
+            self._controller.go_on(now_s)
+        if "freeze" in self._active | ended:
             for transport in self._transports:
                 # New connections too; a second call has no effect.
                 (transport.pause_reading if "freeze" in self._active else transport.resume_reading)()
@@ -201,8 +165,7 @@ class _Simulator:
             self._drop()
         elif not self._listens_now():
             await self._open_listener()
-        if "drop" in self._active and now_s >= self._next_drop_s:
-            self._next_drop_s = now_s + _DROP_EACH_S
+        if self._faults.drops(now_s):
             self._drop()
 
     def _drop(self) -> None:

@@ -6,7 +6,6 @@ import logging
 import time
 from collections.abc import Callable
 
-from controllers.simulated.fault_table import FAULTS
 from controllers.simulated.faults import Faults, copies, pieces
 from controllers.unit.simulated import unit_faults
 from controllers.unit.simulated.controller import Controller
@@ -20,7 +19,6 @@ logger = logging.getLogger(__name__)
 _TOO_MANY = Error(1, "too many clients")
 # Prime, so that the position at which a unit is cut takes every value.
 _CUT_STEP = 37
-_DROP_EACH_S = 1.0
 _HOLD_BACK_S = 2.0
 _PAUSE_S = 0.001
 
@@ -48,7 +46,6 @@ class Server:
         self._empty = asyncio.Event()
         self._faults = fault_schedule
         self._active: frozenset[str] = frozenset()
-        self._dropped_s = 0.0
         self._held_back: list[bytes] = []
         self._held_back_since_s = 0.0
 
@@ -164,20 +161,16 @@ class Server:
 
     def _apply_faults(self, now_s: float) -> None:
         """Update the active faults and apply their effects on connections and controller."""
-        before, self._active = self._active, self._faults.active(now_s)
-        for name in self._active - before:
-            logger.warning("fault: %s, %s", name, FAULTS[name].effect)
+        self._active, begun, ended = self._faults.changes(self._active, now_s)
+        for name in begun:
             self._begin(name, now_s)
-        for name in before - self._active:
-            logger.warning("fault %s is over", name)
-        if "freeze" in before - self._active:
+        if "freeze" in ended:
             for client in self._clients:
                 client.resume_reading()
         if "freeze" in self._active:
             for client in self._clients:
                 client.pause_reading()
-        if "drop" in self._active and now_s - self._dropped_s >= _DROP_EACH_S:
-            self._dropped_s = now_s
+        if self._faults.drops(now_s):
             self._abort_all()
 
     def _begin(self, name: str, now_s: float) -> None:

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Mapping
 
 from controllers.simulated import faults as effects
-from controllers.simulated.fault_table import FAULTS, displacement
+from controllers.simulated.fault_table import displacement
 from controllers.simulated.faults import Faults
 from controllers.universal_robots import rtde_messages as rtde
 from controllers.universal_robots.modes import TextLevel
@@ -44,7 +44,6 @@ UR_FAULTS = (
 _TICK_S = 0.01
 _PRIMARY_S = 0.1
 _PATIENCE_S = 10.0
-_DROP_EACH_S = 1.0
 _HOLD_BACK_S = 2.0
 _PAUSE_S = 0.001
 _LONGEST_BUFFER_BYTES = 4 * 1024 * 1024
@@ -83,7 +82,6 @@ class UrServer:
         self._monitors: set[PrimaryMonitor] = set()
         self._dashboards: set[DashboardClient] = set()
         self.active: frozenset[str] = frozenset()
-        self._dropped_s = 0.0
         self.controller = boot(time.monotonic(), False, self._announce)
 
     # --------------------------------------------------------------------------- clients
@@ -172,21 +170,17 @@ class UrServer:
 
     def apply_faults(self, now_s: float) -> None:
         """Update the active faults, and apply their effects on connections and controller."""
-        before, self.active = self.active, self._faults.active(now_s)
-        for name in self.active - before:
-            logger.warning("fault: %s, %s", name, FAULTS[name].effect)
+        self.active, begun, ended = self._faults.changes(self.active, now_s)
+        for name in begun:
             self._begin(name, now_s)
-        for name in before - self.active:
-            logger.warning("fault %s is over", name)
-            if name == "fault":
-                self.controller.end_protective_stop(now_s)
-            if name == "freeze":
-                for client in (*self.rtde_clients, *self._monitors, *self._dashboards):
-                    client.pause_reading(False)
-            if name == "local":
-                self.controller.remote = True
-        if "drop" in self.active and now_s - self._dropped_s >= _DROP_EACH_S:
-            self._dropped_s = now_s
+        if "fault" in ended:
+            self.controller.end_protective_stop(now_s)
+        if "freeze" in ended:
+            for client in (*self.rtde_clients, *self._monitors, *self._dashboards):
+                client.pause_reading(False)
+        if "local" in ended:
+            self.controller.remote = True
+        if self._faults.drops(now_s):
             self.close()
 
     def _begin(self, name: str, now_s: float) -> None:
@@ -205,9 +199,6 @@ class UrServer:
                 self.controller = self._boot(now_s, True, self._announce)
             case "refuse":
                 self.close()
-            case "freeze":
-                for client in self.rtde_clients:
-                    client.pause_reading(True)
 
 
 class Connection(asyncio.Protocol):

@@ -1,21 +1,17 @@
 """Server of one simulated controller: answers each question immediately, except for the faults."""
 
 import asyncio
-import logging
 import time
 from collections.abc import Callable
 from typing import Any, cast
 
 from controllers.simulated import faults as effects
-from controllers.simulated.fault_table import FAULTS
 from controllers.simulated.faults import Faults
 from controllers.yaskawa import commands
 from controllers.yaskawa.hses import Command, Service
 from controllers.yaskawa.simulated import messages
 from controllers.yaskawa.simulated.controller import NO_ALARM, HsesController, Refusal
 from controllers.yaskawa.simulated.messages import Question
-
-logger = logging.getLogger(__name__)
 
 HSES_FAULTS = (
     *("freeze", "garbage", "flood", "deluge", "jump", "corrupt", "local", "fault", "mute", "joints"),
@@ -87,17 +83,13 @@ class HsesServer(asyncio.DatagramProtocol):
 
     def apply_faults(self, now_s: float) -> None:
         """Update the active faults, and apply their effects on the controller."""
-        before, self.active = self.active, self._faults.active(now_s)
-        for name in self.active - before:
-            logger.warning("fault: %s, %s", name, FAULTS[name].effect)
-            if name == "fault":
-                self.controller.raise_alarm(*_ALARM, now_s)
-            if name == "restart":
-                self.controller = self._boot(True)
-        for name in before - self.active:
-            logger.warning("fault %s is over", name)
-            if name == "fault":
-                self.controller.reset(now_s)
+        self.active, begun, ended = self._faults.changes(self.active, now_s)
+        if "fault" in begun:
+            self.controller.raise_alarm(*_ALARM, now_s)
+        if "restart" in begun:
+            self.controller = self._boot(True)
+        if "fault" in ended:
+            self.controller.reset(now_s)
         if self._held_back and ("burst" not in self.active or now_s - self._released_s >= _HOLD_BACK_S):
             # The newest first: datagrams may overtake each other.
             held_back, self._held_back = self._held_back[::-1], []
