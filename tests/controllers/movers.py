@@ -25,6 +25,7 @@ from protocol_gateway.gateway import RobotSettings
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.controllers.fanuc import fanuc_site
+from tests.controllers.simulated_site import kept
 from tests.controllers.universal_robots import ur_site
 from tests.controllers.yaskawa import hses_site
 from tests.protocol_gateway import gateway_site
@@ -237,11 +238,7 @@ class UnitMover(Mover):
     @staticmethod
     @contextlib.asynccontextmanager
     async def controller(monkeypatch):
-        servers = []
-        make = unit_service._server
-        monkeypatch.setattr(
-            unit_service, "_server", lambda *given: servers.append(make(*given)) or servers[-1]
-        )
+        servers = kept(monkeypatch, unit_service, "_server")
         async with gateway_site.simulator() as port:
             yield (port,), servers[-1]
 

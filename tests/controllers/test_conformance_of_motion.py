@@ -490,6 +490,26 @@ def test_other_axes_after_a_restart_forbid_motion(mesh, tmp_path, monkeypatch, m
     run(main())
 
 
+@contextlib.asynccontextmanager
+async def watched(mover, mesh, monkeypatch):
+    """Yield an arm for a gateway in another process."""
+    async with mover.wired(monkeypatch) as (server, wires), watching(mesh, mover.name) as site:
+        yield mover(site, wires, server)
+
+
+async def all_in_control(arms):
+    for arm in arms:
+        await until(lambda arm=arm: arm.site.joints, timeout_s=60.0)
+        await arm.in_control()
+
+
+async def all_crawl(arms):
+    await asyncio.gather(*(each.crawl() for each in arms))
+    # A gateway that a busy machine holds up for 0.1 s has its arm stopped, too.
+    while resting := [each for each in arms if not each.moves()]:
+        await asyncio.gather(*(each.crawl() for each in resting))
+
+
 async def time_to_rest(arm):
     """Return the time until the arm rests, and the longest time that the controller's event loop was late."""
     began_s = before_s = time.monotonic()
@@ -508,21 +528,12 @@ def test_a_killed_gateway_leaves_its_motions_as_declared_and_the_next_one_ends_t
 
     async def main():
         async with contextlib.AsyncExitStack() as stack:
-            arms, robots = [], []
-            for mover in MOVERS:
-                server, wires = await stack.enter_async_context(mover.wired(monkeypatch))
-                site = await stack.enter_async_context(watching(mesh, mover.name))
-                arms.append(mover(site, wires, server))
-                robots.append(arms[-1].settings())
+            arms = [await stack.enter_async_context(watched(mover, mesh, monkeypatch)) for mover in MOVERS]
+            robots = [each.settings() for each in arms]
             async with gateway_process(mesh, tmp_path, robots) as process:
-                for arm in arms:
-                    await until(lambda arm=arm: arm.site.joints, timeout_s=60.0)
-                    await arm.in_control()
+                await all_in_control(arms)
                 async with kept_control(*(each.site for each in arms)):
-                    await asyncio.gather(*(each.crawl() for each in arms))
-                    # A gateway that a busy machine holds up for 0.1 s has its arm stopped, too.
-                    while resting := [each for each in arms if not each.moves()]:
-                        await asyncio.gather(*(each.crawl() for each in resting))
+                    await all_crawl(arms)
                     process.kill()
                     for arm in arms:
                         if arm.dies_with_link:
@@ -567,20 +578,12 @@ def frozen(process):
 def test_the_motions_of_a_gateway_that_was_frozen_end_when_it_goes_on(mesh, tmp_path, monkeypatch, seconds):
     async def main():
         async with contextlib.AsyncExitStack() as stack:
-            arms, robots = [], []
-            for mover in MOVERS:
-                server, wires = await stack.enter_async_context(mover.wired(monkeypatch))
-                site = await stack.enter_async_context(watching(mesh, mover.name))
-                arms.append(mover(site, wires, server))
-                robots.append(arms[-1].settings())
+            arms = [await stack.enter_async_context(watched(mover, mesh, monkeypatch)) for mover in MOVERS]
+            robots = [each.settings() for each in arms]
             async with gateway_process(mesh, tmp_path, robots) as process:
-                for arm in arms:
-                    await until(lambda arm=arm: arm.site.joints, timeout_s=60.0)
-                    await arm.in_control()
+                await all_in_control(arms)
                 async with kept_control(*(each.site for each in arms)):
-                    await asyncio.gather(*(each.crawl() for each in arms))
-                    while resting := [each for each in arms if not each.moves()]:
-                        await asyncio.gather(*(each.crawl() for each in resting))
+                    await all_crawl(arms)
                 for arm in arms:
                     await arm.site.lease(A.RENEW, ttl_s=5)
                 sent = [each.motions for each in arms]
@@ -609,19 +612,19 @@ def test_the_motions_of_a_gateway_that_was_frozen_end_when_it_goes_on(mesh, tmp_
 @pytest.mark.processes
 def test_a_command_that_waited_for_a_frozen_gateway_is_not_sent(mesh, tmp_path, monkeypatch):
     async def main():
-        async with UnitMover.wired(monkeypatch) as (server, wires), watching(mesh, "unit") as site:
-            arm = UnitMover(site, wires, server)
-            async with gateway_process(mesh, tmp_path, [arm.settings()]) as process:
-                await until(lambda: site.joints, timeout_s=60.0)
-                await arm.in_control()
-                with frozen(process):
-                    late = asyncio.create_task(refusal(arm.move(0.1)))
-                    await asyncio.sleep(1.5)
-                assert "Not sent" in await late
-                assert not site.controller.HasField("stop")
-                judge(arm, motions=0)
-                target = await arm.moved(0.1)
-                async with kept_control(site):
-                    await until(lambda: near(arm.positions(), target))
+        async with (
+            watched(UnitMover, mesh, monkeypatch) as arm,
+            gateway_process(mesh, tmp_path, [arm.settings()]) as process,
+        ):
+            await all_in_control([arm])
+            with frozen(process):
+                late = asyncio.create_task(refusal(arm.move(0.1)))
+                await asyncio.sleep(1.5)
+            assert "Not sent" in await late
+            assert not arm.site.controller.HasField("stop")
+            judge(arm, motions=0)
+            target = await arm.moved(0.1)
+            async with kept_control(arm.site):
+                await until(lambda: near(arm.positions(), target))
 
     run(main(), timeout_s=90.0)

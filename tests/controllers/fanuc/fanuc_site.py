@@ -1,6 +1,5 @@
 """Site with a simulated controller of FANUC's kind that the gateway may move."""
 
-import asyncio
 import contextlib
 import itertools
 import json
@@ -10,7 +9,8 @@ from controllers.fanuc.axes import FanucSettings
 from controllers.fanuc.simulated import service
 from controllers.fanuc.simulated.rmi_program import ProgramStatus
 from controllers.fanuc.simulated.service import SnpxSettings, serve_snpx
-from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, until
+from tests.controllers.simulated_site import kept, remote, running
+from tests.protocol_gateway.gateway_site import A, gateway, until
 
 FANUC = {"description": "puma560", "protocol": "snpx", "up": False}
 # More positions a second than by default, so that tests are short.
@@ -20,19 +20,9 @@ MOVES = FanucSettings(assignments="own", j23=1, motion=True, speed_percent=100.0
 @contextlib.asynccontextmanager
 async def controller(monkeypatch, **settings):
     """Run a simulated controller; yield its ports and RMI's server, to look at it and to change it."""
-    servers = []
-    make = service.RmiServer
-    monkeypatch.setattr(service, "RmiServer", lambda *given: servers.append(make(*given)) or servers[-1])
-    ready = asyncio.get_running_loop().create_future()
-    task = asyncio.create_task(
-        serve_snpx(SnpxSettings(**{"rmi": "127.0.0.1:0", **settings}), ready=ready.set_result)
-    )
-    await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
-    try:
-        yield await ready, servers[-1]
-    finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
+    servers = kept(monkeypatch, service, "RmiServer")
+    async with running(serve_snpx, SnpxSettings(**{"rmi": "127.0.0.1:0", **settings})) as ports:
+        yield ports, servers[-1]
 
 
 @contextlib.asynccontextmanager
@@ -46,17 +36,9 @@ async def movable(mesh, folder, at, *, motion=MOVES, session=None, **robot):
 
 async def in_control(site):
     """Wait until the state is known, take control, and wait until RMI is connected."""
-    await until(lambda: site.seen.get("controller") and site.controller.mode == STATE.REMOTE)
-    await until(lambda: site.joints)
+    await remote(site)
     await site.lease(A.ACQUIRE, ttl_s=5)
     await until(lambda: site.controller.capabilities.stops == site.controller.capabilities.OURS)
-
-
-async def move(site, *offsets, **fields):
-    """Command a target by offsets from the present positions; return the target."""
-    target = [here + by for here, by in zip(site.joints, (*offsets, *[0.0] * 6), strict=False)]
-    await site.command(C.MOVE_ABSOLUTE, joint_positions=target, **fields)
-    return target
 
 
 def positions(server):

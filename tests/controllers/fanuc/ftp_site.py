@@ -1,12 +1,12 @@
 """Simulated controller of FANUC's kind that is read by FTP, and files as its software writes them."""
 
-import asyncio
 import contextlib
 from dataclasses import replace
 
 from controllers.fanuc.axes import FanucSettings
 from controllers.fanuc.files import Reading
 from controllers.fanuc.simulated.service import FtpSettings, serve_ftp
+from tests.controllers.simulated_site import running
 
 SETTINGS = FanucSettings(j23=1, rate_hz=20.0, registers=(1,))
 """Twenty times faster than a site file allows, so that the tests are short."""
@@ -16,16 +16,8 @@ FANUC_FTP = {"description": "puma560", "protocol": "fanuc-ftp", "options": SETTI
 @contextlib.asynccontextmanager
 async def controller(**settings):
     """Run a simulated controller; yield its port."""
-    ready = asyncio.get_running_loop().create_future()
-    task = asyncio.create_task(
-        serve_ftp(FtpSettings(**{"fanuc": replace(SETTINGS)} | settings), ready=ready.set_result)
-    )
-    await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
-    try:
-        yield await ready
-    finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
+    async with running(serve_ftp, FtpSettings(**{"fanuc": replace(SETTINGS)} | settings)) as port:
+        yield port
 
 
 def read(steps, file):

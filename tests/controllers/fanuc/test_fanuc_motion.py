@@ -11,11 +11,11 @@ from tests.controllers.fanuc.fanuc_site import (
     controller,
     in_control,
     movable,
-    move,
     packets,
     positions,
     runs,
 )
+from tests.controllers.simulated_site import move
 from tests.protocol_gateway.gateway_site import A, C, gateway, kept_control, moving, refusal, resting, until
 from tests.protocol_gateway.wire import wire
 

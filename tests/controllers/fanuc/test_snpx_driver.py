@@ -1,6 +1,5 @@
 """SNPX driver: stepped question by question, and in a gateway before the simulated controller."""
 
-import asyncio
 import contextlib
 import math
 import re
@@ -39,6 +38,7 @@ from robots.model import build_model, tool_placement
 from robots.poses import axis_rotation
 from tests.conftest import last_value, run
 from tests.controllers.fanuc.test_snpx import EMPTY_ALARM, alarm, position
+from tests.controllers.simulated_site import running
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
 from tests.protocol_gateway.wire import wire
 
@@ -514,14 +514,8 @@ def test_it_refuses_codes_every_command_and_settings_of_another_model():
 @contextlib.asynccontextmanager
 async def controller(**settings):
     """Run a simulated controller; yield its port."""
-    ready = asyncio.get_running_loop().create_future()
-    task = asyncio.create_task(serve_snpx(SnpxSettings(**settings), ready=ready.set_result))
-    await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
-    try:
-        yield (await ready).snpx
-    finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
+    async with running(serve_snpx, SnpxSettings(**settings)) as ports:
+        yield ports.snpx
 
 
 def packets(data):

@@ -23,6 +23,7 @@ from robots.model import build_model, link_placements
 from robots.poses import axis_rotation
 from robots.verification import Sample, verify
 from tests.conftest import run
+from tests.controllers.simulated_site import running
 
 pytestmark = pytest.mark.slow
 
@@ -32,17 +33,8 @@ OPERATOR = Read(Area.ROBOT_OUTPUTS, 6000, 24)
 
 @contextlib.asynccontextmanager
 async def simulator(**options):
-    ready = asyncio.get_running_loop().create_future()
-    task = asyncio.create_task(serve_snpx(SnpxSettings(**options), ready=ready.set_result))
-    await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
-    if task.done():
-        await task
-    try:
-        yield ready.result().snpx
-    finally:
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
+    async with running(serve_snpx, SnpxSettings(**options)) as ports:
+        yield ports.snpx
 
 
 class Client:

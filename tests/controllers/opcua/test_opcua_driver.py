@@ -1,6 +1,5 @@
 """OPC UA driver: told lines, and in a gateway before the simulated controller."""
 
-import asyncio
 import contextlib
 import itertools
 import math
@@ -29,6 +28,7 @@ from protocol_gateway.seam import (
 )
 from robots.joints import JointType
 from tests.conftest import free_port, run
+from tests.controllers.simulated_site import running
 from tests.protocol_gateway.gateway_site import STATE, A, gateway, refusal, until
 
 DEGREE, RADIAN, MILLIMETRE = (Unit(number_of(code), code) for code in ("DD", "C81", "MMT"))
@@ -443,17 +443,9 @@ async def controller(**settings):
     """Run a simulated controller; yield its port."""
     from controllers.opcua.simulated.service import OpcUaSimulatorSettings, serve_opcua
 
-    port = asyncio.get_running_loop().create_future()
     settings.setdefault("listen", f"127.0.0.1:{free_port()}")
-    task = asyncio.create_task(serve_opcua(OpcUaSimulatorSettings(**settings), ready=port.set_result))
-    try:
-        await asyncio.wait([task, port], return_when=asyncio.FIRST_COMPLETED)
-        if task.done():
-            await task
-        yield port.result()
-    finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
+    async with running(serve_opcua, OpcUaSimulatorSettings(**settings)) as port:
+        yield port
 
 
 def readers():

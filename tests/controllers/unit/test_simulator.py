@@ -18,6 +18,7 @@ from robomesh.errors import ListenError
 from robots.description import load
 from robots.joints import joints_of
 from tests.conftest import run
+from tests.controllers.simulated_site import running
 
 pytestmark = pytest.mark.slow
 
@@ -30,17 +31,8 @@ HOME = tuple(np.round(JOINTS.home * DEGREES, 6).tolist())
 
 @contextlib.asynccontextmanager
 async def simulator(**options):
-    ready = asyncio.get_running_loop().create_future()
-    task = asyncio.create_task(serve(Settings(robot="pt600", **options), ready=ready.set_result))
-    await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
-    if task.done():
-        await task
-    try:
-        yield int(ready.result().removeprefix("listening on 127.0.0.1:"))
-    finally:
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
+    async with running(serve, Settings(robot="pt600", **options)) as line:
+        yield int(line.removeprefix("listening on 127.0.0.1:"))
 
 
 class Client:

@@ -1,6 +1,5 @@
 """RTDE driver: stepped message by message, and in a gateway before the simulated controller."""
 
-import asyncio
 import contextlib
 import re
 import struct
@@ -40,6 +39,7 @@ from robots.description import load
 from robots.joints import JointType
 from robots.model import build_model, tool_placement
 from tests.conftest import free_port, last_value, run
+from tests.controllers.simulated_site import running
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
 from tests.protocol_gateway.wire import wire
 
@@ -313,15 +313,8 @@ async def controller(**settings):
 @contextlib.asynccontextmanager
 async def whole_controller(**settings):
     """Run a simulated controller; yield its ports: RTDE, primary, scripts, dashboard."""
-    ready = asyncio.get_running_loop().create_future()
-    task = asyncio.create_task(serve_rtde(UrSettings(**settings), ready=ready.set_result))
-    await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
-    try:
-        ports = await ready
+    async with running(serve_rtde, UrSettings(**settings)) as ports:
         yield ports.rtde, ports.primary, ports.scripts[0], ports.dashboard
-    finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
 
 
 def test_the_controllers_cartesian_position_is_that_of_its_joints(mesh, tmp_path):

@@ -15,7 +15,8 @@ from protocol_gateway.seam import Recovery
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
-from tests.controllers.universal_robots.ur_site import controller, in_control, movable, move, others, runs
+from tests.controllers.simulated_site import move
+from tests.controllers.universal_robots.ur_site import controller, in_control, movable, others, runs
 from tests.protocol_gateway.gateway_site import STATE, A, C, until
 from tests.protocol_gateway.wire import wire
 

@@ -59,6 +59,7 @@ from robots.joints import joints_of
 from robots.model import build_model, tool_placement
 from robots.poses import rotation_vector
 from tests.conftest import run
+from tests.controllers.simulated_site import running
 
 pytestmark = pytest.mark.slow
 
@@ -67,18 +68,8 @@ PUMA = load("puma560")
 
 @contextlib.asynccontextmanager
 async def simulator(**options):
-    ready = asyncio.get_running_loop().create_future()
-    settings = UrSettings(**options)
-    task = asyncio.create_task(serve_rtde(settings, ready=ready.set_result))
-    await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
-    if task.done():
-        await task
-    try:
-        yield ready.result()[:2]
-    finally:
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
+    async with running(serve_rtde, UrSettings(**options)) as ports:
+        yield ports[:2]
 
 
 @contextlib.asynccontextmanager

@@ -14,6 +14,7 @@ from protocol_gateway.seam import Report, Send, SignalsReceived
 from robots.description import load
 from robots.joints import JointType, joints_of, violations
 from tests.conftest import run
+from tests.controllers.simulated_site import running
 
 pytestmark = [
     pytest.mark.slow,
@@ -172,7 +173,6 @@ async def signals_of(address, port):
 
 @contextlib.asynccontextmanager
 async def simulator(address, *, demo=True, faults=()):
-    ready = asyncio.get_running_loop().create_future()
     settings = UrSettings(
         listen=f"{address}:30004",
         primary=f"{address}:0",
@@ -181,16 +181,8 @@ async def simulator(address, *, demo=True, faults=()):
         demo=demo,
         faults=faults,
     )
-    task = asyncio.create_task(serve_rtde(settings, ready=ready.set_result))
-    await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
-    if task.done():
-        await task
-    try:
-        yield ready.result()[:2]
-    finally:
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
+    async with running(serve_rtde, settings) as ports:
+        yield ports[:2]
 
 
 def test_ur_rtde_reads_states():

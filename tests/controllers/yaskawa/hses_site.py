@@ -1,12 +1,12 @@
 """Site with a simulated controller of Yaskawa's kind that the gateway may move."""
 
-import asyncio
 import contextlib
 from dataclasses import replace
 
 from controllers.yaskawa.simulated import service
 from controllers.yaskawa.simulated.service import HsesSettings, serve_hses, with_factors
-from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, until
+from tests.controllers.simulated_site import kept, remote, running
+from tests.protocol_gateway.gateway_site import A, gateway, until
 from tests.protocol_gateway.wire import wire
 
 # More positions a second than by default, so that tests are short.
@@ -38,17 +38,9 @@ def motions(relay):
 @contextlib.asynccontextmanager
 async def controller(monkeypatch, **settings):
     """Run a simulated controller; yield its port and its server, to look at it and to change it."""
-    servers = []
-    make = service._server
-    monkeypatch.setattr(service, "_server", lambda *given: servers.append(make(*given)) or servers[-1])
-    ready = asyncio.get_running_loop().create_future()
-    task = asyncio.create_task(serve_hses(HsesSettings(**settings), ready=ready.set_result))
-    await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
-    try:
-        yield await ready, servers[-1]
-    finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
+    servers = kept(monkeypatch, service, "_server")
+    async with running(serve_hses, HsesSettings(**settings)) as port:
+        yield port, servers[-1]
 
 
 @contextlib.asynccontextmanager
@@ -60,16 +52,8 @@ async def movable(mesh, folder, port, **robot):
 
 async def in_control(site):
     """Wait until the robot can be moved, and take control."""
-    await until(lambda: site.seen.get("controller") and site.controller.mode == STATE.REMOTE)
-    await until(lambda: site.joints)
+    await remote(site)
     await until(lambda: site.controller.capabilities.stops != site.controller.capabilities.NOT_NOW)
     # The axes of robot and base are asked for by then.
     await site.units(20)
     await site.lease(A.ACQUIRE, ttl_s=5)
-
-
-async def move(site, *offsets, **fields):
-    """Command a target by offsets from the present positions; return the target."""
-    target = [here + by for here, by in zip(site.joints, (*offsets, *[0.0] * 6), strict=False)]
-    await site.command(C.MOVE_ABSOLUTE, joint_positions=target, **fields)
-    return target

@@ -1,7 +1,5 @@
 """HSES driver: stepped question by question, and in a gateway before the simulated controller."""
 
-import asyncio
-import contextlib
 import math
 import struct
 
@@ -34,6 +32,7 @@ from protocol_gateway.seam.polling import TIMEOUT_S
 from robomesh import reason_codes as codes
 from robots.joints import JointType
 from tests.conftest import run
+from tests.controllers.simulated_site import running
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
 from tests.protocol_gateway.wire import wire
 
@@ -426,17 +425,9 @@ def test_it_refuses_codes_every_command_and_settings_of_another_model():
 # ------------------------------------------------------------------- in a gateway
 
 
-@contextlib.asynccontextmanager
-async def controller(**settings):
+def controller(**settings):
     """Run a simulated controller; yield its port."""
-    ready = asyncio.get_running_loop().create_future()
-    task = asyncio.create_task(serve_hses(HsesSettings(**settings), ready=ready.set_result))
-    await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
-    try:
-        yield await ready
-    finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
+    return running(serve_hses, HsesSettings(**settings))
 
 
 def test_a_controller_with_hses_is_shown_and_only_reads_are_sent(mesh, tmp_path):

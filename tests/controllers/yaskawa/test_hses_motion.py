@@ -16,6 +16,7 @@ from protocol_gateway.errors import GatewaySettingsError
 from robomesh.errors import RefusedError
 from robots.joints import JointType
 from tests.conftest import run
+from tests.controllers.simulated_site import move
 from tests.controllers.yaskawa.hses_site import (
     HOLD,
     HSES,
@@ -25,7 +26,6 @@ from tests.controllers.yaskawa.hses_site import (
     in_control,
     motions,
     movable,
-    move,
     written,
 )
 from tests.protocol_gateway.gateway_site import STATE, A, C, moving, refusal, resting, stopped_for, until

@@ -16,6 +16,7 @@ from robomesh.errors import ListenError
 from robots.description import load
 from robots.joints import joints_of, violations
 from tests.conftest import run
+from tests.controllers.simulated_site import running
 
 pytestmark = pytest.mark.slow
 
@@ -23,19 +24,8 @@ PUMA = load("puma560")
 POSITION, STATUS = Read(Command.POSITION, 1), Read(Command.STATUS, 1)
 
 
-@contextlib.asynccontextmanager
-async def simulator(**options):
-    ready = asyncio.get_running_loop().create_future()
-    task = asyncio.create_task(serve_hses(HsesSettings(**options), ready=ready.set_result))
-    await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
-    if task.done():
-        await task
-    try:
-        yield ready.result()
-    finally:
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
+def simulator(**options):
+    return running(serve_hses, HsesSettings(**options))
 
 
 class Client(asyncio.DatagramProtocol):
