@@ -35,10 +35,10 @@ import zenoh
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 import robomesh
-from robomesh.endpoints import client_config, router_config
-from robomesh.publisher import Publisher
+from robomesh.contract.endpoints import client_config, router_config
+from robomesh.publications.publisher import Publisher
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import SessionSettings, open_session
+from robomesh.wire.session import SessionSettings, open_session
 from tests.conftest import free_port
 
 JOINTS = ("waist", "shoulder", "elbow", "wrist", "roll")

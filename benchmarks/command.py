@@ -40,10 +40,10 @@ if __name__ == "__main__":
 
 from benchmarks.latency import free_port, process, service, summary, until_connectable
 from benchmarks.stops_beside import stops_beside
+from robomesh.contract.messages import PROTOBUF
 from robomesh.errors import NoAnswerError, RefusedError, RobomeshError
-from robomesh.messages import PROTOBUF
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session, SessionSettings, open_session
+from robomesh.wire.session import Session, SessionSettings, open_session
 
 TTL_S = 0.5
 OWED_S = 0.05

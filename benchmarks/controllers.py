@@ -39,7 +39,7 @@ from latency import free_port, process, service, summary, until_connectable
 from plant import until
 
 import robomesh
-from robomesh.endpoints import client_config
+from robomesh.contract.endpoints import client_config
 from robomesh.schemas import robomesh_pb2 as schema
 
 _PULSES = [1000.0] * 6

@@ -12,8 +12,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from robots.description import LIBRARY
-from robots.save_description import read_robot
+from robots.descriptions.description import LIBRARY
+from robots.descriptions.save_description import read_robot
 from services.console.define.store import lay_out, open_store, put
 from services.console.define.worker_pool import Limits, Workshop
 

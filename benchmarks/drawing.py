@@ -29,9 +29,9 @@ from renderer.errors import RendererError
 from renderer.opengl import open_context
 from renderer.overlay import Overlay, Row, write_over
 from renderer.scene import Part, Scene
-from robots.description import load
-from robots.glb import link_meshes
-from robots.model import build_model, link_placements
+from robots.descriptions.description import load
+from robots.descriptions.glb import link_meshes
+from robots.kinematics.model import build_model, link_placements
 
 SIZES = ((640, 360), (854, 480), (1280, 720), (1920, 1080))
 

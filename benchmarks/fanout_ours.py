@@ -22,8 +22,8 @@ if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[1])
 
 from benchmarks.fanout_parts import HEADER, ROBOTS, Ages, chosen, publish, told_when, watch_console
-from robomesh.endpoints import Tls, client_config
-from robomesh.session import SessionSettings, open_session
+from robomesh.contract.endpoints import Tls, client_config
+from robomesh.wire.session import SessionSettings, open_session
 
 JOINTS, VIDEO = "robomesh/bench/*/joints", "robomesh/bench/arm-0/video/free"
 

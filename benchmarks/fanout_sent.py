@@ -58,9 +58,9 @@ def pictures() -> Iterator[bytes]:
     from renderer.encoder import open_encoder
     from renderer.mesh import prepared as prepared_mesh
     from renderer.opengl import open_context
-    from robots.description import load
-    from robots.glb import link_meshes
-    from robots.model import build_model, link_placements
+    from robots.descriptions.description import load
+    from robots.descriptions.glb import link_meshes
+    from robots.kinematics.model import build_model, link_placements
 
     size = (1280, 720)
     description = load("pt600")

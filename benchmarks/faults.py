@@ -27,9 +27,9 @@ from typing import Any
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from latency import free_port, service, until_connectable
 
-from robomesh.keys import robot_key
+from robomesh.contract.keys import robot_key
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session, SessionSettings, open_session
+from robomesh.wire.session import Session, SessionSettings, open_session
 
 STATE = schema.ControllerState
 LONGEST_S = 20.0

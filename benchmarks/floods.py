@@ -13,7 +13,7 @@ from typing import Any
 
 import zenoh
 
-from robomesh.topics import Role
+from robomesh.contract.topics import Role
 
 ROBOT = "robomesh/bench/arm"
 MOST_TOKENS = 10_000

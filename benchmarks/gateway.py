@@ -29,9 +29,9 @@ from legacy_clients import serve_old_programs
 from plant import RATE_HZ, cpu_s, paced, rss_mib, running_controllers, running_site, until
 
 from protocol_gateway.unit_driver import UnitDriver
-from robomesh.endpoints import client_config
-from robomesh.header import unpack
-from robots.joints import JointType
+from robomesh.contract.endpoints import client_config
+from robomesh.contract.header import unpack
+from robots.kinematics.joints import JointType
 
 DEGREES = 180 / 3.141592653589793
 

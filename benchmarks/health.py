@@ -17,12 +17,12 @@ import zenoh
 from latency import free_port
 from prometheus_client import CollectorRegistry, generate_latest
 
-from robomesh.endpoints import router_config
-from robomesh.health import Served, health_of
-from robomesh.metrics import SessionMetrics
+from robomesh.contract.endpoints import router_config
+from robomesh.requests.server import Request
 from robomesh.schemas.robomesh_pb2 import LeaseAnswer
-from robomesh.server import Request
-from robomesh.session import Session, SessionSettings, open_session
+from robomesh.service.health import Served, health_of
+from robomesh.service.metrics import SessionMetrics
+from robomesh.wire.session import Session, SessionSettings, open_session
 
 _TOPICS = ("joints", "joints/slow", "controller", "raw", "lease", "events", "audit", "program")
 _REQUESTS = ("lease/request/*", "command/*", "audit/find")

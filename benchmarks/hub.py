@@ -28,8 +28,8 @@ if __name__ == "__main__":
     # Import from the root: a program in this folder has the same name as a package.
     sys.path[0] = str(Path(__file__).parents[1])
 
-from robomesh.endpoints import client_config, router_config
-from robomesh.topics import REQUESTS, TOPICS
+from robomesh.contract.endpoints import client_config, router_config
+from robomesh.contract.topics import REQUESTS, TOPICS
 from tests.conftest import free_port
 
 SERVICES = ("gateway", "kinematics", "renderer", "recorder")

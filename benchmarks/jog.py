@@ -51,8 +51,8 @@ if __name__ == "__main__":
 import robomesh
 from benchmarks.jog_wire import Proxy, UnitLog, rest_ms, until_rest
 from benchmarks.latency import service, until_connectable
-from robots.description import load
-from robots.model import build_model, tool_placement
+from robots.descriptions.description import load
+from robots.kinematics.model import build_model, tool_placement
 from tests.browser.conftest import ARGUMENTS, CHROMIUM, NO_WEBGL
 from tests.browser.hand import COVER, KINDS, SHOW_DIALOG, UNCOVER, Hand
 from tests.browser.robot_page import take

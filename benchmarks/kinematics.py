@@ -27,15 +27,15 @@ import numpy as np
 import pinocchio
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from robots.cells import CellDescription, CellRobot, Fixture
+from robots.checks.check import check_program
 from robots.collision import allowed_positions, build_cell, outside_nearest, own_contacts, own_nearest
-from robots.description import known_names, load
-from robots.inverse import InverseSolver, Task, build_solver, solve
-from robots.joints import FloatArray, violations
-from robots.model import RobotModel, all_positions, build_model, tool_jacobian, tool_placement
-from robots.poses import inverse
-from robots.programs.check import check_program
-from robots.singularity import reach_of
+from robots.collision.cells import CellDescription, CellRobot, Fixture
+from robots.descriptions.description import known_names, load
+from robots.kinematics.inverse import InverseSolver, Task, build_solver, solve
+from robots.kinematics.joints import FloatArray, violations
+from robots.kinematics.model import RobotModel, all_positions, build_model, tool_jacobian, tool_placement
+from robots.kinematics.singularity import reach_of
+from robots.schema.poses import inverse
 from services.kinematics.cell_state import CellState
 from services.kinematics.states import FramesMessage, add_proximity, kinematic_state
 from services.site_file.fixtures import Fixture as FixtureSettings

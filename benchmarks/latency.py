@@ -27,11 +27,11 @@ from typing import Any
 
 import zenoh
 
-from robomesh.endpoints import client_config
-from robomesh.session import SessionSettings, open_session
-from robomesh.subscription import Subscription
-from robots.description import load
-from robots.joints import joints_of
+from robomesh.contract.endpoints import client_config
+from robomesh.publications.subscription import Subscription
+from robomesh.wire.session import SessionSettings, open_session
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 
 RATE_HZ = 100
 # The counter is in the last joint, in steps that the protocol's text carries exactly.

@@ -13,7 +13,7 @@ import zenoh
 from latency import free_port, process, summary, until_connectable
 from plant import RATE_HZ, number_of, running_controllers, running_site, until
 
-from robomesh.endpoints import client_config
+from robomesh.contract.endpoints import client_config
 from robomesh.schemas.robomesh_pb2 import ControllerState
 
 READERS = 63

@@ -26,9 +26,9 @@ from latency import free_port, service, summary, until_connectable
 from plant import RATE_HZ, cpu_s, rss_mib, running_controllers, until
 
 from robomesh.errors import RobomeshError
+from robomesh.publications.subscription import Sample, Subscription
 from robomesh.schemas.robomesh_pb2 import CheckRequest, KinematicState
-from robomesh.session import Session, SessionSettings, open_session
-from robomesh.subscription import Sample, Subscription
+from robomesh.wire.session import Session, SessionSettings, open_session
 
 WARM_UP_S = 3.0
 PROGRAM = "repeat 3\n  move_joints 30 60 -60 20 0\n  move_joints -30 80 -40 -20 0\nend\n"

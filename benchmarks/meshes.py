@@ -21,12 +21,12 @@ from typing import Any
 
 import numpy as np
 
-from robots.meshes.mesh import Material, Mesh, Part
-from robots.meshes.normals import creased
-from robots.meshes.read import read_mesh
-from robots.meshes.three_ds.write import write_3ds
-from robots.meshes.write_glb import glb_of
-from robots.meshes.write_others import write_obj, write_ply, write_stl
+from robots.shapes.files.read import read_mesh
+from robots.shapes.files.three_ds.write import write_3ds
+from robots.shapes.files.write_glb import glb_of
+from robots.shapes.files.write_others import write_obj, write_ply, write_stl
+from robots.shapes.mesh import Material, Mesh, Part
+from robots.shapes.normals import creased
 
 VTK = {
     ".wrl": "vtkVRMLImporter",

@@ -39,17 +39,17 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from latency import free_port, service, until_connectable
 from plant import cpu_s, rss_mib
 
-from robomesh import topics
-from robomesh.endpoints import client_config
+from robomesh.contract import topics
+from robomesh.contract.endpoints import client_config
+from robomesh.contract.header import Header, pack
 from robomesh.errors import NoAnswerError
-from robomesh.header import Header, pack
 from robomesh.recordings.capture import Capture
 from robomesh.recordings.files import describe_file
 from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.recover import State, state_of
 from robomesh.recordings.reindex import index
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import SessionSettings, open_session
+from robomesh.wire.session import SessionSettings, open_session
 
 SITE = "bench"
 WITHIN_S = 60.0

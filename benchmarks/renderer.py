@@ -43,9 +43,9 @@ from renderer.glb import Surface, read_glb
 from renderer.mesh import MOST_TRIANGLES, Mesh, prepared_surfaces
 from renderer.opengl import open_context
 from renderer.scene import Part, Scene
-from robots.description import load
-from robots.glb import link_meshes
-from robots.model import build_model, link_placements
+from robots.descriptions.description import load
+from robots.descriptions.glb import link_meshes
+from robots.kinematics.model import build_model, link_placements
 
 ROBOT = "pt600"
 SIZES = {"480p": (854, 480), "720p": (1280, 720)}

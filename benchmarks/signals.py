@@ -22,13 +22,13 @@ from controllers.universal_robots import rtde_messages as rtde
 from controllers.universal_robots.driver import RTDE, RtdeDriver
 from controllers.universal_robots.simulated.controller import UrController
 from controllers.universal_robots.state import OUTPUTS
-from protocol_gateway.journal import Journal
 from protocol_gateway.link.timestamping import Received, Timestamper
 from protocol_gateway.seam import Report, SignalsReceived
-from protocol_gateway.signals import Signals
-from protocol_gateway.telemetry import Telemetry
-from robots.description import load
-from robots.joints import joints_of
+from protocol_gateway.telemetry.journal import Journal
+from protocol_gateway.telemetry.signals import Signals
+from protocol_gateway.telemetry.telemetry import Telemetry
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 
 JOINTS_AND_MODES = frozenset(
     ("timestamp", "actual_q", "actual_qd", "robot_mode", "safety_mode", "safety_status", "runtime_state")

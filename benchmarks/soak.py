@@ -37,7 +37,7 @@ if __name__ == "__main__":
 
 from benchmarks.fanout_parts import HEADER, WebSocketReader, connected
 from robomesh.schemas.robomesh_pb2 import FromPage
-from robomesh.session import Session, SessionSettings, open_session
+from robomesh.wire.session import Session, SessionSettings, open_session
 from tests.conftest import free_port
 
 SITE = "soak"

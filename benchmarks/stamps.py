@@ -38,7 +38,7 @@ if __name__ == "__main__":
 
 from benchmarks.soak import ROBOMESH, SITE, Ports, site_file, up
 from robomesh.schemas.robomesh_pb2 import RecorderRequest, Recording
-from robomesh.session import Session, SessionSettings, open_session
+from robomesh.wire.session import Session, SessionSettings, open_session
 from tests.conftest import free_port
 
 RECORDED = "arm-0"

@@ -33,7 +33,7 @@ from typing import Any
 import zenoh
 from latency import free_port
 
-from robomesh.endpoints import client_config
+from robomesh.contract.endpoints import client_config
 from services.command_line.site.services import SERVICES
 
 SITE = """site = "bench"

@@ -43,9 +43,9 @@ if __name__ == "__main__":
 from benchmarks import floods
 from benchmarks.floods import FLOODS
 from benchmarks.latency import process, service, until_connectable
+from robomesh.contract.topics import Role
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import SessionSettings, open_session
-from robomesh.topics import Role
+from robomesh.wire.session import SessionSettings, open_session
 from services.pki import Folder, authority
 from tests.conftest import free_port
 
@@ -333,7 +333,7 @@ def plain_client(where: Site, pipe: Any) -> None:
 
 def our_client(where: Site, pipe: Any) -> None:
     """Send stops as the command line does."""
-    from robomesh.endpoints import bundle
+    from robomesh.contract.endpoints import bundle
 
     async def main() -> None:
         tls = None if where.keys is None else bundle(where.keys.person(HONEST))

@@ -31,10 +31,10 @@ import zenoh
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from renderer import service
-from robomesh.endpoints import router_config
-from robomesh.quotas import DEFAULT_QUOTAS
+from robomesh.contract.endpoints import router_config
+from robomesh.contract.quotas import DEFAULT_QUOTAS
 from robomesh.schemas.robomesh_pb2 import View, ViewAnswer, ViewRequest
-from robomesh.session import Session, SessionSettings, open_session
+from robomesh.wire.session import Session, SessionSettings, open_session
 from services import kinematics
 from tests.cells import single_arm
 from tests.conftest import free_port

@@ -32,9 +32,9 @@ from playwright.async_api import async_playwright
 from websockets.asyncio.client import connect
 
 from robomesh.schemas.robomesh_pb2 import FromPage, ToPage
-from robomesh.session import SessionSettings, open_session
-from robots.description import load
-from robots.joints import joints_of
+from robomesh.wire.session import SessionSettings, open_session
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 from web import build_page
 
 RATE_HZ = 100

@@ -22,26 +22,26 @@ import time
 from collections.abc import AsyncIterator, Collection, Mapping
 from dataclasses import dataclass
 
-from protocol_gateway.audit.entry import Entry, Outcome
+from protocol_gateway.authority.entries import MESH, entry_of
+from protocol_gateway.authority.entry import Entry, Outcome
 from protocol_gateway.checking.cell_occupancy import CellOccupancy
 from protocol_gateway.checking.checker import Checker
-from protocol_gateway.control.entries import MESH, entry_of
-from protocol_gateway.errors import AuditError, CheckError
 from protocol_gateway.robot import Robot
+from protocol_gateway.seam.errors import AuditError, CheckError
 from protocol_gateway.settings import CellFile
 from robomesh import reason_codes as codes
+from robomesh.contract.keys import ROOT, robot_key
+from robomesh.contract.messages import reason_message
+from robomesh.contract.quotas import Quota
+from robomesh.contract.topics import Role, check_operator
 from robomesh.errors import MessageError, RefusedError, RobomeshError
-from robomesh.keys import ROOT, robot_key
-from robomesh.messages import reason_message
-from robomesh.publisher import Publisher
-from robomesh.quotas import Quota
+from robomesh.publications.publisher import Publisher
 from robomesh.reasons import Reason
+from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Request
-from robomesh.session import Session
 from robomesh.texts import one_line
-from robomesh.topics import Role, check_operator
-from robots.cells import CellDescription
+from robomesh.wire.session import Session
+from robots.collision.cells import CellDescription
 
 log = logging.getLogger(__name__)
 

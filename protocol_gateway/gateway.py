@@ -14,12 +14,12 @@ from protocol_gateway.checking.policy import Policy
 from protocol_gateway.link.metrics import measure_links
 from protocol_gateway.robot import Robot
 from protocol_gateway.settings import RobotSettings, Settings, check
-from protocol_gateway.signals import measure_signals
+from protocol_gateway.telemetry.signals import measure_signals
 from robomesh import reason_codes as codes
-from robomesh.loop_turns import turns_of
-from robomesh.quotas import Quota
+from robomesh.contract.quotas import Quota
 from robomesh.schemas.robomesh_pb2 import Event
-from robomesh.session import Session
+from robomesh.service.loop_turns import turns_of
+from robomesh.wire.session import Session
 
 __all__ = ["RobotSettings", "Settings", "serve"]
 

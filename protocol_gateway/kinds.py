@@ -13,8 +13,8 @@ from importlib.metadata import EntryPoint, distribution, entry_points
 from inspect import signature
 from typing import Any, Literal, TypeVar, cast
 
-from protocol_gateway.errors import GatewaySettingsError, ProtocolGatewayError
 from protocol_gateway.seam import Capabilities, ControllerCommand, Driver, Effects
+from protocol_gateway.seam.errors import GatewaySettingsError, ProtocolGatewayError
 from protocol_gateway.seam.kind import DriverMaker, Kind, named
 from protocol_gateway.seam.table import Table
 

@@ -7,22 +7,22 @@ from functools import partial
 
 from google.protobuf.message import Message
 
-from protocol_gateway.audit.entry import Entry, Outcome
-from protocol_gateway.clocks import read_clocks
+from protocol_gateway.authority.entries import MESH, entry_of
+from protocol_gateway.authority.entry import Entry, Outcome
+from protocol_gateway.control.clocks import read_clocks
 from protocol_gateway.control.control import Control
 from protocol_gateway.control.deadlines import set_deadline
-from protocol_gateway.control.entries import MESH, entry_of
 from protocol_gateway.control.jog import Jogs
 from protocol_gateway.control.program import Programs
-from protocol_gateway.text_limits import LONGEST_SENTENCE, LONGEST_TEXT
+from protocol_gateway.seam.text_limits import LONGEST_SENTENCE, LONGEST_TEXT
 from robomesh import reason_codes as codes
+from robomesh.contract.topics import check_operator
 from robomesh.errors import KeyNameError, RefusedError
 from robomesh.reasons import Reason
+from robomesh.requests.server import Answerer, Handler, Request
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Answerer, Handler, Request
-from robomesh.session import Session
 from robomesh.texts import one_line
-from robomesh.topics import check_operator
+from robomesh.wire.session import Session
 
 # Request names in the audit log where the request itself could not be read.
 _LEASE, _COMMAND, _JOG = "LEASE", "COMMAND", "JOG_KEEP_ALIVE"

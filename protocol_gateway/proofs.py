@@ -9,10 +9,10 @@ from datetime import date
 from protocol_gateway.seam import Capabilities, Stop
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
-from robots.description import RobotDescription
-from robots.kinematic_tree import tree_of
-from robots.verification import joints_sha256
-from robots.verification_record import VerificationRecord
+from robots.descriptions.description import RobotDescription
+from robots.kinematics.kinematic_tree import tree_of
+from robots.kinematics.verification import joints_sha256
+from robots.kinematics.verification_record import VerificationRecord
 
 
 @dataclass(frozen=True, kw_only=True)

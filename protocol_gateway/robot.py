@@ -10,26 +10,24 @@ from functools import partial
 from pathlib import Path
 
 from protocol_gateway import set_up_file
-from protocol_gateway.audit.entry import audit_entry
 from protocol_gateway.audit.log import AuditLog, Entry
 from protocol_gateway.audit.persisted_state import ROTATE
 from protocol_gateway.audit.search import Query, SearchServer, find
+from protocol_gateway.authority import events
+from protocol_gateway.authority.entry import audit_entry
 from protocol_gateway.authority.lease_rules import Authority
 from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.authority.robot_authority import HEED_TIMEOUT_S, RobotAuthority
 from protocol_gateway.checking.cell_occupancy import CellOccupancy
 from protocol_gateway.checking.checker import Checker
 from protocol_gateway.checking.policy import Policy
-from protocol_gateway.clocks import read_clocks
-from protocol_gateway.control import events
 from protocol_gateway.control.audit_trail import AuditTrail
 from protocol_gateway.control.checks import Checks
+from protocol_gateway.control.clocks import read_clocks
 from protocol_gateway.control.control import Control, Ports
 from protocol_gateway.control.jog import Jogs
 from protocol_gateway.control.program import Programs
-from protocol_gateway.control.robot_authority import HEED_TIMEOUT_S, RobotAuthority
 from protocol_gateway.core.codes import code_table
-from protocol_gateway.errors import GatewaySettingsError
-from protocol_gateway.journal import Journal
 from protocol_gateway.kinds import driver_maker
 from protocol_gateway.legacy.clients import LegacyClients
 from protocol_gateway.link.link import (
@@ -44,20 +42,22 @@ from protocol_gateway.link.status import transition_events
 from protocol_gateway.mesh_requests import MeshRequests
 from protocol_gateway.proofs import Proofs
 from protocol_gateway.seam import Activity, Carries, Channel
+from protocol_gateway.seam.errors import GatewaySettingsError
 from protocol_gateway.settings import RobotSettings
-from protocol_gateway.signals import Signals
-from protocol_gateway.state_messages import controller_state, lease_state, timestamp
-from protocol_gateway.telemetry import Telemetry
-from protocol_gateway.watchdog import SLOW_STALE_S, STALE_S
+from protocol_gateway.telemetry.journal import Journal
+from protocol_gateway.telemetry.signals import Signals
+from protocol_gateway.telemetry.state_messages import controller_state, lease_state, timestamp
+from protocol_gateway.telemetry.telemetry import Telemetry
+from protocol_gateway.telemetry.watchdog import SLOW_STALE_S, STALE_S
 from robomesh import reason_codes as codes
-from robomesh.keys import presence_key
-from robomesh.publisher import LIST_LENGTH, Publisher
+from robomesh.contract.keys import presence_key
+from robomesh.contract.topics import Role
+from robomesh.publications.publisher import LIST_LENGTH, Publisher
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
-from robomesh.topics import Role
-from robots.description import load
-from robots.joints import joints_of
+from robomesh.wire.session import Session
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 
 log = logging.getLogger(__name__)
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from protocol_gateway.seam import SignalValue
-from robomesh.atomic_write import write_atomically
+from robomesh.files.atomic_write import write_atomically
 
 LONGEST_FILE = 65_536
 log = logging.getLogger(__name__)

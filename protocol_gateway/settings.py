@@ -9,19 +9,19 @@ import numpy as np
 
 from protocol_gateway.audit.log import ROTATE_BYTES
 from protocol_gateway.checking.policy import Policy
-from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.kinds import is_known, protocols
 from protocol_gateway.legacy.settings import LegacySettings
 from protocol_gateway.proofs import StopProof
 from protocol_gateway.seam import Recovery
-from robomesh.keys import check_name
-from robomesh.quotas import DEFAULT_QUOTAS, Quotas
+from protocol_gateway.seam.errors import GatewaySettingsError
+from robomesh.contract.keys import check_name
+from robomesh.contract.quotas import DEFAULT_QUOTAS, Quotas
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.cells import CellDescription, CellRobot
+from robots.collision.cells import CellDescription, CellRobot
+from robots.kinematics.verification_record import VerificationRecord
 from robots.programs.jog_steps import MOST_M_S
-from robots.schema import Model
-from robots.verification_record import VerificationRecord
+from robots.schema.robot_toml import Model
 
 _KNOWN_UNKNOWNS = frozenset({"mode", "homed"})
 

@@ -26,7 +26,6 @@ from protocol_gateway.core.records import (
 )
 from protocol_gateway.core.scales import si_scales
 from protocol_gateway.core.stream import Malformed, Unit, UnitStream, printable
-from protocol_gateway.errors import CommandError, UnitFormatError
 from protocol_gateway.seam import (
     ALL,
     COMMANDS,
@@ -55,9 +54,10 @@ from protocol_gateway.seam import (
     Trace,
     UnknownReceived,
 )
+from protocol_gateway.seam.errors import CommandError, UnitFormatError
 from robomesh import reason_codes as codes
 from robomesh.texts import one_line
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 
 UNITS = Channel(name="units", carries=ALL)
 """The one connection, which carries everything."""

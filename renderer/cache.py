@@ -11,7 +11,7 @@ import numpy as np
 
 from renderer import mesh as mesh_module
 from renderer.mesh import Mesh, prepared
-from robomesh.atomic_write import open_atomically, write_atomically
+from robomesh.files.atomic_write import open_atomically, write_atomically
 
 # Incremented with each change of the preparation of meshes.
 _VERSION = 8

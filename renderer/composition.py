@@ -25,7 +25,7 @@ from renderer.robot_state import (
 from renderer.scene import Scene
 from renderer.scene_assembly import Placed, scene_of
 from renderer.views import camera_from, camera_of
-from robomesh.keys import CLOSE
+from robomesh.contract.keys import CLOSE
 from robomesh.schemas.robomesh_pb2 import ViewRequest
 
 FloatArray = NDArray[np.float64]

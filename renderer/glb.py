@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from renderer.errors import GlbError
 from robomesh import bounded_json
-from robots.meshes.mesh import Y_UP_TO_Z_UP
+from robots.shapes.mesh import Y_UP_TO_Z_UP
 
 _MAGIC = 0x46546C67
 _JSON_CHUNK = 0x4E4F534A

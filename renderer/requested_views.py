@@ -11,7 +11,7 @@ from renderer.appearance import Appearance
 from renderer.errors import UnknownViewError, ViewRequestError
 from renderer.views import camera_from, camera_of, view_names
 from robomesh import reason_codes as codes
-from robomesh.keys import FAR
+from robomesh.contract.keys import FAR
 from robomesh.schemas.robomesh_pb2 import View, ViewRequest
 
 IMAGE_HZ = 5.0

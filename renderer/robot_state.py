@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from renderer.appearance import Appearance, home_placements
 from renderer.clearance_line import ClearanceLine, line_of, same_line
 from renderer.overlay import Overlay, Row
-from robomesh.activity import activity_words
-from robomesh.enum_names import enum_word
+from robomesh.contract.activity import activity_words
+from robomesh.contract.enum_names import enum_word
+from robomesh.contract.topics import stale_after_s
 from robomesh.schemas.robomesh_pb2 import ControllerState, Description, KinematicState
-from robomesh.topics import stale_after_s
 
 FloatArray = NDArray[np.float64]
 

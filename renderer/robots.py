@@ -16,11 +16,11 @@ from renderer.appearance import appearance_of, mesh_name
 from renderer.cache import store_glb, stored_glb
 from renderer.errors import RendererError
 from renderer.robot_state import Ages, RobotState
+from robomesh.contract.keys import ROOT, is_replay, robot_key
 from robomesh.errors import MessageError, RobomeshError
-from robomesh.keys import ROOT, is_replay, robot_key
+from robomesh.publications.subscription import Sample, Subscription
 from robomesh.schemas.robomesh_pb2 import ControllerState, Description, KinematicState
-from robomesh.session import Session
-from robomesh.subscription import Sample, Subscription
+from robomesh.wire.session import Session
 
 log = logging.getLogger(__name__)
 

@@ -28,12 +28,12 @@ from renderer.studio import Drawn, Studio, open_thread
 from renderer.view_budget import ViewBudget
 from renderer.views import camera_of, view_names
 from robomesh import reason_codes as codes
+from robomesh.contract.keys import CLOSE, FAR, FREE, WHOLE_SITE
+from robomesh.contract.quotas import DEFAULT_QUOTAS, Quota, Quotas
 from robomesh.errors import RefusedError
-from robomesh.keys import CLOSE, FAR, FREE, WHOLE_SITE
-from robomesh.quotas import DEFAULT_QUOTAS, Quota, Quotas
+from robomesh.requests.server import Answerer, Request
 from robomesh.schemas.robomesh_pb2 import Event, KeyFrameAnswer, ViewAnswer, ViewRequest
-from robomesh.server import Answerer, Request
-from robomesh.session import Session
+from robomesh.wire.session import Session
 
 log = logging.getLogger(__name__)
 

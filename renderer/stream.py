@@ -20,7 +20,7 @@ from renderer.post_processing import EncodedPicture, PictureJob
 from renderer.requested_views import IMAGE_HZ, ViewSpec
 from renderer.robot_state import Ages, RobotState
 from renderer.studio import Drawn
-from robomesh.session import Session
+from robomesh.wire.session import Session
 
 log = logging.getLogger(__name__)
 

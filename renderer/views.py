@@ -12,7 +12,7 @@ from renderer.appearance import Appearance, frame_placements, home_placements
 from renderer.cameras import FIELD_OF_VIEW, Camera, fitted
 from renderer.errors import CameraError, UnknownViewError
 from robomesh import reason_codes as codes
-from robomesh.keys import CLOSE, FREE
+from robomesh.contract.keys import CLOSE, FREE
 from robomesh.schemas.robomesh_pb2 import Vector3, View
 
 FloatArray = NDArray[np.float64]

@@ -69,7 +69,7 @@ class KeyNameError(CodedError):
 
 
 class UnknownTopicError(CodedError):
-    """A topic that is not in the table of `robomesh.topics`."""
+    """A topic that is not in the table of `robomesh.contract.topics`."""
 
 
 class MessageError(CodedError):

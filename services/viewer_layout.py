@@ -5,7 +5,7 @@ Its topics have the same names on the live mesh and in recordings.
 
 from typing import Any
 
-from robomesh.keys import robot_key
+from robomesh.contract.keys import robot_key
 from robomesh.schemas.robomesh_pb2 import Description
 
 Json = dict[str, Any]

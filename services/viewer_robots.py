@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from renderer.appearance import floor_of
 from robomesh.schemas.robomesh_pb2 import Description
-from robots.urdf.viewers import Fixture, Viewed
+from robots.descriptions.urdf.viewers import Fixture, Viewed
 
 # Of a fixture without a colour, as on the page.
 _FIXTURE_COLOR = "#6f7c88"

@@ -19,9 +19,9 @@ import zenoh
 from google.protobuf.message import Message
 from hypothesis import HealthCheck, settings
 
-from robomesh.endpoints import router_config
-from robomesh.publisher import Publisher
-from robomesh.session import Session, SessionSettings
+from robomesh.contract.endpoints import router_config
+from robomesh.publications.publisher import Publisher
+from robomesh.wire.session import Session, SessionSettings
 from tests.distribution import place
 
 T = TypeVar("T")
@@ -160,7 +160,7 @@ def _no_process(event: str, arguments: object) -> None:
     if not _in_quick_test or event not in ("subprocess.Popen", "os.fork", "os.posix_spawn"):
         return
     # Outcomes of a pair study are cached, so that only the first test needs a process.
-    if "robots.collision.pair_study" not in str(arguments):
+    if "robots.bodies.pair_study" not in str(arguments):
         raise AssertionError("this test starts a process: mark it `slow`")
 
 

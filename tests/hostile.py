@@ -14,9 +14,9 @@ import zenoh
 from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.message import Message
 
-from robomesh.endpoints import client_config
-from robomesh.header import Header, pack
-from robomesh.topics import TOPICS
+from robomesh.contract.endpoints import client_config
+from robomesh.contract.header import Header, pack
+from robomesh.contract.topics import TOPICS
 
 # A title, a cleared screen, a question that a terminal answers as its keyboard, a colour that no command has,
 # C1 controls, direction, zero width, forged lines, rich's markup.
@@ -199,8 +199,8 @@ def _topic_keys(site: str) -> dict[str, Any]:
 
 
 def _request_of(key: str) -> Any:
+    from robomesh.contract.topics import request
     from robomesh.errors import RobomeshError
-    from robomesh.topics import request
 
     try:
         return request(key.split("/", 3)[3])

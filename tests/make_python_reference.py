@@ -14,7 +14,7 @@ if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[1])
 
 import robomesh
-from robomesh.endpoints import DEFAULT_ROUTER
+from robomesh.contract.endpoints import DEFAULT_ROUTER
 
 FILE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "python.md"
 

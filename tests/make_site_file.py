@@ -18,8 +18,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from robomesh import quotas
-from robots.schema import Pose
+from robomesh.contract import quotas
+from robots.schema.robot_toml import Pose
 from services.site_file.quotas import Quotas
 from services.site_file.site import Site
 

@@ -6,13 +6,13 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[1])
 
-from robomesh.topics import REQUESTS, TOPICS, History
+from robomesh.contract.topics import REQUESTS, TOPICS, History
 
 FILE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "topics.md"
 
 _HEAD = """# Topics and requests
 
-Generated from `robomesh/topics.py` by `tests/make_topics.py`; do not edit.
+Generated from `robomesh/contract/topics.py` by `tests/make_topics.py`; do not edit.
 
 A key is `robomesh/<site>/<robot>/<name>`; topics of a whole site have `-` as the robot. The schemas are in
 `robomesh/schemas/robomesh.proto`; those that begin with `foxglove.` are Foxglove's.

@@ -15,14 +15,14 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 from mcap_protobuf.schema import register_schema
 
-from robomesh.header import Header
+from robomesh.contract.header import Header
+from robomesh.contract.topics import topic
 from robomesh.recordings.capture import Capture
 from robomesh.recordings.reindex import index
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.topics import topic
-from robots.description import load
-from robots.glb import link_meshes
-from robots.urdf.write import to_urdf
+from robots.descriptions.description import load
+from robots.descriptions.glb import link_meshes
+from robots.descriptions.urdf.write import to_urdf
 from services.kinematics.descriptions import describe
 
 START_NS = 1_700_000_000_000_000_000

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from robomesh.session import SessionSettings
+from robomesh.wire.session import SessionSettings
 from tests import warm
 from tests.conftest import free_port
 

@@ -74,7 +74,9 @@ def test_a_bundle_holds_the_project_the_built_page_and_the_packages(unpacked):
     assert wheels == {PACKAGE, INSTALLER.replace("-", "_")}
 
 
-@pytest.mark.parametrize("name", [".bundle/*.whl", "robomesh/topics.py", "services/console/page/index.html"])
+@pytest.mark.parametrize(
+    "name", [".bundle/*.whl", "robomesh/contract/topics.py", "services/console/page/index.html"]
+)
 def test_a_damaged_or_missing_file_is_named_before_the_first_installation(unpacked, name):
     path = next(iter(unpacked.glob(name)))
     content = bytearray(path.read_bytes())

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from controllers.probing import Probe
-from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.kinds import kind_of, own_kinds, part_of
+from protocol_gateway.seam.errors import GatewaySettingsError
 from protocol_gateway.seam.simulated import Simulated
 
 ROOT = Path(__file__).parents[1]

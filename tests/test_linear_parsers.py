@@ -25,21 +25,22 @@ from controllers.opcua import facts
 from controllers.opcua.driver import OPCUA, OpcUaDriver
 from controllers.universal_robots import dashboard, packages, primary, rtde_messages
 from controllers.yaskawa import hses
-from protocol_gateway.audit.entry import chain_link, parse_line
+from protocol_gateway.authority.entry import chain_link, parse_line
 from protocol_gateway.core.grammar import type_code
 from protocol_gateway.core.records import read_number, speed_percent
 from protocol_gateway.core.stream import Unit, UnitStream
+from protocol_gateway.driver_parts import pendant_text, signal_names
 from protocol_gateway.legacy.requests import requests_of
-from protocol_gateway.seam import pendant_text, signal_names
-from robomesh import keys, messages, reasons, texts
-from robomesh.topics import REQUESTS
-from robots.bounded_toml import check_bounds, parse_toml
-from robots.description import load
-from robots.joints import JointType, joints_of
-from robots.meshes.declared_size import _named
-from robots.meshes.vrml.lexer import Kind, Lexer
-from robots.meshes.vrml.source import Source
+from robomesh import reasons, texts
+from robomesh.contract import keys, messages
+from robomesh.contract.topics import REQUESTS
+from robots.descriptions.description import load
+from robots.kinematics.joints import JointType, joints_of
 from robots.programs.text import parse_program
+from robots.schema.bounded_toml import check_bounds, parse_toml
+from robots.shapes.files.declared_size import _named
+from robots.shapes.files.vrml.lexer import Kind, Lexer
+from robots.shapes.files.vrml.source import Source
 
 pytestmark = pytest.mark.slow
 

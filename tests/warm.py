@@ -25,8 +25,8 @@ _LOADED = (
     "services.command_line.main",
     "services.command_line.commands",
     "services.site_file.site",
-    "robomesh.session",
-    "robomesh.messages",
+    "robomesh.wire.session",
+    "robomesh.contract.messages",
     "numpy",
     "zenoh",
 )

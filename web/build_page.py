@@ -170,7 +170,7 @@ def reasons_of_kinds() -> str:
 def _schema_files() -> list[Any]:
     """Return descriptors of the schema files of topics and requests."""
     with _importable():
-        from robomesh import topics
+        from robomesh.contract import topics
         from robomesh.schemas import robomesh_pb2
     return [robomesh_pb2.DESCRIPTOR, *(row.schema.DESCRIPTOR.file for row in topics.TOPICS.values())]
 

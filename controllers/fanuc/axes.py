@@ -9,7 +9,7 @@ value is the angle of the forearm to the horizontal, so it changes when axis 2 m
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -17,8 +17,8 @@ import numpy as np
 from controllers.fanuc.assignments import Table
 from controllers.fanuc.data import AXES
 from controllers.fanuc.srtp import Area
-from protocol_gateway.errors import GatewaySettingsError
-from robots.joints import FloatArray, JointType
+from protocol_gateway.seam.errors import GatewaySettingsError
+from robots.kinematics.joints import FloatArray, JointType
 
 _SIGNALS = re.compile(r"(DI|DO|RI|RO|UI|UO)\[([1-9]\d{0,3})(?:-([1-9]\d{0,3}))?\]")
 MOST_SIGNALS = 128
@@ -192,3 +192,17 @@ class Axes:
             found[axis] = float(value)
         found[2] -= self._j23 * found[1]
         return tuple(found)
+
+
+def with_defaults(declared: FanucSettings | None, joint_types: tuple[JointType, ...]) -> FanucSettings:
+    """Return the settings of a simulated controller: as declared, and what the site file leaves open.
+
+    It keeps a table of assignments for each connection, and axis 3 contains axis 2 if both turn.
+    """
+    settings = declared or FanucSettings()
+    if settings.assignments is None:
+        settings = replace(settings, assignments="own")
+    if settings.j23 is None:
+        turn = all(each is JointType.ROTARY for each in joint_types)
+        settings = replace(settings, j23=1 if turn else 0)
+    return settings

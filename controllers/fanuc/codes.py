@@ -1,6 +1,6 @@
 """Reasons that only this kind has: code, sentence, advice, and both in Chinese for the page."""
 
-from protocol_gateway.seam import motion_codes as shared
+from protocol_gateway.driver_parts import motion_codes as shared
 from robomesh.reasons import Code
 
 _of_kind = shared.of_kind("fanuc")

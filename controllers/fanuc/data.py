@@ -5,7 +5,7 @@ import re
 from dataclasses import dataclass
 from struct import Struct
 
-from protocol_gateway.seam.pendant_text import text
+from protocol_gateway.driver_parts.pendant_text import text
 
 AXES = 9
 POSITION = Struct("<9f8h9f6h")

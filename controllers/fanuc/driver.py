@@ -27,6 +27,10 @@ from controllers.fanuc.srtp import (
     Question,
     Read,
 )
+from protocol_gateway.driver_parts.only_reads import check_no_type_codes
+from protocol_gateway.driver_parts.pendant_text import text
+from protocol_gateway.driver_parts.polling import Asked, Polling, Regular
+from protocol_gateway.driver_parts.polling_reader import PollingReader, malformed
 from protocol_gateway.seam import (
     Activity,
     AlarmReceived,
@@ -46,12 +50,8 @@ from protocol_gateway.seam import (
     StatusReceived,
     homed_by_nature,
 )
-from protocol_gateway.seam.only_reads import check_no_type_codes
-from protocol_gateway.seam.pendant_text import text
-from protocol_gateway.seam.polling import Asked, Polling, Regular
-from protocol_gateway.seam.polling_reader import PollingReader, malformed
 from robomesh import reason_codes
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 
 # Port 60008 or 18245 of a controller.
 SNPX = Channel(name="snpx", carries=Carries.READING)

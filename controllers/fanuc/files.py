@@ -19,7 +19,7 @@ from typing import Generic, TypeAlias, TypeVar
 
 from controllers.fanuc.axes import SignalBits
 from controllers.fanuc.data import AXES, Cartesian
-from protocol_gateway.seam.pendant_text import text as pendant_text
+from protocol_gateway.driver_parts.pendant_text import text as pendant_text
 
 LONGEST_FILE, LONGEST_LINE = 2**20, 2048
 """Most bytes of a file, and of a line in it."""

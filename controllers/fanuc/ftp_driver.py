@@ -19,7 +19,8 @@ from controllers.fanuc.data import Alarm
 from controllers.fanuc.driver import alarm_of
 from controllers.fanuc.files import FilePosition, ListedAlarm, Reading, Steps
 from controllers.fanuc.ftp import File, Reply, ReplyStream
-from protocol_gateway.errors import GatewaySettingsError
+from protocol_gateway.driver_parts.only_reads import OnlyReads, check_no_type_codes
+from protocol_gateway.driver_parts.polling import Polling, Regular
 from protocol_gateway.seam import (
     NOTHING,
     AxesUndeclared,
@@ -38,12 +39,11 @@ from protocol_gateway.seam import (
     SetTimer,
     SoftwareReceived,
 )
-from protocol_gateway.seam.only_reads import OnlyReads, check_no_type_codes
-from protocol_gateway.seam.polling import Polling, Regular
-from protocol_gateway.secret_file import read_password
+from protocol_gateway.seam.errors import GatewaySettingsError
+from protocol_gateway.seam.secret_file import read_password
 from robomesh import reason_codes
 from robomesh.texts import one_line
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 
 FTP = Channel(name="ftp", carries=Carries.READING)
 FILE = Channel(name="file", carries=NOTHING, brief=True)

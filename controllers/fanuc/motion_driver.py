@@ -32,7 +32,10 @@ from controllers.fanuc.driver import SNPX, SnpxDriver
 from controllers.fanuc.rmi import Answer, LineStream
 from controllers.fanuc.srtp import Answer as Packet
 from controllers.fanuc.srtp import Question
-from protocol_gateway.errors import GatewaySettingsError, NotReadyError
+from protocol_gateway.driver_parts.hexadecimal import hexadecimal
+from protocol_gateway.driver_parts.one_motion import FIRST_PERCENT, OneMotion, Phase, prepared
+from protocol_gateway.driver_parts.polling import Asked
+from protocol_gateway.driver_parts.rest import Rest
 from protocol_gateway.seam import (
     NOTHING,
     Activity,
@@ -62,13 +65,10 @@ from protocol_gateway.seam import (
     Stop,
     StopEnds,
 )
-from protocol_gateway.seam.hexadecimal import hexadecimal
-from protocol_gateway.seam.one_motion import FIRST_PERCENT, OneMotion, Phase, prepared
-from protocol_gateway.seam.polling import Asked
-from protocol_gateway.seam.rest import Rest
+from protocol_gateway.seam.errors import GatewaySettingsError, NotReadyError
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 
 RMI = Channel(name="rmi", carries=NOTHING)
 SESSION = Channel(name="rmi_session", carries=Carries.MOTION | Carries.STOP)

@@ -12,7 +12,7 @@ from enum import StrEnum
 from typing import Any
 
 from controllers.fanuc.data import AXES
-from protocol_gateway.errors import CommandError
+from protocol_gateway.seam.errors import CommandError
 from robomesh import bounded_json
 
 PORT = 16001

@@ -14,9 +14,9 @@ from controllers.fanuc.assignments import (
 )
 from controllers.fanuc.axes import SignalBits
 from controllers.fanuc.data import Cartesian
+from protocol_gateway.driver_parts.signal_names import numbered, of_axes
 from protocol_gateway.seam import Signal, SignalsReceived, SignalValue
-from protocol_gateway.seam.signal_names import numbered, of_axes
-from robots.poses import rotation_vector, rpy_rotation
+from robots.schema.poses import rotation_vector, rpy_rotation
 
 
 class Operator(IntEnum):

@@ -12,11 +12,11 @@ from controllers.fanuc.assignments import (
     MOST_REGISTERS,
     MOST_TOOLS,
 )
-from controllers.fanuc.axes import ANONYMOUS, FanucSettings, signal_bits
+from controllers.fanuc.axes import ANONYMOUS, FanucSettings, signal_bits, with_defaults
 from controllers.fanuc.data import AXES
-from protocol_gateway.errors import GatewaySettingsError
+from protocol_gateway.seam.errors import GatewaySettingsError
 from protocol_gateway.seam.table import Declared, Table
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 
 _FTP = "fanuc-ftp"
 # Positions a second, unless the site file says otherwise.
@@ -101,8 +101,6 @@ class Fanuc(Table):
 
     def simulated_options(self, robot: Declared, joint_types: Sequence[JointType]) -> FanucSettings:
         """Return the driver's settings, with what a simulated controller adds."""
-        from controllers.fanuc.simulated.service import with_defaults
-
         return with_defaults(self.options(robot), tuple(joint_types))
 
     def options(self, robot: Declared) -> FanucSettings:

@@ -9,6 +9,6 @@ OPCUA = Kind(
     extra="opcua",
     packages=("asyncua",),
     certificate="controllers.opcua.certificate:make_own",
-    probe="controllers.opcua.probe:OPCUA",
+    probe="controllers.opcua.reader.probe:OPCUA",
     simulated="controllers.opcua.simulated.start:OPCUA",
 )

@@ -9,9 +9,9 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import NamedTuple
 
-from robomesh.atomic_write import write_atomically
 from robomesh.errors import RobomeshError
 from robomesh.extras import missing
+from robomesh.files.atomic_write import write_atomically
 
 # The largest that every policy from Basic256Sha256 on takes, and that old controllers can compute with.
 _BITS = 2048

@@ -17,6 +17,7 @@ from controllers.opcua.joints import (
     check_declared,
 )
 from controllers.opcua.settings import OpcUaSettings, to_text
+from protocol_gateway.driver_parts.only_reads import OnlyReads, check_no_type_codes
 from protocol_gateway.seam import (
     Activity,
     AlarmReceived,
@@ -36,9 +37,8 @@ from protocol_gateway.seam import (
     SoftwareReceived,
     StatusReceived,
 )
-from protocol_gateway.seam.only_reads import OnlyReads, check_no_type_codes
 from robomesh.texts import one_line
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 
 OPCUA = Channel(name="opcua", carries=Carries.READING, program="controllers.opcua.reader.process")
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from controllers.opcua.facts import POSITION, SPEED, Found, Item, Reading, order_of
 from controllers.opcua.settings import OpcUaJoint
 from controllers.opcua.units import BY_NUMBER, Unit, number_of, scale_of
-from protocol_gateway.errors import GatewaySettingsError
-from robots.joints import JointType
+from protocol_gateway.seam.errors import GatewaySettingsError
+from robots.kinematics.joints import JointType
 
 _UNITS = {"deg": "DD", "rad": "C81", "mm": "MMT", "m": "MTR"}
 _LINEAR_PROFILES, _ROTARY_PROFILES = (3, 4), (1, 2)

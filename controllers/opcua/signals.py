@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from controllers.opcua.facts import DECLARED, MOTOR, Item, Value
 from controllers.opcua.settings import OpcUaSignal
 from controllers.opcua.units import scale_of
+from protocol_gateway.driver_parts.signal_names import unit_of
 from protocol_gateway.seam import Signal
-from protocol_gateway.seam.signal_names import unit_of
 
 JOINTS = Signal("opcua.joints")
 """Text: `shown`, or why the joints are unknown."""

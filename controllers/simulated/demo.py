@@ -11,9 +11,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from robots.description import RobotDescription
-from robots.joints import FloatArray, Joints, joints_of, violations
-from robots.motion import ArmState, Motion
+from robots.descriptions.description import RobotDescription
+from robots.kinematics.joints import FloatArray, Joints, joints_of, violations
+from robots.kinematics.motion import ArmState, Motion
 
 _Reachable: TypeAlias = Callable[[FloatArray, FloatArray], bool]
 
@@ -103,7 +103,11 @@ class DemoProgram:
 
 def demo_tour(description: RobotDescription) -> Iterator[FloatArray]:
     """Return an endless iterator of targets (n,) [rad] or [m]; the tour begins and ends at home."""
-    from robots.model import build_model, link_placements, tool_placement  # takes 0.4 s, only for a demo
+    from robots.kinematics.model import (  # takes 0.4 s, only for a demo
+        build_model,
+        link_placements,
+        tool_placement,
+    )
 
     joints = joints_of(description)
     model = build_model(description)

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from controllers.simulated.errors import FaultError
 from controllers.simulated.faults import Faults
 from robomesh import reason_codes as codes
+from robomesh.contract.topics import Role
 from robomesh.errors import RefusedError
-from robomesh.health import Served, present
+from robomesh.requests.server import Request
 from robomesh.schemas.robomesh_pb2 import FaultAnswer, FaultRequest
-from robomesh.server import Request
-from robomesh.session import SessionSettings, open_session
-from robomesh.topics import Role
+from robomesh.service.health import Served, present
+from robomesh.wire.session import SessionSettings, open_session
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,7 +28,7 @@ from controllers.universal_robots.rtde_reader import Failed, Ready, RtdeReader
 from controllers.universal_robots.settings import UniversalRobotsSettings
 from controllers.universal_robots.signals import SignalReports
 from controllers.universal_robots.state import OUTPUTS, ControllerState
-from protocol_gateway.errors import GatewaySettingsError
+from protocol_gateway.driver_parts.only_reads import OnlyReads, check_no_type_codes
 from protocol_gateway.seam import (
     NOTHING,
     Activity,
@@ -51,8 +51,8 @@ from protocol_gateway.seam import (
     StatusReceived,
     homed_by_nature,
 )
-from protocol_gateway.seam.only_reads import OnlyReads, check_no_type_codes
-from robots.joints import JointType
+from protocol_gateway.seam.errors import GatewaySettingsError
+from robots.kinematics.joints import JointType
 
 RTDE = Channel(name="rtde", carries=Carries.READING)
 PRIMARY = Channel(name="primary", carries=NOTHING)

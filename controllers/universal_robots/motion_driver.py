@@ -39,7 +39,8 @@ from controllers.universal_robots.rtde_messages import ControllerVersion
 from controllers.universal_robots.rtde_reader import RtdeReader
 from controllers.universal_robots.settings import UniversalRobotsSettings
 from controllers.universal_robots.state import ControllerState
-from protocol_gateway.errors import NotReadyError
+from protocol_gateway.driver_parts.one_motion import FIRST_PERCENT, OneMotion, Phase, prepared
+from protocol_gateway.driver_parts.rest import Rest
 from protocol_gateway.seam import (
     AlarmReceived,
     Capabilities,
@@ -66,11 +67,10 @@ from protocol_gateway.seam import (
     Stop,
     StopEnds,
 )
-from protocol_gateway.seam.one_motion import FIRST_PERCENT, OneMotion, Phase, prepared
-from protocol_gateway.seam.rest import Rest
+from protocol_gateway.seam.errors import NotReadyError
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 
 DASHBOARD = Channel(name="dashboard", carries=Carries.STOP)
 INPUTS = Channel(name="inputs", carries=Carries.MOTION)

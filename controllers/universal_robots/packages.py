@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from protocol_gateway.seam.hexadecimal import hexadecimal
+from protocol_gateway.driver_parts.hexadecimal import hexadecimal
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ from controllers.universal_robots.packages import (
     Package,
     PackageStream,
 )
-from protocol_gateway.seam.hexadecimal import hexadecimal
+from protocol_gateway.driver_parts.hexadecimal import hexadecimal
 from robomesh.texts import one_line
 
 ROBOT_MESSAGE = 20

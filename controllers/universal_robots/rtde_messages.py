@@ -28,7 +28,7 @@ from controllers.universal_robots.packages import (
     Package,
     PackageStream,
 )
-from protocol_gateway.seam.hexadecimal import hexadecimal
+from protocol_gateway.driver_parts.hexadecimal import hexadecimal
 from robomesh.texts import one_line
 
 # A recipe of all fields that robomesh reads takes less than 1 KiB. A header could announce 65,535 bytes, for

@@ -13,8 +13,8 @@ from controllers.universal_robots.modes import (
     name_of,
 )
 from controllers.universal_robots.state import ControllerState
+from protocol_gateway.driver_parts.signal_names import numbered, of_axes, of_joints, of_placement
 from protocol_gateway.seam import Signal, SignalsReceived, SignalValue
-from protocol_gateway.seam.signal_names import numbered, of_axes, of_joints, of_placement
 
 JOINTS = 6
 EACH_S = 0.1

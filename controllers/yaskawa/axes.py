@@ -9,14 +9,16 @@ axes are coupled by gears, depends on the robot's type, and the controller does 
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from protocol_gateway.errors import GatewaySettingsError
-from robots.joints import FloatArray, JointType
+from protocol_gateway.seam.errors import GatewaySettingsError
+from robots.kinematics.joints import FloatArray, JointType
 
 MOST_AXES = 8
+# Of a simulated controller.
+_PULSES_PER_DEGREE = 1000.0
 # Before the number in a control group's name: first instance, and number of groups.
 _GROUPS = {"R": (1, 8), "B": (11, 8), "S": (21, 24)}
 _WORST_CONDITION = 1e9
@@ -147,3 +149,11 @@ class Axes:
         for axis, value in zip(self.used, exact, strict=True):
             found[axis] = round(value)
         return tuple(found)
+
+
+def with_factors(declared: YaskawaSettings | None, joints: int) -> YaskawaSettings:
+    """Return the settings of a simulated controller: as declared, with its own factors if there are none."""
+    settings = declared or YaskawaSettings()
+    if settings.pulses_per_degree:
+        return settings
+    return replace(settings, pulses_per_degree=(_PULSES_PER_DEGREE,) * joints)

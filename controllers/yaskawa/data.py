@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from struct import Struct
 
-from protocol_gateway.seam.pendant_text import text
+from protocol_gateway.driver_parts.pendant_text import text
 
 _FEWEST_AXES, _MOST_AXES = 6, 8
 _WORDS = {count: Struct(f"<{count}i") for count in range(_FEWEST_AXES, _MOST_AXES + 1)}

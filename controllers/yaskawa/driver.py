@@ -12,6 +12,10 @@ from controllers.yaskawa import signals
 from controllers.yaskawa.axes import Axes, YaskawaSettings, instance_of
 from controllers.yaskawa.data import HELD, Alarm, DataType, Position, Status, Status1, Status2
 from controllers.yaskawa.hses import Answer, Command, Read, Service, decode
+from protocol_gateway.driver_parts.only_reads import check_no_type_codes
+from protocol_gateway.driver_parts.polling import Polling, Regular
+from protocol_gateway.driver_parts.polling_reader import PollingReader, malformed
+from protocol_gateway.driver_parts.signal_names import of_joints
 from protocol_gateway.seam import (
     Activity,
     AlarmReceived,
@@ -27,13 +31,9 @@ from protocol_gateway.seam import (
     StatusReceived,
     homed_by_nature,
 )
-from protocol_gateway.seam.only_reads import check_no_type_codes
-from protocol_gateway.seam.polling import Polling, Regular
-from protocol_gateway.seam.polling_reader import PollingReader, malformed
-from protocol_gateway.seam.signal_names import of_joints
 from robomesh import reason_codes
 from robomesh.reasons import Reason
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 
 # Port 10040 of a controller.
 HSES = Channel(name="hses", carries=Carries.READING, datagrams=True)

@@ -30,7 +30,9 @@ from controllers.yaskawa.axes import YaskawaSettings, instance_of
 from controllers.yaskawa.data import HELD, Position, Status, Status1, Status2
 from controllers.yaskawa.driver import HSES, STATUS, HsesDriver, mode_of
 from controllers.yaskawa.hses import Answer, Read, decode
-from protocol_gateway.errors import GatewaySettingsError, NotReadyError
+from protocol_gateway.driver_parts.one_motion import FIRST_PERCENT, OneMotion, Phase, prepared
+from protocol_gateway.driver_parts.polling import Polling, Regular
+from protocol_gateway.driver_parts.rest import Rest, near
 from protocol_gateway.seam import (
     Activity,
     AlarmReceived,
@@ -59,12 +61,10 @@ from protocol_gateway.seam import (
     Stop,
     StopEnds,
 )
-from protocol_gateway.seam.one_motion import FIRST_PERCENT, OneMotion, Phase, prepared
-from protocol_gateway.seam.polling import Polling, Regular
-from protocol_gateway.seam.rest import Rest, near
+from protocol_gateway.seam.errors import GatewaySettingsError, NotReadyError
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 
 STOP = Channel(name="stop", carries=Carries.STOP, datagrams=True)
 MOTION = Channel(name="motion", carries=Carries.MOTION, datagrams=True)

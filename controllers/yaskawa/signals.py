@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from math import radians
 
 from controllers.yaskawa.data import HELD, Job, Position, Status, Status1, Status2
+from protocol_gateway.driver_parts.signal_names import numbered, of_placement
 from protocol_gateway.seam import Signal, SignalsReceived, SignalValue
-from protocol_gateway.seam.signal_names import numbered, of_placement
-from robots.poses import rotation_vector, rpy_rotation
+from robots.schema.poses import rotation_vector, rpy_rotation
 
 _SERVO = Signal("robot.servo")
 _MODE = Signal("robot.mode")

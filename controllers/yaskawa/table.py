@@ -5,10 +5,10 @@ from typing import Annotated, TypeAlias
 
 from pydantic import BaseModel, Field, StrictBool, field_validator
 
-from controllers.yaskawa.axes import MOST_AXES, Coupling, YaskawaSettings, instance_of
-from protocol_gateway.errors import GatewaySettingsError
+from controllers.yaskawa.axes import MOST_AXES, Coupling, YaskawaSettings, instance_of, with_factors
+from protocol_gateway.seam.errors import GatewaySettingsError
 from protocol_gateway.seam.table import PART_CONFIG, Declared, Table
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 
 _Axis: TypeAlias = Annotated[int, Field(ge=1, le=MOST_AXES, strict=True)]
 
@@ -76,8 +76,6 @@ class Yaskawa(Table):
 
     def simulated_options(self, robot: Declared, joint_types: Sequence[JointType]) -> YaskawaSettings:
         """Return the driver's settings, with the factors of a simulated controller."""
-        from controllers.yaskawa.simulated.service import with_factors
-
         return with_factors(self.options(robot), len(joint_types))
 
     def options(self, robot: Declared) -> YaskawaSettings:

@@ -11,7 +11,6 @@ docs/controllers/own-driver.md explains each method.
 import json
 from collections.abc import Callable, Hashable, Mapping, Sequence
 
-from protocol_gateway.errors import CommandError, GatewaySettingsError
 from protocol_gateway.seam import (
     ALL,
     Activity,
@@ -33,7 +32,8 @@ from protocol_gateway.seam import (
     StatusReceived,
     Stop,
 )
-from robots.joints import JointType
+from protocol_gateway.seam.errors import CommandError, GatewaySettingsError
+from robots.kinematics.joints import JointType
 
 LINES = Channel(name="lines", carries=ALL)
 LONGEST_LINE = 65_536

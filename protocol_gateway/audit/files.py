@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from protocol_gateway.audit.entry import NO_PREVIOUS, ChainLink, Entry, chain_link, parse_line
 from protocol_gateway.audit.persisted_state import starts_file
-from protocol_gateway.errors import AuditError
+from protocol_gateway.authority.entry import NO_PREVIOUS, ChainLink, Entry, chain_link, parse_line
+from protocol_gateway.seam.errors import AuditError
 
 # Longer than every entry: a file with one endless line must not fill the reader's memory.
 LONGEST_LINE = 1 << 20

@@ -13,8 +13,8 @@ changes nothing.
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from protocol_gateway.audit.entry import Entry, Outcome
-from protocol_gateway.text_limits import LONGEST_SENTENCE
+from protocol_gateway.authority.entry import Entry, Outcome
+from protocol_gateway.seam.text_limits import LONGEST_SENTENCE
 from robomesh import reason_codes as codes
 from robomesh.texts import one_line
 

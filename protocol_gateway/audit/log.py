@@ -23,8 +23,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from protocol_gateway.audit.entry import Entry, Outcome, chain_entry
 from protocol_gateway.audit.files import Verification, older_parts, part_name, read_entries, verify
+from protocol_gateway.audit.latch_file import LatchFile, disk_problem
 from protocol_gateway.audit.persisted_state import (
     LATCH_UNKNOWN,
     ROTATE,
@@ -36,8 +36,8 @@ from protocol_gateway.audit.persisted_state import (
     with_latched_stop,
 )
 from protocol_gateway.audit.recovery import Recovery, find_end
-from protocol_gateway.errors import AuditError
-from protocol_gateway.latch_file import LatchFile, disk_problem
+from protocol_gateway.authority.entry import GATEWAY, Entry, Outcome, chain_entry
+from protocol_gateway.seam.errors import AuditError
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 
@@ -48,7 +48,6 @@ log = logging.getLogger(__name__)
 ROTATE_BYTES = 16 << 20
 # Most entries that wait in memory while the disk fails; refusals may use only half of it.
 MOST_PENDING = 1000
-GATEWAY = "gateway"
 
 
 @dataclass(frozen=True)

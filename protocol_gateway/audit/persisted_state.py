@@ -10,9 +10,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from protocol_gateway.audit.entry import Entry, Outcome
+from protocol_gateway.audit.latch_file import LatchState
+from protocol_gateway.authority.entry import Entry, Outcome
 from protocol_gateway.authority.lease_rules import Authority, Stop
-from protocol_gateway.latch_file import LatchState
 
 ROTATE = "ROTATE"
 UNKNOWN = "audit log damaged: whether a stop was latched is not known"

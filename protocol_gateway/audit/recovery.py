@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
-from protocol_gateway.audit.entry import NO_PREVIOUS, chain_link, parse_line
 from protocol_gateway.audit.files import first_number, lines_of, older_parts
 from protocol_gateway.audit.persisted_state import (
     EMPTY,
@@ -24,7 +23,8 @@ from protocol_gateway.audit.persisted_state import (
     may_change_stop,
     starts_file,
 )
-from protocol_gateway.errors import AuditError
+from protocol_gateway.authority.entry import NO_PREVIOUS, chain_link, parse_line
+from protocol_gateway.seam.errors import AuditError
 
 # Quotes within texts are escaped, so no text matches.
 _REQUEST = re.compile(rb'"request":"[A-Z_]+"')

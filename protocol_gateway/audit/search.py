@@ -9,14 +9,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from protocol_gateway.audit.entry import Entry, Outcome, audit_entry, parse_line
 from protocol_gateway.audit.files import lines_of, open_files
-from protocol_gateway.errors import AuditError
+from protocol_gateway.authority.entry import Entry, Outcome, audit_entry, parse_line
+from protocol_gateway.seam.errors import AuditError
 from robomesh import reason_codes as codes
-from robomesh.enum_names import enum_name
+from robomesh.contract.enum_names import enum_name
 from robomesh.errors import RefusedError
+from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Request
 from robomesh.texts import one_line
 
 MOST = 10_000

@@ -29,7 +29,7 @@ from protocol_gateway.authority.lease_rules import (
     why_not_holder,
 )
 from robomesh import reason_codes as codes
-from robomesh.enum_names import enum_name
+from robomesh.contract.enum_names import enum_name
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest
 

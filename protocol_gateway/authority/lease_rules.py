@@ -32,7 +32,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from robomesh import reason_codes as codes
-from robomesh.enum_names import enum_name
+from robomesh.contract.enum_names import enum_name
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from robomesh.texts import one_line

@@ -41,11 +41,11 @@ from protocol_gateway.seam import (
     Trace,
 )
 from robomesh import reason_codes as codes
-from robomesh.enum_names import enum_name
+from robomesh.contract.enum_names import enum_name
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest
 from robomesh.schemas.robomesh_pb2 import Recover as RecoverMessage
-from robots.joints import Joints, violations
+from robots.kinematics.joints import Joints, violations
 
 _C = CommandRequest.Command
 _MOVES = frozenset({_C.MOVE_ABSOLUTE, _C.MOVE_RELATIVE})

@@ -19,12 +19,12 @@ from protocol_gateway.checking.worker_messages import (
     Prepared,
     ReplaceCells,
 )
-from protocol_gateway.errors import CheckError
+from protocol_gateway.seam.errors import CheckError
 from robomesh import reason_codes as codes
+from robomesh.files.worker import Worker, WorkerError
 from robomesh.reasons import Reason
-from robomesh.worker import Worker, WorkerError
-from robots.cells import CellDescription
-from robots.errors import RobotError, reason_of
+from robots.collision.cells import CellDescription
+from robots.schema.errors import RobotError, reason_of
 
 log = logging.getLogger(__name__)
 

@@ -18,13 +18,13 @@ from protocol_gateway.checking.worker_messages import (
     ReplaceCells,
 )
 from robomesh import reason_codes as codes
+from robomesh.files.worker import answer_all
 from robomesh.reasons import Reason
-from robomesh.worker import answer_all
+from robots.checks.check import check_plan, check_program
+from robots.checks.jog import next_part
 from robots.collision import Cell, build_cell, missing_meshes, pending, unshaped, unshaped_moving
-from robots.inverse import InverseSolver, build_solver
-from robots.joints import FloatArray, doubtful_limits
-from robots.programs.check import check_plan, check_program
-from robots.programs.jog import next_part
+from robots.kinematics.inverse import InverseSolver, build_solver
+from robots.kinematics.joints import FloatArray, doubtful_limits
 from robots.programs.steps import CheckResult, Step, StepKind, Violation, ViolationKind
 
 # A program with these violations is not planned to its end, so it must not run.

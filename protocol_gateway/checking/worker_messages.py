@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from robomesh.reasons import Reason
-from robots.cells import CellDescription
+from robots.collision.cells import CellDescription
 from robots.programs.jog_steps import Jog
 from robots.programs.steps import Step
 
@@ -67,7 +67,7 @@ class CheckProgram:
 
 @dataclass(frozen=True, kw_only=True)
 class ExtendJog:
-    """Request to plan and check the next part of a jog; see `robots.programs.jog.next_part`.
+    """Request to plan and check the next part of a jog; see `robots.checks.jog.next_part`.
 
     Attributes:
         origin, measured, last: Joint positions [rad] or [m].

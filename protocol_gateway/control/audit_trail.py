@@ -8,8 +8,8 @@ from dataclasses import replace
 from protocol_gateway.audit.flood_counter import STOP, FloodCounter
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome
 from protocol_gateway.authority.admission import LONGEST_WAIT_S
-from protocol_gateway.errors import AuditError
-from protocol_gateway.journal import Journal
+from protocol_gateway.seam.errors import AuditError
+from protocol_gateway.telemetry.journal import Journal
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import Event
 

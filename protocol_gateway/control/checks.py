@@ -16,8 +16,10 @@ from contextlib import AbstractAsyncContextManager
 from dataclasses import replace
 
 from protocol_gateway.authority.admission import LONGEST_WAIT_S, time_left_s
+from protocol_gateway.authority.effects import Finding
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, not_sent, refused
 from protocol_gateway.authority.preconditions import Controller, predicted, target_of
+from protocol_gateway.authority.robot_authority import RobotAuthority
 from protocol_gateway.checking.cell_occupancy import CellOccupancy, Occupancy
 from protocol_gateway.checking.checker import SHARE_OF_DEADLINE, Checker
 from protocol_gateway.checking.policy import Policy
@@ -29,16 +31,14 @@ from protocol_gateway.checking.worker_messages import (
     ExtendJog,
     Positions,
 )
-from protocol_gateway.clocks import read_clocks
-from protocol_gateway.control.effects import Finding
-from protocol_gateway.control.robot_authority import RobotAuthority
-from protocol_gateway.errors import CheckError
-from protocol_gateway.motion import has_arrived
+from protocol_gateway.control.clocks import read_clocks
+from protocol_gateway.link.motion import has_arrived
 from protocol_gateway.seam import Activity
+from protocol_gateway.seam.errors import CheckError
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest
-from robots.joints import Joints
+from robots.kinematics.joints import Joints
 from robots.programs.jog_steps import Jog
 
 _C = CommandRequest.Command

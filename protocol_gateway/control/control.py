@@ -14,25 +14,25 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from protocol_gateway.audit.latch_file import LatchFile
+from protocol_gateway.authority import effects, entries, events
 from protocol_gateway.authority.admission import Verdict, admit_all, wait_refusal
+from protocol_gateway.authority.effects import Finding, Program, Seen
+from protocol_gateway.authority.entries import PROGRAM, page_values
+from protocol_gateway.authority.evaluation import RunningProgram
 from protocol_gateway.authority.lease_rules import Answer, Authority
 from protocol_gateway.authority.preconditions import Controller
-from protocol_gateway.clocks import read_clocks
-from protocol_gateway.control import effects, entries, events
+from protocol_gateway.authority.robot_authority import RobotAuthority
 from protocol_gateway.control.audit_trail import AuditTrail
 from protocol_gateway.control.checks import Checks
+from protocol_gateway.control.clocks import read_clocks
 from protocol_gateway.control.deadlines import Arrivals
-from protocol_gateway.control.effects import Finding, Program, Seen
-from protocol_gateway.control.entries import PROGRAM, page_values
-from protocol_gateway.control.evaluation import RunningProgram
-from protocol_gateway.control.robot_authority import RobotAuthority
-from protocol_gateway.errors import AuditError, LinkError
-from protocol_gateway.journal import Journal
-from protocol_gateway.latch_file import LatchFile
-from protocol_gateway.state_messages import lease_answer
+from protocol_gateway.seam.errors import AuditError, LinkError
+from protocol_gateway.telemetry.journal import Journal
+from protocol_gateway.telemetry.state_messages import lease_answer
 from robomesh import reason_codes as codes
+from robomesh.contract.messages import reason_message
 from robomesh.errors import RefusedError
-from robomesh.messages import reason_message
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
 

@@ -13,8 +13,8 @@ from math import inf
 
 from protocol_gateway.authority.admission import LONGEST_WAIT_S, deadline_refusal, longest_deadline_s
 from protocol_gateway.authority.lease_rules import Now
+from robomesh.requests.server import Request
 from robomesh.schemas.robomesh_pb2 import CommandRequest
-from robomesh.server import Request
 
 # Default timeout of a robomesh client.
 DEFAULT_TIMEOUT_S = 2.0

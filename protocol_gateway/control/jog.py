@@ -20,24 +20,24 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from protocol_gateway.authority import lease_rules
+from protocol_gateway.authority.effects import Finding, Program
+from protocol_gateway.authority.events import JogEnded, JogEnding, JogHeld, JogPartReady, StopRequested
 from protocol_gateway.authority.lease_rules import not_sent, why_not_holder
 from protocol_gateway.authority.preconditions import Controller
 from protocol_gateway.checking.worker_messages import Extended, Positions
 from protocol_gateway.control.abort import abort_reason
 from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.control import Control, command_answer, refusal
-from protocol_gateway.control.effects import Finding, Program
-from protocol_gateway.control.events import JogEnded, JogEnding, JogHeld, JogPartReady, StopRequested
-from protocol_gateway.errors import CheckError
-from protocol_gateway.journal import Journal
 from protocol_gateway.seam import Activity
+from protocol_gateway.seam.errors import CheckError
+from protocol_gateway.telemetry.journal import Journal
 from robomesh import reason_codes as codes
-from robomesh.enum_names import enum_word
+from robomesh.contract.enum_names import enum_word
+from robomesh.contract.messages import reason_message
 from robomesh.errors import RefusedError
-from robomesh.messages import reason_message
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.joints import Joints
+from robots.kinematics.joints import Joints
 from robots.programs.jog_steps import MOST_M_S, MOST_RAD_S, Jog
 from robots.programs.statements import StepFrame
 

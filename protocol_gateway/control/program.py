@@ -17,22 +17,22 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from protocol_gateway.authority.admission import time_left_s
+from protocol_gateway.authority.effects import Program
+from protocol_gateway.authority.events import ProgramEnded
 from protocol_gateway.authority.lease_rules import Answer, refused
 from protocol_gateway.authority.preconditions import Controller
 from protocol_gateway.checking.worker_messages import Checked
-from protocol_gateway.clocks import read_clocks
 from protocol_gateway.control.abort import abort_reason
 from protocol_gateway.control.checks import Checks
+from protocol_gateway.control.clocks import read_clocks
 from protocol_gateway.control.control import Control, command_answer, refusal
-from protocol_gateway.control.effects import Program
-from protocol_gateway.control.events import ProgramEnded
-from protocol_gateway.errors import CheckError
-from protocol_gateway.journal import Journal
 from protocol_gateway.seam import Activity
-from protocol_gateway.state_messages import timestamp
-from protocol_gateway.text_limits import LONGEST_TEXT
+from protocol_gateway.seam.errors import CheckError
+from protocol_gateway.seam.text_limits import LONGEST_TEXT
+from protocol_gateway.telemetry.journal import Journal
+from protocol_gateway.telemetry.state_messages import timestamp
 from robomesh import reason_codes as codes
-from robomesh.messages import reason_message
+from robomesh.contract.messages import reason_message
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.texts import one_line

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from protocol_gateway.core.grammar import plain_text
-from protocol_gateway.errors import CodeTableError
+from protocol_gateway.seam.errors import CodeTableError
 
 COMMAND = "COMMAND"
 ABSOLUTE = "ABSOLUTE.DEG"

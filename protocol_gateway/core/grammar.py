@@ -15,7 +15,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from protocol_gateway.errors import UnitError, UnitFormatError
+from protocol_gateway.seam.errors import UnitError, UnitFormatError
 
 TERMINATOR = b"@"
 BLANKS = " \t\r\n"

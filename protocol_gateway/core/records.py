@@ -22,7 +22,7 @@ from typing import TypeAlias
 from protocol_gateway.core import codes
 from protocol_gateway.core.codes import CodeTable, Meaning
 from protocol_gateway.core.grammar import RawRecord, format_unit, parse_unit, plain_text, type_code
-from protocol_gateway.errors import UnitError, UnitFormatError
+from protocol_gateway.seam.errors import UnitError, UnitFormatError
 
 # Some controllers send "- 67.10", with a blank after the sign (Chen et al. 2001, section 4).
 # The pattern is unambiguous, so that it rejects a long invalid text in linear time.

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 
 
 def si_scales(joint_types: Sequence[JointType]) -> tuple[float, ...]:

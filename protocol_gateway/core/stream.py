@@ -15,7 +15,7 @@ from protocol_gateway.core.codes import CodeTable
 from protocol_gateway.core.grammar import TERMINATOR
 from protocol_gateway.core.plain import plain_readers, read_plain
 from protocol_gateway.core.records import Record, read_records
-from protocol_gateway.errors import UnitError
+from protocol_gateway.seam.errors import UnitError
 
 LONGEST_UNIT_BYTES = 64 * 1024
 """Most bytes of a unit, including its "@"."""

@@ -15,4 +15,4 @@ warnings.warn(
 )
 sys.modules[f"{__name__}.driver"] = seam
 for _name in ("hexadecimal", "one_motion", "only_reads", "pendant_text", "polling", "signal_names"):
-    sys.modules[f"{__name__}.{_name}"] = import_module(f"protocol_gateway.seam.{_name}")
+    sys.modules[f"{__name__}.{_name}"] = import_module(f"protocol_gateway.driver_parts.{_name}")

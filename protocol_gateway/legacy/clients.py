@@ -14,13 +14,12 @@ import asyncio
 import time
 from collections.abc import Callable
 
-from protocol_gateway.audit.entry import Entry, Outcome
+from protocol_gateway.authority.entries import entry_of
+from protocol_gateway.authority.entry import Entry, Outcome
 from protocol_gateway.control.control import Control
-from protocol_gateway.control.entries import entry_of
 from protocol_gateway.core.codes import CodeTable
 from protocol_gateway.core.records import Error, write_unit
 from protocol_gateway.core.stream import Malformed, StreamEvent, Unit, printable
-from protocol_gateway.journal import Journal
 from protocol_gateway.legacy.commander import Commander
 from protocol_gateway.legacy.requests import (
     FAULT,
@@ -32,11 +31,12 @@ from protocol_gateway.legacy.requests import (
 )
 from protocol_gateway.legacy.settings import LegacySettings, plain_address
 from protocol_gateway.serving.client import Client
+from protocol_gateway.telemetry.journal import Journal
 from robomesh import reason_codes as codes
-from robomesh.health import listen_when_possible
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
-from robots.joints import Joints
+from robomesh.service.health import listen_when_possible
+from robomesh.wire.session import Session
+from robots.kinematics.joints import Joints
 
 _S = schema.Event.Severity
 # Most rejected clients that get an ERROR before they are closed; further ones are closed without it.

@@ -21,11 +21,11 @@ from protocol_gateway.core.records import (
     speed_percent,
 )
 from protocol_gateway.core.scales import si_scales
-from protocol_gateway.errors import UnitError
 from protocol_gateway.seam import Recovery
+from protocol_gateway.seam.errors import UnitError
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest
-from robots.joints import Joints
+from robots.kinematics.joints import Joints
 
 TOO_MANY, MALFORMED, UNKNOWN_WORD, JOINT_COUNT, LIMIT, LOCAL_MODE, READ_ONLY, STOPPED, FAULT = range(1, 10)
 _NUMBERS = {

@@ -10,10 +10,10 @@ import math
 import random
 from typing import Protocol
 
-from protocol_gateway.errors import LinkDownError
 from protocol_gateway.link.connection import Connection, Datagrams, reason_of
 from protocol_gateway.link.program import ProgramError, ProgramOutput
 from protocol_gateway.seam import Channel
+from protocol_gateway.seam.errors import LinkDownError
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 

@@ -8,8 +8,8 @@ import struct
 from collections.abc import Callable
 from typing import Any, Self, cast
 
-from protocol_gateway.errors import LinkCloggedError, LinkDownError
-from protocol_gateway.sockets import configure
+from protocol_gateway.seam.errors import LinkCloggedError, LinkDownError
+from protocol_gateway.serving.sockets import configure
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 

@@ -22,7 +22,6 @@ from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from operator import attrgetter
 
-from protocol_gateway.errors import LinkDownError, LinkError
 from protocol_gateway.link.channel import KeptChannel
 from protocol_gateway.link.connection import READ_BYTES
 from protocol_gateway.link.flood import EventDispatcher, FloodDetector
@@ -53,11 +52,12 @@ from protocol_gateway.seam import (
     StopEnds,
     UnknownReceived,
 )
+from protocol_gateway.seam.errors import LinkDownError, LinkError
 from robomesh import reason_codes as codes
-from robomesh.loop_turns import LoopTurns, turns_of
+from robomesh.publications.wall_clock import WallClock
 from robomesh.reasons import Reason
-from robomesh.wall_clock import WallClock
-from robots.joints import Joints
+from robomesh.service.loop_turns import LoopTurns, turns_of
+from robots.kinematics.joints import Joints
 
 __all__ = [
     "ControllerLink",

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 from protocol_gateway.link.link import ControllerLink, LinkState
-from robomesh.session import Session
+from robomesh.wire.session import Session
 
 
 def measure_links(session: Session, links: Mapping[str, ControllerLink]) -> None:

@@ -21,7 +21,7 @@ from sys import float_info
 from protocol_gateway.seam import Activity, StatusReceived
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
-from robots.joints import Joints, JointType, position_text
+from robots.kinematics.joints import Joints, JointType, position_text
 
 _MARGINS = {JointType.ROTARY: radians(20.0), JointType.PRISMATIC: 0.1}
 _UNHOMED_MARGINS = {JointType.ROTARY: 2 * pi, JointType.PRISMATIC: 1.0}

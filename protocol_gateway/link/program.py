@@ -12,8 +12,8 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Self, cast
 
-from protocol_gateway.errors import LinkDownError
 from protocol_gateway.link.connection import READ_BYTES
+from protocol_gateway.seam.errors import LinkDownError
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.texts import one_line

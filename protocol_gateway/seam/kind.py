@@ -7,7 +7,7 @@ from typing import Protocol, cast
 
 from protocol_gateway.seam.protocol import Driver
 from protocol_gateway.seam.table import Table
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 
 
 class DriverMaker(Protocol):

@@ -15,7 +15,7 @@ from typing import Protocol
 from protocol_gateway.core.codes import CodeTable
 from protocol_gateway.core.stream import StreamEvent, UnitStream
 from protocol_gateway.serving.rate_limit import Budget, Limits
-from protocol_gateway.sockets import configure
+from protocol_gateway.serving.sockets import configure
 
 # Small: the server must notice a client that does not read, instead of filling its buffer with old states.
 _SEND_BUFFER_BYTES = 16 * 1024

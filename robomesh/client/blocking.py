@@ -22,7 +22,7 @@ from robomesh.client.recording_source import DiskSource
 from robomesh.client.robot import AsyncRobot, CheckResult, InverseResult, Matrix
 from robomesh.client.samples import Alarm, Event, JointState, Sample, SignalState
 from robomesh.client.streams import AsyncStream, OnStale, Stream
-from robomesh.endpoints import DEFAULT_ROUTER
+from robomesh.contract.endpoints import DEFAULT_ROUTER
 from robomesh.errors import ForkedError, SessionError
 from robomesh.schemas import robomesh_pb2 as schema
 

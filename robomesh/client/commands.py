@@ -5,11 +5,11 @@ from collections.abc import Callable, Iterable, Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 
+from robomesh.contract.keys import robot_key
 from robomesh.errors import MessageError
-from robomesh.keys import robot_key
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
 from robomesh.texts import one_line
+from robomesh.wire.session import Session
 
 # The services' limits are lower; a longer text is lost on its way to them.
 _LONGEST_PROGRAM = 1 << 20

@@ -6,10 +6,10 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 
-from robomesh.certificate_identity import Identity, read_identity
-from robomesh.endpoints import DEFAULT_ROUTER, bundle
+from robomesh.contract.certificate_identity import Identity, read_identity
+from robomesh.contract.endpoints import DEFAULT_ROUTER, bundle
 from robomesh.errors import NoAnswerError, SessionError
-from robomesh.session import Session, SessionSettings, open_session
+from robomesh.wire.session import Session, SessionSettings, open_session
 
 # A router that has just started does not know itself yet.
 _STARTING_S, _POLL_S = 1.0, 0.1

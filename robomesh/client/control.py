@@ -24,12 +24,12 @@ from robomesh.client.commands import (
     request_stop,
 )
 from robomesh.client.motion_reports import MotionReports
+from robomesh.contract.keys import robot_key
 from robomesh.errors import BusyError, MessageError, MotionError, NoAnswerError, RefusedError, RobomeshError
-from robomesh.keys import robot_key
-from robomesh.presence import OPERATOR, session_of
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
 from robomesh.texts import one_line
+from robomesh.wire.presence import OPERATOR, session_of
+from robomesh.wire.session import Session
 
 T = TypeVar("T")
 log = logging.getLogger(__name__)

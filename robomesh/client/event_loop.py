@@ -12,7 +12,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, TypeVar
 
 from robomesh.errors import RobomeshError, SessionError
-from robomesh.forked import check_owner
+from robomesh.files.forked import check_owner
 
 T = TypeVar("T")
 

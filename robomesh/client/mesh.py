@@ -14,12 +14,12 @@ from robomesh.client.recording_source import MeshSource
 from robomesh.client.robot import AsyncRobot, events_of
 from robomesh.client.samples import Alarm, Event, alarm_of
 from robomesh.client.streams import AsyncStream
-from robomesh.endpoints import DEFAULT_ROUTER
+from robomesh.contract.endpoints import DEFAULT_ROUTER
+from robomesh.contract.keys import ROOT, WHOLE_SITE, PresenceKey
 from robomesh.errors import RobomeshError, SessionError
-from robomesh.keys import ROOT, WHOLE_SITE, PresenceKey
-from robomesh.last_values import last_values
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
+from robomesh.wire.last_values import last_values
+from robomesh.wire.session import Session
 
 _Change = schema.RecordingRequest
 

@@ -5,13 +5,13 @@ import time
 from collections.abc import Callable
 
 from robomesh import reason_codes as codes
+from robomesh.contract.keys import robot_key
+from robomesh.contract.messages import received_reason
 from robomesh.errors import MotionError, NoAnswerError
-from robomesh.keys import robot_key
-from robomesh.messages import received_reason
+from robomesh.publications.subscription import Sample, Subscription
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
-from robomesh.subscription import Sample, Subscription
+from robomesh.wire.session import Session
 
 # The gateway publishes `lease` and `program` each second.
 _SILENCE_S = 5.0

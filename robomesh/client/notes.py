@@ -8,10 +8,10 @@ from google.protobuf.timestamp_pb2 import Timestamp
 
 from robomesh import reason_codes as codes
 from robomesh.client.samples import utc
+from robomesh.contract.keys import WHOLE_SITE, check_chunk, robot_key
 from robomesh.errors import MessageError
-from robomesh.keys import WHOLE_SITE, check_chunk, robot_key
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
+from robomesh.wire.session import Session
 
 # The store answers when the disk has the note.
 _TIMEOUT_S = 10.0

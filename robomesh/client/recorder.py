@@ -11,13 +11,13 @@ from typing import NamedTuple
 from google.protobuf.message import Message
 
 from robomesh import reason_codes as codes
+from robomesh.contract.keys import WHOLE_SITE, robot_key
 from robomesh.errors import BusyError, NoAnswerError, QuotaError, RefusedError
-from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.recordings.changes import write_changes
 from robomesh.recordings.errors import RecordingError
-from robomesh.repeated_requests import ask_repeatedly
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
+from robomesh.wire.repeated_requests import ask_repeatedly
+from robomesh.wire.session import Session
 
 log = logging.getLogger(__name__)
 

@@ -15,8 +15,8 @@ from robomesh import reason_codes as codes
 from robomesh.client.recorded_values import JointsCollector, RecordedJoints, RecordedValues, ValuesCollector
 from robomesh.client.recording_source import Page, Source
 from robomesh.client.samples import Event, event_of, joint_types, utc
+from robomesh.contract.keys import parse_key
 from robomesh.errors import KeyNameError, MessageError
-from robomesh.keys import parse_key
 from robomesh.recordings.channel_names import robot_channels
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.publisher_time import Recorded

@@ -9,12 +9,12 @@ from pathlib import Path
 
 from robomesh import reason_codes as codes
 from robomesh.client.samples import utc
+from robomesh.contract.keys import WHOLE_SITE, robot_key
 from robomesh.errors import RobomeshError
-from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.recordings.channel_names import topic_name
 from robomesh.recordings.errors import RecordingError
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
+from robomesh.wire.session import Session
 
 log = logging.getLogger(__name__)
 

@@ -9,10 +9,10 @@ from google.protobuf.message import Message
 
 from robomesh.client.recorder import RecorderFile
 from robomesh.client.recording_list import RecordingInfo, describe_recording
+from robomesh.contract.topics import SCHEMAS
 from robomesh.errors import RefusedError
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.publisher_time import Recorded
-from robomesh.topics import SCHEMAS
 
 if TYPE_CHECKING:
     from robomesh.recordings.reading import RecordedMessage

@@ -28,13 +28,13 @@ from robomesh.client.samples import (
     sample_fields,
 )
 from robomesh.client.streams import AsyncStream, OnStale, Reading, check_options
+from robomesh.contract.keys import check_chunk, check_name, robot_key
+from robomesh.contract.topics import OF_ARM, stale_after_s, topic
 from robomesh.errors import MessageError, NoAnswerError
-from robomesh.keys import check_chunk, check_name, robot_key
+from robomesh.publications.subscription import Sample as RawSample
+from robomesh.publications.subscription import Subscription
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
-from robomesh.subscription import Sample as RawSample
-from robomesh.subscription import Subscription
-from robomesh.topics import OF_ARM, stale_after_s, topic
+from robomesh.wire.session import Session
 
 _EVENTS = 1000
 # A check or a solution with restarts takes seconds on a busy machine.

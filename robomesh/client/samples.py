@@ -12,10 +12,10 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.message import Message
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from robomesh.enum_names import enum_name
+from robomesh.contract.enum_names import enum_name
 from robomesh.errors import MessageError
+from robomesh.publications.subscription import Sample as RawSample
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.subscription import Sample as RawSample
 
 ROTARY, PRISMATIC = "rotary", "prismatic"
 

@@ -12,11 +12,11 @@ from dataclasses import replace
 from typing import Generic, Literal, Self, TypeVar
 
 from robomesh.client.samples import Sample
+from robomesh.contract.header import Header
 from robomesh.errors import MessageError, RobomeshError, UnknownTopicError
-from robomesh.forked import check_owner
-from robomesh.header import Header
-from robomesh.subscription import Sample as RawSample
-from robomesh.subscription import Subscription
+from robomesh.files.forked import check_owner
+from robomesh.publications.subscription import Sample as RawSample
+from robomesh.publications.subscription import Subscription
 
 T = TypeVar("T")
 

@@ -20,11 +20,11 @@ from mcap.records import Attachment, Channel, Schema
 from mcap_protobuf.schema import build_file_descriptor_set
 
 from robomesh import reason_codes as codes
-from robomesh.header import Header
+from robomesh.contract.header import Header
+from robomesh.contract.topics import Topic
 from robomesh.recordings import records
 from robomesh.recordings.errors import CaptureError
 from robomesh.recordings.metadata import about_name, about_record, end_record
-from robomesh.topics import Topic
 
 
 def is_being_written(path: Path) -> bool:

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 
 from robomesh import reason_codes as codes
+from robomesh.contract.keys import WHOLE_SITE, Key, parse_key
 from robomesh.errors import KeyNameError
-from robomesh.keys import WHOLE_SITE, Key, parse_key
 from robomesh.recordings.errors import RecordingError
 
 # Endings: of a recording, and of one that is being rewritten.

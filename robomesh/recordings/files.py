@@ -11,8 +11,8 @@ from google.protobuf.message import DecodeError
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from robomesh import reason_codes as codes
-from robomesh.keys import parse_key
-from robomesh.messages import reason_message
+from robomesh.contract.keys import parse_key
+from robomesh.contract.messages import reason_message
 from robomesh.reasons import Reason
 from robomesh.recordings.changes import DamagedChangesError, read_changes, set_labels
 from robomesh.recordings.channel_names import is_recorders, robot_channels

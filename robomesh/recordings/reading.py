@@ -17,11 +17,11 @@ from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
 from robomesh import reason_codes as codes
-from robomesh.keys import ROOT
+from robomesh.contract.keys import ROOT
+from robomesh.contract.topics import SCHEMAS
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.layout import Attached, Block, layout_of
 from robomesh.recordings.records import DAMAGE, MESSAGE, RECORD, unpack_chunk
-from robomesh.topics import SCHEMAS
 
 FOREVER_NS = 1 << 64
 # Messages that wait for sorting because their chunk overlaps the next one; above this limit the file's order

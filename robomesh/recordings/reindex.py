@@ -16,13 +16,13 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.records import Attachment, Channel, Metadata, Schema, Statistics
 
+from robomesh.files.worker import answer_all, report
 from robomesh.recordings import records
 from robomesh.recordings.capture import is_being_written
 from robomesh.recordings.channel_names import INDEXING
 from robomesh.recordings.errors import CaptureError
 from robomesh.recordings.indexed_writer import Copied, IndexedWriter
 from robomesh.recordings.metadata import is_about, is_end
-from robomesh.worker import answer_all, report
 
 _STEP_BYTES = 8 << 20
 # Longest unreadable end of a file after a kill or a power cut; a longer one is damage.

@@ -12,8 +12,8 @@ from typing import Any
 
 from google.protobuf.descriptor import FieldDescriptor as Field
 
+from robomesh.contract.topics import TOPICS, History
 from robomesh.schemas.robomesh_pb2 import Description, Signals
-from robomesh.topics import TOPICS, History
 
 _JOINT_UNITS = {"position": "", "velocity": "/s", "acceleration": "/s²"}
 _MARGIN = "kinematics/margin/"

@@ -3,7 +3,7 @@
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from google.protobuf.message import DecodeError
 
-from robomesh.h264 import is_key_frame
+from robomesh.recordings.h264 import is_key_frame
 
 
 def holds_key_frame(payload: bytes) -> bool:

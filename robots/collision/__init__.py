@@ -3,6 +3,7 @@
 The bodies of a pair are named "<robot>/<link>" or "<fixture>". This package wraps coal.
 """
 
+from robots.bodies.sampling import allowed_positions
 from robots.collision.cell import (
     Arm,
     Cell,
@@ -15,7 +16,6 @@ from robots.collision.cell import (
 )
 from robots.collision.continuous import Encounter, PathEncounters, path_encounters
 from robots.collision.distance import Nearest, outside_clearance, outside_nearest, own_contacts, own_nearest
-from robots.collision.sampling import allowed_positions
 
 __all__ = [
     "Arm",

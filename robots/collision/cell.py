@@ -1,6 +1,6 @@
 """A cell in memory: its arms, fixtures and floor, ready for collision checks.
 
-`build_cell` reads the files that a `robots.cells.CellDescription` names.
+`build_cell` reads the files that a `robots.collision.cells.CellDescription` names.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,17 +10,17 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.cells import FLOOR, CellDescription, CellRobot, Fixture, Floor
-from robots.collision.geometry import Body, exact_bodies, hull_bodies, piece_bodies
-from robots.collision.link_pairs import PairPlan, plan_pairs
+from robots.bodies.geometry import Body, exact_bodies, hull_bodies, piece_bodies
+from robots.bodies.link_pairs import PairPlan, plan_pairs
+from robots.bodies.self_collision import SelfPairs, self_pairs
+from robots.collision.cells import FLOOR, CellDescription, CellRobot, Fixture, Floor
 from robots.collision.obstacles import Balls, Bounds, Obstacles, balls_of, bounds_of, join_obstacles
-from robots.collision.self_collision import SelfPairs, self_pairs
-from robots.description import load
-from robots.errors import MeshError
-from robots.joints import FloatArray, Joints
-from robots.kinematic_tree import BASE, Tree, bare_links, tree_of
-from robots.model import RobotModel, build_model
-from robots.schema import Model, RobotDescription, UrdfDescription, nearest
+from robots.descriptions.description import load
+from robots.kinematics.joints import FloatArray, Joints
+from robots.kinematics.kinematic_tree import BASE, Tree, bare_links, tree_of
+from robots.kinematics.model import RobotModel, build_model
+from robots.schema.errors import MeshError
+from robots.schema.robot_toml import Model, RobotDescription, UrdfDescription, nearest
 
 
 @dataclass(frozen=True, eq=False)

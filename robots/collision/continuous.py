@@ -13,16 +13,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.cells import FLOOR, Floor
+from robots.bodies.geometry import TOUCH_M, Body
 from robots.collision.cell import Arm, Cell
+from robots.collision.cells import FLOOR, Floor
 from robots.collision.distance import Gauge
 from robots.collision.floor import Heights, heights_on_path
-from robots.collision.geometry import TOUCH_M, Body
 from robots.collision.interpolated import Placed, touching_share
 from robots.collision.obstacles import join_boxes, least_distances
 from robots.collision.path import placements_along, travelled
 from robots.collision.swept_volumes import Sweep, distance_to_sweep, sweeps_of, swept_region
-from robots.joints import FloatArray
+from robots.kinematics.joints import FloatArray
 
 # Distance at which bodies touch, and the error of coal's distances [m].
 _TOLERANCE_M = 2 * TOUCH_M

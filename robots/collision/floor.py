@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
-from robots.cells import Floor
+from robots.bodies.geometry import TOUCH_M
 from robots.collision.cell import Arm
-from robots.collision.geometry import TOUCH_M
+from robots.collision.cells import Floor
 from robots.collision.interpolated import ROUND
 from robots.collision.path import SAMPLE_M, placements_along
-from robots.joints import FloatArray
+from robots.kinematics.joints import FloatArray
 
 # Samples per batch.
 _TOGETHER = 500

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from robots.collision.geometry import Body, transform
+from robots.bodies.geometry import Body, transform
 from robots.collision.path import SAMPLE_M, corners_along
-from robots.joints import FloatArray
+from robots.kinematics.joints import FloatArray
 
 # The search ends at intervals in which the bodies travel less than this.
 FINEST_M = 1e-4

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.collision.geometry import Body
-from robots.joints import FloatArray
+from robots.bodies.geometry import Body
+from robots.kinematics.joints import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,11 @@ from itertools import product
 
 import numpy as np
 
+from robots.bodies.geometry import Body
 from robots.collision.cell import Arm
-from robots.collision.geometry import Body
-from robots.joints import FloatArray, JointType
-from robots.kinematic_tree import BASE, Tree
-from robots.poses import axis_rotation
+from robots.kinematics.joints import FloatArray, JointType
+from robots.kinematics.kinematic_tree import BASE, Tree
+from robots.schema.poses import axis_rotation
 
 # Largest distance that a body travels between two samples of a path.
 SAMPLE_M = 0.005

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.bodies.geometry import Body, transform
 from robots.collision.cell import Arm, Cell
 from robots.collision.distance import Gauge
-from robots.collision.geometry import Body, transform
 from robots.collision.obstacles import Boxes, bounds_of, placed_boxes
 from robots.collision.path import (
     SAMPLE_M,
@@ -25,7 +25,7 @@ from robots.collision.path import (
     placements_along,
     sampled_pieces,
 )
-from robots.joints import FloatArray
+from robots.kinematics.joints import FloatArray
 
 # Number of boxes for the volume that an arm sweeps.
 _WINDOWS = 8

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from robots.library import pt_arm, puma_arm
 from robots.library.parts import Piece, mesh_of
-from robots.meshes.three_ds.write import write_3ds
-from robots.meshes.vrml.write import write_vrml
+from robots.shapes.files.three_ds.write import write_3ds
+from robots.shapes.files.vrml.write import write_vrml
 
 LIBRARY = Path(__file__).parent
 

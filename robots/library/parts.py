@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from robots.meshes.mesh import FloatArray, Material, Mesh, Part
-from robots.meshes.normals import creased
-from robots.meshes.solids import Profile, Solid, lofted, moved, plate, rectangle, rounded, strap, turned
+from robots.shapes.mesh import FloatArray, Material, Mesh, Part
+from robots.shapes.normals import creased
+from robots.shapes.solids import Profile, Solid, lofted, moved, plate, rectangle, rounded, strap, turned
 
 Piece = tuple[Material, Solid]
 

@@ -22,8 +22,8 @@ from robots.library.parts import (
     tapered,
     turned_piece,
 )
-from robots.meshes.mesh import FloatArray
-from robots.meshes.solids import lofted, plate, rectangle, tube
+from robots.shapes.mesh import FloatArray
+from robots.shapes.solids import lofted, plate, rectangle, tube
 
 # From x forward, y left, z up to the column's frame, which has x forward and y up.
 _UPRIGHT = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])

@@ -19,7 +19,7 @@ from robots.library.parts import (
     tapered,
     turned_piece,
 )
-from robots.meshes.solids import plate, rectangle, strap
+from robots.shapes.solids import plate, rectangle, strap
 
 _A2, _A3 = 431.8, -20.3  # lengths of the D-H rows of shoulder and elbow
 

@@ -15,15 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from robots.errors import MeshError
-from robots.joints import FloatArray
-from robots.meshes.declared_size import content
-from robots.meshes.dxf import UNITS_M, open_drawing
-from robots.poses import rpy_rotation
+from robots.kinematics.joints import FloatArray
 from robots.programs import MOST_BYTES
 from robots.programs.text import MOST_LINES, pose_of
 from robots.programs.write import number, pose_words
-from robots.schema import nearest
+from robots.schema.errors import MeshError
+from robots.schema.poses import rpy_rotation
+from robots.schema.robot_toml import nearest
+from robots.shapes.files.declared_size import content
+from robots.shapes.files.dxf import UNITS_M, open_drawing
 
 _CURVES = {"LINE", "LWPOLYLINE", "POLYLINE", "CIRCLE", "ARC", "ELLIPSE", "SPLINE"}
 _MOST_CURVES = 5_000

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import radians
 
-from robots.joints import Joints, JointType
+from robots.kinematics.joints import Joints, JointType
 from robots.programs.statements import StepFrame
 
 # Most that may be commanded beyond the measured position: of the tool, of a rotation, or of one joint.

@@ -8,12 +8,12 @@ import numpy as np
 
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
-from robots.inverse import InverseSolver, Task, follow, solve
-from robots.inverse.tasks import tool_misses
-from robots.joints import FloatArray, violations
-from robots.model import RobotModel, tool_jacobian, tool_placement
-from robots.poses import axis_rotation
+from robots.kinematics.inverse import InverseSolver, Task, follow, solve
+from robots.kinematics.inverse.tasks import tool_misses
+from robots.kinematics.joints import FloatArray, violations
+from robots.kinematics.model import RobotModel, tool_jacobian, tool_placement
 from robots.programs.steps import LINE_DEG, LINE_M
+from robots.schema.poses import axis_rotation
 
 # Shares of a joint move at which the tool is compared with the line, and the used part of the tolerance: the
 # rest is a margin for the intervals.

@@ -8,10 +8,10 @@ import numpy as np
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.collision import Arm
-from robots.inverse import InverseSolver, Task, natural_task, solve
-from robots.inverse.tasks import tool_misses
-from robots.joints import FloatArray
-from robots.model import tool_placement
+from robots.kinematics.inverse import InverseSolver, Task, natural_task, solve
+from robots.kinematics.inverse.tasks import tool_misses
+from robots.kinematics.joints import FloatArray
+from robots.kinematics.model import tool_placement
 from robots.programs.lines import (
     BENT_DEG,
     Followed,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeAlias
 
-from robots.joints import FloatArray
+from robots.kinematics.joints import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

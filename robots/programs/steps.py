@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
-from robots.joints import FloatArray
+from robots.kinematics.joints import FloatArray
 
 # Largest deviation of the tool from a line that is approximated by joint moves.
 LINE_M = 0.001

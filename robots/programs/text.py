@@ -32,9 +32,7 @@ import numpy as np
 
 from robomesh import reason_codes as codes
 from robomesh.reasons import Code, Reason
-from robots.errors import ProgramError
-from robots.joints import FloatArray, Joints, JointType
-from robots.poses import rpy_rotation
+from robots.kinematics.joints import FloatArray, Joints, JointType
 from robots.programs import MOST_BYTES
 from robots.programs.statements import (
     Home,
@@ -53,7 +51,9 @@ from robots.programs.statements import (
     Trace,
     Wait,
 )
-from robots.schema import similar
+from robots.schema.errors import ProgramError
+from robots.schema.poses import rpy_rotation
+from robots.schema.robot_toml import similar
 
 MOST_LINES = 10_000
 MOST_STEPS = 100_000

@@ -3,8 +3,7 @@
 from collections.abc import Iterator, Sequence
 from math import degrees
 
-from robots.joints import FloatArray, Joints
-from robots.poses import rotation_rpy
+from robots.kinematics.joints import FloatArray, Joints
 from robots.programs.statements import (
     Home,
     JointTarget,
@@ -22,6 +21,7 @@ from robots.programs.statements import (
 )
 from robots.programs.steps import Step, StepKind
 from robots.programs.text import joint_scales
+from robots.schema.poses import rotation_rpy
 
 
 def program_text(program: Program, joints: Joints) -> str:

@@ -11,7 +11,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
-from services.command_line.output import print_line
+from services.command_line.terminal.output import print_line
 
 
 class Row(NamedTuple):
@@ -101,7 +101,7 @@ class _LazyGroup(TyperGroup):
 def load(name: str) -> Any:
     """Import a command or command group, with `--keys FILE` wherever there is `--connect`."""
     # Not at the top: its imports would double the time of `robomesh --help`.
-    from services.command_line.connection_options import offer_keys
+    from services.command_line.terminal.connection_options import offer_keys
 
     app = import_module(f"services.command_line.{COMMANDS[name].module}").app
     found: Any = get_command(app)

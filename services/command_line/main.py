@@ -14,8 +14,8 @@ import typer
 from robomesh.errors import UnavailableError
 from robomesh.extras import EXTRAS, missing
 from services.command_line.commands import root
-from services.command_line.output import discard, print_line, print_text, protect
-from services.command_line.reading_limits import limit
+from services.command_line.terminal.output import discard, print_line, print_text, protect
+from services.command_line.terminal.reading_limits import limit
 from services.errors import TRY_AGAIN
 
 
@@ -105,10 +105,10 @@ def _failed(text: str, status: int = 2) -> int:
 
 
 def _known_errors() -> tuple[type[Exception], ...]:
-    from protocol_gateway.errors import ProtocolGatewayError
+    from protocol_gateway.seam.errors import ProtocolGatewayError
     from renderer.errors import RendererError
     from robomesh.errors import RobomeshError
-    from robots.errors import RobotError
+    from robots.schema.errors import RobotError
     from services.errors import ServiceError
 
     return (RobomeshError, ProtocolGatewayError, RendererError, RobotError, ServiceError)

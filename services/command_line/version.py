@@ -9,9 +9,9 @@ from typing import Annotated, Any
 
 import typer
 
-from robomesh.endpoints import DEFAULT_ROUTER
-from services.command_line.options import Connect, Json, command_group
-from services.command_line.output import print_json, print_line
+from robomesh.contract.endpoints import DEFAULT_ROUTER
+from services.command_line.terminal.options import Connect, Json, command_group
+from services.command_line.terminal.output import print_json, print_line
 
 app = command_group()
 
@@ -28,7 +28,7 @@ def version(
 ) -> None:
     """Print the version of robomesh; --all: all that a report of a fault needs."""
     from robomesh.errors import RobomeshError
-    from services.command_line import discovery
+    from services.command_line.terminal import discovery
 
     found: dict[str, Any] = {"robomesh": installed("robomesh")}
     if everything:
@@ -72,10 +72,10 @@ async def _services(router: str) -> list[dict[str, Any]]:
         RobomeshError: If no router answers.
         TimeoutError: If the router does not answer in time.
     """
-    from robomesh.keys import ROOT, WHOLE_SITE
-    from robomesh.last_values import last_values
+    from robomesh.contract.keys import ROOT, WHOLE_SITE
     from robomesh.schemas.robomesh_pb2 import ServiceHealth
-    from services.command_line import discovery
+    from robomesh.wire.last_values import last_values
+    from services.command_line.terminal import discovery
 
     async with asyncio.timeout(_ANSWER_S), discovery.attached(router) as session:
         alive, health = await asyncio.gather(

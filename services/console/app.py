@@ -20,41 +20,41 @@ from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.types import ASGIApp, Scope
 from starlette.websockets import WebSocket
 
-from robomesh import keys, topics
 from robomesh import reason_codes as codes
+from robomesh.contract import keys, topics
+from robomesh.contract.keys import PresenceKey
 from robomesh.errors import NoAnswerError
-from robomesh.health import own_version
-from robomesh.keys import PresenceKey
 from robomesh.listen_address import check_page_reach, split_address
 from robomesh.recordings.values import live_topics
 from robomesh.schemas.robomesh_pb2 import Event, ToPage
-from robomesh.session import Session
+from robomesh.service.health import own_version
+from robomesh.wire.session import Session
 from services.console.accounts.auth_middleware import SIGNED_OUT, AuthMiddleware, cookie_name
 from services.console.accounts.auth_service import AuthService
 from services.console.accounts.rights import operator_name
 from services.console.accounts.routes import AccountRoutes, client_address
 from services.console.accounts.sessions import MOST_PAGES, SignedIn
+from services.console.common.error_responses import as_json, as_text
+from services.console.common.errors import PageNotBuiltError, RefusedRequest
+from services.console.common.guard import Guard
+from services.console.common.requested_views import Views
 from services.console.define.routes import Define
 from services.console.define.settings import DefineSettings
-from services.console.errors import PageNotBuiltError, RefusedRequest
 from services.console.http import png
-from services.console.http.error_responses import as_json, as_text
-from services.console.http.guard import Guard
 from services.console.http.layouts import layout_response
-from services.console.http.listener import listening
 from services.console.http.meshes import MeshCache, mesh_response
 from services.console.http.page_files import PageFiles
 from services.console.http.pictures import MJPEG, Pictures
 from services.console.http.recorded_video import RecordedVideo
 from services.console.http.recordings import Recordings
-from services.console.http.uvicorn_server import (
+from services.console.http.view_page import ViewPage
+from services.console.serving.listener import listening
+from services.console.serving.uvicorn_server import (
     follow_certificate,
     serve_until_cancelled,
     server_of,
     tls_context,
 )
-from services.console.http.view_page import ViewPage
-from services.console.requested_views import Views
 from services.console.websocket.page_connection import Browser
 from services.console.websocket.shared_subscriptions import SharedSubscriptions
 from services.console.websocket.websocket_transport import transport_of

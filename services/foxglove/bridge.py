@@ -7,11 +7,11 @@ from collections.abc import Callable
 import foxglove
 from foxglove.websocket import Capability, ChannelView, Client, ServerListener, WebSocketServer
 
+from robomesh.contract.keys import WHOLE_SITE, PresenceKey, every_robot
 from robomesh.errors import RobomeshError
-from robomesh.keys import WHOLE_SITE, PresenceKey, every_robot
-from robomesh.presence import SILENT
 from robomesh.schemas.robomesh_pb2 import Description
-from robomesh.session import Session
+from robomesh.wire.presence import SILENT
+from robomesh.wire.session import Session
 from services.foxglove.channels import Channels
 from services.foxglove.commands import Commands
 from services.foxglove.settings import Settings

@@ -8,12 +8,12 @@ from typing import Any
 
 import foxglove
 
+from robomesh.contract.keys import parse_expression
+from robomesh.contract.topics import History, topic
 from robomesh.errors import RobomeshError
-from robomesh.keys import parse_expression
+from robomesh.publications.subscription import Subscription
 from robomesh.schemas.robomesh_pb2 import KeyFrameRequest
-from robomesh.session import Session
-from robomesh.subscription import Subscription
-from robomesh.topics import History, topic
+from robomesh.wire.session import Session
 from services.foxglove.messages import Timed, timed
 
 log = logging.getLogger(__name__)

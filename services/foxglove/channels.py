@@ -7,11 +7,11 @@ from functools import partial
 import foxglove
 from foxglove_schemas_protobuf.Log_pb2 import Log
 
-from robomesh.keys import WHOLE_SITE, is_replay, robot_key
+from robomesh.contract.keys import WHOLE_SITE, is_replay, robot_key
+from robomesh.contract.topics import topic
 from robomesh.schemas.robomesh_pb2 import Description
-from robomesh.session import Session
-from robomesh.topics import topic
-from robots.urdf.viewers import together
+from robomesh.wire.session import Session
+from robots.descriptions.urdf.viewers import together
 from services.foxglove.channel_subscriptions import LatchedChannel, TopicChannel
 from services.foxglove.messages import TEXT_SCHEMA, log_of, protobuf_schema, text_message
 from services.viewer_robots import meshes_of, viewer_robot

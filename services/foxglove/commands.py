@@ -20,11 +20,11 @@ from robomesh import reason_codes as codes
 from robomesh.client.commands import CommandResult, Progress, request_stop
 from robomesh.client.control import AsyncArm
 from robomesh.client.robot import AsyncRobot
+from robomesh.contract.keys import robot_key
+from robomesh.contract.messages import JSON, decode_request
 from robomesh.errors import MessageError, MotionError, RefusedError, RobomeshError
-from robomesh.keys import robot_key
-from robomesh.messages import JSON, decode_request
 from robomesh.schemas.robomesh_pb2 import CommandRequest
-from robomesh.session import Session
+from robomesh.wire.session import Session
 
 log = logging.getLogger(__name__)
 

@@ -8,9 +8,9 @@ from foxglove_schemas_protobuf.Log_pb2 import Log
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.message import Message
 
+from robomesh.contract.topics import History, Topic
+from robomesh.publications.subscription import Sample
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.subscription import Sample
-from robomesh.topics import History, Topic
 
 # A message's bytes, and the time of its content [ns since the Unix epoch].
 Timed = tuple[bytes, int]

@@ -5,11 +5,11 @@ import logging
 import ssl
 from collections.abc import Callable
 
+from robomesh.contract.keys import check_chunk
 from robomesh.errors import ListenError
-from robomesh.keys import check_chunk
-from robomesh.linked_site import be_present
 from robomesh.listen_address import check_reach, is_loopback, split_address
-from robomesh.session import Session
+from robomesh.service.linked_site import be_present
+from robomesh.wire.session import Session
 from services.foxglove.bridge import Bridge
 from services.foxglove.commands import Commands
 from services.foxglove.listener import Listener, hidden_address

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from robomesh import reason_codes as codes
+from robomesh.contract.quotas import Quota
 from robomesh.errors import RefusedError
-from robomesh.quotas import Quota
+from robomesh.files.worker import Worker, WorkerError
+from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Request
-from robomesh.session import Session
-from robomesh.worker import Worker, WorkerError
-from robots.cells import CellDescription
-from robots.errors import RobotError, reason_of
-from robots.joints import FloatArray
-from robots.model import RobotModel
+from robomesh.wire.session import Session
+from robots.collision.cells import CellDescription
+from robots.kinematics.joints import FloatArray
+from robots.kinematics.model import RobotModel
+from robots.schema.errors import RobotError, reason_of
 from services.kinematics.cell_state import CellState
 from services.kinematics.states import forward_answer
 from services.kinematics.worker_messages import CheckQuestion, InverseQuestion, Question, ReplaceCells

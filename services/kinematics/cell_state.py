@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 
 from robots.collision import Cell, Nearest, outside_clearance, outside_nearest, own_nearest
-from robots.joints import FloatArray
+from robots.kinematics.joints import FloatArray
 from services.kinematics.conditions import deadband_end
 
 

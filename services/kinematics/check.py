@@ -4,12 +4,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from robomesh.messages import reason_message
+from robomesh.contract.messages import reason_message
 from robomesh.schemas import robomesh_pb2 as schema
+from robots.checks.check import check_program
 from robots.collision import Cell
-from robots.inverse import InverseSolver
-from robots.joints import FloatArray
-from robots.programs.check import check_program
+from robots.kinematics.inverse import InverseSolver
+from robots.kinematics.joints import FloatArray
 from robots.programs.steps import CheckResult, SampledPath
 
 

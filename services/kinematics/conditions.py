@@ -9,7 +9,7 @@ import numpy as np
 
 from robomesh.schemas.robomesh_pb2 import Event
 from robots.collision import Nearest
-from robots.joints import FloatArray, Joints, JointType, constraint_values
+from robots.kinematics.joints import FloatArray, Joints, JointType, constraint_values
 from services.kinematics.alarms import Condition
 
 # Fractions of a joint's range.

@@ -5,13 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.cells import CellDescription, CellRobot, Fixture
-from robots.description import RobotDescription
-from robots.glb import shapes_glb
-from robots.joints import FloatArray, JointType, joints_of
-from robots.kinematic_tree import color_text, named_frames, tree_of
-from robots.schema import DhDescription, TitledJoint, UrdfDescription
-from robots.views import views_of
+from robots.collision.cells import CellDescription, CellRobot, Fixture
+from robots.descriptions.description import RobotDescription
+from robots.descriptions.glb import shapes_glb
+from robots.kinematics.joints import FloatArray, JointType, joints_of
+from robots.kinematics.kinematic_tree import color_text, named_frames, tree_of
+from robots.kinematics.views import views_of
+from robots.schema.robot_toml import DhDescription, TitledJoint, UrdfDescription
 
 _TYPES = {
     JointType.ROTARY: schema.Description.Joint.ROTARY,

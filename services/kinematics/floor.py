@@ -4,12 +4,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from robomesh.messages import reason_message
+from robomesh.contract.messages import reason_message
 from robomesh.schemas.robomesh_pb2 import Event
 from robots.collision import Cell
 from robots.collision.floor import floor_advice, heights_above
 from robots.collision.path import placements_along
-from robots.joints import FloatArray
+from robots.kinematics.joints import FloatArray
 
 
 def floor_event(cell: Cell, robot: str, poses: Mapping[str, FloatArray]) -> Event | None:

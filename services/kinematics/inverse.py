@@ -1,11 +1,11 @@
 """Answers to inverse-kinematics requests: a pure function."""
 
 from robomesh import reason_codes as codes
+from robomesh.contract.messages import reason_message
 from robomesh.errors import RefusedError
-from robomesh.messages import reason_message
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.errors import JointCountError, PoseError
-from robots.inverse import InverseSolver, Task, solve
+from robots.kinematics.inverse import InverseSolver, Task, solve
+from robots.schema.errors import JointCountError, PoseError
 
 _TASKS = {
     schema.InverseRequest.POSE_6D: Task.POSE_6D,

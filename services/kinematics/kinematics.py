@@ -6,15 +6,15 @@ import logging
 import time
 from collections.abc import Sequence
 
-from robomesh.quotas import Quota
-from robomesh.session import Session
-from robomesh.worker import Worker
-from robots.cells import CellDescription
-from robots.description import load
-from robots.glb import link_meshes, main_colors
-from robots.model import build_model
-from robots.singularity import reach_of
-from robots.urdf.write import to_urdf
+from robomesh.contract.quotas import Quota
+from robomesh.files.worker import Worker
+from robomesh.wire.session import Session
+from robots.collision.cells import CellDescription
+from robots.descriptions.description import load
+from robots.descriptions.glb import link_meshes, main_colors
+from robots.descriptions.urdf.write import to_urdf
+from robots.kinematics.model import build_model
+from robots.kinematics.singularity import reach_of
 from services.kinematics.answers import Workers, answer_robot_requests
 from services.kinematics.cell_state import CellState
 from services.kinematics.descriptions import add_surroundings, describe

@@ -10,14 +10,14 @@ from functools import partial
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.timestamp_pb2 import Timestamp
 
+from robomesh.contract.keys import ROOT, robot_key
 from robomesh.errors import MessageError
-from robomesh.keys import ROOT, robot_key
+from robomesh.publications.subscription import Sample
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
-from robomesh.subscription import Sample
+from robomesh.wire.session import Session
 from robots.collision import Cell, distances
-from robots.joints import FloatArray
-from robots.model import RobotModel
+from robots.kinematics.joints import FloatArray
+from robots.kinematics.model import RobotModel
 from services.kinematics.alarms import Alarms, Condition
 from services.kinematics.cell_state import CellState, Proximity
 from services.kinematics.conditions import (
@@ -61,7 +61,7 @@ class FollowedArm:
     """An arm and the constants needed to publish its state.
 
     Attributes:
-        reach: Result of `robots.singularity.reach_of` [m].
+        reach: Result of `robots.kinematics.singularity.reach_of` [m].
         base_to_site: (4, 4) placement of the base in the site's frame.
     """
 

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from robomesh.quotas import DEFAULT_QUOTAS, Quotas
+from robomesh.contract.quotas import DEFAULT_QUOTAS, Quotas
 from robomesh.schemas.robomesh_pb2 import CellContent
-from robots.cells import CellDescription
+from robots.collision.cells import CellDescription
 
 
 class CellContents(Protocol):

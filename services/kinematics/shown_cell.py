@@ -11,18 +11,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from robomesh import reason_codes as codes
+from robomesh.contract.keys import ROOT
+from robomesh.contract.messages import reason_message
 from robomesh.errors import MessageError, RefusedError
-from robomesh.keys import ROOT
-from robomesh.messages import reason_message
-from robomesh.publisher import Publisher
+from robomesh.publications.publisher import Publisher
 from robomesh.reasons import Reason
+from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Request
-from robomesh.session import Session
-from robots.cells import CellDescription
+from robomesh.wire.session import Session
 from robots.collision import Cell, build_cell
-from robots.errors import RobotError, reason_of
-from robots.joints import FloatArray
+from robots.collision.cells import CellDescription
+from robots.kinematics.joints import FloatArray
+from robots.schema.errors import RobotError, reason_of
 from services.kinematics.answers import Workers
 from services.kinematics.descriptions import FixtureMesh, fixture_meshes
 from services.kinematics.settings import CellContents

@@ -11,14 +11,14 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.joints import FloatArray, Joints, constraint_values
-from robots.model import (
+from robots.kinematics.joints import FloatArray, Joints, constraint_values
+from robots.kinematics.model import (
     RobotModel,
     all_placements,
     tool_jacobian,
     tool_placement,
 )
-from robots.singularity import dexterity
+from robots.kinematics.singularity import dexterity
 from services.kinematics.cell_state import Proximity
 
 
@@ -128,7 +128,7 @@ def kinematic_state(
     Args:
         positions: (n,) [rad] or [m].
         velocities: (n,) [rad/s] or [m/s]; None if unknown, then there is no twist.
-        reach: Result of `robots.singularity.reach_of` [m].
+        reach: Result of `robots.kinematics.singularity.reach_of` [m].
     """
     joints, jacobian = model.joints, tool_jacobian(model, positions)
     manipulable, margin = dexterity(jacobian, joints.types, reach=reach)

@@ -5,12 +5,12 @@ from functools import cache
 
 import numpy as np
 
+from robomesh.files.worker import answer_all
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.worker import answer_all
-from robots.cells import CellDescription
 from robots.collision import Cell, build_cell, pending
-from robots.description import load
-from robots.inverse import InverseSolver, build_solver
+from robots.collision.cells import CellDescription
+from robots.descriptions.description import load
+from robots.kinematics.inverse import InverseSolver, build_solver
 from services.kinematics.check import check_answer
 from services.kinematics.inverse import inverse_answer
 from services.kinematics.worker_messages import InverseQuestion, Question, ReplaceCells

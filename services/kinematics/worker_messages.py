@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from robots.cells import CellDescription
-from robots.joints import FloatArray
+from robots.collision.cells import CellDescription
+from robots.kinematics.joints import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,11 +11,11 @@ from functools import wraps
 from itertools import count
 from typing import Concatenate, ParamSpec, TypeVar
 
-from robomesh.access_rights import Border, access_sections
-from robomesh.certificate_identity import Identity, header
+from robomesh.contract.access_rights import Border, access_sections
+from robomesh.contract.certificate_identity import Identity, header
+from robomesh.contract.keys import check_name
+from robomesh.contract.topics import PEOPLE, SERVICES, Role
 from robomesh.errors import KeyNameError
-from robomesh.keys import check_name
-from robomesh.topics import PEOPLE, SERVICES, Role
 from services.pki import certificates
 from services.pki.errors import KeysError
 from services.pki.folder import Folder, locked, read, write

@@ -17,8 +17,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from robomesh.atomic_write import write_atomically
-from robomesh.endpoints import Tls, bundle
+from robomesh.contract.endpoints import Tls, bundle
+from robomesh.files.atomic_write import write_atomically
 from services.pki.errors import KeysError
 
 _FOLDER_MODE = 0o700

@@ -9,9 +9,9 @@ from typing import Annotated
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError
 
-from robomesh.access_rights import Border, Principal
-from robomesh.topics import Role
-from robots.bounded_toml import parse_toml
+from robomesh.contract.access_rights import Border, Principal
+from robomesh.contract.topics import Role
+from robots.schema.bounded_toml import parse_toml
 from services.pki.errors import KeysError
 
 _ENTRY_CONFIG = ConfigDict(extra="forbid", frozen=True)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from datetime import timedelta
 
-from robomesh.topics import PEOPLE
+from robomesh.contract.topics import PEOPLE
 from services.pki.authority import exclusive, issued, now, principals_of, save
 from services.pki.errors import KeysError
 from services.pki.folder import Folder

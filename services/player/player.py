@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robomesh import reason_codes as codes
+from robomesh.contract.keys import WHOLE_SITE
 from robomesh.errors import RefusedError
-from robomesh.keys import WHOLE_SITE
-from robomesh.presence import OPERATOR
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.folder import find_file
+from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Request
-from robomesh.session import Session
+from robomesh.wire.presence import OPERATOR
+from robomesh.wire.session import Session
 from services.player.clock import Clock
 from services.player.errors import ReplayError
 from services.player.recording_source import RecordingSource

@@ -8,17 +8,17 @@ from typing import NamedTuple
 from google.protobuf.message import DecodeError
 
 from robomesh import reason_codes as codes
-from robomesh import topics
+from robomesh.contract import topics
+from robomesh.contract.keys import parse_key
+from robomesh.contract.topics import History
 from robomesh.errors import RobomeshError
-from robomesh.keys import parse_key
-from robomesh.publisher import LIST_LENGTH
+from robomesh.publications.publisher import LIST_LENGTH
 from robomesh.recordings.channel_names import robot_channels
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.video import holds_key_frame
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.topics import History
 from services.player.errors import ReplayError
 from services.player.republish import NameMapping, renamed
 

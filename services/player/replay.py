@@ -8,17 +8,17 @@ from collections import deque
 from dataclasses import dataclass
 
 from robomesh import reason_codes as codes
-from robomesh import topics
+from robomesh.contract import topics
+from robomesh.contract.keys import replay_name, robot_key
+from robomesh.contract.messages import reason_message
+from robomesh.contract.topics import History
 from robomesh.errors import RefusedError, RobomeshError
-from robomesh.keys import replay_name, robot_key
-from robomesh.messages import reason_message
-from robomesh.publisher import Publisher
+from robomesh.publications.publisher import Publisher
 from robomesh.reasons import Reason
 from robomesh.recordings.errors import RecordingError
+from robomesh.requests.server import Answerer, Handler, Request
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Answerer, Handler, Request
-from robomesh.session import Session
-from robomesh.topics import History
+from robomesh.wire.session import Session
 from services.player.clock import Clock
 from services.player.errors import ReplayError
 from services.player.recording_source import RecordingSource, ReplayMessage, Snapshot

@@ -8,12 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from robomesh.contract.header import Header
+from robomesh.contract.keys import CLOSE, FAR, WHOLE_SITE, robot_key
 from robomesh.errors import RobomeshError
-from robomesh.header import Header
-from robomesh.keys import CLOSE, FAR, WHOLE_SITE, robot_key
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
-from robots.urdf.viewers import prefixed, without_joints
+from robomesh.wire.session import Session
+from robots.descriptions.urdf.viewers import prefixed, without_joints
 
 _MESH_WITHIN_S = 10.0
 _PICTURE_WITHIN_S = 5.0

@@ -9,15 +9,15 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from robomesh import reason_codes as codes
+from robomesh.contract.keys import check_chunk
 from robomesh.errors import KeyNameError, RefusedError
-from robomesh.keys import check_chunk
+from robomesh.publications.wall_clock import WallClock
 from robomesh.reasons import Reason
 from robomesh.recordings.capture import Capture
 from robomesh.recordings.channel_names import SUFFIX
 from robomesh.recordings.errors import CaptureError
 from robomesh.recordings.files import set_problem
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.wall_clock import WallClock
 from services.recorder.disk import Disk, ended_by
 from services.recorder.file_writer import STATES, OnPublication, Part
 from services.recorder.finishing import Finisher, Job

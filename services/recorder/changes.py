@@ -22,8 +22,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from robomesh import reason_codes as codes
+from robomesh.contract.keys import WHOLE_SITE, check_name
+from robomesh.contract.topics import check_operator
 from robomesh.errors import BusyError, KeyNameError, RefusedError
-from robomesh.keys import WHOLE_SITE, check_name
 from robomesh.reasons import Reason
 from robomesh.recordings.changes import (
     DamagedChangesError,
@@ -38,9 +39,8 @@ from robomesh.recordings.channel_names import SUFFIX
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.files import describe_deleted, describe_unreadable
 from robomesh.recordings.folder import files_in, find_file, is_file_name, robot_of
+from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Request
-from robomesh.topics import check_operator
 from services.recorder.disk import error_text
 
 log = logging.getLogger(__name__)

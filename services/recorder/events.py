@@ -3,12 +3,12 @@
 import logging
 from collections.abc import Mapping
 
-from robomesh.keys import WHOLE_SITE
-from robomesh.messages import reason_message
-from robomesh.publisher import Publisher
+from robomesh.contract.keys import WHOLE_SITE
+from robomesh.contract.messages import reason_message
+from robomesh.publications.publisher import Publisher
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
+from robomesh.wire.session import Session
 from services.recorder.disk import Disk, RecordingLevel
 
 log = logging.getLogger(__name__)

@@ -4,12 +4,12 @@ import time
 from collections import Counter
 from collections.abc import Callable
 
-from robomesh.header import Header
+from robomesh.contract.header import Header
+from robomesh.contract.topics import TOPICS, Topic
+from robomesh.publications.wall_clock import WallClock
 from robomesh.recordings.capture import Capture
 from robomesh.recordings.changes import set_labels
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.topics import TOPICS, Topic
-from robomesh.wall_clock import WallClock
 from services.recorder.disk import Disk, RecordingLevel, is_recorded
 
 OnPublication = Callable[[Topic, bytes], None]

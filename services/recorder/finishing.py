@@ -8,8 +8,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from robomesh.files.worker import Worker, WorkerError
 from robomesh.recordings.errors import CaptureError
-from robomesh.worker import Worker, WorkerError
 
 log = logging.getLogger(__name__)
 

@@ -1,6 +1,6 @@
 """Worker process that reads recordings for `serving`: `python -m services.recorder.reader`."""
 
-from robomesh.worker import answer_all
+from robomesh.files.worker import answer_all
 from services.recorder.answers import Answers
 
 if __name__ == "__main__":

@@ -10,17 +10,17 @@ from functools import partial
 from pathlib import Path
 
 from robomesh import reason_codes as codes
+from robomesh.contract.keys import CLOSE, FAR, FREE, WHOLE_SITE, robot_key
 from robomesh.errors import MessageError, RefusedError
-from robomesh.keys import CLOSE, FAR, FREE, WHOLE_SITE, robot_key
 from robomesh.reasons import Reason
 from robomesh.recordings.capture import Capture
 from robomesh.recordings.changes import set_labels
 from robomesh.recordings.channel_names import INDEXING, ROBOT_DESCRIPTION, SUFFIX
 from robomesh.recordings.errors import RecordingsError
 from robomesh.recordings.recover import State
+from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Request
-from robomesh.session import Session
+from robomesh.wire.session import Session
 from services.recorder.attachments import DescriptionCache, picture, self_contained_urdf
 from services.recorder.captures import Files, RobotRecorder
 from services.recorder.changes import Changes

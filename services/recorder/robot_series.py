@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from robomesh import reason_codes as codes
+from robomesh.contract.keys import check_name
 from robomesh.errors import KeyNameError
-from robomesh.keys import check_name
 from robomesh.recordings.capture import is_being_written
 from robomesh.recordings.channel_names import SUFFIX
 from robomesh.recordings.errors import RecordingError

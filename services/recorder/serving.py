@@ -7,14 +7,14 @@ from pathlib import Path
 from google.protobuf.message import Message
 
 from robomesh import reason_codes as codes
+from robomesh.contract.keys import WHOLE_SITE
+from robomesh.contract.quotas import DEFAULT_QUOTAS, Quota, Quotas
 from robomesh.errors import BusyError, QuotaError, RefusedError
-from robomesh.keys import WHOLE_SITE
-from robomesh.quotas import DEFAULT_QUOTAS, Quota, Quotas
+from robomesh.files.worker import Worker, WorkerError
 from robomesh.recordings.errors import RecordingError
+from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Request
-from robomesh.session import Session
-from robomesh.worker import Worker, WorkerError
+from robomesh.wire.session import Session
 from services.recorder.answers import Question
 from services.recorder.settings import MIB
 from services.recorder.uses import Uses

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from robomesh.quotas import DEFAULT_QUOTAS, Quotas
+from robomesh.contract.quotas import DEFAULT_QUOTAS, Quotas
 from robomesh.schemas.robomesh_pb2 import Event
 
 MIB = 1 << 20

@@ -15,15 +15,15 @@ from typing import Any, Protocol
 import zenoh
 import zenoh.ext
 
-from robomesh.endpoints import wait_until_declared
+from robomesh.contract.endpoints import wait_until_declared
+from robomesh.contract.header import Header, unpack
+from robomesh.contract.ignored import PUBLICATION, REPLY, Ignored
+from robomesh.contract.keys import robot_key
+from robomesh.contract.messages import decode
+from robomesh.contract.topics import History, Topic, topic
 from robomesh.errors import MessageError
-from robomesh.header import Header, unpack
-from robomesh.ignored import PUBLICATION, REPLY, Ignored
-from robomesh.keys import robot_key
-from robomesh.messages import decode
 from robomesh.recordings.video import holds_key_frame
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.topics import History, Topic, topic
 
 log = logging.getLogger(__name__)
 

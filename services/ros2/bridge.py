@@ -10,13 +10,13 @@ import numpy as np
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
+from robomesh.contract.keys import Key, every_robot
+from robomesh.contract.topics import Priority
 from robomesh.errors import RobomeshError
-from robomesh.keys import Key, every_robot
+from robomesh.publications.subscription import Sample
 from robomesh.schemas.robomesh_pb2 import Description
-from robomesh.session import Session
-from robomesh.subscription import Sample
-from robomesh.topics import Priority
-from robots.urdf.viewers import WORLD, Viewed, together
+from robomesh.wire.session import Session
+from robots.descriptions.urdf.viewers import WORLD, Viewed, together
 from services.ros2.meshes import Meshes
 from services.ros2.settings import Settings
 from services.ros2.wire import Node, Topic, message

@@ -5,11 +5,11 @@ import hashlib
 import logging
 from pathlib import Path
 
-from robomesh.atomic_write import write_atomically
+from robomesh.contract.keys import robot_key
 from robomesh.errors import RobomeshError
-from robomesh.keys import robot_key
+from robomesh.files.atomic_write import write_atomically
 from robomesh.schemas.robomesh_pb2 import Description
-from robomesh.session import Session
+from robomesh.wire.session import Session
 from services.viewer_robots import meshes_of
 
 log = logging.getLogger(__name__)

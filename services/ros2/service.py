@@ -2,8 +2,8 @@
 
 import asyncio
 
-from robomesh.linked_site import be_present
-from robomesh.session import Session
+from robomesh.service.linked_site import be_present
+from robomesh.wire.session import Session
 from services.ros2.bridge import Bridge
 from services.ros2.settings import Settings
 

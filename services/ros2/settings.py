@@ -4,7 +4,7 @@ import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from robomesh.keys import is_replay
+from robomesh.contract.keys import is_replay
 
 
 def _cache() -> Path:

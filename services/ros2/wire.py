@@ -19,7 +19,7 @@ import zenoh
 import zenoh.ext
 from rosbags.typesys import Stores, get_typestore
 
-from robomesh.topics import Priority
+from robomesh.contract.topics import Priority
 from services.errors import ServiceError
 
 _STORE = get_typestore(Stores.ROS2_JAZZY)

@@ -12,8 +12,8 @@ from typing import Any
 
 import zenoh
 
-from robomesh.endpoints import Link
-from robomesh.topics import Role
+from robomesh.contract.endpoints import Link
+from robomesh.contract.topics import Role
 
 _ADDRESS = re.compile(r"/\[?([^\]/?#]*)\]?:(\d+)(?:[?#]|$)")
 

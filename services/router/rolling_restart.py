@@ -4,8 +4,8 @@ import asyncio
 
 import zenoh
 
-from robomesh.certificate_identity import read_identity
-from robomesh.endpoints import Tls
+from robomesh.contract.certificate_identity import read_identity
+from robomesh.contract.endpoints import Tls
 
 _MAX_WAIT_S = 10.0
 # Its clients reconnect within this time.

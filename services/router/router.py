@@ -19,12 +19,12 @@ from typing import Any
 import zenoh
 
 from robomesh import reason_codes as codes
-from robomesh.certificate_identity import read_identity
-from robomesh.endpoints import Link, Tls, first_line, router_config, router_values
+from robomesh.contract.certificate_identity import read_identity
+from robomesh.contract.endpoints import Link, Tls, first_line, router_config, router_values
 from robomesh.errors import ListenError, RobomeshError, UnavailableError
 from robomesh.listen_address import check_reach, own_addresses, split_address
 from robomesh.schemas.robomesh_pb2 import Event
-from robomesh.session import SessionSettings
+from robomesh.wire.session import SessionSettings
 from services.errors import ServiceError
 from services.router.peer_audit import find_impostors, to_other_sites, without_rights
 from services.router.rolling_restart import neighbours, wait_for_turn

@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import zenoh
 
+from robomesh.contract.keys import WHOLE_SITE
 from robomesh.errors import RobomeshError
-from robomesh.health import Served, present
-from robomesh.keys import WHOLE_SITE
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import SessionSettings, open_session
+from robomesh.service.health import Served, present
+from robomesh.wire.session import SessionSettings, open_session
 
 log = logging.getLogger(__name__)
 

@@ -8,14 +8,14 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from robomesh import reason_codes as codes
-from robomesh.atomic_write import write_atomically
 from robomesh.errors import RefusedError
+from robomesh.files.atomic_write import write_atomically
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.bounded_toml import MOST_CHARACTERS, parse_toml
-from robots.cells import CellDescription
-from robots.description import load
-from robots.kinematic_tree import tree_of
+from robots.collision.cells import CellDescription
+from robots.descriptions.description import load
+from robots.kinematics.kinematic_tree import tree_of
+from robots.schema.bounded_toml import MOST_CHARACTERS, parse_toml
 from services.site_file import cell_content
 from services.site_file.cell_text import TextFormError, changed_text
 from services.site_file.cells import cells_of

@@ -14,8 +14,8 @@ from pydantic import ValidationError
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Table
 
-from robots.bounded_toml import parse_toml
-from robots.description_text import inline_text
+from robots.descriptions.description_text import inline_text
+from robots.schema.bounded_toml import parse_toml
 from services.site_file.cell_content import new_values
 from services.site_file.fixtures import Fixture, Floor
 from services.site_file.site import Site

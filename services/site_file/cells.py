@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from robots.cells import CellDescription, CellRobot, Fixture, Floor
-from robots.poses import pose_matrix
-from robots.schema import Units
+from robots.collision.cells import CellDescription, CellRobot, Fixture, Floor
+from robots.schema.poses import pose_matrix
+from robots.schema.robot_toml import Units
 from services.site_file import fixtures
 from services.site_file.robot import Robot
 from services.site_file.site import Site

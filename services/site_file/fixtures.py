@@ -12,16 +12,16 @@ import numpy as np
 from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
 
 from protocol_gateway.seam.table import PART_CONFIG
-from robomesh import keys
+from robomesh.contract import keys
 from robomesh.errors import KeyNameError
-from robots.errors import MeshError
-from robots.joints import FloatArray
-from robots.kinematic_tree import Shape, rgb
-from robots.meshes.mesh import Material, Mesh, Part
-from robots.meshes.normals import creased
-from robots.meshes.solids import ball, box, turned
-from robots.poses import pose_matrix
-from robots.schema import Pose, Positive, Units, nearest
+from robots.kinematics.joints import FloatArray
+from robots.kinematics.kinematic_tree import Shape, rgb
+from robots.schema.errors import MeshError
+from robots.schema.poses import pose_matrix
+from robots.schema.robot_toml import Pose, Positive, Units, nearest
+from robots.shapes.mesh import Material, Mesh, Part
+from robots.shapes.normals import creased
+from robots.shapes.solids import ball, box, turned
 
 _ROUND = 48
 _MILLIMETRE = 1e-3
@@ -197,7 +197,7 @@ def fixture_problem(fixtures: tuple[Fixture, ...], links: dict[str, dict[str, bo
     Args:
         links: Links of each robot, by the robot's name.
     """
-    from robots.glb import shapes_glb
+    from robots.descriptions.glb import shapes_glb
 
     for fixture in fixtures:
         for robot, _, link in (pair.partition("/") for pair in fixture.ignore):
@@ -224,7 +224,7 @@ def _missing_part(mesh: Path, within: Path | None) -> str:
 
     Only the VRML reader goes on without such a file; the others refuse the mesh.
     """
-    from robots.meshes.read import READERS, read_mesh
+    from robots.shapes.files.read import READERS, read_mesh
 
     if READERS.get(mesh.suffix.lower()) is not READERS[".wrl"]:
         return ""

@@ -6,8 +6,8 @@ from pydantic import BaseModel, Field, StrictBool, field_validator, model_valida
 
 from protocol_gateway.legacy.settings import LegacySettings, plain_address
 from protocol_gateway.seam.table import PART_CONFIG
-from protocol_gateway.text_limits import LONGEST_TEXT
-from robomesh import keys
+from protocol_gateway.seam.text_limits import LONGEST_TEXT
+from robomesh.contract import keys
 from robomesh.errors import KeyNameError, ListenError
 from robomesh.listen_address import check_reach, is_loopback, split_address
 

@@ -5,12 +5,12 @@ from typing import Annotated
 from pydantic import BaseModel, Field
 
 from protocol_gateway.seam.table import PART_CONFIG
-from robomesh.quotas import DEFAULT_QUOTAS as DEFAULT
-from robomesh.quotas import Quotas as QuotaSettings
+from robomesh.contract.quotas import DEFAULT_QUOTAS as DEFAULT
+from robomesh.contract.quotas import Quotas as QuotaSettings
 
 
 class Quotas(BaseModel):
-    """Limits for each client's name; `robomesh/quotas.py` describes each."""
+    """Limits for each client's name; `robomesh/contract/quotas.py` describes each."""
 
     model_config = PART_CONFIG
     views: Annotated[int, Field(ge=1, le=256)] = DEFAULT.views

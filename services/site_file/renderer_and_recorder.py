@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, Field
 
 from protocol_gateway.seam.table import PART_CONFIG
-from robomesh.keys import CLOSE, FAR
+from robomesh.contract.keys import CLOSE, FAR
 
 Pixels = Annotated[int, Field(ge=64, le=4096, multiple_of=2)]
 

@@ -18,20 +18,20 @@ from pydantic import (
 )
 
 from protocol_gateway.core.codes import code_table
-from protocol_gateway.errors import CodeTableError, GatewaySettingsError
 from protocol_gateway.kinds import is_known, kind_of, own_kinds, protocols
 from protocol_gateway.proofs import StopProof
 from protocol_gateway.seam import Recovery
+from protocol_gateway.seam.errors import CodeTableError, GatewaySettingsError
 from protocol_gateway.seam.kind import Kind
 from protocol_gateway.seam.table import PART_CONFIG, Declared, Table, problem_text
-from robomesh import keys
-from robomesh.access_rights import PROBE_ROBOT
+from robomesh.contract import keys
+from robomesh.contract.access_rights import PROBE_ROBOT
 from robomesh.errors import KeyNameError, ListenError
 from robomesh.listen_address import is_loopback, split_address
-from robots.description import Pose
-from robots.joints import JointType
-from robots.schema import JointSettings, Model, Positive, Range, StatedModel
-from robots.verification_record import VerificationRecord, read_record
+from robots.descriptions.description import Pose
+from robots.kinematics.joints import JointType
+from robots.kinematics.verification_record import VerificationRecord, read_record
+from robots.schema.robot_toml import JointSettings, Model, Positive, Range, StatedModel
 from services.site_file.fixtures import Clearance, Floor
 from services.site_file.legacy_clients import LegacyClients
 

@@ -7,13 +7,13 @@ from typing import Annotated
 from pydantic import BaseModel, Field, StrictBool, ValidationError, field_validator
 
 from protocol_gateway.seam.table import PART_CONFIG
-from robomesh.access_rights import Border
-from robomesh.certificate_identity import read_identity
-from robomesh.endpoints import Link, Tls
+from robomesh.contract.access_rights import Border
+from robomesh.contract.certificate_identity import read_identity
+from robomesh.contract.endpoints import Link, Tls
+from robomesh.contract.keys import check_name
 from robomesh.errors import KeyNameError, ListenError
-from robomesh.keys import check_name
 from robomesh.listen_address import reachable, split_address
-from robots.bounded_toml import read_toml
+from robots.schema.bounded_toml import read_toml
 from services.pki import Folder
 from services.pki.errors import KeysError
 

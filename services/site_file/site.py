@@ -27,11 +27,11 @@ from robomesh.listen_address import (
     same_address,
     split_address,
 )
-from robots import description
-from robots.bounded_toml import read_toml
-from robots.errors import DescriptionError, VerificationRecordError
-from robots.kinematic_tree import BASE, bare_links, tree_of
-from robots.schema import Pose, UrdfDescription
+from robots.descriptions import description
+from robots.kinematics.kinematic_tree import BASE, bare_links, tree_of
+from robots.schema.bounded_toml import read_toml
+from robots.schema.errors import DescriptionError, VerificationRecordError
+from robots.schema.robot_toml import Pose, UrdfDescription
 from services.errors import SiteFileError
 from services.site_file.console import Console
 from services.site_file.console import resolve_paths as resolve_console_paths

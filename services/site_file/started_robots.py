@@ -9,9 +9,9 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from protocol_gateway.seam.table import problem_text
-from robomesh.atomic_write import write_atomically
-from robots.bounded_toml import read_toml
-from robots.description import DESCRIPTION_FILE, library_names
+from robomesh.files.atomic_write import write_atomically
+from robots.descriptions.description import DESCRIPTION_FILE, library_names
+from robots.schema.bounded_toml import read_toml
 from services.errors import SiteFileError
 from services.site_file.robot import Robot
 from services.site_file.site import Site

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from google.protobuf.json_format import MessageToDict, ParseDict, ParseError
 
-from robomesh.atomic_write import write_atomically
+from robomesh.files.atomic_write import write_atomically
 from robomesh.schemas.robomesh_pb2 import ProgramVersion
 from services.store.history import Program, sha256
 

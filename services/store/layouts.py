@@ -12,8 +12,8 @@ from google.protobuf.json_format import MessageToDict, ParseDict, ParseError
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from robomesh import reason_codes as codes
-from robomesh.atomic_write import write_atomically
 from robomesh.errors import RefusedError
+from robomesh.files.atomic_write import write_atomically
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import LayoutList, LayoutRequest, StoredLayout
 from services.store.history import check_name, name_key

@@ -20,9 +20,9 @@ from google.protobuf.json_format import MessageToDict, ParseDict, ParseError
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from robomesh import reason_codes as codes
-from robomesh.atomic_write import fsync_folder
+from robomesh.contract.messages import reason_message
 from robomesh.errors import RefusedError
-from robomesh.messages import reason_message
+from robomesh.files.atomic_write import fsync_folder
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import Event, EventList, Note, NoteQuery, NoteRequest
 from robomesh.texts import one_line

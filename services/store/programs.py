@@ -10,8 +10,8 @@ from typing import NamedTuple
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from robomesh import reason_codes as codes
+from robomesh.contract.keys import check_name as check_robot
 from robomesh.errors import KeyNameError, RefusedError
-from robomesh.keys import check_name as check_robot
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import (
     ProgramAnswer,

@@ -11,17 +11,17 @@ from functools import partial
 from pathlib import Path
 
 from robomesh import reason_codes as codes
-from robomesh.enum_names import enum_word
+from robomesh.contract.enum_names import enum_word
+from robomesh.contract.keys import ROOT, WHOLE_SITE, check_name, is_replay
+from robomesh.contract.messages import reason_message
+from robomesh.contract.quotas import Quota
+from robomesh.contract.topics import check_operator
 from robomesh.errors import MessageError, RefusedError
-from robomesh.keys import ROOT, WHOLE_SITE, check_name, is_replay
-from robomesh.messages import reason_message
-from robomesh.publisher import LIST_LENGTH, Publisher
-from robomesh.quotas import Quota
+from robomesh.publications.publisher import LIST_LENGTH, Publisher
 from robomesh.reasons import Reason
+from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Request
-from robomesh.session import Session
-from robomesh.topics import check_operator
+from robomesh.wire.session import Session
 from services.errors import ServiceError
 from services.store.layouts import Layouts
 from services.store.notes import NoteBook

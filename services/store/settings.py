@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from robomesh.quotas import DEFAULT_QUOTAS, Quotas
+from robomesh.contract.quotas import DEFAULT_QUOTAS, Quotas
 
 MIB = 1 << 20
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from robomesh import reason_codes as codes
-from robomesh.messages import reason_message
+from robomesh.contract.messages import reason_message
 from robomesh.schemas import robomesh_pb2 as schema
 from services.watch import alarm_store
 from services.watch.alarms import Alarm, Alarms

@@ -8,7 +8,7 @@ from typing import Any
 
 from google.protobuf.json_format import MessageToDict, ParseDict, ParseError
 
-from robomesh.atomic_write import write_atomically
+from robomesh.files.atomic_write import write_atomically
 from robomesh.schemas.robomesh_pb2 import Alarm as AlarmMessage
 from robomesh.schemas.robomesh_pb2 import Reason as ReasonMessage
 from services.watch.alarms import Alarm

@@ -24,7 +24,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 from robomesh import reason_codes as codes
-from robomesh.enum_names import enum_word
+from robomesh.contract.enum_names import enum_word
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import Alarm as AlarmMessage
 from robomesh.schemas.robomesh_pb2 import Reason as ReasonMessage

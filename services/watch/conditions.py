@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from robomesh import reason_codes as codes
-from robomesh.keys import WHOLE_SITE
-from robomesh.messages import reason_message
+from robomesh.contract.keys import WHOLE_SITE
+from robomesh.contract.messages import reason_message
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import ControllerState
 from robomesh.schemas.robomesh_pb2 import Reason as ReasonMessage

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 
 from robomesh import reason_codes as codes
-from robomesh.keys import WHOLE_SITE, PresenceKey, is_replay
-from robomesh.messages import received_reason
-from robomesh.session import CERTIFICATE
+from robomesh.contract.keys import WHOLE_SITE, PresenceKey, is_replay
+from robomesh.contract.messages import received_reason
+from robomesh.wire.session import CERTIFICATE
 from services.watch.conditions import Condition, condition_of
 from services.watch.mesh import Mesh, Process
 

@@ -5,10 +5,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from statistics import quantiles
 
-from robomesh.clock import Clock, Reading
-from robomesh.keys import WHOLE_SITE, PresenceKey
-from robomesh.presence import SILENT
+from robomesh.contract.keys import WHOLE_SITE, PresenceKey
 from robomesh.schemas.robomesh_pb2 import MeshState, ServiceHealth
+from robomesh.service.clock import Clock, Reading
+from robomesh.wire.presence import SILENT
 
 _LOSS_OVER = 30  # health messages: a minute
 _HOPS_KEPT = 200

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from robomesh.keys import Key
+from robomesh.contract.keys import Key
 from robomesh.schemas.robomesh_pb2 import Event
 from services.watch.alarms import Alarm, Alarms
 from services.watch.conditions import Condition, alarm_id

@@ -8,17 +8,17 @@ from collections.abc import Coroutine, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from robomesh.clock import read_clock
+from robomesh.contract.ignored import PUBLICATION
+from robomesh.contract.keys import ROOT, WHOLE_SITE, check_name, is_replay
+from robomesh.contract.topics import check_operator
 from robomesh.errors import MessageError, NoAnswerError, RefusedError
-from robomesh.ignored import PUBLICATION
-from robomesh.keys import ROOT, WHOLE_SITE, check_name, is_replay
+from robomesh.publications.subscription import Subscription
+from robomesh.publications.wall_clock import ForwardClock
+from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Request
-from robomesh.session import Session
-from robomesh.subscription import Subscription
+from robomesh.service.clock import read_clock
 from robomesh.texts import one_line
-from robomesh.topics import check_operator
-from robomesh.wall_clock import ForwardClock
+from robomesh.wire.session import Session
 from services.watch.alarm_registry import AlarmRegistry
 from services.watch.alarms import AlarmError
 from services.watch.conditions import Condition, ConditionTracker, robot_conditions

@@ -17,12 +17,12 @@ from controllers.unit.simulated import service as simulator
 from protocol_gateway import gateway
 from protocol_gateway.legacy.settings import LegacySettings
 from protocol_gateway.settings import RobotSettings
-from robomesh.endpoints import router_config
-from robomesh.keys import WHOLE_SITE
-from robomesh.messages import reason_message
+from robomesh.contract.endpoints import router_config
+from robomesh.contract.keys import WHOLE_SITE
+from robomesh.contract.messages import reason_message
 from robomesh.schemas.robomesh_pb2 import Event
-from robomesh.session import Session, SessionSettings, open_session
-from robots.cells import Fixture
+from robomesh.wire.session import Session, SessionSettings, open_session
+from robots.collision.cells import Fixture
 from services.console import app
 from services.console.websocket import shared_subscriptions
 from services.kinematics import kinematics

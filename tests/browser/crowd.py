@@ -20,15 +20,15 @@ import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from robomesh import reason_codes
-from robomesh.messages import reason_message
+from robomesh.contract.messages import reason_message
+from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Request
-from robomesh.session import Session, SessionSettings, open_session
-from robots.description import load
-from robots.glb import link_meshes
-from robots.joints import Joints
-from robots.model import build_model
-from robots.urdf.write import to_urdf
+from robomesh.wire.session import Session, SessionSettings, open_session
+from robots.descriptions.description import load
+from robots.descriptions.glb import link_meshes
+from robots.descriptions.urdf.write import to_urdf
+from robots.kinematics.joints import Joints
+from robots.kinematics.model import build_model
 from services.kinematics.descriptions import describe
 
 State = schema.ControllerState

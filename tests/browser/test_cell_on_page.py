@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 from playwright.sync_api import expect
 
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from tests.browser.robot_page import (
     events,
     keep_picture,

@@ -6,8 +6,8 @@ import pytest
 from playwright.sync_api import expect
 
 from robomesh import reason_codes as codes
+from robomesh.contract.keys import WHOLE_SITE
 from robomesh.errors import RefusedError
-from robomesh.keys import WHOLE_SITE
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.texts import DIRECTION
 from tests.browser.robot_page import alarms, button, journal_entry, journal_lines, region, tile

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.description import load
-from robots.model import build_model, link_placements
-from robots.urdf.write import to_urdf
+from robots.descriptions.description import load
+from robots.descriptions.urdf.write import to_urdf
+from robots.kinematics.model import build_model, link_placements
 from tests.browser.conftest import ARGUMENTS, CHROMIUM, LAUNCH_MS
 from web import build_page
 

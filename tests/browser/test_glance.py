@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import expect
 
 from protocol_gateway.authority import lease_rules
-from robomesh.keys import WHOLE_SITE
+from robomesh.contract.keys import WHOLE_SITE
 from tests.browser.rendering import rendering
 from tests.browser.robot_page import (
     ARM,

@@ -20,10 +20,10 @@ import numpy as np
 import pytest
 
 import robomesh
-from robots.description import load
-from robots.glb import link_mesh
-from robots.kinematic_tree import tree_of
-from robots.model import build_model, link_placements
+from robots.descriptions.description import load
+from robots.descriptions.glb import link_mesh
+from robots.kinematics.kinematic_tree import tree_of
+from robots.kinematics.model import build_model, link_placements
 from services.viewer_layout import viewer_layout
 from tests.browser.conftest import ARGUMENTS, CHROMIUM, LAUNCH_MS
 from tests.compatibility.earlier import unpack

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from robots.cells import Fixture
-from robots.schema import Pose
+from robots.collision.cells import Fixture
+from robots.schema.robot_toml import Pose
 from services.site_file.fixtures import Fixture as FixtureRow
 from services.site_file.fixtures import fixture_shape, fixture_to_site
 from tests.browser.crowd import crowd

@@ -9,8 +9,8 @@ from mcap.writer import Writer
 from mcap_protobuf.schema import build_file_descriptor_set
 from playwright.sync_api import expect
 
+from robomesh.contract.keys import WHOLE_SITE
 from robomesh.errors import RefusedError
-from robomesh.keys import WHOLE_SITE
 from robomesh.schemas import robomesh_pb2 as schema
 from services import player, recorder, store
 from tests.browser.robot_page import (

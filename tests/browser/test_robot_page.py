@@ -13,7 +13,7 @@ from controllers.universal_robots.settings import MotionSettings, UniversalRobot
 from protocol_gateway import gateway
 from protocol_gateway.seam import Recovery
 from protocol_gateway.settings import RobotSettings
-from robomesh.session import SessionSettings, open_session
+from robomesh.wire.session import SessionSettings, open_session
 from services.kinematics import kinematics
 from tests.browser.robot_page import (
     ARM,

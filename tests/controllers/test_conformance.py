@@ -7,7 +7,7 @@ import pytest
 
 from protocol_gateway.gateway import RobotSettings
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from tests.conftest import free_port, run
 from tests.controllers.conformance import SUBJECTS
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, gateway_process, refusal, until

@@ -24,18 +24,18 @@ if __name__ == "__main__":
 
 import numpy as np
 
-from robots.description import LIBRARY, parse
-from robots.errors import RobotError
-from robots.meshes.mesh import Material, Mesh, Part
-from robots.meshes.normals import creased
-from robots.meshes.read import read_mesh
-from robots.meshes.solids import box
-from robots.meshes.three_ds.read import read_3ds
-from robots.meshes.three_ds.write import write_3ds
-from robots.meshes.vrml.read import read_vrml
-from robots.meshes.vrml.write import write_vrml
-from robots.meshes.write_glb import glb_of
-from robots.meshes.write_others import write_obj, write_ply, write_stl
+from robots.descriptions.description import LIBRARY, parse
+from robots.schema.errors import RobotError
+from robots.shapes.files.read import read_mesh
+from robots.shapes.files.three_ds.read import read_3ds
+from robots.shapes.files.three_ds.write import write_3ds
+from robots.shapes.files.vrml.read import read_vrml
+from robots.shapes.files.vrml.write import write_vrml
+from robots.shapes.files.write_glb import glb_of
+from robots.shapes.files.write_others import write_obj, write_ply, write_stl
+from robots.shapes.mesh import Material, Mesh, Part
+from robots.shapes.normals import creased
+from robots.shapes.solids import box
 from tests.fuzz.fuzzing import Finding, keep, options
 
 TESTDATA = Path(__file__).resolve().parents[2].parent / "shared" / "testdata"

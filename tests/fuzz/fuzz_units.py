@@ -22,15 +22,15 @@ from google.protobuf.message import Message
 from protocol_gateway.core.codes import TYPES, code_table
 from protocol_gateway.core.records import Error
 from protocol_gateway.core.stream import Unit, UnitStream
-from protocol_gateway.journal import Journal
 from protocol_gateway.legacy.requests import asks_for_more, asks_to_stop, requests_of
 from protocol_gateway.link.timestamping import Received, Timestamper
 from protocol_gateway.seam import JointsReceived
-from protocol_gateway.signals import Signals
-from protocol_gateway.telemetry import Telemetry
+from protocol_gateway.telemetry.journal import Journal
+from protocol_gateway.telemetry.signals import Signals
+from protocol_gateway.telemetry.telemetry import Telemetry
 from protocol_gateway.unit_driver import UnitDriver
-from robots.description import load
-from robots.joints import joints_of
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 from tests.fuzz.fuzzing import Finding, campaign, cut
 
 JOINTS = joints_of(load("pt600"))

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from robots.cells import CellDescription, CellRobot, Fixture
 from robots.collision import Cell, allowed_positions, build_cell, outside_nearest, own_contacts
-from robots.joints import FloatArray
-from robots.kinematic_tree import Shape
-from robots.meshes.mesh import Material, Mesh, Part
-from robots.meshes.solids import ball, box
-from robots.views import reach
+from robots.collision.cells import CellDescription, CellRobot, Fixture
+from robots.kinematics.joints import FloatArray
+from robots.kinematics.kinematic_tree import Shape
+from robots.kinematics.views import reach
+from robots.shapes.mesh import Material, Mesh, Part
+from robots.shapes.solids import ball, box
 
 Pairs = set[tuple[str, str]]
 

@@ -5,18 +5,18 @@ from contextlib import asynccontextmanager
 from protocol_gateway.audit.log import AuditLog, read_entries
 from protocol_gateway.authority.lease_rules import Authority
 from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.authority.robot_authority import RobotAuthority
 from protocol_gateway.control.audit_trail import AuditTrail
 from protocol_gateway.control.control import Control, Ports
-from protocol_gateway.control.robot_authority import RobotAuthority
-from protocol_gateway.errors import LinkDownError
-from protocol_gateway.journal import Journal
 from protocol_gateway.link.link import LinkState, LinkStatus
 from protocol_gateway.seam import Activity, Mode, StatusReceived
+from protocol_gateway.seam.errors import LinkDownError
+from protocol_gateway.telemetry.journal import Journal
 from protocol_gateway.unit_driver import UnitDriver
 from robomesh import reason_codes as codes
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.description import load
-from robots.joints import joints_of
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 
 
 class ControlBench:

@@ -16,7 +16,7 @@ from protocol_gateway.gateway import RobotSettings, Settings, serve
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from tests.conftest import last_value
 
 C = schema.CommandRequest.Command
@@ -198,7 +198,7 @@ async def gateway(mesh, folder, *ports, up=True, each=(), **robot):
 _PROCESS = """
 import asyncio, pickle, sys
 from protocol_gateway.gateway import serve
-from robomesh.session import SessionSettings, open_session
+from robomesh.wire.session import SessionSettings, open_session
 
 async def main(router, settings):
     async with open_session(SessionSettings(connect=(router,))) as session:

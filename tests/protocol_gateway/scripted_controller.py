@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from robots.joints import Joints, JointType
+from robots.kinematics.joints import Joints, JointType
 
 
 def endless_joints(count):

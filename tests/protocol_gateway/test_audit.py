@@ -12,7 +12,7 @@ import pytest
 
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome, read_entries, verify
 from protocol_gateway.audit.persisted_state import authority_after
-from protocol_gateway.errors import AuditError
+from protocol_gateway.seam.errors import AuditError
 from tests.conftest import run
 
 HOUSE = Path(__file__).resolve().parents[2]

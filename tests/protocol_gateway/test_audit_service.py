@@ -20,7 +20,7 @@ from protocol_gateway.audit import search
 from protocol_gateway.audit.log import read_entries, verify
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import (
     STATE,

@@ -5,7 +5,7 @@ import json
 import math
 
 from protocol_gateway.audit.log import read_entries, verify
-from robomesh.messages import JSON, PROTOBUF
+from robomesh.contract.messages import JSON, PROTOBUF
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import C, gateway, simulator, until

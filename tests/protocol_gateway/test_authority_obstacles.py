@@ -14,7 +14,7 @@ from protocol_gateway.authority.preconditions import (
     recoveries_of,
 )
 from protocol_gateway.link.link import LinkState, LinkStatus
-from protocol_gateway.motion import MotionDetector, has_arrived, is_moving, motion_may_be_held
+from protocol_gateway.link.motion import MotionDetector, has_arrived, is_moving, motion_may_be_held
 from protocol_gateway.seam import (
     Activity,
     Capabilities,
@@ -31,8 +31,8 @@ from protocol_gateway.seam import (
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest
 from robomesh.schemas.robomesh_pb2 import Recover as RecoverMessage
-from robots.description import load
-from robots.joints import JointType, joints_of
+from robots.descriptions.description import load
+from robots.kinematics.joints import JointType, joints_of
 
 C = CommandRequest.Command
 JOINTS = joints_of(load("pt600"))

@@ -13,12 +13,12 @@ import pytest
 from protocol_gateway.checking.checker import MOST_PROCESSES, Checker, make_checkers
 from protocol_gateway.checking.worker import begin
 from protocol_gateway.checking.worker_messages import Checked, CheckMotion
-from protocol_gateway.errors import CheckError
+from protocol_gateway.seam.errors import CheckError
 from robomesh import reason_codes as codes
-from robots.cells import CellDescription, CellRobot, Fixture
-from robots.kinematic_tree import Shape
-from robots.meshes.mesh import Material, Mesh, Part
-from robots.schema import JointSettings, StatedModel
+from robots.collision.cells import CellDescription, CellRobot, Fixture
+from robots.kinematics.kinematic_tree import Shape
+from robots.schema.robot_toml import JointSettings, StatedModel
+from robots.shapes.mesh import Material, Mesh, Part
 from tests.conftest import run
 from tests.robots.boxes import bar_arm, block, one_joint_arm, placed
 

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from protocol_gateway.clocks import read_clocks
+from protocol_gateway.control.clocks import read_clocks
+from robomesh.contract.messages import PROTOBUF
 from robomesh.errors import RefusedError
-from robomesh.messages import PROTOBUF
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.cells import CellDescription, CellRobot, Fixture
-from robots.poses import pose_matrix
-from robots.schema import Pose, Units
+from robots.collision.cells import CellDescription, CellRobot, Fixture
+from robots.schema.poses import pose_matrix
+from robots.schema.robot_toml import Pose, Units
 from services.site_file import fixtures
 from services.watch.rules import RULES
 from tests.conftest import run

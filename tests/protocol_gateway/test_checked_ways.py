@@ -14,8 +14,8 @@ from protocol_gateway.seam import Activity, Mode, StatusReceived
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.description import load
-from robots.joints import joints_of
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 from tests.conftest import run
 from tests.protocol_gateway.control_bench import control_bench
 from tests.protocol_gateway.gateway_site import A, C, gateway, simulator, until

@@ -13,7 +13,7 @@ import pytest
 from controllers.simulated.errors import SimulatorError
 from controllers.simulated.fault_requests import Mesh
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import SessionSettings
+from robomesh.wire.session import SessionSettings
 from tests.conftest import run
 from tests.protocol_gateway.faulty_site import faulty_site
 from tests.protocol_gateway.gateway_site import STATE, gateway, refusal, simulator, until

@@ -7,7 +7,7 @@ from math import radians
 import pytest
 
 from protocol_gateway.audit.files import read_entries
-from protocol_gateway.control.events import (
+from protocol_gateway.authority.events import (
     LeaseEnded,
     LinkLost,
     LinkRestored,

@@ -6,7 +6,6 @@ import time
 
 import pytest
 
-from protocol_gateway.errors import LinkDownError, NotReadyError
 from protocol_gateway.link.link import ControllerLink, LinkSettings, LinkState
 from protocol_gateway.seam import (
     ALL,
@@ -21,8 +20,9 @@ from protocol_gateway.seam import (
     Send,
     SetTimer,
 )
+from protocol_gateway.seam.errors import LinkDownError, NotReadyError
 from robomesh import reason_codes as codes
-from robomesh.loop_turns import LONG_S, MeasuredLoop, turns_of
+from robomesh.service.loop_turns import LONG_S, MeasuredLoop, turns_of
 from tests.conftest import free_port, run
 from tests.protocol_gateway.scripted_controller import endless_joints
 from tests.protocol_gateway.test_link import Seen, controller, end, until

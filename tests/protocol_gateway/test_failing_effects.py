@@ -6,21 +6,21 @@ import errno
 
 import pytest
 
+from protocol_gateway.authority.effects import Finding, Program
+from protocol_gateway.authority.events import LeaseEnded, LinkLost, LinkRestored, MotionObserved
 from protocol_gateway.authority.lease_rules import Authority
 from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.authority.robot_authority import RobotAuthority
 from protocol_gateway.control.control import Control, Ports
-from protocol_gateway.control.effects import Finding, Program
-from protocol_gateway.control.events import LeaseEnded, LinkLost, LinkRestored, MotionObserved
-from protocol_gateway.control.robot_authority import RobotAuthority
-from protocol_gateway.errors import AuditError, LinkDownError
 from protocol_gateway.link.link import LinkState, LinkStatus
 from protocol_gateway.seam import Activity, Mode, StatusReceived
+from protocol_gateway.seam.errors import AuditError, LinkDownError
 from protocol_gateway.unit_driver import UnitDriver
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
-from robots.description import load
-from robots.joints import joints_of
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 
 A, C = LeaseRequest.Action, CommandRequest.Command
 JOINTS = joints_of(load("pt600"))

@@ -10,7 +10,7 @@ import pytest
 from protocol_gateway.link.flood import EventDispatcher, FloodDetector
 from protocol_gateway.link.timestamping import Received
 from protocol_gateway.seam import Activity, JointsReceived, Mode, Refused, StatusReceived
-from robomesh.keys import robot_key
+from robomesh.contract.keys import robot_key
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, none_left_out, refusal, simulator, until
 from tests.protocol_gateway.old_client import legacy, program

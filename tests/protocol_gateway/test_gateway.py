@@ -7,10 +7,10 @@ import time
 import pytest
 
 from protocol_gateway.audit.log import read_entries, verify
-from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.gateway import RobotSettings, Settings, check
-from robomesh.loop_turns import LONG_S, MeasuredLoop
+from protocol_gateway.seam.errors import GatewaySettingsError
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.service.loop_turns import LONG_S, MeasuredLoop
 from tests.conftest import last_value, run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, simulator, until
 

@@ -12,8 +12,8 @@ import zenoh
 
 from protocol_gateway.audit.log import read_entries
 from protocol_gateway.robot import Robot
-from robomesh.endpoints import router_config
-from robomesh.session import SessionSettings
+from robomesh.contract.endpoints import router_config
+from robomesh.wire.session import SessionSettings
 from tests.conftest import free_port, last_value, run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, simulator, until
 

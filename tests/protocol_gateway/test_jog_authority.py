@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from protocol_gateway.control.effects import Finding, Program
-from protocol_gateway.control.events import JogEnding, JogHeld, JogPartReady
+from protocol_gateway.authority.effects import Finding, Program
+from protocol_gateway.authority.events import JogEnding, JogHeld, JogPartReady
 from protocol_gateway.seam import Activity
 from robomesh import reason_codes as codes
 from robomesh.schemas import robomesh_pb2 as schema

@@ -10,11 +10,11 @@ import numpy as np
 import pinocchio
 import pytest
 
+from robomesh.contract.messages import reason_message
 from robomesh.errors import RefusedError
-from robomesh.messages import reason_message
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.description import load
-from robots.urdf.write import to_urdf
+from robots.descriptions.description import load
+from robots.descriptions.urdf.write import to_urdf
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, kept_control, refusal, simulator, until
 from tests.protocol_gateway.test_checked_motion import POST, one_robot_cell

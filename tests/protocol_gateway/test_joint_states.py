@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol_gateway.seam import JointsReceived
-from protocol_gateway.state_messages import JointStatesMessage, timestamp
+from protocol_gateway.telemetry.state_messages import JointStatesMessage, timestamp
 
 NAMES = ("waist", "elbow")
 _NUMBERS = st.tuples(*[st.floats(allow_nan=False, allow_infinity=False)] * len(NAMES))

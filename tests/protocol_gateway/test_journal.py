@@ -1,6 +1,6 @@
 """Rate limit of repeated events."""
 
-from protocol_gateway.journal import Journal
+from protocol_gateway.telemetry.journal import Journal
 from robomesh.schemas.robomesh_pb2 import Event
 
 

@@ -312,7 +312,7 @@ async def test_a_controllers_refusal_is_relayed_only_to_the_client_in_control(me
 async def test_a_robot_moves_without_the_port_of_old_programs_and_gets_it_when_it_is_free(
     mesh, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr("robomesh.health._LISTEN_AGAIN_S", 0.1)
+    monkeypatch.setattr("robomesh.service.health._LISTEN_AGAIN_S", 0.1)
     settings = legacy()
     other = await asyncio.start_server(lambda *_: None, ME, settings.port)
     async with legacy_site(mesh, tmp_path, settings) as site:

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from protocol_gateway.authority.events import LeaseEnded, MotionObserved
 from protocol_gateway.authority.lease_rules import Authority, Stop
 from protocol_gateway.authority.preconditions import Controller
-from protocol_gateway.control.events import LeaseEnded, MotionObserved
 from protocol_gateway.core.records import Error, read_records, write_unit
 from protocol_gateway.core.stream import Unit, UnitStream
 from protocol_gateway.legacy.requests import (
@@ -32,8 +32,8 @@ from protocol_gateway.seam import (
 )
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest, Recover
-from robots.description import load
-from robots.joints import joints_of
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 from tests.conftest import run
 from tests.protocol_gateway.control_bench import control_bench
 

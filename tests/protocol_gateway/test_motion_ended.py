@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import pytest
 
-from protocol_gateway.audit.log import GATEWAY
+from protocol_gateway.authority.entry import GATEWAY
+from protocol_gateway.authority.events import MotionObserved, StatusReported
 from protocol_gateway.authority.lease_rules import Authority, Now, end_lease, request_lease
 from protocol_gateway.authority.motion_owner import command_sent, observe, reported
-from protocol_gateway.control.events import MotionObserved, StatusReported
 from protocol_gateway.seam import Activity, Mode, StatusReceived
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
-from robots.description import load
-from robots.joints import joints_of
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 from tests.conftest import run
 from tests.protocol_gateway.control_bench import control_bench
 from tests.protocol_gateway.gateway_site import gateway, simulator, until

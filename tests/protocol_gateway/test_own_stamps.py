@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import pytest
 
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import gateway, until
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from protocol_gateway.core.codes import NAMES, code_table
 from protocol_gateway.core.plain import plain_readers, read_plain
 from protocol_gateway.core.records import read_records
-from protocol_gateway.errors import UnitError
+from protocol_gateway.seam.errors import UnitError
 
 OWN = code_table({2: "ABSOLUTE.DEG", -9: "TIME", 12: "OVEN", 101: "COMMAND:home"})
 TABLES = {"names": NAMES, "codes of its own": OWN}

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from protocol_gateway.link.plausibility import Plausibility
 from protocol_gateway.seam import Activity, StatusReceived
-from robots.description import load
-from robots.joints import joints_of
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 from tests.robots.arms import TELESCOPE
 
 # Limits of the waist: ±150°, of the shoulder: -30° to 130°; both at most 90°/s.

@@ -15,12 +15,12 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from protocol_gateway.authority.lease_rules import Now
 from protocol_gateway.checking.checker import Checker
 from protocol_gateway.control.deadlines import set_deadline
-from protocol_gateway.errors import CheckError
+from protocol_gateway.seam.errors import CheckError
 from robomesh import reason_codes as codes
-from robomesh.activity import activity_words
+from robomesh.contract.activity import activity_words
 from robomesh.errors import RefusedError
+from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Request
 from tests.conftest import last_value, run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, simulator, until
 from tests.protocol_gateway.test_checked_motion import POST, checked, one_robot_cell, standing

@@ -8,11 +8,11 @@ import pytest
 from protocol_gateway.proofs import Proofs, StopProof
 from protocol_gateway.seam import COMMANDS, Capabilities, Hold
 from robomesh import reason_codes as codes
-from robots.description import load, parse
-from robots.joints import joints_of
-from robots.kinematic_tree import tree_of
-from robots.verification import joints_sha256
-from robots.verification_record import VerificationRecord
+from robots.descriptions.description import load, parse
+from robots.kinematics.joints import joints_of
+from robots.kinematics.kinematic_tree import tree_of
+from robots.kinematics.verification import joints_sha256
+from robots.kinematics.verification_record import VerificationRecord
 
 ARM = load("puma560")
 READS = Capabilities(commands=frozenset(), reports_pose=True, joint_mapping="J3 + J2")

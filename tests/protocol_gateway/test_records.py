@@ -21,7 +21,7 @@ from protocol_gateway.core.records import (
     write_number,
     write_unit,
 )
-from protocol_gateway.errors import UnitError, UnitFormatError
+from protocol_gateway.seam.errors import UnitError, UnitFormatError
 
 BOTH_WAYS = [
     (Command(("trace", "home")), b"1#COMMAND*trace;home@"),

@@ -3,9 +3,9 @@
 import asyncio
 
 from protocol_gateway.audit.log import read_entries
-from robomesh.requests import ask_all
+from robomesh.requests.requests import ask_all
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, simulator, until
 

@@ -2,8 +2,8 @@
 
 import pytest
 
+from protocol_gateway.driver_parts.rest import STILL_S, Rest
 from protocol_gateway.seam import Activity
-from protocol_gateway.seam.rest import STILL_S, Rest
 
 HERE, MOVED = (0.0, 1.0), (0.0, 1.01)
 

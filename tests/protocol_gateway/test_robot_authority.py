@@ -5,19 +5,19 @@ from dataclasses import replace
 
 import pytest
 
+from protocol_gateway.authority import effects, events
+from protocol_gateway.authority.effects import Finding, Program, Seen
 from protocol_gateway.authority.lease_rules import Authority, Now
 from protocol_gateway.authority.preconditions import Controller
-from protocol_gateway.control import effects, events
+from protocol_gateway.authority.robot_authority import RobotAuthority
 from protocol_gateway.control.control import Control, Ports
-from protocol_gateway.control.effects import Finding, Program, Seen
-from protocol_gateway.control.robot_authority import RobotAuthority
 from protocol_gateway.link.link import LinkState, LinkStatus
 from protocol_gateway.seam import Activity, Mode, StatusReceived
 from protocol_gateway.unit_driver import UnitDriver
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
-from robots.description import load
-from robots.joints import joints_of
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 from tests.protocol_gateway.conftest import later
 from tests.protocol_gateway.control_bench import control_bench
 

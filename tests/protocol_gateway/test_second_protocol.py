@@ -13,7 +13,6 @@ from pathlib import Path
 
 import pytest
 
-from protocol_gateway.errors import CommandError, GatewaySettingsError
 from protocol_gateway.kinds import driver_maker, protocols
 from protocol_gateway.seam import (
     Hold,
@@ -23,8 +22,9 @@ from protocol_gateway.seam import (
     Refused,
     Stop,
 )
+from protocol_gateway.seam.errors import CommandError, GatewaySettingsError
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 from services.errors import SiteFileError
 from services.site_file.site import load
 from tests.conftest import run

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from protocol_gateway import set_up_file
-from protocol_gateway.journal import Journal
+from protocol_gateway.driver_parts.signal_names import SHARED, numbered, of_axes, of_joints
 from protocol_gateway.link.timestamping import Received
 from protocol_gateway.seam import Signal, SignalsReceived
-from protocol_gateway.seam.signal_names import SHARED, numbered, of_axes, of_joints
-from protocol_gateway.signals import MOST_SIGNALS, Signals
+from protocol_gateway.telemetry.journal import Journal
+from protocol_gateway.telemetry.signals import MOST_SIGNALS, Signals
 from tests.conftest import run
 from tests.controllers.universal_robots.test_rtde_driver import UR, controller
 from tests.protocol_gateway.gateway_site import gateway, until

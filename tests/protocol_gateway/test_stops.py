@@ -9,8 +9,8 @@ import zenoh
 
 from protocol_gateway.audit.log import Outcome, read_entries
 from protocol_gateway.audit.persisted_state import authority_after
-from protocol_gateway.control.events import FateUnknown, LinkRestored, MotionObserved, TimePassed
-from protocol_gateway.control.robot_authority import NEW_STOPS_BURST
+from protocol_gateway.authority.events import FateUnknown, LinkRestored, MotionObserved, TimePassed
+from protocol_gateway.authority.robot_authority import NEW_STOPS_BURST
 from protocol_gateway.seam import Mode
 from robomesh import reason_codes as codes
 from robomesh.errors import NoAnswerError

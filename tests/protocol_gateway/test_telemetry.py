@@ -2,13 +2,13 @@
 
 from types import SimpleNamespace
 
-from protocol_gateway.journal import Journal
 from protocol_gateway.link.link import Received
 from protocol_gateway.seam import Activity, JointsReceived, Mode, StatusReceived
-from protocol_gateway.signals import Signals
-from protocol_gateway.telemetry import Telemetry
-from robots.description import load
-from robots.joints import joints_of
+from protocol_gateway.telemetry.journal import Journal
+from protocol_gateway.telemetry.signals import Signals
+from protocol_gateway.telemetry.telemetry import Telemetry
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 
 
 class Desk:

@@ -4,7 +4,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol_gateway.errors import CommandError
 from protocol_gateway.seam import (
     Activity,
     Hold,
@@ -23,8 +22,9 @@ from protocol_gateway.seam import (
     Trace,
     UnknownReceived,
 )
+from protocol_gateway.seam.errors import CommandError
 from protocol_gateway.unit_driver import UNITS, UnitDriver
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 
 R, P = JointType.ROTARY, JointType.PRISMATIC
 

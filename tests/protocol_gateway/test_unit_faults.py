@@ -4,7 +4,7 @@ import asyncio
 import math
 import time
 
-from robomesh.keys import robot_key
+from robomesh.contract.keys import robot_key
 from tests.conftest import run
 from tests.protocol_gateway.faulty_site import faulty_site
 from tests.protocol_gateway.gateway_site import (

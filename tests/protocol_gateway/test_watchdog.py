@@ -2,7 +2,7 @@
 
 import pytest
 
-from protocol_gateway.watchdog import SLOW_STALE_S, Watchdog
+from protocol_gateway.telemetry.watchdog import SLOW_STALE_S, Watchdog
 
 
 def seen(*reports):

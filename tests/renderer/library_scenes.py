@@ -10,10 +10,10 @@ from renderer.cache import prepared_once
 from renderer.drawing import Drawing
 from renderer.mesh import Mesh
 from renderer.opengl import open_context
-from robots.cells import CellDescription, CellRobot
-from robots.description import load
-from robots.glb import link_meshes
-from robots.urdf.write import to_urdf
+from robots.collision.cells import CellDescription, CellRobot
+from robots.descriptions.description import load
+from robots.descriptions.glb import link_meshes
+from robots.descriptions.urdf.write import to_urdf
 from services.kinematics.descriptions import add_surroundings, describe, fixture_meshes
 from services.site_file import site as site_file
 from services.site_file.cells import cells_of

@@ -13,7 +13,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from renderer import service
 from renderer.overlay import AMBER
 from renderer.service import Settings
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from services import kinematics
 from tests.cells import single_arm
 from tests.renderer.bodies import context_or_skip

@@ -9,9 +9,9 @@ from renderer.chain import placements, reach, read_chain
 from renderer.errors import ChainError, UnknownViewError
 from renderer.views import camera_of
 from robomesh.schemas.robomesh_pb2 import Description, Vector3, View
-from robots.description import load
-from robots.model import build_model, frame_placements, link_placements
-from robots.urdf.write import to_urdf
+from robots.descriptions.description import load
+from robots.descriptions.urdf.write import to_urdf
+from robots.kinematics.model import build_model, frame_placements, link_placements
 from services.kinematics.descriptions import describe
 
 SIZE = (640, 360)

@@ -10,7 +10,7 @@ from renderer.encoder import H264Encoder
 from renderer.errors import Mp4Error
 from renderer.h264_sps import picture_size
 from renderer.mp4 import FragmentedMp4
-from robomesh.h264 import is_key_frame
+from robomesh.recordings.h264 import is_key_frame
 
 # Not a multiple of 16: the parameter set has a cropping rectangle.
 SIZE = (334, 190)

@@ -11,10 +11,10 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from renderer import service
 from renderer.mp4 import FragmentedMp4
 from robomesh import reason_codes as codes
+from robomesh.contract.quotas import Quotas
 from robomesh.errors import QuotaError, RefusedError
-from robomesh.quotas import Quotas
 from robomesh.schemas.robomesh_pb2 import Description, KeyFrameRequest, Vector3, View, ViewAnswer, ViewRequest
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from tests.conftest import last_value, run
 from tests.refusals import refused
 from tests.renderer.renderer_site import frames, moving, picture, renderer_site

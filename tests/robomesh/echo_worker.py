@@ -4,7 +4,7 @@ import os
 import sys
 import time
 
-from robomesh import worker
+from robomesh.files import worker
 
 
 class OfTwoArgumentsError(Exception):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from robomesh.activity import activity_words
+from robomesh.contract.activity import activity_words
 from robomesh.schemas.robomesh_pb2 import ControllerState, StopState
 
 Program = ControllerState.Program

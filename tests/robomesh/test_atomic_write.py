@@ -5,7 +5,7 @@ import stat
 
 import pytest
 
-from robomesh.atomic_write import open_atomically, write_atomically
+from robomesh.files.atomic_write import open_atomically, write_atomically
 
 
 def test_a_write_replaces_the_content_and_leaves_no_temporary_file(tmp_path):

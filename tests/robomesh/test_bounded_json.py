@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from renderer.errors import GlbError
 from renderer.glb import read_glb
 from robomesh.bounded_json import MOST_DEPTH, _check_depth, loads
+from robomesh.contract.messages import JSON, decode_request
 from robomesh.errors import MessageError
-from robomesh.messages import JSON, decode_request
 from robomesh.schemas.robomesh_pb2 import ViewRequest
 
 VALUES = st.recursive(

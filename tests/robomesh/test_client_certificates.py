@@ -12,10 +12,10 @@ import pytest
 import zenoh
 
 import robomesh
-from robomesh.certificate_identity import read_identity
-from robomesh.endpoints import router_config
-from robomesh.session import Session
-from robomesh.topics import Role
+from robomesh.contract.certificate_identity import read_identity
+from robomesh.contract.endpoints import router_config
+from robomesh.contract.topics import Role
+from robomesh.wire.session import Session
 from services.pki import Folder, authority
 from tests.conftest import free_port
 from tests.site import ONE_ARM, lean, running_file, site_file, wait_until

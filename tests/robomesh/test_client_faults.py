@@ -14,8 +14,8 @@ import zenoh
 import robomesh
 from robomesh.client.commands import numbers, program_text
 from robomesh.client.event_loop import EventLoopThread
-from robomesh.endpoints import client_config
-from robomesh.header import Header, pack
+from robomesh.contract.endpoints import client_config
+from robomesh.contract.header import Header, pack
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.recordings import joints
 

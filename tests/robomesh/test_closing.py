@@ -6,8 +6,8 @@ import sys
 import threading
 from pathlib import Path
 
-from robomesh.session import open_session
-from robomesh.subscription import Subscription
+from robomesh.publications.subscription import Subscription
+from robomesh.wire.session import open_session
 from tests.conftest import run
 
 
@@ -34,8 +34,8 @@ def test_subscription_closed_before_its_first_read_ends_without_error(mesh, monk
 # On a busy machine a reading thread may wake up late.
 _ENDS_WHILE_A_THREAD_READS = """
 import asyncio, sys, time
-from robomesh.session import SessionSettings, open_session
-from robomesh.subscription import Subscription
+from robomesh.wire.session import SessionSettings, open_session
+from robomesh.publications.subscription import Subscription
 
 read = Subscription._read
 

@@ -6,9 +6,9 @@ import time
 import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from robomesh.delay import Delay
-from robomesh.header import Header
-from robomesh.session import open_session
+from robomesh.contract.header import Header
+from robomesh.publications.delay import Delay
+from robomesh.wire.session import open_session
 from tests.conftest import run
 
 S = 10**9

@@ -7,8 +7,8 @@ import psutil
 import pytest
 import zenoh
 
-from robomesh.endpoints import client_config, router_config, router_values
-from robomesh.session import SessionSettings, open_session
+from robomesh.contract.endpoints import client_config, router_config, router_values
+from robomesh.wire.session import SessionSettings, open_session
 from tests.conftest import free_port, run
 
 

@@ -9,9 +9,9 @@ import pytest
 
 from deploy.locked_parts import PARTS
 from robomesh import extras
-from robots.errors import MeshError, SaveError
-from robots.meshes.step import read_step
-from robots.programs.plot import plot_check
+from robots.checks.plot import plot_check
+from robots.schema.errors import MeshError, SaveError
+from robots.shapes.files.step import read_step
 
 ROOT = Path(__file__).parents[2]
 

@@ -1,6 +1,6 @@
 """Key frames of H.264 byte streams."""
 
-from robomesh.h264 import is_key_frame
+from robomesh.recordings.h264 import is_key_frame
 
 KEY = b"\0\0\0\1\x67\x42\xc0\x1f\0\0\0\1\x68\xce\0\0\0\1\x65\x88"
 DELTA = b"\0\0\0\1\x41\x9a\x01"

@@ -2,9 +2,9 @@
 
 import pytest
 
-from robomesh import keys
+from robomesh.contract import keys
 from robomesh.errors import KeyNameError
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from tests.conftest import run
 
 

@@ -4,14 +4,14 @@ import asyncio
 
 import zenoh
 
-from robomesh.access_rights import PROBE_ROBOT
-from robomesh.endpoints import client_config
-from robomesh.header import Header, pack
-from robomesh.ignored import PUBLICATION, Ignored
-from robomesh.last_values import last_values
+from robomesh.contract.access_rights import PROBE_ROBOT
+from robomesh.contract.endpoints import client_config
+from robomesh.contract.header import Header, pack
+from robomesh.contract.ignored import PUBLICATION, Ignored
+from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Request
-from robomesh.session import open_session
+from robomesh.wire.last_values import last_values
+from robomesh.wire.session import open_session
 from tests.conftest import last_value, run
 from tests.robomesh.test_session import joints, until
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from tests.conftest import run
 
 

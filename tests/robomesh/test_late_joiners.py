@@ -5,8 +5,8 @@ import threading
 import pytest
 import zenoh
 
-from robomesh.late_joiners import _MOST_WAITING, AnsweringThread
-from robomesh.session import open_session
+from robomesh.publications.late_joiners import _MOST_WAITING, AnsweringThread
+from robomesh.wire.session import open_session
 from tests.conftest import last_value, run
 from tests.robomesh.test_session import joints
 

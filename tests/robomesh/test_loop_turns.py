@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from robomesh.loop_turns import LONG_S, OTHER, LoopTurns, MeasuredLoop, turns_of
+from robomesh.service.loop_turns import LONG_S, OTHER, LoopTurns, MeasuredLoop, turns_of
 
 BLOCKED_S = 4 * LONG_S
 

@@ -3,8 +3,8 @@
 import pytest
 
 from robomesh import reason_codes as codes
+from robomesh.contract.messages import JSON, PROTOBUF, decode, decode_request
 from robomesh.errors import MessageError
-from robomesh.messages import JSON, PROTOBUF, decode, decode_request
 from robomesh.schemas.robomesh_pb2 import CheckRequest, Event, EventList, InverseRequest
 
 

@@ -6,12 +6,12 @@ import time
 import pytest
 import zenoh
 
-from robomesh.endpoints import client_config
+from robomesh.contract.endpoints import client_config
+from robomesh.contract.messages import TEXT
 from robomesh.errors import RefusedError
-from robomesh.messages import TEXT
-from robomesh.requests import ask_all
+from robomesh.requests.requests import ask_all
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from tests.conftest import run
 
 STOP = "robomesh/site/{}/stop"

@@ -7,10 +7,10 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from robomesh.client.robot import AsyncRobot
 from robomesh.client.streams import StaleError
+from robomesh.contract.topics import stale_after_s
 from robomesh.errors import UnknownTopicError
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
-from robomesh.topics import stale_after_s
+from robomesh.wire.session import open_session
 from tests.conftest import run
 
 

@@ -5,9 +5,9 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from robomesh import pieces
 from robomesh.errors import BrokenAnswerError
-from robomesh.session import open_session
+from robomesh.requests import pieces
+from robomesh.wire.session import open_session
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import until
 

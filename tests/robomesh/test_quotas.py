@@ -2,12 +2,12 @@
 
 import pytest
 
-from robomesh import quotas
+from robomesh.contract import quotas
+from robomesh.contract.quotas import Quota
 from robomesh.errors import QuotaError
-from robomesh.metrics import SessionMetrics
-from robomesh.quotas import Quota
 from robomesh.schemas.robomesh_pb2 import CheckAnswer, CheckRequest
-from robomesh.session import open_session
+from robomesh.service.metrics import SessionMetrics
+from robomesh.wire.session import open_session
 from tests.conftest import run
 
 

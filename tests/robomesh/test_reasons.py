@@ -7,12 +7,12 @@ import pytest
 import zenoh
 
 from robomesh import reason_codes as codes
-from robomesh.endpoints import client_config
+from robomesh.contract.endpoints import client_config
+from robomesh.contract.messages import TEXT
 from robomesh.errors import BusyError, QuotaError, RefusedError
-from robomesh.messages import TEXT
 from robomesh.reasons import MOST_PARAMETER_BYTES, Code, Reason, pairs_of, reason_of, to_parameters
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from tests.conftest import run
 
 TABLE = [each for each in vars(codes).values() if isinstance(each, Code)]

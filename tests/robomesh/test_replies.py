@@ -4,10 +4,10 @@ import asyncio
 
 import pytest
 
+from robomesh.contract.topics import Priority
 from robomesh.errors import NoAnswerError
-from robomesh.replies import query
-from robomesh.session import open_session
-from robomesh.topics import Priority
+from robomesh.requests.replies import query
+from robomesh.wire.session import open_session
 from tests.conftest import run
 
 KEY = "robomesh/site/arm/joints"

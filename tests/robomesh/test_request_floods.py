@@ -6,13 +6,13 @@ import time
 
 import pytest
 
+from robomesh.contract.messages import PROTOBUF
 from robomesh.errors import BusyError
-from robomesh.messages import PROTOBUF
-from robomesh.request_queue import RateLimit, begin_now, paced
-from robomesh.requests import ask_all
+from robomesh.requests.request_queue import RateLimit, begin_now, paced
+from robomesh.requests.requests import ask_all
+from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Request
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import until
 

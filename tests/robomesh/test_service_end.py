@@ -10,7 +10,7 @@ pytestmark = pytest.mark.slow
 
 SERVICE = """
 import asyncio, sys
-from robomesh.service import run_until_signalled
+from robomesh.service.service import run_until_signalled
 async def main():
     print("up", flush=True)
     try:

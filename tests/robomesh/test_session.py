@@ -14,14 +14,14 @@ import zenoh
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from robomesh import reason_codes as codes
-from robomesh import subscription as subscription_module
-from robomesh.endpoints import client_config, router_config
+from robomesh.contract.endpoints import client_config, router_config
+from robomesh.contract.header import pack
 from robomesh.errors import NoAnswerError, RefusedError, SessionError
-from robomesh.header import pack
-from robomesh.presence import MOST_OF_ONE, name_of
+from robomesh.publications import subscription as subscription_module
+from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.server import Request
-from robomesh.session import SessionSettings, open_session
+from robomesh.wire.presence import MOST_OF_ONE, name_of
+from robomesh.wire.session import SessionSettings, open_session
 from tests.conftest import free_port, put_unheard, run
 from tests.refusals import refused
 
@@ -543,7 +543,7 @@ def test_query_for_everything_stops_no_robot_but_wildcard_stop_stops_all(mesh):
 
 _ROUTER = """
 import sys, zenoh
-from robomesh.endpoints import router_config
+from robomesh.contract.endpoints import router_config
 with zenoh.open(router_config((sys.argv[1],))):
     sys.stdin.read()
 """

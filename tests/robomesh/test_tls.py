@@ -6,10 +6,10 @@ import pytest
 import trustme
 import zenoh
 
-from robomesh.endpoints import Tls, router_config
+from robomesh.contract.endpoints import Tls, router_config
 from robomesh.errors import SessionError
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import SessionSettings, open_session
+from robomesh.wire.session import SessionSettings, open_session
 from tests.conftest import free_port, last_value, run
 
 

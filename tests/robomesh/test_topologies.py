@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 import zenoh
 
-from robomesh.endpoints import client_config, router_config
+from robomesh.contract.endpoints import client_config, router_config
 from tests.conftest import free_port
 
 # Links of each site.

@@ -2,7 +2,7 @@ import time
 
 import pytest
 
-from robomesh.wall_clock import ForwardClock, WallClock
+from robomesh.publications.wall_clock import ForwardClock, WallClock
 
 S = 1_000_000_000
 

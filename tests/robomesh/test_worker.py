@@ -12,7 +12,7 @@ from subprocess import PIPE
 import psutil
 import pytest
 
-from robomesh.worker import HandlerError, Worker, WorkerError, WorkerTimeoutError
+from robomesh.files.worker import HandlerError, Worker, WorkerError, WorkerTimeoutError
 
 CHILD = "tests.robomesh.echo_worker"
 
@@ -144,7 +144,7 @@ def test_questions_wait_for_each_other_and_the_wait_counts():
 def test_worker_ends_with_its_parent_during_a_question():
     owner = (
         "import asyncio\n"
-        "from robomesh.worker import Worker\n"
+        "from robomesh.files.worker import Worker\n"
         "async def main():\n"
         f"    worker = Worker({CHILD!r}, 'settings')\n"
         "    await worker.start()\n"

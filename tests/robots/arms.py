@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from robots.description import load, parse
-from robots.inverse import InverseSolver, build_solver
-from robots.joints import violations
-from robots.model import RobotModel, build_model, tool_placement
-from robots.schema import RobotDescription
+from robots.descriptions.description import load, parse
+from robots.kinematics.inverse import InverseSolver, build_solver
+from robots.kinematics.joints import violations
+from robots.kinematics.model import RobotModel, build_model, tool_placement
+from robots.schema.robot_toml import RobotDescription
 
 LIMIT = '<limit lower="-2.5" upper="2.5" velocity="3" effort="1"/>'
 LIFT = '<limit lower="0" upper="0.3" velocity="0.2" effort="1"/>'

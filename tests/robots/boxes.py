@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
-from robots.cells import CellDescription, CellRobot, Fixture
-from robots.joints import FloatArray
-from robots.kinematic_tree import Shape
-from robots.meshes.mesh import Material, Mesh, Part
-from robots.meshes.solids import Solid, ball, box, moved
-from robots.poses import rpy_rotation
+from robots.collision.cells import CellDescription, CellRobot, Fixture
+from robots.kinematics.joints import FloatArray
+from robots.kinematics.kinematic_tree import Shape
+from robots.schema.poses import rpy_rotation
+from robots.shapes.mesh import Material, Mesh, Part
+from robots.shapes.solids import Solid, ball, box, moved
 
 # Stretched along x, the bars reach from 0.02 to 0.38 and from 0.42 to 0.78 m, 0.02 m to each side of y = 0,
 # from z = 0 to 0.02; the post reaches 0.1 m to each side, and up to 0.125.

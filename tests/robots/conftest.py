@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from robots.meshes.mesh import Mesh
-from robots.meshes.vrml.read import read_vrml
+from robots.shapes.files.vrml.read import read_vrml
+from robots.shapes.mesh import Mesh
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ import ezdxf
 import numpy as np
 import pytest
 
-from robots.errors import MeshError
-from robots.meshes import step
-from robots.meshes.read import read_mesh
+from robots.schema.errors import MeshError
+from robots.shapes.files import step
+from robots.shapes.files.read import read_mesh
 
 FACES = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 DAE = """<?xml version="1.0" encoding="utf-8"?>

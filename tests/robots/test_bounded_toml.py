@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robots.bounded_toml import MOST_CHARACTERS, MOST_DEPTH, parse_toml, read_toml
-from robots.description import from_values, load, parse
-from robots.errors import DescriptionError
+from robots.descriptions.description import from_values, load, parse
+from robots.schema.bounded_toml import MOST_CHARACTERS, MOST_DEPTH, parse_toml, read_toml
+from robots.schema.errors import DescriptionError
 from services.errors import SiteFileError
 from services.site_file.site import load as load_site
 

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.cells import CellDescription, Fixture
 from robots.collision import (
     Nearest,
     build_cell,
@@ -19,9 +18,10 @@ from robots.collision import (
     own_nearest,
     unshaped,
 )
-from robots.errors import JointCountError, MeshError
-from robots.kinematic_tree import Shape
-from robots.poses import rpy_rotation
+from robots.collision.cells import CellDescription, Fixture
+from robots.kinematics.kinematic_tree import Shape
+from robots.schema.errors import JointCountError, MeshError
+from robots.schema.poses import rpy_rotation
 from tests.robots.boxes import bar_arm, block, bracket, cell_of, globe, placed, two_cheeks
 
 STRETCHED = np.zeros(2)

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.cells import CellDescription, CellRobot
 from robots.collision import (
     Cell,
     allowed_positions,
@@ -17,9 +16,10 @@ from robots.collision import (
     own_contacts,
     path_encounters,
 )
+from robots.collision.cells import CellDescription, CellRobot
 from robots.collision.distance import arm_obstacles
 from robots.collision.path import SAMPLE_M, placements_along, sampled_path, travelled
-from robots.joints import FloatArray
+from robots.kinematics.joints import FloatArray
 from tests.robots.arms import TELESCOPE
 from tests.robots.boxes import bar_arm, block, cell_of, globe, placed
 

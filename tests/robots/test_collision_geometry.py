@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.cells import CellDescription, CellRobot
+from robots.bodies.geometry import hull_body
 from robots.collision import build_cell, outside_nearest
-from robots.collision.geometry import hull_body
-from robots.description import load
-from robots.glb import link_mesh
-from robots.joints import FloatArray
-from robots.kinematic_tree import tree_of
+from robots.collision.cells import CellDescription, CellRobot
+from robots.descriptions.description import load
+from robots.descriptions.glb import link_mesh
+from robots.kinematics.joints import FloatArray
+from robots.kinematics.kinematic_tree import tree_of
 from services.command_line.main import run
 from tests.robots.boxes import block, placed
 

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.cells import CellDescription, CellRobot
+from robots.checks.check import check_plan
 from robots.collision import Cell, allowed_positions, build_cell, outside_nearest, path_encounters
+from robots.collision.cells import CellDescription, CellRobot
 from robots.collision.distance import Gauge
 from robots.collision.path import placements_along
 from robots.collision.swept_volumes import sweeps_of, swept_region
-from robots.programs.check import check_plan
 from robots.programs.steps import CheckResult, Step, StepKind, ViolationKind
 from tests.robots.boxes import bar_arm, block, cell_of, placed, two_cheeks
 

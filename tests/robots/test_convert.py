@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.meshes.mesh import bounds
-from robots.meshes.read import read_mesh
+from robots.shapes.files.read import read_mesh
+from robots.shapes.mesh import bounds
 from services.command_line.main import run
 
 BOX = """#VRML V2.0 utf8

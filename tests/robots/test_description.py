@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from robots.description import JointType, library_names, load, parse
-from robots.errors import DescriptionError
+from robots.descriptions.description import JointType, library_names, load, parse
+from robots.schema.errors import DescriptionError
 
 GOOD = """
 name = "small"

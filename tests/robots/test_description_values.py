@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robots.description import from_values
-from robots.description_checks import Problem
-from robots.schema import DhDescription, UrdfDescription
+from robots.descriptions.description import from_values
+from robots.schema.description_checks import Problem
+from robots.schema.robot_toml import DhDescription, UrdfDescription
 
 JOINT: dict[str, Any] = {
     "a": 0.0, "alpha": 90.0, "d": 100.0, "limits": [-90.0, 90.0],
@@ -106,7 +106,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_description_adds_values_that_urdf_does_not_have(folder: Path) -> None:
-    from robots.joints import joints_of
+    from robots.kinematics.joints import joints_of
 
     values = {
         "name": "u", "urdf": "u.urdf", "tool": {"link": "l1", "xyz": [0.0, 0.0, 10.0]},
@@ -124,7 +124,7 @@ def test_description_adds_values_that_urdf_does_not_have(folder: Path) -> None:
 
 
 def test_default_home_is_zero_or_the_middle_of_the_limits(folder: Path) -> None:
-    from robots.joints import joints_of
+    from robots.kinematics.joints import joints_of
 
     description, _ = from_values({"name": "u", "urdf": "u.urdf"}, folder=folder)
     assert description is not None

@@ -6,17 +6,17 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from robots.description import from_values, library_names, load
-from robots.errors import DescriptionError
-from robots.kinematic_tree import tree_of
-from robots.model import build_model, frame_placements, link_placements, tool_placement
-from robots.poses import rpy_rotation
-from robots.save_description import write_description
-from robots.schema import DhDescription, Pose, UrdfDescription
-from robots.summary import dh_summary
-from robots.urdf.write import to_urdf
-from robots.urdf_to_dh import DhForm, dh_form
-from robots.views import views_of
+from robots.descriptions.description import from_values, library_names, load
+from robots.descriptions.save_description import write_description
+from robots.descriptions.summary import dh_summary
+from robots.descriptions.urdf.write import to_urdf
+from robots.descriptions.urdf_to_dh import DhForm, dh_form
+from robots.kinematics.kinematic_tree import tree_of
+from robots.kinematics.model import build_model, frame_placements, link_placements, tool_placement
+from robots.kinematics.views import views_of
+from robots.schema.errors import DescriptionError
+from robots.schema.poses import rpy_rotation
+from robots.schema.robot_toml import DhDescription, Pose, UrdfDescription
 
 
 def urdf(*joints: tuple[str, str, str, str], tool: str = "0.1 0.2 0.3") -> str:

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robots.errors import MeshError
-from robots.meshes import dxf
-from robots.meshes.dxf import read_dxf
-from robots.meshes.mesh import Mesh, bounds
+from robots.schema.errors import MeshError
+from robots.shapes.files import dxf
+from robots.shapes.files.dxf import read_dxf
+from robots.shapes.mesh import Mesh, bounds
 
 ezdxf: Any = dxf._ezdxf()
 SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
@@ -220,7 +220,10 @@ def test_nothing_is_written_to_the_users_home(tmp_path: Path, drawing: Any) -> N
     drawing.saveas(path)
     home = tmp_path / "home"
     home.mkdir()
-    code = f"from pathlib import Path; from robots.meshes.dxf import read_dxf; read_dxf(Path({str(path)!r}))"
+    code = (
+        "from pathlib import Path; from robots.shapes.files.dxf import read_dxf; "
+        f"read_dxf(Path({str(path)!r}))"
+    )
     subprocess.run(
         [sys.executable, "-W", "error", "-c", code],
         check=True,

@@ -6,17 +6,17 @@ import numpy as np
 import pinocchio
 import pytest
 
-from robots.cells import CellDescription, CellRobot
 from robots.collision import allowed_positions, build_cell, own_contacts
-from robots.description import EXAMPLES, from_values, known_names, library_names, load
-from robots.errors import DescriptionError
-from robots.example_robots import example_folder
-from robots.glb import link_meshes
-from robots.joints import violations
-from robots.model import RobotModel, build_model, link_placements, tool_placement
-from robots.schema import UrdfDescription
-from robots.urdf.write import to_urdf
-from robots.urdf_to_dh import dh_form
+from robots.collision.cells import CellDescription, CellRobot
+from robots.descriptions.description import EXAMPLES, from_values, known_names, library_names, load
+from robots.descriptions.example_robots import example_folder
+from robots.descriptions.glb import link_meshes
+from robots.descriptions.urdf.write import to_urdf
+from robots.descriptions.urdf_to_dh import dh_form
+from robots.kinematics.joints import violations
+from robots.kinematics.model import RobotModel, build_model, link_placements, tool_placement
+from robots.schema.errors import DescriptionError
+from robots.schema.robot_toml import UrdfDescription
 
 FOLDER = example_folder()
 installed = pytest.mark.skipif(FOLDER is None, reason="the extra example-robots is not installed")
@@ -31,7 +31,7 @@ REFUSED = {
 
 
 def test_error_without_the_package_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robots.example_robots.example_folder", lambda: None)
+    monkeypatch.setattr("robots.descriptions.example_robots.example_folder", lambda: None)
     with pytest.raises(
         DescriptionError, match=r"ur5: .* not installed .* Run \./dev example-robots or pip install"
     ):

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robots.description import load, parse
-from robots.errors import MeshError
-from robots.glb import _cached_glb, cache_folder, link_meshes
-from robots.kinematic_tree import Shape
-from robots.meshes.mesh import Material, Mesh, Part, bounds
-from robots.meshes.read import read_mesh
+from robots.descriptions.description import load, parse
+from robots.descriptions.glb import _cached_glb, cache_folder, link_meshes
+from robots.kinematics.kinematic_tree import Shape
+from robots.schema.errors import MeshError
+from robots.shapes.files.read import read_mesh
+from robots.shapes.mesh import Material, Mesh, Part, bounds
 
 BOX = """#VRML V2.0 utf8
 Shape { appearance Appearance { material DEF %s Material { diffuseColor 1 0 0 transparency 0.5 } }
@@ -153,7 +153,7 @@ def test_link_of_several_files_is_read_once(tmp_path: Path, monkeypatch: pytest.
     (tmp_path / "part.wrl").write_text("#VRML V2.0 utf8\nShape { geometry Box { } }")
     description = parse(ROBOT, tmp_path / "robot.toml")
     first = link_meshes(description, cache=tmp_path / "cache")
-    monkeypatch.setattr("robots.glb.read_mesh", None)
+    monkeypatch.setattr("robots.descriptions.glb.read_mesh", None)
     assert link_meshes(description, cache=tmp_path / "cache") == first
 
 
@@ -193,7 +193,8 @@ def test_any_change_of_a_generated_mesh_changes_its_glb(tmp_path: Path, change: 
 @pytest.mark.slow
 def test_librarys_meshes_need_no_trimesh(tmp_path: Path) -> None:
     code = (
-        "import sys; from robots.description import load; from robots.glb import link_meshes; "
+        "import sys; from robots.descriptions.description import load; "
+        "from robots.descriptions.glb import link_meshes; "
         "meshes = link_meshes(load('pt600')); print(len(meshes), 'trimesh' in sys.modules)"
     )
     answers = [

@@ -12,16 +12,16 @@ import pytest
 import trimesh
 
 from renderer.glb import read_glb
-from robots.description import load
-from robots.glb import link_mesh, link_meshes, main_colors
-from robots.kinematic_tree import tree_of
-from robots.meshes.mesh import Material, Mesh, Part, Wire, bounds
-from robots.meshes.normals import creased
-from robots.meshes.read import read_mesh
-from robots.meshes.solids import box
-from robots.meshes.write_glb import glb_of
-from robots.urdf.viewers import prefixed
-from robots.urdf.write import to_urdf
+from robots.descriptions.description import load
+from robots.descriptions.glb import link_mesh, link_meshes, main_colors
+from robots.descriptions.urdf.viewers import prefixed
+from robots.descriptions.urdf.write import to_urdf
+from robots.kinematics.kinematic_tree import tree_of
+from robots.shapes.files.read import read_mesh
+from robots.shapes.files.write_glb import glb_of
+from robots.shapes.mesh import Material, Mesh, Part, Wire, bounds
+from robots.shapes.normals import creased
+from robots.shapes.solids import box
 from web import build_page
 
 # Reads the paths in argv; prints, for each, the validator's errors and warnings and three.js's bounding box.

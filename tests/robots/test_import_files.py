@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from robots.importing import import_robot
+from robots.descriptions.importing import import_robot
 
 ROBOT = """
 name = "one"

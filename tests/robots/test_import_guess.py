@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.meshes.mesh import Material, Mesh, Part
-from robots.meshes.normals import creased
-from robots.meshes.read import read_mesh
-from robots.meshes.solids import box
-from robots.meshes.unit_guess import file_to_link, guess
-from robots.meshes.write_glb import glb_of
+from robots.shapes.files.read import read_mesh
+from robots.shapes.files.unit_guess import file_to_link, guess
+from robots.shapes.files.write_glb import glb_of
+from robots.shapes.mesh import Material, Mesh, Part
+from robots.shapes.normals import creased
+from robots.shapes.solids import box
 
 ODD = "odd for a robot's link"
 

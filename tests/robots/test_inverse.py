@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
-from robots.description import load, parse
-from robots.errors import JointCountError, PoseError
-from robots.example_robots import example_folder
-from robots.inverse import (
+from robots.descriptions.description import load, parse
+from robots.descriptions.example_robots import example_folder
+from robots.kinematics.inverse import (
     InverseSolver,
     Task,
     build_solver,
@@ -24,8 +23,9 @@ from robots.inverse import (
     solve,
     tool_pose,
 )
-from robots.joints import violations
-from robots.model import build_model, tool_placement
+from robots.kinematics.joints import violations
+from robots.kinematics.model import build_model, tool_placement
+from robots.schema.errors import JointCountError, PoseError
 from tests.robots.arms import allowed_positions, arm, dh_arm, reached, telescope
 
 installed = pytest.mark.skipif(example_folder() is None, reason="./dev example-robots is not installed")

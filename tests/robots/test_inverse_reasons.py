@@ -7,9 +7,9 @@ import pytest
 
 from robomesh import reason_codes as codes
 from robomesh.reasons import Code, Reason
-from robots.inverse import InverseResult, Task, build_solver, solve
-from robots.model import build_model, tool_placement
-from robots.poses import rpy_rotation
+from robots.kinematics.inverse import InverseResult, Task, build_solver, solve
+from robots.kinematics.model import build_model, tool_placement
+from robots.schema.poses import rpy_rotation
 from tests.robots.arms import allowed_positions, arm, telescope
 
 

@@ -6,14 +6,14 @@ import numpy as np
 import pinocchio
 import pytest
 
-from robots.cells import CellDescription, CellRobot
+from robots.checks.jog import next_part
 from robots.collision import build_cell
-from robots.description import load
-from robots.inverse import build_solver
-from robots.programs.jog import next_part
+from robots.collision.cells import CellDescription, CellRobot
+from robots.descriptions.description import load
+from robots.descriptions.urdf.write import to_urdf
+from robots.kinematics.inverse import build_solver
 from robots.programs.jog_steps import AHEAD_M, AHEAD_RAD, Jog
 from robots.programs.statements import StepFrame
-from robots.urdf.write import to_urdf
 
 pytestmark = pytest.mark.slow
 

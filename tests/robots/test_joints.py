@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from robomesh import reason_codes as codes
-from robots.description import load
-from robots.errors import JointCountError
-from robots.joints import JointType, joints_of, violations
+from robots.descriptions.description import load
+from robots.kinematics.joints import JointType, joints_of, violations
+from robots.schema.errors import JointCountError
 
 PAPER_SAMPLE_DEG = [100.00, 30.45, 92.66, -67.10, -25.85]
 
@@ -75,7 +75,8 @@ def test_wrong_count_is_an_error(positions: list[float]) -> None:
 @pytest.mark.slow
 def test_joints_need_neither_pinocchio_nor_trimesh() -> None:
     code = (
-        "import sys; from robots.description import load; from robots.joints import joints_of; "
+        "import sys; from robots.descriptions.description import load; "
+        "from robots.kinematics.joints import joints_of; "
         "joints_of(load('pt600')); print({'pinocchio', 'trimesh'} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.description import LIBRARY, library_names, load
+from robots.descriptions.description import LIBRARY, library_names, load
+from robots.kinematics.model import build_model, link_placements, tool_placement
 from robots.library.build_meshes import ROBOTS, mesh_file
-from robots.meshes.mesh import Mesh, bounds
-from robots.meshes.read import read_mesh
-from robots.meshes.vrml.read import read_vrml
-from robots.meshes.vrml.write import write_vrml
-from robots.model import build_model, link_placements, tool_placement
+from robots.shapes.files.read import read_mesh
+from robots.shapes.files.vrml.read import read_vrml
+from robots.shapes.files.vrml.write import write_vrml
+from robots.shapes.mesh import Mesh, bounds
 
 FILES = [(robot, name) for robot, files in ROBOTS.items() for name in files]
 

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from robots.bodies.link_pairs import plan_of
+from robots.bodies.verdicts import Kind
 from robots.collision import allowed_positions
-from robots.collision.link_pairs import plan_of
-from robots.collision.verdicts import Kind
-from robots.description import load
-from robots.joints import joints_of
-from robots.schema import RobotDescription
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
+from robots.schema.robot_toml import RobotDescription
 
 # Studies run in separate processes.
 pytestmark = pytest.mark.slow

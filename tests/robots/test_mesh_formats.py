@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robots.errors import MeshError
-from robots.meshes.mesh import Mesh, bounds
-from robots.meshes.read import read_mesh
+from robots.schema.errors import MeshError
+from robots.shapes.files.read import read_mesh
+from robots.shapes.mesh import Mesh, bounds
 
 ASCII_STL = """solid one
 facet normal 0 0 1

@@ -7,9 +7,8 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 import pytest
 
-from robots.description import library_names, load, parse
-from robots.errors import JointCountError
-from robots.model import (
+from robots.descriptions.description import library_names, load, parse
+from robots.kinematics.model import (
     build_model,
     frame_placements,
     link_placements,
@@ -17,6 +16,7 @@ from robots.model import (
     tool_jacobian,
     tool_placement,
 )
+from robots.schema.errors import JointCountError
 from tests.robots.arms import allowed_positions, telescope
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"

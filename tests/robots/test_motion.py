@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robots.description import load
-from robots.joints import joints_of
-from robots.motion import Motion, _plan_on_line
-from robots.straight_motion import straight_motion
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
+from robots.kinematics.motion import Motion, _plan_on_line
+from robots.kinematics.straight_motion import straight_motion
 
 JOINTS = joints_of(load("pt600"))
 # The ratios differ between joints, so ruckig's phase synchronization would leave the straight line.

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 from robomesh import reason_codes as codes
-from robots.cells import CellDescription, CellRobot
+from robots.checks.check import check_plan, check_program
+from robots.checks.tool_chain import samples_between, tool_chain, tools_and_jacobians
+from robots.checks.violations import MOST_VIOLATIONS, Runs
 from robots.collision import Cell, build_cell
+from robots.collision.cells import CellDescription, CellRobot
 from robots.collision.path import SAMPLE_M, placements_along, travelled
-from robots.model import tool_jacobian, tool_placement
-from robots.motion import Motion
-from robots.programs.check import check_plan, check_program
+from robots.kinematics.model import tool_jacobian, tool_placement
+from robots.kinematics.motion import Motion
+from robots.kinematics.singularity import reach_of, singularity_margin, singularity_margins
+from robots.kinematics.straight_motion import HOMING_REST_S
 from robots.programs.steps import CheckResult, Step, StepKind, ViolationKind
-from robots.programs.tool_chain import samples_between, tool_chain, tools_and_jacobians
-from robots.programs.violations import MOST_VIOLATIONS, Runs
-from robots.singularity import reach_of, singularity_margin, singularity_margins
-from robots.straight_motion import HOMING_REST_S
 from tests.robots.boxes import bar_arm, block, cell_of, placed
 
 STRETCHED = np.zeros(2)

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from ezdxf.document import Drawing
 
-from robots.description import load
-from robots.errors import MeshError
-from robots.joints import joints_of
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 from robots.programs.dxf import DxfPath, program_from_dxf
 from robots.programs.statements import MoveJoints, MoveLine
 from robots.programs.text import parse_program, pose_of
+from robots.schema.errors import MeshError
 
 JOINTS = joints_of(load("pt600"))
 SQUARE = [(0.0, 0.0), (100.0, 0.0), (100.0, 50.0), (0.0, 50.0)]

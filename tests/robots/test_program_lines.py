@@ -6,9 +6,9 @@ from trimesh.transformations import euler_matrix, rotation_from_matrix
 
 from robomesh import reason_codes as codes
 from robots.collision import build_cell
-from robots.inverse import build_solver, natural_task
-from robots.inverse.tasks import tool_misses
-from robots.model import tool_placement
+from robots.kinematics.inverse import build_solver, natural_task
+from robots.kinematics.inverse.tasks import tool_misses
+from robots.kinematics.model import tool_placement
 from robots.programs.lines import line_to
 from robots.programs.plan import plan_program
 from robots.programs.steps import LINE_DEG, LINE_M, StepKind, ViolationKind

@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
-from robots.description import load
-from robots.errors import ProgramError
-from robots.joints import joints_of
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 from robots.programs import MOST_BYTES
 from robots.programs.statements import (
     Home,
@@ -30,6 +29,7 @@ from robots.programs.statements import (
 )
 from robots.programs.text import MOST_LINES, MOST_STEPS, parse_program, pose_of
 from robots.programs.write import program_text
+from robots.schema.errors import ProgramError
 
 JOINTS = joints_of(load("pt600"))
 ABOVE = JointTarget(np.radians([10.0, 20.0, 30.0, 0.0, -5.5]), "above")

@@ -7,14 +7,14 @@ import numpy as np
 import pinocchio
 import pytest
 
-from robots.description import load
-from robots.errors import DescriptionError
-from robots.kinematic_tree import Shape, end_link
-from robots.mesh_inspection import mesh_findings
-from robots.meshes.mesh import Mesh, bounds
-from robots.model import build_model, frame_placements, link_placements, tool_jacobian
-from robots.urdf.files import files_of
-from robots.urdf.read import UrdfRobot, read_urdf
+from robots.descriptions.description import load
+from robots.descriptions.mesh_inspection import mesh_findings
+from robots.descriptions.urdf.files import files_of
+from robots.descriptions.urdf.read import UrdfRobot, read_urdf
+from robots.kinematics.kinematic_tree import Shape, end_link
+from robots.kinematics.model import build_model, frame_placements, link_placements, tool_jacobian
+from robots.schema.errors import DescriptionError
+from robots.shapes.mesh import Mesh, bounds
 
 LIMIT = '<limit lower="-1" upper="2" velocity="3" effort="1"/>'
 # A branching arm: skew axes, a slide, a gripper with a second finger that follows, a continuous joint.

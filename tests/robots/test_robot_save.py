@@ -12,12 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from robots.description import LIBRARY, load
-from robots.description_text import description_text
-from robots.errors import DescriptionError, RobotExistsError, SaveError
-from robots.glb import link_mesh, link_meshes
-from robots.kinematic_tree import tree_of
-from robots.save_description import (
+from robots.descriptions.description import LIBRARY, load
+from robots.descriptions.description_text import description_text
+from robots.descriptions.glb import link_mesh, link_meshes
+from robots.descriptions.save_description import (
     Saved,
     read_robot,
     refused_path,
@@ -25,6 +23,8 @@ from robots.save_description import (
     write_description,
     zip_description,
 )
+from robots.kinematics.kinematic_tree import tree_of
+from robots.schema.errors import DescriptionError, RobotExistsError, SaveError
 
 PT500 = (LIBRARY / "pt500" / "robot.toml").read_text(encoding="utf-8")
 

@@ -7,12 +7,12 @@ import numpy as np
 import pinocchio
 import pytest
 
-from robots.description import library_names, load, parse
-from robots.model import build_model, link_placements, tool_placement
-from robots.schema import UrdfDescription
-from robots.urdf.read import read_urdf
-from robots.urdf.write import to_urdf
-from robots.urdf_to_dh import dh_form
+from robots.descriptions.description import library_names, load, parse
+from robots.descriptions.urdf.read import read_urdf
+from robots.descriptions.urdf.write import to_urdf
+from robots.descriptions.urdf_to_dh import dh_form
+from robots.kinematics.model import build_model, link_placements, tool_placement
+from robots.schema.robot_toml import UrdfDescription
 
 
 @pytest.mark.parametrize("robot", library_names())

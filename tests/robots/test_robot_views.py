@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from robots.description import library_names, load, parse
-from robots.model import build_model, tool_placement
-from robots.summary import description_summary
-from robots.views import reach, views_of
+from robots.descriptions.description import library_names, load, parse
+from robots.descriptions.summary import description_summary
+from robots.kinematics.model import build_model, tool_placement
+from robots.kinematics.views import reach, views_of
 
 CLOSE = """
 [view.top]

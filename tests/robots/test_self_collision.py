@@ -11,16 +11,17 @@ import numpy as np
 import pytest
 
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.cells import CellDescription, CellRobot
-from robots.collision import build_cell, own_contacts, own_nearest, pair_study, path_encounters, pending
+from robots.bodies import pair_study
+from robots.bodies.link_pairs import plan_of
+from robots.bodies.surfaces import winding_number
+from robots.bodies.verdicts import Kind
+from robots.collision import build_cell, own_contacts, own_nearest, path_encounters, pending
 from robots.collision.cell import Cell
-from robots.collision.link_pairs import plan_of
-from robots.collision.surfaces import winding_number
-from robots.collision.verdicts import Kind
-from robots.description import load
-from robots.importing import import_robot
-from robots.meshes.solids import ball
-from robots.save_description import write_folder
+from robots.collision.cells import CellDescription, CellRobot
+from robots.descriptions.description import load
+from robots.descriptions.importing import import_robot
+from robots.descriptions.save_description import write_folder
+from robots.shapes.solids import ball
 from services.command_line.main import run
 from services.kinematics.worker import begin
 from services.kinematics.worker_messages import CheckQuestion
@@ -144,7 +145,7 @@ def test_too_large_meshes_and_a_failed_study_leave_hulls(
     assert touching(cell, 0.0, 0.21) == [("arm/base", "arm/hand")]
     monkeypatch.setattr(pair_study, "MOST_TRIANGLES", 30)
     monkeypatch.setattr(
-        "robots.collision.link_pairs.study_results", lambda case, *, wait: pair_study.study(case)
+        "robots.bodies.link_pairs.study_results", lambda case, *, wait: pair_study.study(case)
     )
     ((links, text),) = plan_of(load(model)).elsewhere
     assert links == ("base", "hand")

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from robots.description import load
-from robots.model import build_model, manipulability, tool_jacobian
-from robots.singularity import dexterity, reach_of, singularity_margin
+from robots.descriptions.description import load
+from robots.kinematics.model import build_model, manipulability, tool_jacobian
+from robots.kinematics.singularity import dexterity, reach_of, singularity_margin
 
 
 def margin(name, degrees):

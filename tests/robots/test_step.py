@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.errors import MeshError
-from robots.meshes.mesh import bounds
-from robots.meshes.read import read_mesh
-from robots.meshes.step import read_step
+from robots.schema.errors import MeshError
+from robots.shapes.files.read import read_mesh
+from robots.shapes.files.step import read_step
+from robots.shapes.mesh import bounds
 
 MILLIMETRE = "SI_UNIT(.MILLI.,.METRE.)"
 METRE = "SI_UNIT($,.METRE.)"

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.errors import MeshError
-from robots.meshes.mesh import Material, Mesh, Part, bounds
-from robots.meshes.normals import creased
-from robots.meshes.solids import box
-from robots.meshes.three_ds.read import read_3ds
-from robots.meshes.three_ds.write import write_3ds
+from robots.schema.errors import MeshError
+from robots.shapes.files.three_ds.read import read_3ds
+from robots.shapes.files.three_ds.write import write_3ds
+from robots.shapes.mesh import Material, Mesh, Part, bounds
+from robots.shapes.normals import creased
+from robots.shapes.solids import box
 
 TESTDATA = Path(__file__).resolve().parents[2].parent / "shared" / "testdata" / "3ds"
 GLASS = Material("glass", (0.2, 0.4, 0.6), (1.0, 1.0, 1.0), shininess=0.5, transparency=0.25)

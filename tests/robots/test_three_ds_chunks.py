@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.errors import MeshError
-from robots.meshes.mesh import Mesh, bounds
-from robots.meshes.three_ds.read import read_3ds
+from robots.schema.errors import MeshError
+from robots.shapes.files.three_ds.read import read_3ds
+from robots.shapes.mesh import Mesh, bounds
 
 TESTDATA = Path(__file__).resolve().parents[2].parent / "shared" / "testdata" / "3ds"
 

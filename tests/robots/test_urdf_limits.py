@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.description import library_names, load
-from robots.errors import DescriptionError
-from robots.importing import import_robot
-from robots.joints import doubt_notes, doubt_texts, joints_of
-from robots.mesh_inspection import mesh_findings
-from robots.save_description import write_folder
-from robots.schema import JointSettings, StatedModel
-from robots.urdf.write import to_urdf
+from robots.descriptions.description import library_names, load
+from robots.descriptions.importing import import_robot
+from robots.descriptions.mesh_inspection import mesh_findings
+from robots.descriptions.save_description import write_folder
+from robots.descriptions.urdf.write import to_urdf
+from robots.kinematics.joints import doubt_notes, doubt_texts, joints_of
+from robots.schema.errors import DescriptionError
+from robots.schema.robot_toml import JointSettings, StatedModel
 from tests.robots.boxes import one_joint_arm
 
 RAD, DEGREES = "-6.2832 to 6.2832 rad is assumed", "; probably degrees: "

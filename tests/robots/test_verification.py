@@ -9,12 +9,12 @@ from math import cos, pi, radians, sin
 import numpy as np
 import pytest
 
-from robots.description import load
-from robots.errors import DescriptionError
-from robots.joints import Joints, joints_of
-from robots.model import build_model, link_placements, tool_placement
-from robots.poses import axis_rotation, inverse
-from robots.verification import Sample, unlike, unmoved, verify
+from robots.descriptions.description import load
+from robots.kinematics.joints import Joints, joints_of
+from robots.kinematics.model import build_model, link_placements, tool_placement
+from robots.kinematics.verification import Sample, unlike, unmoved, verify
+from robots.schema.errors import DescriptionError
+from robots.schema.poses import axis_rotation, inverse
 
 # a, alpha, d of the joints, from the manufacturer's page of D-H parameters.
 UR5 = (

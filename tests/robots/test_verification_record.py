@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from robots.errors import VerificationRecordError
-from robots.verification_record import read_record
+from robots.kinematics.verification_record import read_record
+from robots.schema.errors import VerificationRecordError
 
 
 def test_a_name_or_file_that_cannot_be_read_is_refused_at_once(tmp_path):

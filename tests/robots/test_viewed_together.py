@@ -7,10 +7,10 @@ import numpy as np
 import pinocchio
 import pytest
 
-from robots.description import load
-from robots.model import build_model, link_placements
-from robots.urdf.viewers import WORLD, Viewed, prefixed, together
-from robots.urdf.write import to_urdf
+from robots.descriptions.description import load
+from robots.descriptions.urdf.viewers import WORLD, Viewed, prefixed, together
+from robots.descriptions.urdf.write import to_urdf
+from robots.kinematics.model import build_model, link_placements
 
 POSES = {
     "upright": pinocchio.SE3(pinocchio.rpy.rpyToMatrix(0.3, -0.4, 2.0), np.array([1.0, -2.0, 0.5])),

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.errors import MeshError
-from robots.meshes.mesh import Mesh, bounds
-from robots.meshes.read import read_mesh
-from robots.meshes.vrml.read import read_vrml
+from robots.schema.errors import MeshError
+from robots.shapes.files.read import read_mesh
+from robots.shapes.files.vrml.read import read_vrml
+from robots.shapes.mesh import Mesh, bounds
 
 TESTDATA = Path(__file__).resolve().parents[2].parent / "shared" / "testdata"
 
@@ -139,7 +139,7 @@ def test_uses_in_a_proto_cannot_exhaust_the_reader(draw: Draw) -> None:
 
 
 def test_uses_of_a_large_mesh_are_counted(draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robots.meshes.vrml.drawing.MAX_TRIANGLES", 100_000)
+    monkeypatch.setattr("robots.shapes.files.vrml.drawing.MAX_TRIANGLES", 100_000)
     uses = "DEF S " + grid(120) + "USE S " * 4
     refused_in_time(draw, f"Group {{ children [ {uses} ] }}", "draws more than 100000 triangles")
 

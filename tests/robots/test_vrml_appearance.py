@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.meshes.mesh import Material, Mesh, Wire
+from robots.shapes.mesh import Material, Mesh, Wire
 
 Draw = Callable[[str], Mesh]
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robots.meshes import polygons
-from robots.meshes.faces import Faces, Table, surface
-from robots.meshes.mesh import Mesh, Part
-from robots.meshes.polygons import Effort, ears
+from robots.shapes import polygons
+from robots.shapes.faces import Faces, Table, surface
+from robots.shapes.mesh import Mesh, Part
+from robots.shapes.polygons import Effort, ears
 
 Draw = Callable[[str], Mesh]
 

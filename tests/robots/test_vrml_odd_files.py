@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robots.errors import MeshError
-from robots.meshes.mesh import Mesh, bounds
-from robots.meshes.vrml.lexer import Kind, Lexer
-from robots.meshes.vrml.read import read_vrml
-from robots.meshes.vrml.source import Source
+from robots.schema.errors import MeshError
+from robots.shapes.files.vrml.lexer import Kind, Lexer
+from robots.shapes.files.vrml.read import read_vrml
+from robots.shapes.files.vrml.source import Source
+from robots.shapes.mesh import Mesh, bounds
 
 Draw = Callable[[str], Mesh]
 

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.errors import MeshError
-from robots.kinematic_tree import BASE
-from robots.meshes.mesh import Mesh, bounds
-from robots.meshes.vrml.read import read_vrml
-from robots.schema import JointType
-from robots.vrml_robot import VrmlRobot, read_vrml_robot
+from robots.descriptions.vrml_robot import VrmlRobot, read_vrml_robot
+from robots.kinematics.kinematic_tree import BASE
+from robots.schema.errors import MeshError
+from robots.schema.robot_toml import JointType
+from robots.shapes.files.vrml.read import read_vrml
+from robots.shapes.mesh import Mesh, bounds
 
 PROTOS = """
 PROTO Joint [

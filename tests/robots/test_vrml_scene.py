@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.errors import MeshError
-from robots.meshes.mesh import Mesh, bounds
-from robots.meshes.vrml.parser import parse_vrml
-from robots.meshes.vrml.read import read_vrml
-from robots.meshes.vrml.source import load
-from robots.meshes.vrml.values import nodes_of, strings
+from robots.schema.errors import MeshError
+from robots.shapes.files.vrml.parser import parse_vrml
+from robots.shapes.files.vrml.read import read_vrml
+from robots.shapes.files.vrml.source import load
+from robots.shapes.files.vrml.values import nodes_of, strings
+from robots.shapes.mesh import Mesh, bounds
 
 Draw = Callable[[str], Mesh]
 

@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from robots.errors import MeshError
-from robots.meshes.mesh import Mesh, Part, bounds
-from robots.meshes.vrml.extrusion import section_planes
+from robots.schema.errors import MeshError
+from robots.shapes.files.vrml.extrusion import section_planes
+from robots.shapes.mesh import Mesh, Part, bounds
 
 Draw = Callable[[str], Mesh]
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from renderer.glb import read_glb
-from robots.meshes.mesh import Material, Mesh, Part, Wire, bounds
-from robots.meshes.normals import creased
-from robots.meshes.read import read_mesh
-from robots.meshes.simplify import lightened
-from robots.meshes.solids import ball, box
-from robots.meshes.write_glb import glb_of
+from robots.shapes.files.read import read_mesh
+from robots.shapes.files.write_glb import glb_of
+from robots.shapes.mesh import Material, Mesh, Part, Wire, bounds
+from robots.shapes.normals import creased
+from robots.shapes.simplify import lightened
+from robots.shapes.solids import ball, box
 
 GLASS = Material("glass", (0.2, 0.4, 0.6), emissive=(0.0, 0.5, 0.0), transparency=0.25, texture="wood.png")
 

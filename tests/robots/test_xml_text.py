@@ -4,11 +4,11 @@ import time
 
 import pytest
 
-from robots.description import load
-from robots.errors import DescriptionError, MeshError
-from robots.joints import joints_of
-from robots.meshes.read import read_mesh
-from robots.xml_text import XmlError, read_xml
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
+from robots.schema.errors import DescriptionError, MeshError
+from robots.schema.xml_text import XmlError, read_xml
+from robots.shapes.files.read import read_mesh
 from tests.conftest import SHARED
 from tests.robots.test_mesh_formats import DAE
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from services.command_line.site.services import SERVICES, Options
 from services.kinematics import serve as serve_kinematics
 from services.site_file.cell_content import version_of

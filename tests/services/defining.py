@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from robomesh.session import SessionSettings, open_session
+from robomesh.wire.session import SessionSettings, open_session
 from services.console.app import Settings, serve
 from services.console.define.settings import DefineSettings
 from services.site_file.robot import Robot

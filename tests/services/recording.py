@@ -7,7 +7,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from robomesh.recordings.recover import State, state_of
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from services import recorder
 from services.recorder.settings import Settings
 

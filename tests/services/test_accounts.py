@@ -20,7 +20,7 @@ from services.console.accounts.sessions import (
     Sessions,
 )
 from services.console.accounts.sign_in_attempts import Attempts, SignInLimits
-from services.console.errors import AccountsError
+from services.console.common.errors import AccountsError
 from services.errors import SiteFileError
 from services.site_file import site
 from tests.services.signing_in import PASSWORD, cheap_hasher, hashed

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robomesh import reason_codes as codes
-from robomesh.keys import parse_key
-from robomesh.messages import reason_message
+from robomesh.contract.keys import parse_key
+from robomesh.contract.messages import reason_message
 from robomesh.schemas.robomesh_pb2 import Alarm as Message
 from robomesh.schemas.robomesh_pb2 import Event
 from services.watch import alarm_store

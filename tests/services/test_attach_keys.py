@@ -7,11 +7,11 @@ import pytest
 import zenoh
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from robomesh.endpoints import bundle, client_config, router_config
-from robomesh.presence import MONITOR
+from robomesh.contract.endpoints import bundle, client_config, router_config
+from robomesh.contract.topics import Role
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import SessionSettings, open_session
-from robomesh.topics import Role
+from robomesh.wire.presence import MONITOR
+from robomesh.wire.session import SessionSettings, open_session
 from services.pki import Folder, authority
 from services.ros2 import Settings as Ros2Settings
 from services.ros2 import serve as serve_ros2

@@ -6,7 +6,7 @@ import json
 
 from protocol_gateway.audit.log import read_entries
 from robomesh.recordings.files import describe_file
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from services.recorder.recorder import Settings, serve
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import A, C, gateway, simulator, until

@@ -19,7 +19,7 @@ from protocol_gateway import cell_changes
 from robomesh import reason_codes as codes
 from robomesh.errors import RobomeshError
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from services.kinematics.shown_cell import ShownCell
 from services.site_file.cell_file import CellFile
 from tests.conftest import free_port, last_value, run

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from robomesh import reason_codes as codes
-from robomesh.atomic_write import write_atomically
 from robomesh.errors import RefusedError
+from robomesh.files.atomic_write import write_atomically
 from robomesh.schemas import robomesh_pb2 as schema
 from services.site_file.cell_content import MOST_FIXTURES, changes, summary, version_of
 from services.site_file.cell_file import CellFile

@@ -3,8 +3,8 @@
 import numpy as np
 
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.cells import CellDescription, CellRobot
 from robots.collision import Cell, build_cell
+from robots.collision.cells import CellDescription, CellRobot
 from services.kinematics.check import check_answer
 from tests.robots.boxes import block, placed
 

@@ -3,10 +3,10 @@
 import pytest
 
 from robomesh import reason_codes as codes
-from robomesh.clock import Reading
-from robomesh.keys import PresenceKey
-from robomesh.messages import reason_message
+from robomesh.contract.keys import PresenceKey
+from robomesh.contract.messages import reason_message
 from robomesh.schemas.robomesh_pb2 import ControllerState, ServiceHealth
+from robomesh.service.clock import Reading
 from services.errors import SiteFileError
 from services.site_file import site as site_file
 from services.watch.conditions import Condition, ConditionTracker, robot_conditions

@@ -13,11 +13,11 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from robomesh.errors import ListenError, RefusedError
+from robomesh.publications.subscription import Subscription
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
-from robomesh.subscription import Subscription
+from robomesh.wire.session import open_session
 from services.console.app import Settings, serve
-from services.console.errors import PageNotBuiltError
+from services.console.common.errors import PageNotBuiltError
 from services.console.websocket import shared_subscriptions
 from tests.conftest import put_unheard, run
 from tests.services.http_refusals import read_refusal

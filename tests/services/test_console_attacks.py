@@ -12,9 +12,10 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
 from robomesh.client import recorder
 from robomesh.schemas.robomesh_pb2 import FromPage
-from services.console.http import meshes, uvicorn_server
-from services.console.http.listener import Listener
-from services.console.http.request_timeout import Connection
+from services.console.http import meshes
+from services.console.serving import uvicorn_server
+from services.console.serving.listener import Listener
+from services.console.serving.request_timeout import Connection
 from services.console.websocket import websocket_transport
 from tests.conftest import run
 from tests.services.signing_in import Client, guarded

@@ -4,8 +4,8 @@ import pytest
 from starlette.requests import Request
 
 from robomesh import reason_codes as codes
+from robomesh.contract.keys import PresenceKey
 from robomesh.errors import BusyError, NoAnswerError, QuotaError, RefusedError
-from robomesh.keys import PresenceKey
 from services.console.http import meshes
 from services.console.http.meshes import MeshCache, mesh_response
 from tests.conftest import run

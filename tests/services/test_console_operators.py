@@ -3,7 +3,7 @@
 import asyncio
 
 from robomesh.errors import RefusedError
-from robomesh.requests import ask_all
+from robomesh.requests.requests import ask_all
 from robomesh.schemas.robomesh_pb2 import LeaseAnswer, LeaseRequest, ReplayState
 from tests.conftest import run
 from tests.services.test_console import browse, console, page

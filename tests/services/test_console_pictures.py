@@ -13,10 +13,10 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from robomesh import reason_codes as codes
+from robomesh.contract.header import Header
 from robomesh.errors import QuotaError, RefusedError
-from robomesh.header import Header
+from robomesh.publications.subscription import Sample
 from robomesh.schemas.robomesh_pb2 import KeyFrameAnswer, ViewAnswer, ViewRequest
-from robomesh.subscription import Sample
 from services.console.http import pictures
 from services.console.http.streaming import Streamed
 from services.console.websocket.framing import SampleBatch
@@ -291,7 +291,7 @@ def test_a_missing_picture_is_refused_with_code_and_sentence(mesh, page, path, s
 
 
 def test_without_a_renderer_the_answer_says_so(mesh, page, monkeypatch):  # noqa: F811
-    monkeypatch.setattr("services.console.requested_views.TIMEOUT_S", 0.3)
+    monkeypatch.setattr("services.console.common.requested_views.TIMEOUT_S", 0.3)
 
     async def main():
         async with console(mesh, page) as (address, _):

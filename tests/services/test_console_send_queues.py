@@ -5,9 +5,9 @@ from dataclasses import replace
 
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from robomesh import topics
-from robomesh.header import Header
-from robomesh.subscription import Sample
+from robomesh.contract import topics
+from robomesh.contract.header import Header
+from robomesh.publications.subscription import Sample
 from services.console.websocket.send_queues import drop_outdated, queue_for
 
 KEY = b"\0\0\0\1\x67\x42\xc0\x1f\0\0\0\1\x68\xce\0\0\0\1\x65\x88"

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from robomesh.header import Header
+from robomesh.contract.header import Header
+from robomesh.publications.subscription import Sample
 from robomesh.schemas.robomesh_pb2 import FromPage, ToPage
-from robomesh.subscription import Sample
 from services.console.websocket.framing import SampleBatch, batches, frame, state_frame
 from services.console.websocket.page_connection import Browser
 from services.console.websocket.write_scheduler import WriteScheduler

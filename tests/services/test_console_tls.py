@@ -11,7 +11,7 @@ from contextlib import AsyncExitStack
 import pytest
 
 from robomesh.errors import ListenError
-from services.console.http import uvicorn_server
+from services.console.serving import uvicorn_server
 from tests.conftest import run
 from tests.services.certificates import self_signed
 from tests.services.signing_in import accounts_file

@@ -4,8 +4,8 @@ import asyncio
 from dataclasses import dataclass, field
 
 from robomesh.schemas.robomesh_pb2 import FromPage, ToPage
-from robomesh.session import open_session
-from services.console.requested_views import Views
+from robomesh.wire.session import open_session
+from services.console.common.requested_views import Views
 from services.console.websocket.page_connection import Browser
 from services.console.websocket.shared_subscriptions import SharedSubscriptions
 from tests.conftest import run

@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import pytest
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
+from robomesh.contract.header import Header
 from robomesh.errors import RefusedError
-from robomesh.header import Header
+from robomesh.publications.subscription import Sample
 from robomesh.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
-from robomesh.session import open_session
-from robomesh.subscription import Sample
-from services.console.requested_views import LOWEST_STEP, Views, reduced_request
+from robomesh.wire.session import open_session
+from services.console.common.requested_views import LOWEST_STEP, Views, reduced_request
 from services.console.websocket import adaptive_video, send_queues
 from services.console.websocket.adaptive_video import AdaptiveVideo
 from services.console.websocket.framing import SampleBatch

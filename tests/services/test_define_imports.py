@@ -10,12 +10,12 @@ import pytest
 import trimesh
 import zenoh
 
-from robomesh.endpoints import router_config
-from robomesh.session import SessionSettings
-from robots.collision.link_pairs import plan_of
-from robots.collision.verdicts import IGNORED
-from robots.description import load
-from robots.urdf.write import to_urdf
+from robomesh.contract.endpoints import router_config
+from robomesh.wire.session import SessionSettings
+from robots.bodies.link_pairs import plan_of
+from robots.bodies.verdicts import IGNORED
+from robots.descriptions.description import load
+from robots.descriptions.urdf.write import to_urdf
 from tests.conftest import free_port
 from tests.robots.test_step import step_box
 from tests.services.defining import defining

@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio
 import pytest
 
-from robots.meshes.read import read_mesh
-from robots.meshes.surface_points import surface_points
+from robots.shapes.files.read import read_mesh
+from robots.shapes.surface_points import surface_points
 from tests import page_modules
 
 pytestmark = pytest.mark.slow

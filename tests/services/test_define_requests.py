@@ -13,16 +13,16 @@ import pytest
 import zenoh
 from starlette.requests import Request
 
-from robomesh.endpoints import router_config
-from robomesh.session import SessionSettings
-from robots.description import LIBRARY, load
-from robots.save_description import read_robot, write_folder
+from robomesh.contract.endpoints import router_config
+from robomesh.wire.session import SessionSettings
+from robots.descriptions.description import LIBRARY, load
+from robots.descriptions.save_description import read_robot, write_folder
 from services.command_line.site import launch
 from services.command_line.site.services import Options
+from services.console.common.errors import RefusedRequest
 from services.console.define import routes, store
 from services.console.define.routes import Define
 from services.console.define.settings import DefineSettings
-from services.console.errors import RefusedRequest
 from services.site_file.site import Define as DefinePart
 from services.site_file.site import Site
 from tests.conftest import free_port, run

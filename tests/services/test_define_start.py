@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from robomesh.schemas.robomesh_pb2 import ControllerState
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from tests.conftest import run
 from tests.services.defining import Page
 from tests.site import alive, kill, robomesh, running_site, wait_until

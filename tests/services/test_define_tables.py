@@ -7,9 +7,9 @@ import numpy as np
 import pinocchio
 import pytest
 
-from robots.description import from_values
-from robots.example_robots import example_folder
-from robots.model import build_model, link_placements
+from robots.descriptions.description import from_values
+from robots.descriptions.example_robots import example_folder
+from robots.kinematics.model import build_model, link_placements
 from tests import page_modules
 
 pytestmark = pytest.mark.slow

@@ -12,12 +12,12 @@ from types import SimpleNamespace
 import pytest
 from starlette.requests import Request
 
-from robots.description import load
-from robots.urdf.write import to_urdf
+from robots.descriptions.description import load
+from robots.descriptions.urdf.write import to_urdf
 from services.console.accounts.sessions import SignedIn
+from services.console.common.errors import RefusedRequest
 from services.console.define import routes, store
 from services.console.define.worker_pool import ConfinedWorker, Limits, Workers, Workshop
-from services.console.errors import RefusedRequest
 from tests.conftest import run
 from tests.robots.test_step import step_box
 from tests.services.defining import defining

@@ -10,12 +10,12 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from robomesh import reason_codes as codes
-from robomesh.header import Header
+from robomesh.contract.header import Header
+from robomesh.contract.topics import topic
 from robomesh.recordings.capture import Capture
 from robomesh.recordings.files import describe_file
 from robomesh.recordings.reindex import rewrite
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.topics import topic
 from services.recorder import flight
 from services.recorder.settings import Flight
 from tests.conftest import run

@@ -13,9 +13,9 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from foxglove_schemas_protobuf.Log_pb2 import Log
 
 from renderer.encoder import H264Encoder
-from robomesh.endpoints import router_config
+from robomesh.contract.endpoints import router_config
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import SessionSettings, open_session
+from robomesh.wire.session import SessionSettings, open_session
 from services.foxglove import Settings, serve
 from tests.conftest import free_port, run
 from tests.protocol_gateway.gateway_site import STATE, gateway, simulator

@@ -12,15 +12,15 @@ import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from prometheus_client.parser import text_string_to_metric_families
 
-from robomesh import subscription as subscription_module
-from robomesh.clock import Clock, Reading, hops_of, read_clock, reading_of
 from robomesh.errors import NoAnswerError
-from robomesh.health import Served, health_of, own_version, present
-from robomesh.latencies import Latencies
-from robomesh.loop_turns import LONG_S, MeasuredLoop
-from robomesh.metrics import SessionMetrics, serve_metrics
+from robomesh.publications import subscription as subscription_module
+from robomesh.requests.latencies import Latencies
 from robomesh.schemas.robomesh_pb2 import ServiceHealth
-from robomesh.session import open_session
+from robomesh.service.clock import Clock, Reading, hops_of, read_clock, reading_of
+from robomesh.service.health import Served, health_of, own_version, present
+from robomesh.service.loop_turns import LONG_S, MeasuredLoop
+from robomesh.service.metrics import SessionMetrics, serve_metrics
+from robomesh.wire.session import open_session
 from services.watch.rules import RULES
 from tests.conftest import run
 from tests.site import robomesh, wait_until
@@ -162,7 +162,7 @@ def test_the_heartbeat_ages_while_the_event_loop_hangs(mesh):
 
 
 def test_a_service_without_its_metrics_runs_and_says_so_and_listens_when_it_can(mesh, monkeypatch):
-    monkeypatch.setattr("robomesh.health._LISTEN_AGAIN_S", 0.1)
+    monkeypatch.setattr("robomesh.service.health._LISTEN_AGAIN_S", 0.1)
 
     async def main():
         with socket.create_server(("127.0.0.1", 0)) as other:

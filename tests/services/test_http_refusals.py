@@ -8,8 +8,13 @@ from starlette.responses import Response
 
 from robomesh import reason_codes as codes
 from robomesh.errors import BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError
-from services.console.errors import RefusedRequest
-from services.console.http.error_responses import as_json, as_text, refused_on_the_mesh, with_error_responses
+from services.console.common.error_responses import (
+    as_json,
+    as_text,
+    refused_on_the_mesh,
+    with_error_responses,
+)
+from services.console.common.errors import RefusedRequest
 from tests.conftest import run
 from tests.services.http_refusals import read_refusal
 

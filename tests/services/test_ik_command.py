@@ -10,9 +10,9 @@ import pytest
 from robomesh import reason_codes as codes
 from robomesh.reasons import Code
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.description import load
-from robots.inverse import build_solver
-from robots.model import build_model, tool_placement
+from robots.descriptions.description import load
+from robots.kinematics.inverse import build_solver
+from robots.kinematics.model import build_model, tool_placement
 from services.command_line.main import run
 from services.kinematics.inverse import inverse_answer
 from tests.refusals import refused

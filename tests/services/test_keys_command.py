@@ -11,11 +11,11 @@ from itertools import chain
 import pytest
 import zenoh
 
-from robomesh.access_rights import PROBE_ROBOT
-from robomesh.certificate_identity import read_identity
-from robomesh.endpoints import router_config
-from robomesh.topics import Role
-from robots.description import library_names
+from robomesh.contract.access_rights import PROBE_ROBOT
+from robomesh.contract.certificate_identity import read_identity
+from robomesh.contract.endpoints import router_config
+from robomesh.contract.topics import Role
+from robots.descriptions.description import library_names
 from services.command_line import main
 from services.command_line.site import up
 from services.pki import Folder, authority

@@ -8,12 +8,12 @@ import threading
 import pytest
 
 from controllers import probing
-from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.kinds import kind_with, part_of
+from protocol_gateway.seam.errors import GatewaySettingsError
 from protocol_gateway.seam.simulated import Simulated
-from services.command_line import probe
 from services.command_line.doctor import machine
 from services.command_line.main import run
+from services.command_line.site import probe
 from services.command_line.site.up import programs
 from services.errors import SiteFileError
 from services.site_file.site import load

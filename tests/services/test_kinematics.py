@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from robomesh import reason_codes as codes
 from robomesh.errors import NoAnswerError
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
-from robots.description import library_names, load
-from robots.model import build_model, tool_placement
-from robots.poses import rpy_rotation
+from robomesh.wire.session import open_session
+from robots.descriptions.description import library_names, load
+from robots.kinematics.model import build_model, tool_placement
+from robots.schema.poses import rpy_rotation
 from services import kinematics
 from services.kinematics.states import FramesMessage, kinematic_state, quaternion
 from tests.cells import single_arm

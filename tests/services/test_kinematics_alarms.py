@@ -6,11 +6,11 @@ import pytest
 from controllers.simulated.demo import demo_tour
 from robomesh.schemas.robomesh_pb2 import Event
 from robots.collision import Nearest
-from robots.description import load
-from robots.joints import joints_of
-from robots.model import build_model
-from robots.singularity import reach_of, singularity_margin
-from robots.straight_motion import straight_motion
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
+from robots.kinematics.model import build_model
+from robots.kinematics.singularity import reach_of, singularity_margin
+from robots.kinematics.straight_motion import straight_motion
 from services.kinematics.alarms import Alarms
 from services.kinematics.conditions import (
     limit_conditions,

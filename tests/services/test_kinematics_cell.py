@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from robomesh import quotas
 from robomesh import reason_codes as codes
+from robomesh.contract import quotas
+from robomesh.files.worker import Worker
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
-from robomesh.worker import Worker
-from robots.cells import CellDescription, CellRobot, Fixture
+from robomesh.wire.session import open_session
 from robots.collision import build_cell, outside_clearance, own_nearest
-from robots.model import tool_placement
+from robots.collision.cells import CellDescription, CellRobot, Fixture
+from robots.kinematics.model import tool_placement
 from services import kinematics
 from services.kinematics import answers
 from services.kinematics.cell_state import CellState

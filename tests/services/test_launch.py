@@ -2,7 +2,7 @@
 
 import pytest
 
-from robomesh.endpoints import DEFAULT_ROUTER
+from robomesh.contract.endpoints import DEFAULT_ROUTER
 from services.command_line.site.launch import session_settings
 from services.site_file.router import Router
 from services.site_file.site import Site

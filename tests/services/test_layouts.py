@@ -6,7 +6,7 @@ import json
 import pytest
 
 from robomesh import reason_codes as codes
-from robomesh.quotas import Quotas
+from robomesh.contract.quotas import Quotas
 from robomesh.schemas import robomesh_pb2 as schema
 from services.console.accounts.file import AccountRole
 from services.console.accounts.rights import check_right, parse_request

@@ -6,12 +6,13 @@ import pytest
 from rich.console import Console
 
 from robomesh.client.mesh import RobotNotFoundError
-from robomesh.keys import PresenceKey
+from robomesh.contract.keys import PresenceKey
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
-from services.command_line import alarms, discovery
-from services.command_line.alarm_lists import gone_sites, lists
+from robomesh.wire.session import open_session
 from services.command_line.live import listing, listing_text
+from services.command_line.log import alarms
+from services.command_line.terminal import discovery
+from services.command_line.terminal.alarm_lists import gone_sites, lists
 from tests.conftest import run
 
 Alarm = schema.Alarm

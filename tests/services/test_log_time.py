@@ -5,10 +5,10 @@ import time
 
 from mcap.reader import make_reader
 
-from robomesh.header import Header, pack
+from robomesh.contract.header import Header, pack
+from robomesh.publications.wall_clock import WallClock
 from robomesh.recordings.capture import Capture
-from robomesh.session import open_session
-from robomesh.wall_clock import WallClock
+from robomesh.wire.session import open_session
 from services.recorder import captures, subscriptions
 from tests.conftest import run
 from tests.services.recording import put_states, recording_site, trace_off, trace_on, until, until_indexed

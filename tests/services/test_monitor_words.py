@@ -13,7 +13,7 @@ from robomesh.schemas.robomesh_pb2 import (
     KinematicState,
     ProgramState,
 )
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from services.command_line.live import monitor
 from services.command_line.live.monitor_text import (
     check_words,

@@ -12,8 +12,8 @@ from mcap_protobuf.decoder import DecoderFactory
 from robomesh import reason_codes as codes
 from robomesh.client.mesh import AsyncMesh
 from robomesh.client.robot import AsyncRobot
+from robomesh.contract.quotas import Quotas
 from robomesh.errors import NoAnswerError
-from robomesh.quotas import Quotas
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.main import run as robomesh
 from services.console.accounts.file import Account, AccountRole

@@ -17,14 +17,14 @@ from websockets.asyncio.client import connect
 import renderer.service
 from protocol_gateway import gateway
 from renderer.errors import RendererError
-from robomesh.endpoints import bundle, client_config, router_config
+from robomesh.contract.endpoints import bundle, client_config, router_config
+from robomesh.contract.header import Header, pack
+from robomesh.contract.keys import parse_key
+from robomesh.contract.topics import REQUESTS, TOPICS, Role
 from robomesh.errors import KeyNameError
-from robomesh.header import Header, pack
-from robomesh.health import Served, present
-from robomesh.keys import parse_key
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import SessionSettings, open_session
-from robomesh.topics import REQUESTS, TOPICS, Role
+from robomesh.service.health import Served, present
+from robomesh.wire.session import SessionSettings, open_session
 from services import foxglove, kinematics, player, recorder, ros2, watch
 from services.command_line.live.listing import _Clocks, _collect
 from services.console import app

@@ -9,9 +9,9 @@ from websockets.exceptions import ConnectionClosed
 from websockets.frames import Frame, Opcode
 
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session, open_session
-from services.console import read_scheduler
-from services.console.read_scheduler import Allowance, ReadScheduler
+from robomesh.wire.session import Session, open_session
+from services.console.common import read_scheduler
+from services.console.common.read_scheduler import Allowance, ReadScheduler
 from services.console.websocket import shared_subscriptions, websocket_transport
 from services.console.websocket.page_connection import Browser
 from services.console.websocket.shared_subscriptions import SharedSubscriptions
@@ -144,7 +144,7 @@ def test_a_turn_of_the_event_loop_reads_a_bounded_number_of_frames(mesh, page, m
             turns[now] = turns.get(now, 0) + len(self.conn.events)
             super().handle_events()
 
-    monkeypatch.setattr("services.console.http.uvicorn_server.WebSocketTransport", Counted)
+    monkeypatch.setattr("services.console.serving.uvicorn_server.WebSocketTransport", Counted)
     now = 0
 
     async def count():

@@ -14,7 +14,7 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from robomesh import reason_codes as codes
 from robomesh.errors import NoAnswerError, RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from services import player, recorder
 from services.command_line.live import listing, monitor
 from tests.conftest import last_value, run

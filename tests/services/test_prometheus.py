@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from robomesh.topics import Role
+from robomesh.contract.topics import Role
 from services.command_line.site.metrics_ports import ports, scrape_config
 from services.command_line.site.services import SERVICES
 from services.pki import Folder, authority

@@ -20,7 +20,7 @@ def ended(script: str) -> tuple[int, str]:
 
 def test_a_command_that_takes_too_long_ends_with_one_line() -> None:
     script = (
-        "import time; from services.command_line.reading_limits import limit\n"
+        "import time; from services.command_line.terminal.reading_limits import limit\n"
         "limit('mesh', longest_s=0.2)\n"
         "while True: sum(range(1000))\n"
     )
@@ -31,7 +31,7 @@ def test_a_command_that_takes_too_much_memory_ends_with_one_line() -> None:
     script = (
         "import sys\n"
         "from services.command_line import main\n"
-        "from robots.meshes import read\n"
+        "from robots.shapes.files import read\n"
         "read.read_mesh = lambda *_, **__: bytearray(2 << 30)\n"
         "main.limit = lambda *words, given=main.limit: given(*words, most_bytes=1 << 30)\n"
         "sys.argv = ['robomesh', 'mesh', 'info', 'x.stl']\n"
@@ -44,7 +44,7 @@ def test_a_command_that_takes_too_much_memory_ends_with_one_line() -> None:
 
 def test_other_commands_and_those_that_wait_for_a_person_have_no_clock() -> None:
     script = (
-        "import resource, threading; from services.command_line.reading_limits import limit\n"
+        "import resource, threading; from services.command_line.terminal.reading_limits import limit\n"
         "before = resource.getrlimit(resource.RLIMIT_DATA)\n"
         "limit('up'); limit()\n"
         "assert resource.getrlimit(resource.RLIMIT_DATA) == before\n"

@@ -8,12 +8,12 @@ from contextlib import asynccontextmanager
 import pytest
 import zenoh
 
-from robomesh.endpoints import router_config
+from robomesh.contract.endpoints import router_config
 from robomesh.errors import RefusedError
-from robomesh.session import SessionSettings
-from services.command_line.discovery import Robot
+from robomesh.wire.session import SessionSettings
 from services.command_line.live.send import joined
 from services.command_line.recordings.record import _interrupted, _record, _stop
+from services.command_line.terminal.discovery import Robot
 from tests.conftest import free_port, run
 from tests.services.recording import put_states, recording_site, trace_off
 from tests.services.test_recorder import fill_disk_under

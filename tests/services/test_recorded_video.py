@@ -19,7 +19,7 @@ URL = "/recordings/site/trial.mcap/video"
 SLOW = """
 import os, sys, time
 from pathlib import Path
-from robomesh.worker import answer_all, report
+from robomesh.files.worker import answer_all, report
 def render(question):
     Path(question[1]).write_bytes(b"part")
     Path({pid!r}).write_text(str(os.getpid()))

@@ -5,10 +5,10 @@ import threading
 
 import pytest
 
-from robomesh.header import Header
+from robomesh.contract.header import Header
+from robomesh.contract.topics import topic
 from robomesh.recordings.capture import Capture
 from robomesh.recordings.recover import State, state_of
-from robomesh.topics import topic
 from services.recorder.disk import Disk
 from services.recorder.settings import Marks
 

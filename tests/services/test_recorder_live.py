@@ -9,11 +9,11 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from mcap.reader import make_reader
 
 from robomesh import reason_codes as codes
-from robomesh.endpoints import router_config
+from robomesh.contract.endpoints import router_config
 from robomesh.errors import RefusedError
 from robomesh.recordings.files import describe_file
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import SessionSettings
+from robomesh.wire.session import SessionSettings
 from services.recorder.settings import Marks, Split
 from tests.conftest import free_port, run
 from tests.refusals import refused

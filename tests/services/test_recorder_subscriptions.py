@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import pytest
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from robomesh.header import Header, pack
+from robomesh.contract.header import Header, pack
+from robomesh.contract.topics import TOPICS, topic
 from robomesh.recordings.capture import Capture
 from robomesh.recordings.reading import RecordingFile
 from robomesh.schemas.robomesh_pb2 import Event, EventList, RecordingQuery
-from robomesh.session import open_session
-from robomesh.topics import TOPICS, topic
+from robomesh.wire.session import open_session
 from services.recorder import subscriptions
 from services.recorder.disk import RecordingLevel
 from services.recorder.file_writer import Part

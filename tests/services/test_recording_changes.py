@@ -13,11 +13,11 @@ from mcap.reader import make_reader
 
 from robomesh import reason_codes as codes
 from robomesh.client.recorder import RecorderFile
-from robomesh.health import Served, present
 from robomesh.recordings import changes as changes_of
 from robomesh.recordings.changes import changes_path, read_changes
 from robomesh.recordings.reading import RecordingFile
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.service.health import Served, present
 from services.command_line.main import run as robomesh
 from tests.conftest import run
 from tests.recordings import write_recording

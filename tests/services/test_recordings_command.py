@@ -16,7 +16,7 @@ from robomesh.errors import QuotaError
 from robomesh.recordings.capture import Capture
 from robomesh.recordings.series import Series
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from services.command_line.main import run
 from services.command_line.recordings import plots
 from services.command_line.recordings.output import atomic_file

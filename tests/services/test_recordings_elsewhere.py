@@ -13,9 +13,9 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from renderer.encoder import H264Encoder
-from robomesh.endpoints import router_config
+from robomesh.contract.endpoints import router_config
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import SessionSettings
+from robomesh.wire.session import SessionSettings
 from services.recorder.attachments import without_secrets
 from tests.conftest import free_port, run
 from tests.services.recording import put_states, recording_site, trace_off, trace_on, until, until_indexed

@@ -11,11 +11,11 @@ from robomesh import reason_codes as codes
 from robomesh.client.recorder import RecorderFile
 from robomesh.client.recording_list import recording_info
 from robomesh.client.recording_source import MeshSource
-from robomesh.endpoints import client_config
+from robomesh.contract.endpoints import client_config
 from robomesh.errors import QuotaError
 from robomesh.recordings.layout import layout_of
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from tests.conftest import run
 from tests.recordings import Written, joints, write_recording
 from tests.services.test_recordings_served import served
@@ -76,7 +76,7 @@ def test_a_used_up_quota_makes_a_reader_wait(mesh, folder, monkeypatch):
         if refusals and (error := refusals.pop(0)):
             raise error
 
-    monkeypatch.setattr("robomesh.quotas.Quota.check", check)
+    monkeypatch.setattr("robomesh.contract.quotas.Quota.check", check)
     assert len(read(mesh, folder, robomesh.AsyncRecording.joints)) == 400
     assert not refusals
 

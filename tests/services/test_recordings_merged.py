@@ -16,12 +16,12 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
 import robomesh
-from robomesh.endpoints import router_config
+from robomesh.contract.endpoints import router_config
 from robomesh.recordings.files import describe_file
 from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.recover import State, recover, state_of
 from robomesh.recordings.series import known_values
-from robomesh.session import SessionSettings
+from robomesh.wire.session import SessionSettings
 from services.command_line.main import run as command
 from services.player.recording_source import RecordingSource
 from tests.conftest import free_port, run

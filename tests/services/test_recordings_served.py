@@ -19,14 +19,14 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from starlette.applications import Starlette
 
 from robomesh import reason_codes as codes
+from robomesh.contract.keys import WHOLE_SITE
+from robomesh.contract.quotas import DEFAULT_QUOTAS, Quotas
 from robomesh.errors import BrokenAnswerError, BusyError, QuotaError, RefusedError
-from robomesh.keys import WHOLE_SITE
-from robomesh.quotas import DEFAULT_QUOTAS, Quotas
 from robomesh.recordings.changes import write_changes
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.files import describe_file
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from services.console.http.recordings import Recordings
 from services.recorder.answers import Answers
 from services.recorder.serving import RecordingServer

@@ -12,8 +12,8 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.description import load
-from robots.model import build_model, link_placements
+from robots.descriptions.description import load
+from robots.kinematics.model import build_model, link_placements
 from services.command_line.main import run
 from tests.recordings import START_NS, Written, joints, write_recording, write_swinging_arm
 

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
-from robots.description import LIBRARY, load
-from robots.model import build_model, link_placements, tool_placement
-from robots.schema import DhDescription, UrdfDescription
+from robots.descriptions.description import LIBRARY, load
+from robots.kinematics.model import build_model, link_placements, tool_placement
+from robots.schema.robot_toml import DhDescription, UrdfDescription
 from services.command_line.main import run
 from tests.renderer.bodies import context_or_skip
 

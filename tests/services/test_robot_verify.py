@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
-from robots.description import load
-from robots.errors import VerificationRecordError
-from robots.kinematic_tree import tool_frame
-from robots.model import build_model, tool_placement
-from robots.poses import rotation_vector
-from robots.urdf.write import to_urdf
-from robots.verification_record import VerificationRecord, read_record
+from robomesh.wire.session import open_session
+from robots.descriptions.description import load
+from robots.descriptions.urdf.write import to_urdf
+from robots.kinematics.kinematic_tree import tool_frame
+from robots.kinematics.model import build_model, tool_placement
+from robots.kinematics.verification_record import VerificationRecord, read_record
+from robots.schema.errors import VerificationRecordError
+from robots.schema.poses import rotation_vector
 from services.command_line.robot import verify
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import until

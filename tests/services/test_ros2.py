@@ -14,7 +14,7 @@ from zenoh_ros2_sdk import ROS2Subscriber, ZenohSession, get_topic_names_and_typ
 from zenoh_ros2_sdk.qos import QosDurability, QosProfile
 
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
+from robomesh.wire.session import open_session
 from services.ros2 import Settings, serve
 from services.ros2.bridge import JOINT_STATES, ROBOT_DESCRIPTION, TF
 from services.ros2.wire import Topic

@@ -8,9 +8,9 @@ from itertools import product
 import pytest
 import zenoh
 
-from robomesh.endpoints import Link, bundle, client_config, router_config
-from robomesh.keys import robot_key
-from robomesh.topics import Role
+from robomesh.contract.endpoints import Link, bundle, client_config, router_config
+from robomesh.contract.keys import robot_key
+from robomesh.contract.topics import Role
 from services.pki import authority, certificates
 from services.router.rolling_restart import neighbours, wait_for_turn
 from services.router.router import read_access

@@ -9,11 +9,11 @@ import pytest
 import zenoh
 
 from robomesh import reason_codes as codes
-from robomesh.endpoints import bundle, router_config
+from robomesh.contract.endpoints import bundle, router_config
+from robomesh.contract.keys import robot_key
+from robomesh.contract.topics import Role
 from robomesh.errors import NoAnswerError, NoRightError, SessionError
-from robomesh.keys import robot_key
-from robomesh.session import CERTIFICATE, SessionSettings, open_session
-from robomesh.topics import Role
+from robomesh.wire.session import CERTIFICATE, SessionSettings, open_session
 from services import router as service
 from services.pki import Folder, authority, certificates, renewals
 from services.router.router import AccessError, read_access

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from robomesh.endpoints import Tls, bundle, client_config, router_config
+from robomesh.contract.endpoints import Tls, bundle, client_config, router_config
+from robomesh.contract.keys import parse_presence_key
+from robomesh.contract.topics import PEOPLE, REQUESTS, SERVICES, TOPICS, Role
 from robomesh.errors import KeyNameError
-from robomesh.keys import parse_presence_key
-from robomesh.topics import PEOPLE, REQUESTS, SERVICES, TOPICS, Role
 from services.pki import Folder, authority
 from services.router.router import read_access
 from tests.conftest import free_port

@@ -11,9 +11,9 @@ from protocol_gateway import gateway
 from protocol_gateway.audit.log import Outcome
 from protocol_gateway.audit.search import Query, find
 from robomesh.client.robot import AsyncRobot
-from robomesh.endpoints import bundle, router_config
-from robomesh.session import SessionSettings, open_session
-from robomesh.topics import Role
+from robomesh.contract.endpoints import bundle, router_config
+from robomesh.contract.topics import Role
+from robomesh.wire.session import SessionSettings, open_session
 from services.command_line.doctor import security
 from services.pki import Folder, authority
 from services.router.router import read_access

@@ -9,11 +9,11 @@ import pytest
 
 from robomesh import reason_codes as codes
 from robomesh.errors import MessageError, RefusedError
-from robomesh.requests import ask_all
+from robomesh.requests.requests import ask_all
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
-from services.command_line import discovery
+from robomesh.wire.session import open_session
 from services.command_line.live import send
+from services.command_line.terminal import discovery
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import A, until
 

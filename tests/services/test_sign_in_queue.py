@@ -7,7 +7,7 @@ import pytest
 
 from services.console.accounts.passwords import Verifier
 from services.console.accounts.sign_in_queue import MOST_OF_ADDRESS, MOST_OF_NAME, MOST_WAITING, SignInQueue
-from services.console.errors import SignInBusyError
+from services.console.common.errors import SignInBusyError
 from tests.conftest import run
 
 

@@ -10,11 +10,11 @@ from mcap.reader import make_reader
 from prometheus_client import CollectorRegistry, generate_latest
 
 import robomesh as client
-from robomesh.metrics import SessionMetrics
 from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.series import SeriesReader, known_values
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
+from robomesh.service.metrics import SessionMetrics
+from robomesh.wire.session import open_session
 from services import recorder
 from services.command_line.main import run as robomesh_run
 from services.recorder.answers import Answers

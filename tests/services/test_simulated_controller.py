@@ -15,8 +15,8 @@ from protocol_gateway.core.records import (
     Velocities,
     write_unit,
 )
-from robots.description import load
-from robots.joints import joints_of
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 
 PT600 = load("pt600")
 JOINTS = joints_of(PT600)

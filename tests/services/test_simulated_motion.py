@@ -12,11 +12,11 @@ from controllers.unit.simulated.controller import Controller
 from protocol_gateway.core.records import AbsolutePositions, Command
 from robots.collision.cell import build_cell
 from robots.collision.distance import outside_clearance
-from robots.description import load
-from robots.example_robots import example_folder
-from robots.joints import joints_of, violations
-from robots.model import build_model, tool_placement
-from robots.motion import Motion
+from robots.descriptions.description import load
+from robots.descriptions.example_robots import example_folder
+from robots.kinematics.joints import joints_of, violations
+from robots.kinematics.model import build_model, tool_placement
+from robots.kinematics.motion import Motion
 from services.site_file.cells import cells_of
 from services.site_file.site import DEMO
 

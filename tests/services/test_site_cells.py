@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots import description
-from robots.cells import CellDescription, Floor
 from robots.collision import build_cell, distances, outside_clearance, unshaped
-from robots.glb import link_mesh
-from robots.meshes.mesh import bounds
+from robots.collision.cells import CellDescription, Floor
+from robots.descriptions import description
+from robots.descriptions.glb import link_mesh
+from robots.shapes.mesh import bounds
 from services.errors import SiteFileError
 from services.site_file import site
 from services.site_file.cells import cells_of

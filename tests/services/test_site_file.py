@@ -7,8 +7,8 @@ import pytest
 
 from robomesh.errors import ListenError
 from robomesh.listen_address import check_reach, split_address
-from robots import description
-from robots.joints import joints_of
+from robots.descriptions import description
+from robots.kinematics.joints import joints_of
 from services.errors import SiteFileError
 from services.site_file import site
 from services.site_file.cells import cells_of

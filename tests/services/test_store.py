@@ -8,10 +8,10 @@ from contextlib import asynccontextmanager
 import pytest
 
 from robomesh import reason_codes as codes
-from robomesh.health import Served, present
-from robomesh.quotas import Quotas
+from robomesh.contract.quotas import Quotas
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
+from robomesh.service.health import Served, present
+from robomesh.wire.session import open_session
 from services.command_line.main import run as robomesh
 from services.store import Settings, serve
 from services.store.history import sha256

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from robomesh import atomic_write
 from robomesh import reason_codes as codes
+from robomesh.files import atomic_write
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.programs import MOST_BYTES
 from services.store import history

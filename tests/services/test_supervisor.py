@@ -127,7 +127,7 @@ def test_a_blocked_terminal_does_not_block_a_service():
     # The test does not read the pipe: lines that do not fit are dropped.
     program = (
         "import logging, time\n"
-        "from robomesh.service import log_to_stderr\n"
+        "from robomesh.service.service import log_to_stderr\n"
         "log_to_stderr()\n"
         "begun = time.monotonic()\n"
         "for number in range(20000): logging.getLogger('x').info('a line of some length %d', number)\n"

@@ -17,8 +17,8 @@ from typing import NamedTuple
 import pytest
 import zenoh
 
-from robomesh import service
-from robomesh.endpoints import router_config
+from robomesh.contract.endpoints import router_config
+from robomesh.service import service
 from services.command_line.commands import COMMANDS, load
 from services.command_line.site.services import SERVICES
 from tests import warm

@@ -6,7 +6,7 @@ import pytest
 
 from renderer.robot_state import _time
 from services.command_line.live.listing_text import since
-from services.command_line.local_time import time_text
+from services.command_line.terminal.local_time import time_text
 
 AT_S = 1_795_912_378.083
 

@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
-from robots.description import load
-from robots.model import build_model, tool_placement
+from robots.descriptions.description import load
+from robots.kinematics.model import build_model, tool_placement
 from tests.renderer.bodies import context_or_skip
 from tests.site import robomesh, running_site
 

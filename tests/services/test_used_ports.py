@@ -12,7 +12,7 @@ import pytest
 
 from robomesh.errors import ListenError
 from robomesh.listen_address import own_addresses
-from robomesh.session import SessionSettings, open_session
+from robomesh.wire.session import SessionSettings, open_session
 from services.command_line.site import up
 from services.router.router import Settings, check_ports_free, serve
 from services.site_file.console import Console

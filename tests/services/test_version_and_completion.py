@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from robomesh.health import own_version
+from robomesh.service.health import own_version
 from services.command_line.commands import COMMANDS
 from services.command_line.main import run
 from tests.conftest import free_port
@@ -21,9 +21,9 @@ def gateway(router):
     """Yield a router with a gateway of two sites, which share the robot name `arm`."""
     script = """
 import asyncio, sys
-from robomesh.health import Served, present
-from robomesh.last_values import last_values
-from robomesh.session import SessionSettings, open_session
+from robomesh.service.health import Served, present
+from robomesh.wire.last_values import last_values
+from robomesh.wire.session import SessionSettings, open_session
 
 async def main():
     served = Served(service="gateway", present_for=(("a", "arm"), ("a", "left"), ("b", "arm")))

@@ -23,8 +23,8 @@ from services.console.accounts.file import AccountRole, read_accounts
 from services.console.accounts.view_access import add_token, revoke_token
 from services.console.accounts.view_token import ViewToken
 from services.console.app import Hub, Settings, application
+from services.console.common.errors import AccountsError
 from services.console.define.settings import DefineSettings
-from services.console.errors import AccountsError
 from services.site_file.site import Define, Site
 from tests.conftest import run
 from tests.services.http_refusals import read_refusal
@@ -199,7 +199,7 @@ def test_a_token_opens_no_other_address(mesh, page, tmp_path, path, status):
 
 def set_clock(monkeypatch, by):
     real = time.time
-    monkeypatch.setattr("robomesh.wall_clock.time.time", lambda: real() + by.total_seconds())
+    monkeypatch.setattr("robomesh.publications.wall_clock.time.time", lambda: real() + by.total_seconds())
 
 
 @pytest.mark.parametrize("path", ["/video/s/r/front.mjpeg", "/video/s/r/front.mp4", "/view/s/r/front/live"])

@@ -8,12 +8,12 @@ import pytest
 import zenoh
 
 from robomesh import reason_codes as codes
-from robomesh.clock import answer_clock
-from robomesh.endpoints import router_config
-from robomesh.health import Served, present
-from robomesh.messages import reason_message
+from robomesh.contract.endpoints import router_config
+from robomesh.contract.messages import reason_message
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import SessionSettings, open_session
+from robomesh.service.clock import answer_clock
+from robomesh.service.health import Served, present
+from robomesh.wire.session import SessionSettings, open_session
 from services.watch import Settings, serve
 from tests.conftest import free_port, run
 from tests.refusals import refused

@@ -16,10 +16,10 @@ import pytest
 from mcap.reader import make_reader
 
 from robomesh import reason_codes as codes
-from robomesh.keys import parse_key
+from robomesh.contract.keys import parse_key
+from robomesh.contract.topics import topic
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import open_session
-from robomesh.topics import topic
+from robomesh.wire.session import open_session
 from services.errors import TRY_AGAIN
 from tests.conftest import free_port, last_value, run
 from tests.refusals import refused

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from robomesh.session import SessionSettings, open_session
+from robomesh.wire.session import SessionSettings, open_session
 from services import router as service
 from services.pki import Folder, authority
 from tests.conftest import free_port, run

@@ -28,10 +28,10 @@ import zenoh
 
 from protocol_gateway.audit.log import read_entries, verify
 from protocol_gateway.audit.persisted_state import authority_after
-from robomesh.endpoints import router_config
+from robomesh.contract.endpoints import router_config
 from robomesh.errors import NoAnswerError, RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session, SessionSettings, open_session
+from robomesh.wire.session import Session, SessionSettings, open_session
 from tests.conftest import free_port
 
 C = schema.CommandRequest.Command

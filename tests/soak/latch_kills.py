@@ -30,9 +30,9 @@ from pathlib import Path
 import zenoh
 
 from protocol_gateway.audit.log import read_entries, verify
-from robomesh.endpoints import router_config
+from robomesh.contract.endpoints import router_config
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session, SessionSettings, open_session
+from robomesh.wire.session import Session, SessionSettings, open_session
 from tests.conftest import free_port
 from tests.soak.audit_kills import Controller
 

@@ -27,12 +27,12 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 
-from robomesh.endpoints import router_config
+from robomesh.contract.endpoints import router_config
 from robomesh.errors import NoAnswerError, RefusedError
 from robomesh.recordings import records
 from robomesh.recordings.recover import State, state_of
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session, SessionSettings, open_session
+from robomesh.wire.session import Session, SessionSettings, open_session
 from tests.conftest import free_port
 
 KEY = "robomesh/kills/arm/recorder/request"

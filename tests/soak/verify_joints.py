@@ -26,8 +26,8 @@ from controllers.fanuc.simulated import service as fanuc
 from controllers.simulated import demo
 from controllers.universal_robots.simulated import service as universal_robots
 from controllers.yaskawa.simulated import service as yaskawa
-from robots.description import LIBRARY, RobotDescription, load
-from robots.joints import FloatArray, joints_of
+from robots.descriptions.description import LIBRARY, RobotDescription, load
+from robots.kinematics.joints import FloatArray, joints_of
 from tests.conftest import free_port
 from tests.site import lean, robomesh, running_file, site_file
 

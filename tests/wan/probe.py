@@ -18,14 +18,14 @@ from typing import Any
 import zenoh
 from google.protobuf import json_format
 
-from robomesh import messages
-from robomesh.endpoints import bundle
+from robomesh.contract import messages
+from robomesh.contract.endpoints import bundle
+from robomesh.contract.messages import PROTOBUF
+from robomesh.contract.topics import request
 from robomesh.errors import NoAnswerError, RobomeshError
-from robomesh.messages import PROTOBUF
-from robomesh.server import Request
-from robomesh.session import Session, SessionSettings, open_session
-from robomesh.subscription import Subscription
-from robomesh.topics import request
+from robomesh.publications.subscription import Subscription
+from robomesh.requests.server import Request
+from robomesh.wire.session import Session, SessionSettings, open_session
 
 
 class Probe:

@@ -16,10 +16,10 @@ from controllers.fanuc.simulated.rmi_program import NAME as RMI_MOVE
 from controllers.fanuc.simulated.rmi_program import ProgramStatus, RmiProgram
 from controllers.simulated.demo import DemoProgram
 from controllers.simulated.fault_table import displacement
-from robots.description import RobotDescription
-from robots.joints import FloatArray, joints_of, violations
-from robots.model import build_model, link_placements, tool_placement
-from robots.poses import rotation_rpy
+from robots.descriptions.description import RobotDescription
+from robots.kinematics.joints import FloatArray, joints_of, violations
+from robots.kinematics.model import build_model, link_placements, tool_placement
+from robots.schema.poses import rotation_rpy
 
 PROGRAM = "DEMO"
 SOFTWARE = "V0.00P/00 simulated"

@@ -4,8 +4,8 @@ from collections import deque
 from dataclasses import dataclass
 from enum import IntEnum
 
-from robots.joints import FloatArray, Joints
-from robots.motion import ArmState, Motion
+from robots.kinematics.joints import FloatArray, Joints
+from robots.kinematics.motion import ArmState, Motion
 
 MOST_INSTRUCTIONS = 8
 NAME = "RMI_MOVE"

@@ -3,10 +3,10 @@
 import asyncio
 import contextlib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
-from controllers.fanuc.axes import Axes, FanucSettings
+from controllers.fanuc.axes import Axes, FanucSettings, with_defaults
 from controllers.fanuc.data import AXES
 from controllers.fanuc.rmi import PORT
 from controllers.fanuc.simulated.controller import SnpxController
@@ -24,10 +24,10 @@ from controllers.simulated.serving import (
     run,
     warn_beyond_loopback,
 )
-from protocol_gateway.errors import GatewaySettingsError
+from protocol_gateway.seam.errors import GatewaySettingsError
 from robomesh.listen_address import split_address
-from robots.description import load
-from robots.joints import JointType, joints_of
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 
 _BECAUSE = "these protocols have no TLS"
 
@@ -46,20 +46,6 @@ class SnpxSettings(SimulatorSettings):
     rmi: str = ""
     fanuc: FanucSettings | None = None
     shared: bool = False
-
-
-def with_defaults(declared: FanucSettings | None, joint_types: tuple[JointType, ...]) -> FanucSettings:
-    """Return the settings of a simulated controller: as declared, and what the site file leaves open.
-
-    It keeps a table of assignments for each connection, and axis 3 contains axis 2 if both turn.
-    """
-    settings = declared or FanucSettings()
-    if settings.assignments is None:
-        settings = replace(settings, assignments="own")
-    if settings.j23 is None:
-        turn = all(each is JointType.ROTARY for each in joint_types)
-        settings = replace(settings, j23=1 if turn else 0)
-    return settings
 
 
 class FanucPorts(NamedTuple):

@@ -30,7 +30,7 @@ from controllers.opcua.reader.problems import ReadingError, in_words
 from controllers.opcua.reader.security import secured_client
 from controllers.opcua.reader.session import Changes, ReadOnlySession, Sampled, connected
 from controllers.opcua.settings import OpcUaSettings, from_text
-from robomesh.memory_limit import limit_memory
+from robomesh.files.memory_limit import limit_memory
 
 _PR_SET_PDEATHSIG = 1
 _MEMORY_BYTES = 512 * 1024**2

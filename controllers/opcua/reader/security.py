@@ -14,8 +14,8 @@ from cryptography.hazmat.primitives import hashes, serialization
 from controllers.opcua.reader.problems import ReadingError, in_words
 from controllers.opcua.reader.session import TIMEOUT_S, OnlyReads
 from controllers.opcua.settings import OpcUaSettings
-from protocol_gateway.errors import GatewaySettingsError
-from protocol_gateway.secret_file import read_password, read_secret
+from protocol_gateway.seam.errors import GatewaySettingsError
+from protocol_gateway.seam.secret_file import read_password, read_secret
 from robomesh.texts import one_line
 
 _POLICIES: dict[str, type[policies.SecurityPolicy]] = {

@@ -5,8 +5,8 @@ from collections.abc import Collection, Iterator, Mapping
 
 from controllers.simulated.demo import DemoProgram
 from controllers.simulated.fault_table import displacement
-from robots.description import RobotDescription
-from robots.joints import FloatArray, JointType, joints_of
+from robots.descriptions.description import RobotDescription
+from robots.kinematics.joints import FloatArray, JointType, joints_of
 
 PROGRAM = "DEMO"
 MANUAL, EXTERNAL = 1, 4

@@ -16,8 +16,8 @@ from controllers.simulated.demo import demo_tour
 from controllers.simulated.faults import Faults
 from controllers.simulated.serving import SimulatorSettings, cannot_listen, run, warn_beyond_loopback
 from robomesh.listen_address import split_address
-from robots.description import load
-from robots.joints import JointType, joints_of
+from robots.descriptions.description import load
+from robots.kinematics.joints import JointType, joints_of
 
 OPCUA_FAULTS = (
     *("freeze", "garbage", "drop", "jump", "corrupt", "local", "fault", "mute"),

@@ -38,9 +38,9 @@ from protocol_gateway.core.records import (
     Velocities,
 )
 from protocol_gateway.core.scales import si_scales
-from robots.joints import FloatArray, Joints
-from robots.motion import Motion
-from robots.straight_motion import HOMING_REST_S, HOMING_SPEED
+from robots.kinematics.joints import FloatArray, Joints
+from robots.kinematics.motion import Motion
+from robots.kinematics.straight_motion import HOMING_REST_S, HOMING_SPEED
 
 _DEMO_SPEED = 0.6
 _DEMO_REST_S = 0.4

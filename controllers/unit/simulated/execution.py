@@ -20,8 +20,8 @@ from protocol_gateway.core.records import (
     speed_percent,
 )
 from protocol_gateway.core.scales import si_scales
-from protocol_gateway.errors import UnitError
-from robots.joints import FloatArray, Joints, violations
+from protocol_gateway.seam.errors import UnitError
+from robots.kinematics.joints import FloatArray, Joints, violations
 
 MALFORMED, UNKNOWN_WORD, JOINT_COUNT, LIMIT, LOCAL, STOPPED, FAULT = 2, 3, 4, 5, 6, 8, 9
 

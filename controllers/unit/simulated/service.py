@@ -12,8 +12,8 @@ from controllers.simulated.serving import SimulatorSettings, listen, run, warn_b
 from controllers.unit.simulated.controller import Controller
 from controllers.unit.simulated.server import Server
 from robomesh.listen_address import split_address
-from robots.description import load
-from robots.joints import joints_of
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 
 
 @dataclass(frozen=True, kw_only=True)

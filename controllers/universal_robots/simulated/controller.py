@@ -41,10 +41,10 @@ from controllers.universal_robots.simulated.script.code import compile_script
 from controllers.universal_robots.simulated.script.errors import ScriptError
 from controllers.universal_robots.simulated.script.machine import Pose
 from controllers.universal_robots.simulated.script_functions import functions_of
-from robots.description import RobotDescription
-from robots.inverse import InverseSolver, build_solver
-from robots.joints import FloatArray, joints_of
-from robots.model import build_model, link_placements, tool_jacobian, tool_placement
+from robots.descriptions.description import RobotDescription
+from robots.kinematics.inverse import InverseSolver, build_solver
+from robots.kinematics.joints import FloatArray, joints_of
+from robots.kinematics.model import build_model, link_placements, tool_jacobian, tool_placement
 
 logger = logging.getLogger(__name__)
 

@@ -9,11 +9,11 @@ from typing import Protocol
 import numpy as np
 
 from controllers.universal_robots.simulated.script.errors import ScriptError
-from robots.inverse import InverseSolver, Task, follow
-from robots.inverse.tasks import tool_misses
-from robots.joints import FloatArray
-from robots.model import RobotModel, tool_placement
-from robots.motion import ArmState
+from robots.kinematics.inverse import InverseSolver, Task, follow
+from robots.kinematics.inverse.tasks import tool_misses
+from robots.kinematics.joints import FloatArray
+from robots.kinematics.model import RobotModel, tool_placement
+from robots.kinematics.motion import ArmState
 from robots.programs.lines import Line, UnreachableError, follow_line, line_to
 
 # Between two positions that inverse kinematics computes, and the largest number of them.

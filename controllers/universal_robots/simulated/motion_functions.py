@@ -15,11 +15,11 @@ from controllers.universal_robots.simulated.line_motion import (
 )
 from controllers.universal_robots.simulated.script.errors import ScriptError
 from controllers.universal_robots.simulated.script.machine import Machine, Pose, Value, Wait, text_of
-from robots.errors import PoseError
-from robots.inverse import Task, solve, tool_pose
-from robots.joints import FloatArray, violations
-from robots.model import link_placements, tool_jacobian, tool_placement
-from robots.poses import axis_rotation, inverse, rotation_vector
+from robots.kinematics.inverse import Task, solve, tool_pose
+from robots.kinematics.joints import FloatArray, violations
+from robots.kinematics.model import link_placements, tool_jacobian, tool_placement
+from robots.schema.errors import PoseError
+from robots.schema.poses import axis_rotation, inverse, rotation_vector
 
 if TYPE_CHECKING:
     from controllers.universal_robots.simulated.controller import UrController

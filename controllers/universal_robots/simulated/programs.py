@@ -13,8 +13,8 @@ from controllers.universal_robots.simulated.registers import Registers
 from controllers.universal_robots.simulated.script.code import Program
 from controllers.universal_robots.simulated.script.errors import ScriptError
 from controllers.universal_robots.simulated.script.machine import ControllerFunction, Machine
-from robots.joints import FloatArray, Joints
-from robots.motion import ArmState
+from robots.kinematics.joints import FloatArray, Joints
+from robots.kinematics.motion import ArmState
 
 logger = logging.getLogger(__name__)
 

@@ -14,7 +14,7 @@ from controllers.universal_robots.rtde_messages import ControllerVersion
 from controllers.universal_robots.simulated.controller import UrController
 from controllers.universal_robots.simulated.fields import INPUTS
 from controllers.universal_robots.simulated.server import UR_FAULTS, UrServer
-from robots.description import load
+from robots.descriptions.description import load
 
 
 @dataclass(frozen=True, kw_only=True)

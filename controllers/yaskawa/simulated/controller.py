@@ -24,11 +24,11 @@ from controllers.yaskawa.data import (
     Status2,
     System,
 )
-from robots.description import RobotDescription
-from robots.joints import FloatArray, joints_of, violations
-from robots.model import build_model, tool_placement
-from robots.motion import ArmState, Motion
-from robots.poses import rotation_rpy
+from robots.descriptions.description import RobotDescription
+from robots.kinematics.joints import FloatArray, joints_of, violations
+from robots.kinematics.model import build_model, tool_placement
+from robots.kinematics.motion import ArmState, Motion
+from robots.schema.poses import rotation_rpy
 
 JOB = "DEMO"
 AXIS_NAMES = ("S", "L", "U", "R", "B", "T", "E", "W")

@@ -2,21 +2,20 @@
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from controllers.simulated.demo import demo_tour
 from controllers.simulated.errors import SimulatorError
 from controllers.simulated.faults import Faults
 from controllers.simulated.serving import SimulatorSettings, cannot_listen, run, warn_beyond_loopback
-from controllers.yaskawa.axes import Axes, YaskawaSettings, instance_of
+from controllers.yaskawa.axes import Axes, YaskawaSettings, instance_of, with_factors
 from controllers.yaskawa.simulated.controller import AXIS_NAMES, HsesController
 from controllers.yaskawa.simulated.server import HSES_FAULTS, HsesServer
-from protocol_gateway.errors import GatewaySettingsError
+from protocol_gateway.seam.errors import GatewaySettingsError
 from robomesh.listen_address import split_address
-from robots.description import load
-from robots.joints import joints_of
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 
-_PULSES_PER_DEGREE = 1000.0
 _CLOSED_CHECK_S = 0.05
 
 
@@ -36,14 +35,6 @@ class HsesSettings(SimulatorSettings):
     axis_count: int = len(AXIS_NAMES)
     sub_codes: bool = True
     held_motions_go_on: bool = False
-
-
-def with_factors(declared: YaskawaSettings | None, joints: int) -> YaskawaSettings:
-    """Return the settings of a simulated controller: as declared, with its own factors if there are none."""
-    settings = declared or YaskawaSettings()
-    if settings.pulses_per_degree:
-        return settings
-    return replace(settings, pulses_per_degree=(_PULSES_PER_DEGREE,) * joints)
 
 
 async def serve_hses(settings: HsesSettings, *, ready: Callable[[int], None] | None = None) -> None:

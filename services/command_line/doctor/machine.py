@@ -15,15 +15,15 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.kinds import driver_maker, kind_of, own_kinds, part_of
+from protocol_gateway.seam.errors import GatewaySettingsError
 from protocol_gateway.seam.simulated import Simulated
 from robomesh.errors import UnavailableError
 from robomesh.extras import ADDED_IN_CHECKOUT, install_command, is_missing
 from robomesh.listen_address import reachable, split_address
-from services.command_line.output import print_json, print_line
 from services.command_line.site.metrics_ports import first_address, ports
 from services.command_line.site.services import SERVICES
+from services.command_line.terminal.output import print_json, print_line
 from services.used_ports import check_free, is_absent
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ def _addresses(site: "Site") -> Iterator[Finding]:
 def _is_router(endpoint: str) -> bool:
     """Return whether a Zenoh router answers at the endpoint, by TCP or, with `--keys`, by TLS."""
     from robomesh.errors import RobomeshError
-    from services.command_line import discovery
+    from services.command_line.terminal import discovery
 
     async def answers() -> bool:
         async with asyncio.timeout(_ANSWER_S), discovery.attached(endpoint):

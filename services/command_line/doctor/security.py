@@ -16,9 +16,9 @@ from itertools import chain, product
 
 import zenoh
 
-from robomesh.access_rights import PROBE_ROBOT, Act, Principal
-from robomesh.keys import has_wildcard
-from robomesh.topics import Role, Topic
+from robomesh.contract.access_rights import PROBE_ROBOT, Act, Principal
+from robomesh.contract.keys import has_wildcard
+from robomesh.contract.topics import Role, Topic
 from services.command_line.doctor.security_probes import probe
 from services.command_line.doctor.security_rules import wrong_rules
 from services.command_line.doctor.security_sessions import (
@@ -31,7 +31,7 @@ from services.command_line.doctor.security_sessions import (
     with_files,
 )
 from services.command_line.doctor.security_table import ROBOTS, ROWS, names, should, tried, tried_on_real
-from services.command_line.output import print_json, print_line
+from services.command_line.terminal.output import print_json, print_line
 from services.pki import Folder, authority
 from services.pki.errors import KeysError
 

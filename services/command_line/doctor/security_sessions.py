@@ -9,9 +9,9 @@ from threading import Condition
 
 import zenoh
 
-from robomesh.access_rights import PROBE_ROBOT, Act, Principal
-from robomesh.endpoints import bundle, client_config, first_line
-from robomesh.messages import PROTOBUF
+from robomesh.contract.access_rights import PROBE_ROBOT, Act, Principal
+from robomesh.contract.endpoints import bundle, client_config, first_line
+from robomesh.contract.messages import PROTOBUF
 from services.pki import Folder, authority
 from services.pki.errors import KeysError
 from services.pki.principals import Principals

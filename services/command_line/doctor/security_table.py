@@ -1,15 +1,15 @@
 """The rights of each certificate by the topic table, as `doctor --security` expects them.
 
-Written independently of the generator of the rules (`robomesh/access_rights.py`), which it verifies.
+Written independently of the generator of the rules (`robomesh/contract/access_rights.py`), which it verifies.
 """
 
 from collections.abc import Iterable
 
-from robomesh import topics
-from robomesh.access_rights import PROBE_ROBOT, Act, Principal
+from robomesh.contract import topics
+from robomesh.contract.access_rights import PROBE_ROBOT, Act, Principal
+from robomesh.contract.keys import has_wildcard, is_replay, parse_expression, replay_name
+from robomesh.contract.topics import REQUESTS, TOPICS, Request, Role, Topic
 from robomesh.errors import UnknownTopicError
-from robomesh.keys import has_wildcard, is_replay, parse_expression, replay_name
-from robomesh.topics import REQUESTS, TOPICS, Request, Role, Topic
 
 ROWS: tuple[Topic | Request, ...] = (*TOPICS.values(), *REQUESTS.values())
 # Matches the robot that no site has, and robots whose name begins with its name.

@@ -2,13 +2,14 @@
 
 import asyncio
 
-from robomesh import keys, presence
+from robomesh.contract import keys
+from robomesh.contract.keys import PresenceKey
 from robomesh.errors import RobomeshError
-from robomesh.keys import PresenceKey
 from robomesh.schemas.robomesh_pb2 import ClockRequest
-from robomesh.session import Session
-from services.command_line import discovery
-from services.command_line.output import print_line
+from robomesh.wire import presence
+from robomesh.wire.session import Session
+from services.command_line.terminal import discovery
+from services.command_line.terminal.output import print_line
 
 _ROUTER = "router"
 # Per answer: a service that takes longer is not usable.

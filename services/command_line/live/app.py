@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from robomesh.endpoints import DEFAULT_ROUTER
-from services.command_line.options import Connect, Height, Json, Robot, Width, command_group
+from robomesh.contract.endpoints import DEFAULT_ROUTER
+from services.command_line.terminal.options import Connect, Height, Json, Robot, Width, command_group
 
 app = command_group()
 

@@ -1,10 +1,10 @@
 """`robomesh fault`: faults of a simulated controller, begun and ended on request."""
 
 from controllers.simulated.fault_table import FAULTS
-from robomesh.keys import robot_key
+from robomesh.contract.keys import robot_key
 from robomesh.schemas.robomesh_pb2 import FaultAnswer, FaultRequest
-from services.command_line import discovery
-from services.command_line.output import print_json, print_line
+from services.command_line.terminal import discovery
+from services.command_line.terminal.output import print_json, print_line
 
 
 def run(robot: str, name: str, off: bool, router: str, as_json: bool) -> None:

@@ -7,22 +7,22 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-from robomesh.activity import activity_words
-from robomesh.clock import Clock, Reading, read_clock
-from robomesh.enum_names import enum_name, enum_word
+from robomesh.contract.activity import activity_words
+from robomesh.contract.enum_names import enum_name, enum_word
+from robomesh.contract.keys import ROOT, WHOLE_SITE, PresenceKey, is_replay, robot_key
+from robomesh.contract.messages import received_reason
+from robomesh.contract.topics import Role
 from robomesh.errors import NoAnswerError
-from robomesh.keys import ROOT, WHOLE_SITE, PresenceKey, is_replay, robot_key
-from robomesh.last_values import last_values
-from robomesh.messages import received_reason
-from robomesh.presence import SILENT
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
-from robomesh.topics import Role
-from services.command_line import discovery
-from services.command_line.alarm_lists import gone_sites, lists
+from robomesh.service.clock import Clock, Reading, read_clock
+from robomesh.wire.last_values import last_values
+from robomesh.wire.presence import SILENT
+from robomesh.wire.session import Session
 from services.command_line.live.listing_text import listing_text
 from services.command_line.live.monitor_text import replay_record
-from services.command_line.output import console, print_json, print_line
+from services.command_line.terminal import discovery
+from services.command_line.terminal.alarm_lists import gone_sites, lists
+from services.command_line.terminal.output import console, print_json, print_line
 
 _State = schema.ControllerState
 _Stops, _Command = schema.Capabilities.Stops, schema.CommandRequest.Command

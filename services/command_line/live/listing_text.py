@@ -4,9 +4,9 @@ from collections.abc import Iterable
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
-from robomesh.keys import WHOLE_SITE
-from services.command_line.local_time import local_time, time_text
-from services.command_line.output import styled
+from robomesh.contract.keys import WHOLE_SITE
+from services.command_line.terminal.local_time import local_time, time_text
+from services.command_line.terminal.output import styled
 
 if TYPE_CHECKING:
     from rich.console import Group

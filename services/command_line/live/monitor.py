@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from robomesh.activity import activity_words
-from robomesh.enum_names import enum_word
-from robomesh.keys import WHOLE_SITE, is_replay, robot_key
-from robomesh.presence import MONITOR
+from robomesh.contract.activity import activity_words
+from robomesh.contract.enum_names import enum_word
+from robomesh.contract.keys import WHOLE_SITE, is_replay, robot_key
+from robomesh.contract.topics import stale_after_s
+from robomesh.publications.subscription import Sample, Subscription
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
-from robomesh.subscription import Sample, Subscription
-from robomesh.topics import stale_after_s
-from services.command_line import discovery
+from robomesh.wire.presence import MONITOR
+from robomesh.wire.session import Session
 from services.command_line.live.monitor_text import (
     OLD,
     Words,
@@ -32,8 +31,9 @@ from services.command_line.live.monitor_text import (
     replay_record,
     replay_words,
 )
-from services.command_line.local_time import local_time
-from services.command_line.output import console, print_json, styled_line
+from services.command_line.terminal import discovery
+from services.command_line.terminal.local_time import local_time
+from services.command_line.terminal.output import console, print_json, styled_line
 
 if TYPE_CHECKING:
     from rich.console import Group

@@ -5,10 +5,10 @@ from collections.abc import Iterable
 from datetime import datetime
 from typing import Any
 
-from robomesh.enum_names import enum_name, enum_word
-from robomesh.keys import WHOLE_SITE
+from robomesh.contract.enum_names import enum_name, enum_word
+from robomesh.contract.keys import WHOLE_SITE
 from robomesh.schemas import robomesh_pb2 as schema
-from services.command_line.local_time import local_time, time_text
+from services.command_line.terminal.local_time import local_time, time_text
 
 _State = schema.ControllerState
 _Program = schema.ProgramState

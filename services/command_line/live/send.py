@@ -12,12 +12,12 @@ from robomesh import reason_codes as codes
 from robomesh.client.commands import CommandResult, Progress, program_text, request_stop
 from robomesh.client.control import AsyncArm
 from robomesh.client.robot import AsyncRobot
+from robomesh.contract.keys import check_chunk
 from robomesh.errors import CodedError, MotionError, NoAnswerError, RefusedError
-from robomesh.keys import check_chunk
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
-from services.command_line import discovery
-from services.command_line.output import json_line, print_line
+from robomesh.wire.session import Session
+from services.command_line.terminal import discovery
+from services.command_line.terminal.output import json_line, print_line
 from services.errors import ServiceError
 
 T = TypeVar("T")

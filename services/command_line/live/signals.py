@@ -7,11 +7,11 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from robomesh.client.samples import utc
-from robomesh.keys import is_replay, robot_key
+from robomesh.contract.keys import is_replay, robot_key
+from robomesh.publications.subscription import Sample
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.subscription import Sample
-from services.command_line import discovery
-from services.command_line.output import print_json, print_line
+from services.command_line.terminal import discovery
+from services.command_line.terminal.output import print_json, print_line
 from services.errors import ServiceError
 
 # Signals that do not change are published once a second.

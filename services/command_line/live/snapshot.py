@@ -4,9 +4,9 @@ from pathlib import Path
 
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 
-from services.command_line import discovery
 from services.command_line.live.views import view_of
-from services.command_line.output import print_line
+from services.command_line.terminal import discovery
+from services.command_line.terminal.output import print_line
 from services.errors import ServiceError
 
 # On a busy machine the first picture of a robot with many parts takes seconds.

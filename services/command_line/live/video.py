@@ -13,11 +13,11 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from renderer.errors import Mp4Error
 from renderer.mp4 import FragmentedMp4
 from robomesh.errors import MessageError
-from robomesh.h264 import is_key_frame
-from robomesh.subscription import Subscription
-from services.command_line import discovery
+from robomesh.publications.subscription import Subscription
+from robomesh.recordings.h264 import is_key_frame
 from services.command_line.live.views import view_of
-from services.command_line.output import print_json, print_line
+from services.command_line.terminal import discovery
+from services.command_line.terminal.output import print_json, print_line
 from services.errors import ServiceError
 
 # The renderer sends a view without motion twice a second.

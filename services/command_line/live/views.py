@@ -3,11 +3,11 @@
 import contextlib
 from typing import NamedTuple
 
+from robomesh.contract.keys import check_chunk, robot_key
 from robomesh.errors import NoAnswerError, RobomeshError
-from robomesh.keys import check_chunk, robot_key
 from robomesh.schemas.robomesh_pb2 import KeyFrameRequest, ViewAnswer, ViewRequest
-from robomesh.session import Session
-from services.command_line import discovery
+from robomesh.wire.session import Session
+from services.command_line.terminal import discovery
 from services.errors import ServiceError
 
 # The first view on a busy machine opens an encoder.

@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from robomesh.endpoints import DEFAULT_ROUTER
-from services.command_line.options import Connect, Json, command_group
+from robomesh.contract.endpoints import DEFAULT_ROUTER
+from services.command_line.terminal.options import Connect, Json, command_group
 
 app = command_group(
     "recordings", "Recordings: list, inspect, play, export, fetch, rename, note, tag, delete."

@@ -3,11 +3,11 @@
 from collections.abc import Callable, Sequence
 
 from robomesh.client.recorder import RecorderFile
-from robomesh.keys import check_chunk
+from robomesh.contract.keys import check_chunk
 from robomesh.schemas import robomesh_pb2 as schema
-from services.command_line import discovery
-from services.command_line.output import print_line
 from services.command_line.recordings.listing import found, show
+from services.command_line.terminal import discovery
+from services.command_line.terminal.output import print_line
 
 _Request = schema.RecordingRequest
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robomesh.recordings.reading import RecordingFile
-from services.command_line.output import print_json, print_line
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.fetch import local_file
 from services.command_line.recordings.output import atomic_file
 from services.command_line.recordings.span import Span, span_of
+from services.command_line.terminal.output import print_json, print_line
 
 _PLOTS = (".png", ".pdf", ".svg")
 

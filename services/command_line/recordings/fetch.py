@@ -7,10 +7,10 @@ from pathlib import Path
 
 from robomesh.client.recorder import Fetched, RecorderFile
 from robomesh.errors import QuotaError
-from services.command_line import discovery
-from services.command_line.output import print_json, print_line, progress
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.listing import attached_for, found
+from services.command_line.terminal import discovery
+from services.command_line.terminal.output import print_json, print_line, progress
 
 
 def run(what: str, out: Path, router: str, as_json: bool) -> None:

@@ -15,17 +15,17 @@ from robomesh.client.recording_list import (
     find_recording,
     list_recordings,
 )
-from robomesh.enum_names import enum_word
+from robomesh.contract.enum_names import enum_word
+from robomesh.contract.messages import to_json
 from robomesh.errors import RobomeshError, SessionError
-from robomesh.messages import to_json
 from robomesh.recordings.errors import RecordingError
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
 from robomesh.texts import for_terminal
-from services.command_line import discovery
-from services.command_line.local_time import local_time, time_text
-from services.command_line.output import print_json, print_line
+from robomesh.wire.session import Session
 from services.command_line.recordings.errors import ExportError
+from services.command_line.terminal import discovery
+from services.command_line.terminal.local_time import local_time, time_text
+from services.command_line.terminal.output import print_json, print_line
 
 _Change = schema.RecordingChange
 

@@ -8,15 +8,15 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+from robomesh.contract.keys import WHOLE_SITE, robot_key
 from robomesh.errors import RobomeshError
-from robomesh.keys import WHOLE_SITE, robot_key
-from robomesh.presence import OPERATOR, session_of
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
-from services.command_line import discovery
-from services.command_line.output import print_line, progress
+from robomesh.wire.presence import OPERATOR, session_of
+from robomesh.wire.session import Session
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.listing import attached_for, found
+from services.command_line.terminal import discovery
+from services.command_line.terminal.output import print_line, progress
 
 _OPEN_WITHIN_S = 20.0
 # A player publishes its position five times a second, also when paused.

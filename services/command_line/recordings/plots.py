@@ -5,16 +5,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from robomesh.contract.topics import topic
 from robomesh.extras import missing
 from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.series import MOST_VALUES, Series, SeriesReader, known_values
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.topics import topic
-from services.command_line.local_time import time_text
-from services.command_line.output import progress
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.span import Span, decoded, topics_of
+from services.command_line.terminal.local_time import time_text
+from services.command_line.terminal.output import progress
 
 COLORS = ("#1462a8", "#8a6a1f", "#2b7a4b", "#93456f", "#5a51a8", "#5b6369", "#9a5426")
 _TEXT, _LINE = "#1d2124", "#cbd0d3"

@@ -10,15 +10,15 @@ from typing import NamedTuple
 
 import typer
 
+from robomesh.contract.keys import robot_key
 from robomesh.errors import NoAnswerError, RefusedError
-from robomesh.keys import robot_key
+from robomesh.publications.subscription import Subscription
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
-from robomesh.subscription import Subscription
-from services.command_line import discovery
-from services.command_line.local_time import time_text
-from services.command_line.output import print_line
+from robomesh.wire.session import Session
 from services.command_line.recordings.listing import show, summary
+from services.command_line.terminal import discovery
+from services.command_line.terminal.local_time import time_text
+from services.command_line.terminal.output import print_line
 
 _Request = schema.RecorderRequest
 # The recorder publishes each second; after this silence its presence is checked.

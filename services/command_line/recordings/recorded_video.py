@@ -9,9 +9,9 @@ from renderer.mp4 import FragmentedMp4
 from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.video import holds_key_frame
-from services.command_line.output import progress
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.span import Span, decoded, needed
+from services.command_line.terminal.output import progress
 
 
 def write_recorded(file: RecordingFile, span: Span, target: Path, view: str) -> tuple[int, float]:

@@ -5,8 +5,8 @@ from pathlib import Path
 from robomesh.recordings import recover as files
 from robomesh.recordings.capture import is_being_written
 from robomesh.recordings.files import describe_file
-from services.command_line.output import print_json, print_line, progress
 from services.command_line.recordings.errors import ExportError
+from services.command_line.terminal.output import print_json, print_line, progress
 
 
 def run(file: Path, as_json: bool) -> None:

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from robomesh.files.worker import answer_all, report
 from robomesh.recordings.reading import RecordingFile
-from robomesh.worker import answer_all, report
 from services.command_line.recordings.rendered_video import Rendering, write_rendered
 from services.command_line.recordings.span import span_of
 

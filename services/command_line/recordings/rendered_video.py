@@ -20,11 +20,11 @@ from renderer.studio import Studio
 from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.schemas import robomesh_pb2 as schema
-from services.command_line.output import progress
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.meshes import recorded_mesh
 from services.command_line.recordings.span import Span, decoded, needed, topics_of
 from services.command_line.recordings.tables import description_of
+from services.command_line.terminal.output import progress
 
 _KEY_FRAME_EACH_S = 2.0
 _LARGEST_PX, _SMALLEST_PX = 4096, 64

@@ -18,15 +18,14 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from renderer.appearance import Appearance, appearance_of, frame_placements, placements_at
 from renderer.glb import glb_to_z_up, read_glb
 from renderer.views import camera_of
+from robomesh.contract.keys import FREE, parse_key
 from robomesh.extras import missing
-from robomesh.h264 import is_key_frame
-from robomesh.keys import FREE, parse_key
+from robomesh.recordings.h264 import is_key_frame
 from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.series import known_values, units_of
 from robomesh.recordings.values import values_of
 from robomesh.schemas import robomesh_pb2 as schema
-from services.command_line.output import print_line, progress
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.meshes import recorded_mesh
 from services.command_line.recordings.plots import COLORS, panels_of
@@ -34,6 +33,7 @@ from services.command_line.recordings.recorded_video import recorded_pictures
 from services.command_line.recordings.rerun_layout import PUBLISHER_TIME, RECEIVE_TIME, blueprint
 from services.command_line.recordings.span import Span, decoded, topics_of
 from services.command_line.recordings.tables import description_of
+from services.command_line.terminal.output import print_line, progress
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -11,9 +11,9 @@ from google.protobuf.message import Message
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.table import Table, is_due, table_of
 from robomesh.schemas import robomesh_pb2 as schema
-from services.command_line.output import progress
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.span import Span, decoded, needed, topics_of
+from services.command_line.terminal.output import progress
 
 _REPORT_EACH = 5000
 

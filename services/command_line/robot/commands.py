@@ -9,9 +9,9 @@ from typing import Annotated, Any
 
 import typer
 
-from robomesh.endpoints import DEFAULT_ROUTER
-from services.command_line.options import Connect, Json, Robot, command_group
-from services.command_line.output import print_json, print_line
+from robomesh.contract.endpoints import DEFAULT_ROUTER
+from services.command_line.terminal.options import Connect, Json, Robot, command_group
+from services.command_line.terminal.output import print_json, print_line
 from services.errors import ServiceError
 
 app = command_group("robot", "Robot descriptions: check, show, import, export, verify.")
@@ -26,9 +26,9 @@ class ExportFolderError(ServiceError):
 @app.command()
 def check(robot: _Robot, as_json: Json = False) -> None:
     """Check a description and its meshes: a line a problem; exit status 1 when there is one."""
-    from robots.description import load
-    from robots.errors import DescriptionError
-    from robots.mesh_inspection import mesh_findings
+    from robots.descriptions.description import load
+    from robots.descriptions.mesh_inspection import mesh_findings
+    from robots.schema.errors import DescriptionError
 
     name = robot
     problems: list[dict[str, Any]] = []
@@ -41,7 +41,7 @@ def check(robot: _Robot, as_json: Json = False) -> None:
         problems += [{"file": each.file, "path": [], "text": each.text} for each in found]
         warnings = [{"file": each.file, "text": each.text} for each in odd]
         if not problems:
-            from robots.collision.report import collision_report
+            from robots.bodies.report import collision_report
 
             report = collision_report(robot)
     except DescriptionError as error:
@@ -83,9 +83,9 @@ def show(
     ] = None,
 ) -> None:
     """Show a robot's D-H table, limits, frames and reach."""
-    from robots.description import load
-    from robots.model import build_model, tool_placement
-    from robots.summary import description_summary
+    from robots.descriptions.description import load
+    from robots.descriptions.summary import description_summary
+    from robots.kinematics.model import build_model, tool_placement
 
     description = load(robot)
     model = build_model(description)
@@ -156,9 +156,9 @@ def _cell(value: float) -> str:
 @app.command()
 def export(robot: _Robot, folder: Annotated[Path, typer.Argument(metavar="FOLDER")]) -> None:
     """Write a robot as URDF with GLB meshes."""
-    from robots.description import load
-    from robots.glb import collision_meshes, link_meshes, main_colors
-    from robots.urdf.write import collision_beside, glb_beside, to_urdf
+    from robots.descriptions.description import load
+    from robots.descriptions.glb import collision_meshes, link_meshes, main_colors
+    from robots.descriptions.urdf.write import collision_beside, glb_beside, to_urdf
 
     description = load(robot)
     urdf = folder / f"{description.name}.urdf"
@@ -195,8 +195,8 @@ def import_(
 
     Writes the whole folder, or nothing.
     """
-    from robots.importing import import_robot
-    from robots.save_description import write_folder
+    from robots.descriptions.importing import import_robot
+    from robots.descriptions.save_description import write_folder
 
     robot = import_robot(source, packages=package or [], as_dh=dh)
     for note in robot.notes:

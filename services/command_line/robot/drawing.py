@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.errors import RobotError
-from robots.schema import RobotDescription
+from robots.schema.errors import RobotError
+from robots.schema.robot_toml import RobotDescription
 
 _VIEWS = ("front", "left", "top", "free")
 _SIZE = (720, 540)
@@ -32,8 +32,8 @@ def draw_four_views(description: RobotDescription, out: Path) -> None:
     from renderer.overlay import Overlay, write_over
     from renderer.scene_assembly import Placed, scene_of
     from renderer.views import camera_of
-    from robots.glb import link_meshes
-    from robots.urdf.write import to_urdf
+    from robots.descriptions.glb import link_meshes
+    from robots.descriptions.urdf.write import to_urdf
     from services.kinematics.descriptions import describe
 
     drawing = Drawing(open_context(), _SIZE)

@@ -8,13 +8,13 @@ import numpy as np
 import typer
 
 from robomesh import bounded_json
-from robots.description import load
-from robots.errors import RobotError
-from robots.inverse import InverseResult, InverseSolver, Task, build_solver, natural_task, solve
-from robots.joints import JointType
-from robots.poses import rpy_rotation
-from services.command_line.output import print_json, print_line
+from robots.descriptions.description import load
+from robots.kinematics.inverse import InverseResult, InverseSolver, Task, build_solver, natural_task, solve
+from robots.kinematics.joints import JointType
+from robots.schema.errors import RobotError
+from robots.schema.poses import rpy_rotation
 from services.command_line.robot.kinematics import RequestError, request_lines
+from services.command_line.terminal.output import print_json, print_line
 
 _KEYS = {"pose", "task", "near", "all", "seed"}
 _EXAMPLE = '{"pose": [[1, 0, 0, 0.3], ...], "task": "6d", "near": [...], "all": false, "seed": 0}'

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from robomesh import bounded_json
-from services.command_line.options import Json, command_group
+from services.command_line.terminal.options import Json, command_group
 from services.errors import ServiceError
 
 app = command_group()
@@ -31,10 +31,10 @@ def fk(
 
     Poses are in the base frame.
     """
-    from robots.description import load
-    from robots.errors import RobotError
-    from robots.model import build_model, link_placements, tool_placement
-    from services.command_line.output import print_json
+    from robots.descriptions.description import load
+    from robots.kinematics.model import build_model, link_placements, tool_placement
+    from robots.schema.errors import RobotError
+    from services.command_line.terminal.output import print_json
 
     if requests != "-":
         raise RequestError(f"{requests!r}: '-' is right, and one JSON request a line on standard input")

@@ -9,17 +9,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robomesh import reason_codes as codes
-from robomesh.atomic_write import write_atomically
 from robomesh.client.robot import AsyncRobot
+from robomesh.files.atomic_write import write_atomically
 from robomesh.schemas import robomesh_pb2 as schema
-from services.command_line import discovery
-from services.command_line.output import print_json, print_line
+from services.command_line.terminal import discovery
+from services.command_line.terminal.output import print_json, print_line
 from services.errors import ServiceError
 
 if TYPE_CHECKING:
-    from robots.joints import FloatArray, Joints
-    from robots.verification import Placement, Sample, Verification
-    from robots.verification_record import VerificationRecord
+    from robots.kinematics.joints import FloatArray, Joints
+    from robots.kinematics.verification import Placement, Sample, Verification
+    from robots.kinematics.verification_record import VerificationRecord
 
 _REST_S = 1.0
 _STILL = 2e-4  # of a joint at rest [rad] or [m]: more than the noise of encoders
@@ -65,7 +65,7 @@ def verify(robot: str, connect: str, out: Path | None, *, base: str, flange: str
 async def _verify(
     name: str, connect: str, base: str, flange: str, poses: Path | None
 ) -> "VerificationRecord":
-    from robots.verification import verify
+    from robots.kinematics.verification import verify
 
     async with discovery.attached(connect) as session:
         place = await discovery.find(session, name)
@@ -126,8 +126,8 @@ def _kept(file: Path, now: "VerificationRecord") -> list["Sample"]:
     """
     import numpy as np
 
-    from robots.verification import Sample
-    from robots.verification_record import read_record
+    from robots.kinematics.verification import Sample
+    from robots.kinematics.verification_record import read_record
 
     if not file.exists():
         return []
@@ -161,9 +161,9 @@ async def _state(robot: AsyncRobot) -> schema.ControllerState:
 
 def _model(description: schema.Description, base: str, flange: str) -> tuple["Joints", "Placement"]:
     """Return the joints of a site's description, and the placement of its flange in the base frame."""
-    from robots.description import load
-    from robots.model import build_model, link_placements
-    from robots.poses import inverse
+    from robots.descriptions.description import load
+    from robots.kinematics.model import build_model, link_placements
+    from robots.schema.poses import inverse
 
     with tempfile.TemporaryDirectory() as folder:
         urdf = Path(folder) / "robot.urdf"
@@ -201,7 +201,7 @@ async def _take(
     keep: Callable[[], Awaitable[None]],
 ) -> None:
     """Add a sample of each pose in which the arm rests, until they are enough; `keep` each."""
-    from robots.verification import POSES, unlike, unmoved
+    from robots.kinematics.verification import POSES, unlike, unmoved
 
     if len(samples) >= POSES and not unmoved(joints, samples):
         return
@@ -296,7 +296,7 @@ class _Signals:
 
     def sample(self, positions: "FloatArray", since_ns: int) -> "Sample | None":
         """Return the sample of an arm at rest; None: the signals are from before the rest."""
-        from robots.verification import Sample
+        from robots.kinematics.verification import Sample
 
         pose, offset = self._vector("tool.pose"), self._vector("tool.offset")
         if pose is None or pose[1] < since_ns + _REST_S * 0.5e9:
@@ -319,7 +319,7 @@ def _placement(vector: tuple[float, ...]) -> "FloatArray":
     """Convert a position [m] and a rotation vector [rad] to a (4, 4) placement."""
     import numpy as np
 
-    from robots.poses import axis_rotation
+    from robots.schema.poses import axis_rotation
 
     placement = np.eye(4)
     placement[:3, :3] = axis_rotation(np.array(vector[3:]), float(np.linalg.norm(vector[3:])))
@@ -341,7 +341,7 @@ def _record(
     joints: "Joints",
     found: "Verification",
 ) -> "VerificationRecord":
-    from robots.verification_record import VerificationRecord, VerifiedPose
+    from robots.kinematics.verification_record import VerificationRecord, VerifiedPose
 
     return VerificationRecord(
         robot=place,

@@ -2,16 +2,16 @@
 
 from importlib import import_module
 
-from robomesh import service
 from robomesh.client.connection import addresses
-from robomesh.endpoints import DEFAULT_ROUTER
-from robomesh.keys import WHOLE_SITE
+from robomesh.contract.endpoints import DEFAULT_ROUTER
+from robomesh.contract.keys import WHOLE_SITE
 from robomesh.listen_address import own_addresses
-from robomesh.session import SessionSettings
-from services.command_line.connection_options import with_keys
+from robomesh.service import service
+from robomesh.wire.session import SessionSettings
 from services.command_line.site.controllers import ControllerError
 from services.command_line.site.metrics_ports import own_address
 from services.command_line.site.services import SERVICES, Options
+from services.command_line.terminal.connection_options import with_keys
 from services.site_file import site as site_file
 from services.site_file.site import Site
 from services.site_file.started_robots import read_started

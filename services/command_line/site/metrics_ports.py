@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from robomesh.errors import ListenError
 from robomesh.listen_address import check_reach, split_address
-from services.command_line.output import print_text
 from services.command_line.site.services import SERVICES
+from services.command_line.terminal.output import print_text
 from services.site_file.router import RoutedSite
 from services.supervisor import ExtraPrograms, Program
 

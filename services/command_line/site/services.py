@@ -101,8 +101,8 @@ def _driver_options(robot: "Robot") -> object:
     """Return the settings of the driver; a simulated controller has its own values, unless declared."""
     if not robot.simulated:
         return robot.options
-    from robots.description import load
-    from robots.joints import joints_of
+    from robots.descriptions.description import load
+    from robots.kinematics.joints import joints_of
 
     return robot.simulated_options(joints_of(load(robot.model)).types)
 

@@ -11,17 +11,17 @@ from typer.core import TyperCommand
 from typer.main import get_command
 
 from controllers.simulated.fault_table import FAULTS
-from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.kinds import is_known, kind_of, own_kinds, part_of, protocols
+from protocol_gateway.seam.errors import GatewaySettingsError
 from protocol_gateway.seam.simulated import Common, Option, Simulated
-from robomesh import service
-from robomesh.endpoints import DEFAULT_ROUTER
-from robomesh.keys import check_name
-from services.command_line.connection_options import offer_keys
-from services.command_line.options import Connect, SiteFile, command_group
-from services.command_line.output import print_line
+from robomesh.contract.endpoints import DEFAULT_ROUTER
+from robomesh.contract.keys import check_name
+from robomesh.service import service
 from services.command_line.site.controllers import ControllerError
 from services.command_line.site.launch import session_settings
+from services.command_line.terminal.connection_options import offer_keys
+from services.command_line.terminal.options import Connect, SiteFile, command_group
+from services.command_line.terminal.output import print_line
 from services.site_file import site as site_file
 
 if TYPE_CHECKING:

@@ -14,15 +14,15 @@ from pathlib import Path
 
 from protocol_gateway.kinds import part_of
 from protocol_gateway.seam.simulated import Simulated
-from robomesh import service
 from robomesh.client.connection import addresses
-from robomesh.keys import robot_key
+from robomesh.contract.keys import robot_key
 from robomesh.listen_address import own_addresses, split_address
-from robomesh.session import SessionSettings, open_session
+from robomesh.service import service
+from robomesh.wire.session import SessionSettings, open_session
 from services.command_line import main
-from services.command_line.output import print_line
 from services.command_line.site.metrics_ports import extra_with_metrics, first_address, with_metrics
 from services.command_line.site.services import SERVICES
+from services.command_line.terminal.output import print_line
 from services.errors import SiteFileError
 from services.pki import Folder
 from services.pki.errors import KeysError

@@ -19,9 +19,9 @@ from services.console.accounts.rights import PASSWORD_AGAIN, lacks_right
 from services.console.accounts.routes import client_address, refused
 from services.console.accounts.sessions import SignedIn
 from services.console.accounts.view_access import TokenRequest
-from services.console.errors import RefusedRequest, SignInError
-from services.console.http.error_responses import as_json
-from services.console.http.guard import VIEW_PAGE
+from services.console.common.error_responses import as_json
+from services.console.common.errors import RefusedRequest, SignInError
+from services.console.common.guard import VIEW_PAGE
 
 # The page's files are public; its data is not.
 _OPEN = frozenset({"/", "/index.html", "/icon.svg", "/health", "/account/me", "/account/sign-in"})

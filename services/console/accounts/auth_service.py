@@ -26,7 +26,7 @@ from services.console.accounts.refusal_events import PublishEvent, RefusalEvents
 from services.console.accounts.sessions import Sessions, SignedIn
 from services.console.accounts.sign_in_attempts import SignInLimits, network
 from services.console.accounts.view_access import ViewTokens
-from services.console.errors import AccountsError, SignInBusyError, SignInError
+from services.console.common.errors import AccountsError, SignInBusyError, SignInError
 
 log = logging.getLogger(__name__)
 

@@ -23,13 +23,13 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, TypeVar
 
-from robomesh import keys
 from robomesh import reason_codes as codes
-from robomesh.atomic_write import write_atomically
+from robomesh.contract import keys
 from robomesh.errors import KeyNameError
-from robots.bounded_toml import read_toml
+from robomesh.files.atomic_write import write_atomically
+from robots.schema.bounded_toml import read_toml
 from services.console.accounts.view_token import MOST_TOKENS, ViewToken, parse_token, token_lines, utc
-from services.console.errors import AccountsError
+from services.console.common.errors import AccountsError
 
 Row = TypeVar("Row", "Account", ViewToken)
 

@@ -18,7 +18,7 @@ from argon2.exceptions import InvalidHashError, VerificationError
 
 from robomesh import reason_codes as codes
 from services.console.accounts.sign_in_queue import SignInQueue
-from services.console.errors import AccountsError, SignInBusyError
+from services.console.common.errors import AccountsError, SignInBusyError
 
 Result = TypeVar("Result")
 

@@ -2,12 +2,12 @@
 
 from google.protobuf.message import DecodeError
 
-from robomesh import keys, topics
 from robomesh import reason_codes as codes
+from robomesh.contract import keys, topics
+from robomesh.contract.topics import Role
 from robomesh.errors import KeyNameError, RefusedError, UnknownTopicError
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import StopRequest
-from robomesh.topics import Role
 from services.console.accounts.file import Account, AccountRole
 from services.console.accounts.sessions import SignedIn
 

@@ -19,8 +19,8 @@ from services.console.accounts.auth_service import AuthService
 from services.console.accounts.file import AccountRole, role_of
 from services.console.accounts.rights import operator_name
 from services.console.accounts.sessions import SignedIn
-from services.console.errors import AccountsError, RefusedRequest, SignInBusyError, SignInError
-from services.console.http.error_responses import Handler, as_json, with_error_responses
+from services.console.common.error_responses import Handler, as_json, with_error_responses
+from services.console.common.errors import AccountsError, RefusedRequest, SignInBusyError, SignInError
 
 Json = dict[str, Any]
 

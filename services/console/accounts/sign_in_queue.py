@@ -5,8 +5,8 @@ A client that sends many attempts delays and displaces only its own. No I/O and 
 
 from typing import Generic, TypeVar
 
-from services.console.errors import SignInBusyError
-from services.console.fair_queue import AskerQueue
+from services.console.common.errors import SignInBusyError
+from services.console.common.fair_queue import AskerQueue
 
 Job = TypeVar("Job")
 

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from robomesh import reason_codes as codes
+from robomesh.publications.wall_clock import ForwardClock
 from robomesh.schemas.robomesh_pb2 import Event
-from robomesh.wall_clock import ForwardClock
 from services.console.accounts.file import changing, now, read_accounts
 from services.console.accounts.refusal_events import PublishEvent, RefusalEvents
 from services.console.accounts.sign_in_attempts import Attempts, network
@@ -28,7 +28,7 @@ from services.console.accounts.view_token import (
     find_token,
     new_token,
 )
-from services.console.errors import AccountsError, SignInError
+from services.console.common.errors import AccountsError, SignInError
 
 # A token's use is an event once for each address; so many pairs are remembered.
 _MOST_READERS = 1024

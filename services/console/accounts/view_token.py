@@ -20,11 +20,11 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from robomesh import keys
 from robomesh import reason_codes as codes
+from robomesh.contract import keys
 from robomesh.errors import KeyNameError
 from robomesh.reasons import Reason
-from services.console.errors import AccountsError
+from services.console.common.errors import AccountsError
 
 MOST_TOKENS = 1000
 _LONGEST_NAME = 32

@@ -12,26 +12,32 @@ from typing import Any
 import numpy as np
 
 from robomesh import reason_codes as codes
-from robots.collision.link_pairs import plan_of
-from robots.description import DESCRIPTION_FILE, Problem, RobotDescription, from_values, robot_name
-from robots.description_checks import named_files
-from robots.description_text import as_saved
-from robots.errors import DescriptionError, MeshError
-from robots.importing import import_as_dh
-from robots.joints import joints_of
-from robots.mesh_inspection import mesh_findings
-from robots.meshes.mesh import Mesh
-from robots.meshes.read import read_mesh
-from robots.meshes.surface_points import surface_points
-from robots.meshes.unit_guess import guess
-from robots.meshes.write_glb import glb_of
-from robots.model import RobotModel, build_model, link_placements, tool_placement
-from robots.save_description import read_robot, refused_path
-from robots.schema import UrdfDescription
-from robots.summary import mesh_summary
-from robots.units import position_factor
+from robots.bodies.link_pairs import plan_of
+from robots.descriptions.description import (
+    DESCRIPTION_FILE,
+    Problem,
+    RobotDescription,
+    from_values,
+    robot_name,
+)
+from robots.descriptions.description_text import as_saved
+from robots.descriptions.importing import import_as_dh
+from robots.descriptions.mesh_inspection import mesh_findings
+from robots.descriptions.save_description import read_robot, refused_path
+from robots.descriptions.summary import mesh_summary
+from robots.kinematics.joints import joints_of
+from robots.kinematics.model import RobotModel, build_model, link_placements, tool_placement
+from robots.schema.description_checks import named_files
+from robots.schema.errors import DescriptionError, MeshError
+from robots.schema.robot_toml import UrdfDescription
+from robots.schema.units import position_factor
+from robots.shapes.files.read import read_mesh
+from robots.shapes.files.unit_guess import guess
+from robots.shapes.files.write_glb import glb_of
+from robots.shapes.mesh import Mesh
+from robots.shapes.surface_points import surface_points
+from services.console.common.errors import RefusedRequest
 from services.console.define.store import MOST_FILES, Store, put
-from services.console.errors import RefusedRequest
 
 Json = dict[str, Any]
 

@@ -18,16 +18,22 @@ from starlette.routing import Mount, Route
 
 from robomesh import bounded_json
 from robomesh import reason_codes as codes
-from robots.description import library_names
-from robots.errors import RobotError, RobotExistsError
-from robots.save_description import read_robot, refused_path, revision_of, write_description, zip_description
+from robots.descriptions.description import library_names
+from robots.descriptions.save_description import (
+    read_robot,
+    refused_path,
+    revision_of,
+    write_description,
+    zip_description,
+)
+from robots.schema.errors import RobotError, RobotExistsError
 from services.console.accounts.sessions import SignedIn
+from services.console.common.error_responses import Handler, as_json, with_error_responses
+from services.console.common.errors import RefusedRequest
 from services.console.define import saved_robots, store
 from services.console.define.settings import DefineSettings
 from services.console.define.start import start, started_names, stop
 from services.console.define.worker_pool import Workshop
-from services.console.errors import RefusedRequest
-from services.console.http.error_responses import Handler, as_json, with_error_responses
 
 log = logging.getLogger(__name__)
 

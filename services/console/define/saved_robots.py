@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from robots.bounded_toml import read_toml
-from robots.description import DESCRIPTION_FILE, LIBRARY, library_names
+from robots.descriptions.description import DESCRIPTION_FILE, LIBRARY, library_names
+from robots.schema.bounded_toml import read_toml
 from services.site_file.site import Site
 
 Json = dict[str, Any]

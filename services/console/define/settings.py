@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from robots.glb import cache_folder
+from robots.descriptions.glb import cache_folder
 from services.console.define.worker_pool import Limits
 from services.site_file.site import Site
 

@@ -1,7 +1,7 @@
 """Starting and stopping a defined robot as a simulated robot of the site."""
 
 from robomesh import reason_codes as codes
-from services.console.errors import RefusedRequest
+from services.console.common.errors import RefusedRequest
 from services.errors import SiteFileError
 from services.site_file.robot import Robot
 from services.site_file.site import Site

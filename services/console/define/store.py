@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from robomesh import reason_codes as codes
-from robots.save_description import refused_path
-from services.console.errors import RefusedRequest
+from robots.descriptions.save_description import refused_path
+from services.console.common.errors import RefusedRequest
 
 MOST_BYTES = 2 * 1024**3
 MOST_DRAFTS = 64

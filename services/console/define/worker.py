@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from robomesh.worker import answer_all
+from robomesh.files.worker import answer_all
 
 Job = tuple[str, Path, dict[str, Any]]
 
@@ -27,11 +27,11 @@ def begin(settings: tuple[Path, Path, int]) -> Callable[[Job], dict[str, Any]]:
     os.environ.update(TMPDIR=str(temporary), XDG_CACHE_HOME=str(temporary))
     # Imported after the limit and the environment are set, and before `confine`.
     from robomesh import reason_codes as codes
-    from robots.errors import DescriptionError, RobotError
+    from robots.schema.errors import DescriptionError, RobotError
+    from services.console.common.errors import RefusedRequest
     from services.console.define.jobs import JOBS
     from services.console.define.sandbox import confine
     from services.console.define.store import Store
-    from services.console.errors import RefusedRequest
 
     store = Store(store_folder)
     confine(store_folder)

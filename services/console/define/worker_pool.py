@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from robomesh import reason_codes as codes
-from robomesh.memory_limit import MEMORY_BYTES
+from robomesh.files.memory_limit import MEMORY_BYTES
+from robomesh.files.worker import HandlerError, Worker, WorkerError, WorkerTimeoutError
 from robomesh.reasons import Reason
-from robomesh.worker import HandlerError, Worker, WorkerError, WorkerTimeoutError
-from services.console.errors import RefusedRequest, TooSlowError
-from services.console.fair_queue import AskerQueue
+from services.console.common.errors import RefusedRequest, TooSlowError
+from services.console.common.fair_queue import AskerQueue
 
 log = logging.getLogger(__name__)
 

@@ -7,8 +7,8 @@ from starlette.responses import JSONResponse, Response
 
 from robomesh.client.robot import AsyncRobot
 from robomesh.errors import RobomeshError
-from robomesh.session import Session
-from services.console.http.error_responses import as_text, refused_on_the_mesh
+from robomesh.wire.session import Session
+from services.console.common.error_responses import as_text, refused_on_the_mesh
 from services.viewer_layout import viewer_layout
 
 

@@ -6,13 +6,13 @@ from collections import OrderedDict
 from starlette.requests import Request
 from starlette.responses import Response
 
-from robomesh import keys
 from robomesh import reason_codes as codes
+from robomesh.contract import keys
 from robomesh.errors import QuotaError, RobomeshError
-from robomesh.repeated_requests import ask_repeatedly
-from robomesh.session import Session
-from services.console.errors import RefusedRequest
-from services.console.http.error_responses import as_text, refused_on_the_mesh
+from robomesh.wire.repeated_requests import ask_repeatedly
+from robomesh.wire.session import Session
+from services.console.common.error_responses import as_text, refused_on_the_mesh
+from services.console.common.errors import RefusedRequest
 
 _MOST_BYTES = 256 * 1024 * 1024
 # A busy machine may lose a reply; a retry is better than an arm without a link.

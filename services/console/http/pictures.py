@@ -31,22 +31,22 @@ from starlette.types import Scope
 
 from renderer.errors import Mp4Error
 from renderer.mp4 import FragmentedMp4
-from robomesh import keys
 from robomesh import reason_codes as codes
+from robomesh.contract import keys
 from robomesh.errors import BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError, RobomeshError
+from robomesh.publications.subscription import Sample
 from robomesh.schemas.robomesh_pb2 import KeyFrameRequest, VideoFrames, ViewRequest
-from robomesh.session import Session
-from robomesh.subscription import Sample
-from services.console.errors import RefusedRequest
-from services.console.http.error_responses import (
+from robomesh.wire.session import Session
+from services.console.common.error_responses import (
     Handler,
     as_text,
     refused_on_the_mesh,
     with_error_responses,
 )
+from services.console.common.errors import RefusedRequest
+from services.console.common.requested_views import Views, robot_key
 from services.console.http.png import png
 from services.console.http.streaming import Streamed
-from services.console.requested_views import Views, robot_key
 from services.console.websocket.framing import SampleBatch
 from services.console.websocket.send_queues import NewestQueue, SendQueue, VideoQueue
 from services.console.websocket.shared_subscriptions import SharedSubscriptions

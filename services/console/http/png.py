@@ -6,7 +6,7 @@ from fractions import Fraction
 from importlib import import_module
 
 from robomesh import reason_codes as codes
-from services.console.errors import RefusedRequest
+from services.console.common.errors import RefusedRequest
 
 
 def prepare() -> None:

@@ -29,15 +29,15 @@ from starlette.types import Scope
 
 from robomesh import reason_codes as codes
 from robomesh.client.recorder import RecorderFile
+from robomesh.contract.keys import check_chunk
+from robomesh.contract.messages import reason_message, to_json
 from robomesh.errors import CodedError
-from robomesh.keys import check_chunk
-from robomesh.messages import reason_message, to_json
+from robomesh.files.worker import Worker
 from robomesh.reasons import Reason
 from robomesh.recordings.channel_names import SUFFIX
-from robomesh.session import Session
-from robomesh.worker import Worker
-from services.console.errors import RefusedRequest
-from services.console.http.error_responses import Handler, as_text, refused_error, with_error_responses
+from robomesh.wire.session import Session
+from services.console.common.error_responses import Handler, as_text, refused_error, with_error_responses
+from services.console.common.errors import RefusedRequest
 from services.console.http.recording_span import Span, span_of
 from services.console.http.streaming import Streamed
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from robomesh import reason_codes as codes
 from robomesh.schemas import robomesh_pb2 as schema
-from services.console.errors import RefusedRequest
+from services.console.common.errors import RefusedRequest
 
 
 class Span(NamedTuple):

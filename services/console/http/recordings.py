@@ -29,14 +29,14 @@ from robomesh.recordings.channel_names import SUFFIX, robot_channels
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.table import Table, is_due, table_of
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.session import Session
-from services.console.errors import RefusedRequest
-from services.console.http.error_responses import (
+from robomesh.wire.session import Session
+from services.console.common.error_responses import (
     Handler,
     as_text,
     refused_error,
     with_error_responses,
 )
+from services.console.common.errors import RefusedRequest
 from services.console.http.recording_span import Span, span_of
 from services.console.http.recordings_zip import ZipEntry, zip_of
 from services.console.http.streaming import Streamed

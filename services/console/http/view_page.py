@@ -20,17 +20,17 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
-from robomesh import keys, topics
 from robomesh import reason_codes as codes
+from robomesh.contract import keys, topics
+from robomesh.contract.header import pack
 from robomesh.errors import KeyNameError
-from robomesh.header import pack
+from robomesh.publications.subscription import Sample
 from robomesh.schemas.robomesh_pb2 import ControllerState, Description, ToPage
-from robomesh.session import Session
-from robomesh.subscription import Sample
-from services.console.errors import RefusedRequest
-from services.console.http.error_responses import as_text, with_error_responses
+from robomesh.wire.session import Session
+from services.console.common.error_responses import as_text, with_error_responses
+from services.console.common.errors import RefusedRequest
+from services.console.common.requested_views import robot_key
 from services.console.http.pictures import Pictures, Watch
-from services.console.requested_views import robot_key
 from services.console.websocket.send_queues import NewestQueue
 
 PATH = "/view/{site}/{robot}/{view}"

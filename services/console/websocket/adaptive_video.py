@@ -13,8 +13,8 @@ import time
 from collections.abc import AsyncIterator, Callable
 
 from robomesh.errors import RobomeshError
-from robomesh.subscription import Sample
-from services.console.requested_views import LOWEST_STEP, Views
+from robomesh.publications.subscription import Sample
+from services.console.common.requested_views import LOWEST_STEP, Views
 from services.console.websocket.framing import SampleBatch
 from services.console.websocket.send_queues import VideoQueue, begins_video
 from services.console.websocket.shared_subscriptions import SharedSubscriptions

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 
 from websockets.frames import Frame, Opcode
 
-from robomesh.header import pack
+from robomesh.contract.header import pack
+from robomesh.publications.subscription import Sample
 from robomesh.schemas.robomesh_pb2 import ToPage
-from robomesh.subscription import Sample
 
 # Field 1 of ToPage, a message; field 5 of its Sample, a double. Fields of a message may have any order.
 _SAMPLE, _AGE = 0x0A, 0x29

@@ -13,12 +13,12 @@ from contextlib import contextmanager, suppress
 import zenoh
 from google.protobuf.message import DecodeError
 
-from robomesh import keys
 from robomesh import reason_codes as codes
+from robomesh.contract import keys
 from robomesh.errors import RefusedError, RobomeshError
-from robomesh.presence import OPERATOR, session_of
 from robomesh.schemas.robomesh_pb2 import LeaseAnswer, LeaseRequest
-from robomesh.session import Session
+from robomesh.wire.presence import OPERATOR, session_of
+from robomesh.wire.session import Session
 
 _ACTION = LeaseRequest.Action
 _GIVES_CONTROL = frozenset({_ACTION.ACQUIRE, _ACTION.ACCEPT, _ACTION.TAKE})

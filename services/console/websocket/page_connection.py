@@ -14,10 +14,11 @@ from typing import Any
 from google.protobuf.message import DecodeError
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from robomesh import keys, topics
 from robomesh import reason_codes as codes
+from robomesh.contract import keys, topics
+from robomesh.contract.messages import reason_message
+from robomesh.contract.topics import History
 from robomesh.errors import BusyError, NoAnswerError, RefusedError, RobomeshError
-from robomesh.messages import reason_message
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import (
     FromPage,
@@ -27,12 +28,11 @@ from robomesh.schemas.robomesh_pb2 import (
     ViewAnswer,
     ViewRequest,
 )
-from robomesh.session import Session
-from robomesh.topics import History
+from robomesh.wire.session import Session
 from services.console.accounts.rights import check_own_name, check_right, in_own_name, parse_request
 from services.console.accounts.sessions import SignedIn
-from services.console.errors import WatchError
-from services.console.requested_views import Views
+from services.console.common.errors import WatchError
+from services.console.common.requested_views import Views
 from services.console.websocket.adaptive_video import AdaptiveVideo
 from services.console.websocket.framing import SampleBatch
 from services.console.websocket.operator_liveliness import OperatorPresence

@@ -6,7 +6,7 @@ newer samples replace older ones, until these are empty.
 
 from collections import deque
 
-from robomesh import topics
+from robomesh.contract import topics
 from services.console.websocket.adaptive_video import AdaptiveVideo
 from services.console.websocket.framing import (
     MOST_BEHIND,

@@ -12,10 +12,10 @@ from typing import Protocol
 
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from robomesh.h264 import is_key_frame
-from robomesh.header import Header
-from robomesh.subscription import Sample
-from robomesh.topics import History, Topic
+from robomesh.contract.header import Header
+from robomesh.contract.topics import History, Topic
+from robomesh.publications.subscription import Sample
+from robomesh.recordings.h264 import is_key_frame
 
 LIST_LENGTH = 200
 # About two seconds of video; longer than the interval of key frames would never catch up.

@@ -4,13 +4,13 @@ import asyncio
 import logging
 from collections.abc import Callable
 
-from robomesh import keys, topics
 from robomesh import reason_codes as codes
+from robomesh.contract import keys, topics
+from robomesh.contract.topics import History
 from robomesh.errors import KeyNameError, UnknownTopicError
-from robomesh.session import Session
-from robomesh.subscription import Sample
-from robomesh.topics import History
-from services.console.errors import WatchError
+from robomesh.publications.subscription import Sample
+from robomesh.wire.session import Session
+from services.console.common.errors import WatchError
 from services.console.websocket.framing import SampleBatch, batches
 from services.console.websocket.send_queues import SendQueue, drop_outdated, queue_for
 from services.console.websocket.write_scheduler import WriteScheduler

@@ -13,8 +13,8 @@ from uvicorn._types import ASGIReceiveEvent
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from robomesh import reason_codes as codes
-from services.console.errors import WatchError
-from services.console.read_scheduler import READS, Allowance, ReadScheduler
+from services.console.common.errors import WatchError
+from services.console.common.read_scheduler import READS, Allowance, ReadScheduler
 
 _MOST_WAITING = 16 * 1024
 # Limits: unread answers to pings [bytes], and parts of an unfinished message.

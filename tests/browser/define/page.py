@@ -8,7 +8,7 @@ import re
 import numpy as np
 from playwright.sync_api import expect
 
-from robots.description import LIBRARY
+from robots.descriptions.description import LIBRARY
 from tests.browser.robot_page import region
 
 SHAPES = LIBRARY / "pt500" / "meshes"

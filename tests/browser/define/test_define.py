@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from robots.description import load
-from robots.glb import link_meshes
-from robots.urdf.write import to_urdf
+from robots.descriptions.description import load
+from robots.descriptions.glb import link_meshes
+from robots.descriptions.urdf.write import to_urdf
 from tests.browser.define.page import (
     SHAPES,
     chain_row,

@@ -6,7 +6,7 @@ import shutil
 import pytest
 from playwright.sync_api import expect
 
-from robots.description import load
+from robots.descriptions.description import load
 from tests.browser.conftest import NO_WEBGL
 from tests.browser.define.page import (
     SHAPES,

@@ -36,7 +36,7 @@ from protocol_gateway.seam import (
     SignalsReceived,
     StatusReceived,
 )
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 from tests.fuzz.fuzzing import Finding, answers, campaign, changed
 
 NEW_BENCH_EACH = 500

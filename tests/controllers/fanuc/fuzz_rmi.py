@@ -21,7 +21,6 @@ if __name__ == "__main__":
 
 from controllers.fanuc.axes import FanucSettings
 from controllers.fanuc.motion_driver import RMI, SESSION, FanucMotionDriver
-from protocol_gateway.errors import NotReadyError
 from protocol_gateway.link.timers import Timers
 from protocol_gateway.seam import (
     Activity,
@@ -36,7 +35,8 @@ from protocol_gateway.seam import (
     SetTimer,
     StatusReceived,
 )
-from robots.joints import JointType
+from protocol_gateway.seam.errors import NotReadyError
+from robots.kinematics.joints import JointType
 from tests.fuzz.fuzzing import Finding, answers, campaign, changed
 
 NEW_BENCH_EACH = 400

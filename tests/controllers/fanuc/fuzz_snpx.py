@@ -33,7 +33,7 @@ from protocol_gateway.seam import (
     SetTimer,
     StatusReceived,
 )
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 from tests.fuzz.fuzzing import Finding, answers, campaign, changed
 
 TIMEOUT_S = 1.0

@@ -17,7 +17,6 @@ from controllers.fanuc.motion_driver import (
     fanuc_driver,
 )
 from controllers.fanuc.table import Fanuc
-from protocol_gateway.errors import CommandError, GatewaySettingsError, NotReadyError
 from protocol_gateway.seam import (
     Activity,
     FollowsControl,
@@ -33,7 +32,8 @@ from protocol_gateway.seam import (
     Stop,
     StopEnds,
 )
-from robots.joints import JointType
+from protocol_gateway.seam.errors import CommandError, GatewaySettingsError, NotReadyError
+from robots.kinematics.joints import JointType
 
 TYPES = (JointType.ROTARY,) * 6
 SETTINGS = FanucSettings(assignments="own", j23=1, motion=True)

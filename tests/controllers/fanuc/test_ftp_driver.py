@@ -10,7 +10,6 @@ import pytest
 
 from controllers.fanuc.axes import FanucSettings
 from controllers.fanuc.ftp_driver import FILE, FTP, TIMEOUT_S, FtpDriver, fanuc_ftp_driver
-from protocol_gateway.errors import CommandError, GatewaySettingsError
 from protocol_gateway.link.link import UnaskedSends
 from protocol_gateway.seam import (
     Activity,
@@ -29,12 +28,13 @@ from protocol_gateway.seam import (
     StatusReceived,
     Stop,
 )
+from protocol_gateway.seam.errors import CommandError, GatewaySettingsError
 from robomesh import reason_codes as codes
-from robomesh.session import open_session
-from robots.description import load
-from robots.joints import JointType, joints_of
-from robots.model import build_model, tool_placement
-from robots.poses import axis_rotation
+from robomesh.wire.session import open_session
+from robots.descriptions.description import load
+from robots.kinematics.joints import JointType, joints_of
+from robots.kinematics.model import build_model, tool_placement
+from robots.schema.poses import axis_rotation
 from tests.conftest import last_value, run
 from tests.controllers.fanuc.ftp_site import (
     FANUC_FTP,

@@ -14,7 +14,7 @@ from controllers.fanuc.ftp import File
 from controllers.fanuc.ftp_driver import fanuc_ftp_driver
 from protocol_gateway.link.link import ControllerLink, LinkSettings
 from protocol_gateway.seam import AlarmReceived, JointsReceived, MalformedReceived, SignalsReceived
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 from tests.conftest import run
 from tests.controllers.fanuc import ftp_site
 from tests.protocol_gateway.gateway_site import until

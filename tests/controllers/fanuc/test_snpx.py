@@ -34,8 +34,8 @@ from controllers.fanuc.srtp import (
     Connect,
     Read,
 )
-from protocol_gateway.errors import GatewaySettingsError
-from robots.joints import JointType
+from protocol_gateway.seam.errors import GatewaySettingsError
+from robots.kinematics.joints import JointType
 
 SIX = (JointType.ROTARY,) * 6
 

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from controllers.fanuc.assignments import SystemVariable
-from controllers.fanuc.axes import FanucSettings
+from controllers.fanuc.axes import FanucSettings, with_defaults
 from controllers.fanuc.driver import SNPX, TIMEOUT_S, SnpxDriver, activity_of, mode_of
-from controllers.fanuc.simulated.service import SnpxSettings, serve_snpx, with_defaults
-from protocol_gateway.errors import CommandError, GatewaySettingsError
+from controllers.fanuc.simulated.service import SnpxSettings, serve_snpx
 from protocol_gateway.seam import (
     Activity,
     AlarmReceived,
@@ -30,12 +29,13 @@ from protocol_gateway.seam import (
     SoftwareReceived,
     StatusReceived,
 )
+from protocol_gateway.seam.errors import CommandError, GatewaySettingsError
 from robomesh import reason_codes as codes
-from robomesh.session import open_session
-from robots.description import load
-from robots.joints import JointType, joints_of
-from robots.model import build_model, tool_placement
-from robots.poses import axis_rotation
+from robomesh.wire.session import open_session
+from robots.descriptions.description import load
+from robots.kinematics.joints import JointType, joints_of
+from robots.kinematics.model import build_model, tool_placement
+from robots.schema.poses import axis_rotation
 from tests.conftest import last_value, run
 from tests.controllers.fanuc.test_snpx import EMPTY_ALARM, alarm, position
 from tests.controllers.simulated_site import running

@@ -19,9 +19,9 @@ from protocol_gateway.seam import (
     MalformedReceived,
     StatusReceived,
 )
-from robots.description import load
-from robots.joints import joints_of, violations
-from robots.model import build_model, tool_placement
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of, violations
+from robots.kinematics.model import build_model, tool_placement
 from tests.conftest import run
 from tests.controllers.fanuc.test_snpx_driver import controller
 from tests.protocol_gateway.gateway_site import until

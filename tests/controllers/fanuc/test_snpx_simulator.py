@@ -17,11 +17,11 @@ from controllers.fanuc.simulated.service import SnpxSettings, serve_snpx
 from controllers.fanuc.srtp import PORT, Area, BeginSession, Clear, Connect, Read, Service
 from controllers.simulated.errors import FaultError, SimulatorError
 from robomesh.errors import ListenError
-from robots.description import load
-from robots.joints import joints_of
-from robots.model import build_model, link_placements
-from robots.poses import axis_rotation
-from robots.verification import Sample, verify
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
+from robots.kinematics.model import build_model, link_placements
+from robots.kinematics.verification import Sample, verify
+from robots.schema.poses import axis_rotation
 from tests.conftest import run
 from tests.controllers.simulated_site import running
 

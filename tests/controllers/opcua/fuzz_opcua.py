@@ -29,7 +29,7 @@ from protocol_gateway.seam import (
     Report,
     StatusReceived,
 )
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 from tests.fuzz.fuzzing import Finding, campaign, changed, cut
 
 JOINTS = 3

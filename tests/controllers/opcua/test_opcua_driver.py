@@ -11,7 +11,6 @@ from controllers.opcua.driver import OPCUA, OpcUaDriver
 from controllers.opcua.facts import Found, Item, Reading, Values, encode
 from controllers.opcua.settings import OpcUaJoint, OpcUaSettings, OpcUaSignal, from_text, to_text
 from controllers.opcua.units import Unit, number_of
-from protocol_gateway.errors import CommandError, GatewaySettingsError
 from protocol_gateway.seam import (
     Activity,
     AlarmReceived,
@@ -26,7 +25,8 @@ from protocol_gateway.seam import (
     SoftwareReceived,
     StatusReceived,
 )
-from robots.joints import JointType
+from protocol_gateway.seam.errors import CommandError, GatewaySettingsError
+from robots.kinematics.joints import JointType
 from tests.conftest import free_port, run
 from tests.controllers.simulated_site import running
 from tests.protocol_gateway.gateway_site import STATE, A, gateway, refusal, until

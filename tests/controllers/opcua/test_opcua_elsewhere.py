@@ -17,7 +17,7 @@ from controllers.opcua.reader.security import endpoints_of, offers_of
 from controllers.opcua.settings import OpcUaSettings
 from protocol_gateway.link.link import ControllerLink, LinkSettings
 from protocol_gateway.seam import JointsReceived, SignalsReceived
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 from tests.conftest import free_port, run
 from tests.controllers.opcua.test_opcua_driver import controller
 from tests.protocol_gateway.gateway_site import until

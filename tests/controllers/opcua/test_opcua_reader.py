@@ -22,7 +22,7 @@ from controllers.opcua.reader.security import endpoints_of, offers_of
 from controllers.opcua.reader.session import ALLOWED, OnlyReads
 from controllers.opcua.settings import OpcUaJoint, OpcUaSettings, OpcUaSignal, to_text
 from protocol_gateway.seam import JointsReceived
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 from tests.conftest import run
 from tests.controllers.opcua.companion_server import companion_server
 from tests.protocol_gateway.gateway_site import until

@@ -15,8 +15,8 @@ from controllers.unit.simulated.service import Settings, serve
 from protocol_gateway.core.records import Error
 from protocol_gateway.core.stream import Malformed, Unit, UnitStream
 from robomesh.errors import ListenError
-from robots.description import load
-from robots.joints import joints_of
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
 from tests.conftest import run
 from tests.controllers.simulated_site import running
 

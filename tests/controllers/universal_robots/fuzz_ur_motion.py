@@ -35,7 +35,6 @@ from controllers.universal_robots.motion_driver import (
 )
 from controllers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
 from controllers.universal_robots.state import OUTPUTS
-from protocol_gateway.errors import NotReadyError
 from protocol_gateway.link.link import UnaskedSends
 from protocol_gateway.link.timers import Timers
 from protocol_gateway.seam import (
@@ -60,7 +59,8 @@ from protocol_gateway.seam import (
     StatusReceived,
     Stop,
 )
-from robots.joints import JointType
+from protocol_gateway.seam.errors import NotReadyError
+from robots.kinematics.joints import JointType
 from tests.controllers.universal_robots.fuzz_ur import PRIMARY as PRIMARY_MESSAGES
 from tests.controllers.universal_robots.fuzz_ur import TOKENS, rtde_package, strict_packages
 from tests.fuzz.fuzzing import Finding, Wrong, campaign, changed, cut, near, step

@@ -17,7 +17,7 @@ from controllers.universal_robots.modes import (
 from controllers.universal_robots.signals import signals_of
 from controllers.universal_robots.simulated.service import UrSettings, serve_rtde
 from controllers.universal_robots.state import OUTPUTS, ControllerState
-from protocol_gateway.errors import CommandError, GatewaySettingsError
+from protocol_gateway.driver_parts.signal_names import BOOLEAN, SHARED, TEXT
 from protocol_gateway.seam import (
     Activity,
     AlarmReceived,
@@ -33,11 +33,11 @@ from protocol_gateway.seam import (
     SignalsReceived,
     StatusReceived,
 )
-from protocol_gateway.seam.signal_names import BOOLEAN, SHARED, TEXT
-from robomesh.session import open_session
-from robots.description import load
-from robots.joints import JointType
-from robots.model import build_model, tool_placement
+from protocol_gateway.seam.errors import CommandError, GatewaySettingsError
+from robomesh.wire.session import open_session
+from robots.descriptions.description import load
+from robots.kinematics.joints import JointType
+from robots.kinematics.model import build_model, tool_placement
 from tests.conftest import free_port, last_value, run
 from tests.controllers.simulated_site import running
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until

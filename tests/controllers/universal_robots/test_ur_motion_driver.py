@@ -19,7 +19,6 @@ from controllers.universal_robots.rtde_messages import PackageType, Recipe, pack
 from controllers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
 from controllers.universal_robots.simulated.fields import INPUTS as INPUT_TYPES
 from controllers.universal_robots.simulated.fields import OFFERED
-from protocol_gateway.errors import CommandError, NotReadyError
 from protocol_gateway.kinds import driver_maker
 from protocol_gateway.link.timers import Timers
 from protocol_gateway.seam import (
@@ -46,7 +45,8 @@ from protocol_gateway.seam import (
     Stop,
     StopEnds,
 )
-from robots.joints import JointType
+from protocol_gateway.seam.errors import CommandError, NotReadyError
+from robots.kinematics.joints import JointType
 
 SIX = (JointType.ROTARY,) * 6
 TARGET = (0.1, -1.5, 1.5, 0.0, 0.5, 0.0)

@@ -8,10 +8,10 @@ import pytest
 from controllers.universal_robots import motion_driver
 from controllers.universal_robots.modes import RobotMode, RuntimeState, SafetyMode
 from controllers.universal_robots.simulated import controller as simulated
-from protocol_gateway.audit.entry import Outcome
 from protocol_gateway.audit.log import read_entries
-from protocol_gateway.errors import GatewaySettingsError
+from protocol_gateway.authority.entry import Outcome
 from protocol_gateway.seam import Recovery
+from protocol_gateway.seam.errors import GatewaySettingsError
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run

@@ -19,8 +19,8 @@ from controllers.universal_robots.simulated.controller import UrController
 from controllers.universal_robots.simulated.script.code import LONGEST_SOURCE, compile_script
 from controllers.universal_robots.simulated.script.errors import ScriptError
 from controllers.universal_robots.simulated.script.machine import Machine, Wait, text_of
-from robots.description import load
-from robots.joints import violations
+from robots.descriptions.description import load
+from robots.kinematics.joints import violations
 
 PUMA = load("puma560")
 VERSION = ControllerVersion(5, 21, 0, 0)

@@ -54,10 +54,10 @@ from controllers.universal_robots.simulated.service import UrSettings, serve_rtd
 from controllers.universal_robots.simulated.start import RTDE
 from controllers.universal_robots.state import OUTPUTS, ControllerState
 from robomesh.errors import ListenError
-from robots.description import load
-from robots.joints import joints_of
-from robots.model import build_model, tool_placement
-from robots.poses import rotation_vector
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of
+from robots.kinematics.model import build_model, tool_placement
+from robots.schema.poses import rotation_vector
 from tests.conftest import run
 from tests.controllers.simulated_site import running
 

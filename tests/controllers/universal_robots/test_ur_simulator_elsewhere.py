@@ -11,8 +11,8 @@ import pytest
 from controllers.universal_robots.driver import RTDE, RtdeDriver
 from controllers.universal_robots.simulated.service import UrSettings, serve_rtde
 from protocol_gateway.seam import Report, Send, SignalsReceived
-from robots.description import load
-from robots.joints import JointType, joints_of, violations
+from robots.descriptions.description import load
+from robots.kinematics.joints import JointType, joints_of, violations
 from tests.conftest import run
 from tests.controllers.simulated_site import running
 

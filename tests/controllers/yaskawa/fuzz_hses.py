@@ -31,7 +31,7 @@ from protocol_gateway.seam import (
     SignalsReceived,
     StatusReceived,
 )
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 from tests.fuzz.fuzzing import Finding, answers, campaign, changed
 
 READS = {0x70: 1, 0x72: 1, 0x73: 1, 0x74: 1, 0x75: 1, 0x77: 1, 0x78: 0x0E, 0x89: 1}

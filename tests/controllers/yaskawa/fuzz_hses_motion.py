@@ -26,7 +26,7 @@ if __name__ == "__main__":
 from controllers.yaskawa.axes import YaskawaSettings
 from controllers.yaskawa.driver import HSES
 from controllers.yaskawa.motion_driver import MOTION, STOP, HsesMotionDriver
-from protocol_gateway.errors import NotReadyError
+from protocol_gateway.driver_parts.pendant_text import text
 from protocol_gateway.link.link import UnaskedSends
 from protocol_gateway.link.timers import Timers
 from protocol_gateway.seam import (
@@ -49,8 +49,8 @@ from protocol_gateway.seam import (
     StatusReceived,
     Stop,
 )
-from protocol_gateway.seam.pendant_text import text
-from robots.joints import JointType
+from protocol_gateway.seam.errors import NotReadyError
+from robots.kinematics.joints import JointType
 from tests.controllers.yaskawa.fuzz_hses import (
     BUSY,
     DATA,

@@ -3,8 +3,9 @@
 import contextlib
 from dataclasses import replace
 
+from controllers.yaskawa.axes import with_factors
 from controllers.yaskawa.simulated import service
-from controllers.yaskawa.simulated.service import HsesSettings, serve_hses, with_factors
+from controllers.yaskawa.simulated.service import HsesSettings, serve_hses
 from tests.controllers.simulated_site import kept, remote, running
 from tests.protocol_gateway.gateway_site import A, gateway, until
 from tests.protocol_gateway.wire import wire

@@ -9,9 +9,9 @@ import pytest
 from controllers.yaskawa import data as payloads
 from controllers.yaskawa.axes import Axes, Coupling, YaskawaSettings, instance_of
 from controllers.yaskawa.hses import Answer, Command, Read, Service, decode
-from protocol_gateway.errors import GatewaySettingsError
-from protocol_gateway.seam.polling import TIMEOUT_S, Polling, Regular
-from robots.joints import JointType
+from protocol_gateway.driver_parts.polling import TIMEOUT_S, Polling, Regular
+from protocol_gateway.seam.errors import GatewaySettingsError
+from robots.kinematics.joints import JointType
 
 SIX = (JointType.ROTARY,) * 6
 STATUS = Read(Command.STATUS, 1)

@@ -6,11 +6,11 @@ import struct
 import pytest
 
 from controllers.yaskawa import codes as hses_codes
-from controllers.yaskawa.axes import YaskawaSettings
+from controllers.yaskawa.axes import YaskawaSettings, with_factors
 from controllers.yaskawa.data import Status
 from controllers.yaskawa.driver import HSES, HsesDriver, activity_of, mode_of
-from controllers.yaskawa.simulated.service import HsesSettings, serve_hses, with_factors
-from protocol_gateway.errors import CommandError, GatewaySettingsError
+from controllers.yaskawa.simulated.service import HsesSettings, serve_hses
+from protocol_gateway.driver_parts.polling import TIMEOUT_S
 from protocol_gateway.seam import (
     Activity,
     AlarmReceived,
@@ -28,9 +28,9 @@ from protocol_gateway.seam import (
     SoftwareReceived,
     StatusReceived,
 )
-from protocol_gateway.seam.polling import TIMEOUT_S
+from protocol_gateway.seam.errors import CommandError, GatewaySettingsError
 from robomesh import reason_codes as codes
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 from tests.conftest import run
 from tests.controllers.simulated_site import running
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until

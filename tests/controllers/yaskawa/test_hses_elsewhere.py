@@ -10,14 +10,13 @@ import sys
 import pytest
 
 from controllers.yaskawa import commands
-from controllers.yaskawa.axes import YaskawaSettings
+from controllers.yaskawa.axes import YaskawaSettings, with_factors
 from controllers.yaskawa.driver import HsesDriver
 from controllers.yaskawa.hses import decode
-from controllers.yaskawa.simulated.service import with_factors
 from protocol_gateway.link.link import ControllerLink, LinkSettings
 from protocol_gateway.seam import JointsReceived, MalformedReceived, SignalsReceived, StatusReceived
-from robots.description import load
-from robots.joints import joints_of, violations
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of, violations
 from tests.conftest import free_port, run
 from tests.controllers.yaskawa.test_hses_simulator import simulator
 from tests.protocol_gateway.gateway_site import until

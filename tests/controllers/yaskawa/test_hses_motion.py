@@ -12,9 +12,9 @@ import pytest
 from controllers.yaskawa.data import Status1
 from controllers.yaskawa.motion_driver import HsesMotionDriver, hses_driver
 from controllers.yaskawa.simulated.controller import Refusal
-from protocol_gateway.errors import GatewaySettingsError
+from protocol_gateway.seam.errors import GatewaySettingsError
 from robomesh.errors import RefusedError
-from robots.joints import JointType
+from robots.kinematics.joints import JointType
 from tests.conftest import run
 from tests.controllers.simulated_site import move
 from tests.controllers.yaskawa.hses_site import (

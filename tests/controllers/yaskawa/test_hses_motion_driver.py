@@ -6,7 +6,6 @@ import pytest
 
 from controllers.yaskawa.motion_driver import HSES, STOP, HsesMotionDriver
 from controllers.yaskawa.motion_driver import MOTION as MOTIONS
-from protocol_gateway.errors import CommandError, NotReadyError
 from protocol_gateway.link.timers import Timers
 from protocol_gateway.seam import (
     Activity,
@@ -18,7 +17,8 @@ from protocol_gateway.seam import (
     StatusReceived,
     Stop,
 )
-from robots.joints import JointType
+from protocol_gateway.seam.errors import CommandError, NotReadyError
+from robots.kinematics.joints import JointType
 from tests.controllers.yaskawa.hses_site import HOLD, MOTION, MOVE, command
 
 

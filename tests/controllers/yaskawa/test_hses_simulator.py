@@ -13,8 +13,8 @@ from controllers.yaskawa.data import DataType, Status1, Status2
 from controllers.yaskawa.hses import PORT, Command, Read, Service, decode
 from controllers.yaskawa.simulated.service import HsesSettings, serve_hses
 from robomesh.errors import ListenError
-from robots.description import load
-from robots.joints import joints_of, violations
+from robots.descriptions.description import load
+from robots.kinematics.joints import joints_of, violations
 from tests.conftest import run
 from tests.controllers.simulated_site import running
 

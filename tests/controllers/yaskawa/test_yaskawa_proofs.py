@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from controllers.yaskawa import data, signals
-from controllers.yaskawa.axes import Axes, YaskawaSettings
+from controllers.yaskawa.axes import Axes, YaskawaSettings, with_factors
 from controllers.yaskawa.simulated.controller import HsesController
-from controllers.yaskawa.simulated.service import with_factors
-from robots.joints import joints_of
-from robots.model import build_model, link_placements
-from robots.poses import axis_rotation
-from robots.verification import POSES, Sample, verify
+from robots.kinematics.joints import joints_of
+from robots.kinematics.model import build_model, link_placements
+from robots.kinematics.verification import POSES, Sample, verify
+from robots.schema.poses import axis_rotation
 from tests.conftest import run
 from tests.controllers.yaskawa.test_hses_driver import YASKAWA, controller
 from tests.protocol_gateway.gateway_site import STATE, gateway, until

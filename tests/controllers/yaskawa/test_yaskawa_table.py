@@ -2,7 +2,7 @@
 
 import pytest
 
-from controllers.yaskawa.simulated.service import with_factors
+from controllers.yaskawa.axes import with_factors
 from controllers.yaskawa.table import Yaskawa
 from services.command_line.site.controllers import controller_addresses
 from services.command_line.site.services import SERVICES, Options

@@ -8,7 +8,8 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 from mcap_protobuf.decoder import DecoderFactory
 
-from robomesh.header import Header
+from robomesh.contract.header import Header
+from robomesh.contract.topics import TOPICS, topic
 from robomesh.recordings import indexed_writer
 from robomesh.recordings.capture import Capture
 from robomesh.recordings.channel_names import ROBOT_DESCRIPTION
@@ -17,7 +18,6 @@ from robomesh.recordings.files import describe_file
 from robomesh.recordings.layout import layout_of
 from robomesh.recordings.recover import State, close_in_place, is_ours, recover, state_of
 from robomesh.recordings.reindex import index, rewrite
-from robomesh.topics import TOPICS, topic
 from tests.recordings import write_recording
 
 ABOUT = {"site": "site", "robot": "arm", "name": "trial", "started_by": "request"}

@@ -4,9 +4,9 @@ import errno
 
 import pytest
 
-from robomesh.header import Header
+from robomesh.contract.header import Header
+from robomesh.contract.topics import topic
 from robomesh.recordings.capture import Capture, is_being_written
-from robomesh.topics import topic
 
 KEY = "robomesh/site/arm/joints"
 

@@ -20,13 +20,13 @@ from mcap_protobuf.schema import register_schema
 
 import robomesh
 from robomesh import reason_codes as codes
-from robomesh.header import Header
+from robomesh.contract.header import Header
+from robomesh.contract.topics import topic
 from robomesh.recordings.capture import Capture
 from robomesh.recordings.errors import CaptureError
 from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.recover import recover
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.topics import topic
 from services.command_line.recordings.span import Span
 from services.command_line.recordings.tables import write_table
 from tests.recordings import START_NS, Written, joints, write_recording

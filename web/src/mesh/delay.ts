@@ -1,4 +1,4 @@
-// Delay of a sample on its way to this page: the rule of `robomesh/delay.py`, for the page's own connection.
+// Delay of a sample on its way to this page: the rule of `publications/delay.py`, for the page's own connection.
 
 interface Least {
   publisher: bigint;

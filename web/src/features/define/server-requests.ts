@@ -63,7 +63,7 @@ export interface Checked {
   links: Record<string, number[][]>;
 }
 
-/** Why a pair of links is ignored (the first three), or its shape for checks: robots/collision/verdicts.py. */
+/** Why a pair of links is ignored (the first three), or its shape for checks: robots/bodies/verdicts.py. */
 export type PairKind =
   | "adjacent"
   | "description"

@@ -6,7 +6,7 @@ import { useMesh } from "../../mesh/site-health";
 import { Panel } from "../../ui/panel";
 import { Marked } from "./this-console";
 
-/** The name in a process's health message: see robomesh/session.py. */
+/** The name in a process's health message: see robomesh/wire/session.py. */
 const SECONDS = "certificate_seconds";
 const SOON_S = 10 * 86_400;
 const DAY_S = 86_400;

@@ -1,0 +1,1 @@
+"""What is published and subscribed to: order, losses, the values that late joiners get."""

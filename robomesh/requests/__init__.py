@@ -1,0 +1,1 @@
+"""Requests and their answers: pieces, queues, refusals, times."""

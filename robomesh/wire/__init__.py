@@ -1,0 +1,1 @@
+"""A session: its connections, presence, last values and counters. It joins publications and requests."""

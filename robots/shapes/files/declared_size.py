@@ -1,0 +1,406 @@
+"""The sizes, units and names that a mesh file declares, read before a library reads the file.
+
+A count that the file cannot hold is rejected before memory is allocated for it. The unit, the upward
+axis and the names of textures and of other files are kept here, because the libraries drop them.
+"""
+
+import re
+import struct
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+from robomesh import bounded_json
+from robots.schema.errors import MeshError
+from robots.schema.xml_text import XmlError, xml_text
+from robots.shapes.files.text_repair import check_instances, counted_from_first, plain_text
+
+# A robot's link is far smaller. The console reads uploaded files, so the limits must be firm.
+MAX_BYTES = 1 << 30
+MAX_VALUES = 100_000_000
+# Points and triangle corners, counted once for each node that draws them.
+MAX_DRAWN = 30_000_000
+# trimesh makes a mesh for each material, which takes milliseconds.
+_MOST_MATERIALS = 2000
+_JSON_CHUNK = 0x4E4F534A
+# In `asset.extras["robomesh"]` of our GLB; before 2026-11 it was {"up": "z"}, and nothing was turned.
+TURNED_MARK = {"up": "y", "content_up": "z"}
+
+
+@dataclass(frozen=True)
+class Declared:
+    """The properties that a file declares.
+
+    Attributes:
+        unit_m: Length of the file's unit [m]; None if the file does not state one.
+        up: Upward axis, "y" or "z"; empty if the file does not state one.
+        turned: Our writer turned the content from z up to y up; turning it back gives `up`.
+        textures: Image by material name.
+        base_colors: Linear colour and opacity by material name; trimesh would round them to bytes.
+        linear: The colours are linear light, not sRGB.
+        missing: Names of material files that do not exist or may not be read.
+        files: Files that this file names, existing or not, in its folder or below.
+        rewritten: Content to read instead of the file, if the libraries cannot read the file itself.
+    """
+
+    unit_m: float | None = None
+    up: str = ""
+    turned: bool = False
+    textures: Mapping[str, str] = field(default_factory=dict)
+    base_colors: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    linear: bool = False
+    missing: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()
+    warnings: tuple[str, ...] = ()
+    rewritten: bytes | None = None
+
+
+def read_declared(path: Path, kind: str) -> Declared:
+    """Return the properties that a file of this kind ("ply") declares.
+
+    Raises:
+        MeshError: If the file cannot be opened, is too large, or declares more than it can hold.
+    """
+    data = content(path)
+    reader = _READERS.get(kind)
+    return reader(path, data) if reader is not None else Declared()
+
+
+def content(path: Path) -> bytes:
+    """Return a file's bytes.
+
+    Raises:
+        MeshError: If it cannot be read, is empty, or is larger than MAX_BYTES.
+    """
+    try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise MeshError(path, f"has {size >> 20} MiB; at most {MAX_BYTES >> 20} MiB are read")
+        data = path.read_bytes()
+    except OSError as error:
+        raise MeshError(path, f"cannot be read: {error.strerror}") from error
+    if not data:
+        raise MeshError(path, "is empty")
+    return data
+
+
+def _stl(path: Path, data: bytes) -> Declared:
+    if len(data) >= 84 and data[:5].lower() != b"solid":
+        (count,) = struct.unpack_from("<I", data, 80)
+        if 84 + 50 * count > len(data):
+            raise MeshError(
+                path,
+                f"declares {count} triangles, which take {50 * count} bytes; {len(data) - 84} follow",
+                place="byte 80",
+            )
+    return Declared()
+
+
+_SIZES = {"char": 1, "uchar": 1, "int8": 1, "uint8": 1, "short": 2, "ushort": 2, "int16": 2, "uint16": 2}
+_SIZES |= {"int": 4, "uint": 4, "float": 4, "int32": 4, "uint32": 4, "float32": 4, "double": 8, "float64": 8}
+
+
+def _ply(path: Path, data: bytes) -> Declared:
+    end = data.find(b"end_header")
+    if not data.startswith(b"ply") or end < 0:
+        raise MeshError(path, "is not a PLY file: one begins with 'ply' and has a line 'end_header'")
+    needed = 0
+    text = b"format ascii" in data[:end]
+    count = 0
+    for number, line in enumerate(data[:end].decode("latin-1").splitlines(), 1):
+        words = line.split()
+        if words[:1] == ["element"]:
+            if len(words) != 3 or not (words[2].isascii() and words[2].isdigit()):
+                raise MeshError(
+                    path, f"{line!r} must have the form 'element vertex 8'", place=f"line {number}"
+                )
+            count = int(words[2])
+        elif words[:1] == ["property"] and len(words) >= 3:
+            # A list takes at least the bytes of its count; a number in text takes a digit and a blank.
+            needed += count * (2 if text else _SIZES.get(words[1] if words[1] != "list" else words[2], 1))
+            if needed - 2 > len(data) - end:
+                raise MeshError(
+                    path,
+                    f"declares {count} rows; only {len(data) - end} bytes follow",
+                    place=f"line {number}",
+                )
+    return Declared()
+
+
+def _obj(path: Path, data: bytes) -> Declared:
+    warnings: list[str] = []
+    textures: dict[str, str] = {}
+    missing: list[str] = []
+    files: list[Path] = []
+    text = plain_text(data)
+    rewritten = counted_from_first(path, text)
+    for found in _named("mtllib", text)[:100]:
+        library = _below(path, found)
+        files += [library] if library is not None else []
+        if library is not None and library.is_file():
+            textures |= _mtl_textures(library)
+        else:
+            missing.append(found)
+            warnings.append(f"materials: no file {found!r} in this file's folder; drawn grey")
+    _check_obj_numbers(path, rewritten)
+    names = set(_named("usemtl", rewritten))
+    if len(names) > _MOST_MATERIALS:
+        rewritten = re.sub(r"(?m)^[ \t]*usemtl[ \t].*$", "", rewritten)
+        warnings.append(f"{len(names)} materials, more than {_MOST_MATERIALS}: all ignored, drawn grey")
+    left_out = len(re.findall(r"(?m)^[ \t]*[lp][ \t]", text))
+    if left_out:
+        warnings.append(f"{left_out} lines or points are left out")
+    return Declared(
+        textures=textures,
+        files=(*files, *_textures_below(path, textures)),
+        missing=tuple(missing),
+        warnings=tuple(warnings),
+        rewritten=None if rewritten.encode() == data else rewritten.encode(),
+    )
+
+
+def _named(keyword: str, text: str) -> list[str]:
+    """Return the name in each line that begins with a keyword, without its outer blanks."""
+    return [name.rstrip(" \t\r") for name in re.findall(rf"(?m)^[ \t]*{keyword}[ \t]+(\S.*)$", text)]
+
+
+def _check_obj_numbers(path: Path, text: str) -> None:
+    """Reject a face with a vertex number far above the count: trimesh would allocate up to that number.
+
+    Raises:
+        MeshError: If there is one.
+    """
+    count = len(re.findall(r"(?m)^[ \t]*v[nt]?[ \t]", text))
+    digits = len(str(count)) + 1
+    found = re.search(rf"(?m)^[ \t]*f[ \t](?:[^\n]*[ \t/])?(\d{{{digits},}})", text)
+    if found is not None:
+        line = text.count("\n", 0, found.start(1)) + 1
+        number = found[1][:20]
+        raise MeshError(path, f"a face uses vertex {number}; there are at most {count}", place=f"line {line}")
+
+
+def _below(path: Path, address: str) -> Path | None:
+    """Return the path that an address in a file names; None outside the file's folder.
+
+    trimesh reads no files outside the folder either.
+    """
+    try:
+        found = (path.parent / address.replace("\\", "/")).resolve()
+        found.is_file()
+    except (OSError, ValueError):  # the name is too long or has a zero byte
+        return None
+    return found if found.is_relative_to(path.parent.resolve()) else None
+
+
+def _textures_below(path: Path, textures: Mapping[str, str]) -> list[Path]:
+    places = (_below(path, unquote(texture)) for texture in textures.values() if ":" not in texture)
+    return [place for place in places if place is not None]
+
+
+def _mtl_textures(library: Path) -> dict[str, str]:
+    name, textures = "", {}
+    for line in library.read_text(encoding="utf-8", errors="replace").splitlines():
+        words = line.split()
+        if words[:1] == ["newmtl"]:
+            name = " ".join(words[1:])
+        elif len(words) > 1 and words[0].lower() == "map_kd":
+            textures[name] = words[-1]
+    return textures
+
+
+def _dae(path: Path, data: bytes) -> Declared:
+    try:
+        text, notes = xml_text(data)
+    except XmlError as error:
+        raise MeshError(path, str(error)) from None
+    data = text.encode()
+    if b"<!ENTITY" in data or b"<!DOCTYPE" in data:
+        raise MeshError(path, "has a DOCTYPE or ENTITY, which can expand without limit; remove it")
+    if b"COLLADA" not in data[:4096]:
+        raise MeshError(path, "is not a COLLADA file: the first element must be COLLADA")
+    unit = re.search(rb"<unit\b[^<>]*\bmeter\s*=\s*[\"']\s*([-+0-9.eE]+)", data)
+    axis = re.search(rb"<up_axis>\s*([XYZ])_UP\s*</up_axis>", data)
+    try:
+        unit_m = float(unit.group(1)) if unit else 1.0
+    except ValueError:
+        unit_m = 1.0
+    check_instances(path, data)
+    letter = axis.group(1).decode().lower() if axis else "y"
+    warnings = (*notes, *(("its upward axis is x: rotate the mesh by hand",) if letter == "x" else ()))
+    return Declared(
+        unit_m=unit_m if 0 < unit_m < 1e6 else 1.0,
+        up="z" if letter == "x" else letter,
+        warnings=warnings,
+        rewritten=data,  # the bytes that were checked
+    )
+
+
+def _gltf(path: Path, data: bytes) -> Declared:
+    return _gltf_declared(path, _json(path, data))
+
+
+def _glb(path: Path, data: bytes) -> Declared:
+    if len(data) < 20 or data[:4] != b"glTF":
+        raise MeshError(path, "is not a GLB file: one begins with 'glTF'")
+    version, length, size, kind = struct.unpack_from("<IIII", data, 4)
+    if version != 2:
+        raise MeshError(path, f"is glTF version {version}; only version 2 is read", place="byte 4")
+    if kind != _JSON_CHUNK or 20 + size > len(data) or length > len(data):
+        raise MeshError(path, f"is truncated or damaged: declares {length} bytes, has {len(data)}")
+    return _gltf_declared(path, _json(path, data[20 : 20 + size]))
+
+
+def _json(path: Path, data: bytes) -> dict[str, Any]:
+    try:
+        document = bounded_json.loads(data)
+    except (ValueError, RecursionError) as error:
+        raise MeshError(path, f"its JSON is invalid: {error}") from error
+    if not isinstance(document, dict):
+        raise MeshError(path, "its JSON is not an object")
+    return document
+
+
+def _gltf_declared(path: Path, document: dict[str, Any]) -> Declared:
+    required = [str(name) for name in _list(document, "extensionsRequired")]
+    packed = [name for name in required if "draco" in name.lower() or "meshopt" in name.lower()]
+    if packed:
+        raise MeshError(path, f"is compressed with {', '.join(packed)}; export it without compression")
+    counts = [item.get("count", 0) for item in _list(document, "accessors") if isinstance(item, dict)]
+    if any(not isinstance(count, int) or not 0 <= count <= MAX_VALUES for count in counts):
+        raise MeshError(path, f"an accessor's count is {max(map(str, counts))}; it must be 0 to {MAX_VALUES}")
+    bare = sum(
+        item.get("count", 0)
+        for item in _list(document, "accessors")
+        if isinstance(item, dict) and "bufferView" not in item
+    )
+    if bare > MAX_VALUES // 100:
+        raise MeshError(path, f"accessors of {bare} values have no data in the file")
+    _check_tree(path, [node for node in _list(document, "nodes") if isinstance(node, dict)])
+    _check_drawn(path, document)
+    asset = document.get("asset")
+    extras = asset.get("extras") if isinstance(asset, dict) else None
+    own = extras.get("robomesh") if isinstance(extras, dict) else None
+    addresses = [
+        str(item["uri"])
+        for item in _list(document, "buffers")
+        if isinstance(item, dict) and isinstance(item.get("uri"), str)
+    ]
+    outside = [address for address in addresses if not address.startswith("data:")]
+    files: list[Path] = []
+    for address in outside:
+        place = _below(path, unquote(address))
+        if place is not None and place.is_file():
+            files.append(place)
+        else:
+            raise MeshError(path, f"buffer {address!r}: no such file in this folder", missing=address)
+    textures = _gltf_textures(document)
+    return Declared(
+        unit_m=1.0,
+        up="z" if own else "y",
+        turned=isinstance(own, dict) and own.items() >= TURNED_MARK.items(),
+        textures=textures,
+        base_colors=_gltf_base_colors(document),
+        linear=True,
+        files=(*files, *_textures_below(path, textures)),
+    )
+
+
+def _check_tree(path: Path, nodes: list[dict[str, Any]]) -> None:
+    """Check that no node has two parents and that no node is its own ancestor.
+
+    With one parent each, a walk visits no node twice, and only a cycle can make it endless.
+
+    Raises:
+        MeshError: If the nodes are no forest, or are nested deeper than 1000.
+    """
+    parents: dict[int, int] = {}
+    for number, node in enumerate(nodes):
+        for child in _list(node, "children"):
+            if child in parents:
+                raise MeshError(path, f"node {child} has two parents; glTF allows one")
+            parents[child] = number
+    for start in range(len(nodes)):
+        seen, number = 0, start
+        while number in parents:
+            number, seen = parents[number], seen + 1
+            if seen > min(1000, len(nodes)):
+                raise MeshError(path, f"node {start} is nested deeper than 1000, or is its own ancestor")
+
+
+def _check_drawn(path: Path, document: dict[str, Any]) -> None:
+    """Reject a small file with many nodes and primitives that all draw the same values.
+
+    Raises:
+        MeshError: If they draw more than MAX_DRAWN points and corners.
+    """
+
+    def count(number: object) -> int:
+        accessors = _list(document, "accessors")
+        known = (
+            isinstance(number, int) and 0 <= number < len(accessors) and isinstance(accessors[number], dict)
+        )
+        return int(accessors[number].get("count", 0)) if known else 0  # type: ignore[call-overload]
+
+    sizes = []
+    for mesh in _list(document, "meshes"):
+        primitives = _list(mesh, "primitives") if isinstance(mesh, dict) else []
+        shapes = [shape for shape in primitives if isinstance(shape, dict)]
+        attributes = [shape.get("attributes") for shape in shapes]
+        points = [count(each.get("POSITION")) for each in attributes if isinstance(each, dict)]
+        sizes.append(sum(points) + sum(count(shape.get("indices")) for shape in shapes))
+    meshes = [node.get("mesh") for node in _list(document, "nodes") if isinstance(node, dict)]
+    drawn = sum(sizes[each] for each in meshes if isinstance(each, int) and 0 <= each < len(sizes))
+    if drawn > MAX_DRAWN:
+        raise MeshError(path, f"draws {drawn} points and corners; at most {MAX_DRAWN} are read")
+
+
+def _gltf_base_colors(document: dict[str, Any]) -> dict[str, tuple[float, ...]]:
+    found: dict[str, tuple[float, ...]] = {}
+    twice: set[str] = set()
+    for material in _list(document, "materials"):
+        try:
+            name, factor = material["name"], material["pbrMetallicRoughness"]["baseColorFactor"]
+            values = tuple(float(value) for value in factor)
+        except (KeyError, TypeError, ValueError):
+            continue
+        if name in found:
+            twice.add(name)
+        if len(values) == 4:
+            found[name] = values
+    return {name: values for name, values in found.items() if name not in twice}
+
+
+def _gltf_textures(document: dict[str, Any]) -> dict[str, str]:
+    textures, images = _list(document, "textures"), _list(document, "images")
+    found = {}
+    for material in _list(document, "materials"):
+        if not isinstance(material, dict):
+            continue
+        name = str(material.get("name", ""))
+        extras = material.get("extras")
+        if isinstance(extras, dict) and isinstance(extras.get("texture"), str):
+            found[name] = extras["texture"]
+        try:
+            index = material["pbrMetallicRoughness"]["baseColorTexture"]["index"]
+            image = images[textures[index]["source"]]
+            found[name] = str(image.get("uri") or image.get("name") or "image in the file")[:200]
+        except (KeyError, IndexError, TypeError, AttributeError):
+            continue
+    return found
+
+
+def _list(document: dict[str, Any], key: str) -> list[Any]:
+    value = document.get(key, [])
+    return value if isinstance(value, list) else []
+
+
+_READERS: Mapping[str, Callable[[Path, bytes], Declared]] = {
+    "stl": _stl,
+    "ply": _ply,
+    "obj": _obj,
+    "dae": _dae,
+    "glb": _glb,
+    "gltf": _gltf,
+}

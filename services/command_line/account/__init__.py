@@ -1,0 +1,1 @@
+"""Commands for the console's accounts: people, passwords, tokens of views."""

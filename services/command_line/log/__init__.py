@@ -1,0 +1,1 @@
+"""Commands for what happened: alarms, audit entries, notes."""

@@ -1,0 +1,1 @@
+"""What commands share: options, output, completion, connections, times for people. No command."""
