@@ -21,6 +21,7 @@ from protocol_gateway.seam import (
     Effects,
     Home,
     JointsReceived,
+    JointType,
     MalformedReceived,
     Mode,
     MoveAbsolute,
@@ -33,7 +34,6 @@ from protocol_gateway.seam import (
     Stop,
 )
 from protocol_gateway.seam.errors import CommandError, GatewaySettingsError
-from robots.kinematics.joints import JointType
 
 LINES = Channel(name="lines", carries=ALL)
 LONGEST_LINE = 65_536

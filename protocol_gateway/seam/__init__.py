@@ -67,6 +67,7 @@ from protocol_gateway.seam.events import (
     homed_by_nature,
 )
 from protocol_gateway.seam.protocol import Driver, FollowsControl, StopDepends
+from robots.kinematics.joints import JointType
 
 __all__ = [
     "ALL",
@@ -88,6 +89,7 @@ __all__ = [
     "FollowsControl",
     "Hold",
     "Home",
+    "JointType",
     "JointsReceived",
     "MalformedReceived",
     "Mode",
