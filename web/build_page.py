@@ -28,7 +28,9 @@ TYPE_CHECKER = MODULES / "type-checker" / "bin" / "tsc"
 BIOME = MODULES / "@biomejs" / "biome" / "bin" / "biome"
 
 # Schemas and the table that names them: a change there is a change of the page.
-_SCHEMAS = tuple(ROOT / "robomesh" / name for name in ("topics.py", "reasons.py", "schemas/robomesh_pb2.py"))
+_SCHEMAS = tuple(
+    ROOT / "robomesh" / name for name in ("contract/topics.py", "reasons.py", "schemas/robomesh_pb2.py")
+)
 # Reasons that only a kind of controllers has, in both languages.
 _CODES = sorted((ROOT / "controllers").glob("*/codes.py"))
 

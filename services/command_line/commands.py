@@ -41,8 +41,10 @@ COMMANDS = {
     "simulate": Row(
         "site.simulate", "Run a simulated controller of any kind that a site file's `protocol` can name."
     ),
-    "foxglove": Row("bridges", "Serve Foxglove and Lichtblick on a Foxglove WebSocket, ws://127.0.0.1:8765."),
-    "ros2": Row("bridges", "Publish the robots to ROS 2 nodes with rmw_zenoh."),
+    "foxglove": Row(
+        "site.bridges", "Serve Foxglove and Lichtblick on a Foxglove WebSocket, ws://127.0.0.1:8765."
+    ),
+    "ros2": Row("site.bridges", "Publish the robots to ROS 2 nodes with rmw_zenoh."),
     "list": Row("live.app", "List sites, robots and services, with monitors, control, ages and round trips."),
     "monitor": Row("live.app", "Watch a robot in the terminal."),
     "signals": Row(
@@ -65,21 +67,21 @@ COMMANDS = {
         'Inverse kinematics of a pose; JSON: {"pose", "task", "near", "all", "seed"} a line in.',
     ),
     "robot": Row("robot.commands", "Robot descriptions: check, show, import, export, verify."),
-    "mesh": Row("mesh", "Mesh files: inspect, convert."),
-    "program": Row("program", "Teach programs: check, plan, from CAD."),
+    "mesh": Row("robot.mesh", "Mesh files: inspect, convert."),
+    "program": Row("teach.program", "Teach programs: check, plan, from CAD."),
     "programs": Row(
-        "programs", "Programs stored at a site: list, show, save, restore, diff, export, import."
+        "teach.programs", "Programs stored at a site: list, show, save, restore, diff, export, import."
     ),
-    "probe": Row("probe", "Show which protocol a controller's port speaks."),
-    "note": Row("note", "Write a note on a robot's time, list its notes, or withdraw one."),
-    "cell": Row("cell", "Fixtures and the floor of a robot's cell: show, set, move, undo."),
+    "probe": Row("site.probe", "Show which protocol a controller's port speaks."),
+    "note": Row("log.note", "Write a note on a robot's time, list its notes, or withdraw one."),
+    "cell": Row("site.cell", "Fixtures and the floor of a robot's cell: show, set, move, undo."),
     "recordings": Row(
         "recordings.app", "Recordings: list, inspect, play, export, fetch, rename, note, tag, delete."
     ),
-    "audit": Row("audit", "The gateway's audit log."),
-    "alarms": Row("alarms", "Alarms: list, acknowledge, shelve."),
-    "keys": Row("keys", "A site's certificates: who may take part, in which role."),
-    "accounts": Row("accounts", "Accounts that may sign in to a console."),
+    "audit": Row("log.audit", "The gateway's audit log."),
+    "alarms": Row("log.alarms", "Alarms: list, acknowledge, shelve."),
+    "keys": Row("site.keys", "A site's certificates: who may take part, in which role."),
+    "accounts": Row("account.accounts", "Accounts that may sign in to a console."),
 }
 
 
