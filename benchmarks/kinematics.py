@@ -29,7 +29,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 
 from robots.checks.check import check_program
 from robots.collision import allowed_positions, build_cell, outside_nearest, own_contacts, own_nearest
-from robots.collision.cells import CellDescription, CellRobot, Fixture
+from robots.descriptions.cells import CellDescription, CellRobot, Fixture
 from robots.descriptions.description import known_names, load
 from robots.kinematics.inverse import InverseSolver, Task, build_solver, solve
 from robots.kinematics.joints import FloatArray, violations

@@ -41,7 +41,7 @@ from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.texts import one_line
 from robomesh.wire.session import Session
-from robots.collision.cells import CellDescription
+from robots.descriptions.cells import CellDescription
 
 log = logging.getLogger(__name__)
 

@@ -18,7 +18,7 @@ from robomesh.contract.keys import check_name
 from robomesh.contract.quotas import DEFAULT_QUOTAS, Quotas
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.collision.cells import CellDescription, CellRobot
+from robots.descriptions.cells import CellDescription, CellRobot
 from robots.kinematics.verification_record import VerificationRecord
 from robots.programs.jog_steps import MOST_M_S
 from robots.schema.robot_toml import Model

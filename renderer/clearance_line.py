@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from renderer.cameras import Camera, pixels
 from renderer.overlay import AMBER, FAINT, INK, Color, Picture, write_label
 from robomesh.schemas.robomesh_pb2 import Clearance, Description
-from robots.collision.cells import FLOOR
+from robots.descriptions.cells import FLOOR
 
 FloatArray = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robots.collision.cells import STOP_M, WARNING_M, CellDescription, CellRobot, Fixture
+from robots.descriptions.cells import STOP_M, WARNING_M, CellDescription, CellRobot, Fixture
 from services import kinematics
 
 

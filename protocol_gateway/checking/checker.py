@@ -23,7 +23,7 @@ from protocol_gateway.seam.errors import CheckError
 from robomesh import reason_codes as codes
 from robomesh.files.worker import Worker, WorkerError
 from robomesh.reasons import Reason
-from robots.collision.cells import CellDescription
+from robots.descriptions.cells import CellDescription
 from robots.schema.errors import RobotError, reason_of
 
 log = logging.getLogger(__name__)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from robomesh.reasons import Reason
-from robots.collision.cells import CellDescription
+from robots.descriptions.cells import CellDescription
 from robots.programs.jog_steps import Jog
 from robots.programs.steps import Step
 

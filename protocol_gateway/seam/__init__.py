@@ -67,7 +67,7 @@ from protocol_gateway.seam.events import (
     homed_by_nature,
 )
 from protocol_gateway.seam.protocol import Driver, FollowsControl, StopDepends
-from robots.kinematics.joints import JointType
+from robots.schema.robot_toml import JointType
 
 __all__ = [
     "ALL",

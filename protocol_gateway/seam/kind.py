@@ -7,7 +7,7 @@ from typing import Protocol, cast
 
 from protocol_gateway.seam.protocol import Driver
 from protocol_gateway.seam.table import Table
-from robots.kinematics.joints import JointType
+from robots.schema.robot_toml import JointType
 
 
 class DriverMaker(Protocol):

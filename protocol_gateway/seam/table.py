@@ -7,7 +7,7 @@ from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict
 
-from robots.kinematics.joints import JointType
+from robots.schema.robot_toml import JointType
 
 # Unknown keys are errors, and so are NaN and infinity.
 PART_CONFIG = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)

@@ -11,8 +11,8 @@ from robots.checks.path import PathSamples
 from robots.checks.segments import Segment, SegmentChecker
 from robots.checks.violations import Runs
 from robots.collision import Cell, pending, unshaped
-from robots.collision.cells import FLOOR
 from robots.collision.floor import floor_advice
+from robots.descriptions.cells import FLOOR
 from robots.kinematics.inverse import InverseSolver, build_solver
 from robots.kinematics.joints import FloatArray, Joints, as_positions, doubtful_limits, violations
 from robots.kinematics.straight_motion import HOMING_REST_S, HOMING_SPEED, straight_motion

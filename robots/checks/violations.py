@@ -6,7 +6,7 @@ import numpy as np
 
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
-from robots.collision.cells import FLOOR
+from robots.descriptions.cells import FLOOR
 from robots.kinematics.joints import FloatArray
 from robots.programs.steps import Violation, ViolationKind
 

@@ -1,6 +1,6 @@
 """A cell in memory: its arms, fixtures and floor, ready for collision checks.
 
-`build_cell` reads the files that a `robots.collision.cells.CellDescription` names.
+`build_cell` reads the files that a `robots.descriptions.cells.CellDescription` names.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from robots.bodies.geometry import Body, exact_bodies, hull_bodies, piece_bodies
 from robots.bodies.link_pairs import PairPlan, plan_pairs
 from robots.bodies.self_collision import SelfPairs, self_pairs
-from robots.collision.cells import FLOOR, CellDescription, CellRobot, Fixture, Floor
 from robots.collision.obstacles import Balls, Bounds, Obstacles, balls_of, bounds_of, join_obstacles
+from robots.descriptions.cells import FLOOR, CellDescription, CellRobot, Fixture, Floor
 from robots.descriptions.description import load
 from robots.kinematics.joints import FloatArray, Joints
 from robots.kinematics.kinematic_tree import BASE, Tree, bare_links, tree_of

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from robots.bodies.geometry import TOUCH_M, Body
 from robots.collision.cell import Arm, Cell
-from robots.collision.cells import FLOOR, Floor
 from robots.collision.distance import Gauge
 from robots.collision.floor import Heights, heights_on_path
 from robots.collision.interpolated import Placed, touching_share
 from robots.collision.obstacles import join_boxes, least_distances
 from robots.collision.path import placements_along, travelled
 from robots.collision.swept_volumes import Sweep, distance_to_sweep, sweeps_of, swept_region
+from robots.descriptions.cells import FLOOR, Floor
 from robots.kinematics.joints import FloatArray
 
 # Distance at which bodies touch, and the error of coal's distances [m].

@@ -10,9 +10,9 @@ import numpy as np
 from robots.bodies.geometry import TOUCH_M, Body, transform
 from robots.bodies.self_collision import nearest_pair, touching_pairs
 from robots.collision.cell import Arm, Cell, surroundings_of
-from robots.collision.cells import FLOOR
 from robots.collision.floor import heights_above
 from robots.collision.obstacles import Obstacles, least_distances, placed_boxes
+from robots.descriptions.cells import FLOOR
 from robots.kinematics.joints import FloatArray
 from robots.kinematics.model import link_placements
 

@@ -10,9 +10,9 @@ from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.bodies.geometry import TOUCH_M
 from robots.collision.cell import Arm
-from robots.collision.cells import Floor
 from robots.collision.interpolated import ROUND
 from robots.collision.path import SAMPLE_M, placements_along
+from robots.descriptions.cells import Floor
 from robots.kinematics.joints import FloatArray
 
 # Samples per batch.

@@ -13,7 +13,7 @@ from robomesh.files.worker import Worker, WorkerError
 from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session
-from robots.collision.cells import CellDescription
+from robots.descriptions.cells import CellDescription
 from robots.kinematics.joints import FloatArray
 from robots.kinematics.model import RobotModel
 from robots.schema.errors import RobotError, reason_of

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.collision.cells import CellDescription, CellRobot, Fixture
+from robots.descriptions.cells import CellDescription, CellRobot, Fixture
 from robots.descriptions.description import RobotDescription
 from robots.descriptions.glb import shapes_glb
 from robots.kinematics.joints import FloatArray, JointType, joints_of

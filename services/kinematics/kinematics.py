@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from robomesh.contract.quotas import Quota
 from robomesh.files.worker import Worker
 from robomesh.wire.session import Session
-from robots.collision.cells import CellDescription
+from robots.descriptions.cells import CellDescription
 from robots.descriptions.description import load
 from robots.descriptions.glb import link_meshes, main_colors
 from robots.descriptions.urdf.write import to_urdf

@@ -5,7 +5,7 @@ from typing import Protocol
 
 from robomesh.contract.quotas import DEFAULT_QUOTAS, Quotas
 from robomesh.schemas.robomesh_pb2 import CellContent
-from robots.collision.cells import CellDescription
+from robots.descriptions.cells import CellDescription
 
 
 class CellContents(Protocol):

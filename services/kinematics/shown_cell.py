@@ -20,7 +20,7 @@ from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session
 from robots.collision import Cell, build_cell
-from robots.collision.cells import CellDescription
+from robots.descriptions.cells import CellDescription
 from robots.kinematics.joints import FloatArray
 from robots.schema.errors import RobotError, reason_of
 from services.kinematics.answers import Workers

@@ -8,7 +8,7 @@ import numpy as np
 from robomesh.files.worker import answer_all
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.collision import Cell, build_cell, pending
-from robots.collision.cells import CellDescription
+from robots.descriptions.cells import CellDescription
 from robots.descriptions.description import load
 from robots.kinematics.inverse import InverseSolver, build_solver
 from services.kinematics.check import check_answer

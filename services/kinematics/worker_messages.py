@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from robots.collision.cells import CellDescription
+from robots.descriptions.cells import CellDescription
 from robots.kinematics.joints import FloatArray
 
 

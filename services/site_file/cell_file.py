@@ -12,7 +12,7 @@ from robomesh.errors import RefusedError
 from robomesh.files.atomic_write import write_atomically
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.collision.cells import CellDescription
+from robots.descriptions.cells import CellDescription
 from robots.descriptions.description import load
 from robots.kinematics.kinematic_tree import tree_of
 from robots.schema.bounded_toml import MOST_CHARACTERS, parse_toml

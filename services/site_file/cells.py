@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from robots.collision.cells import CellDescription, CellRobot, Fixture, Floor
+from robots.descriptions.cells import CellDescription, CellRobot, Fixture, Floor
 from robots.schema.poses import pose_matrix
 from robots.schema.robot_toml import Units
 from services.site_file import fixtures

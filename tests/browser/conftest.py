@@ -22,7 +22,7 @@ from robomesh.contract.keys import WHOLE_SITE
 from robomesh.contract.messages import reason_message
 from robomesh.schemas.robomesh_pb2 import Event
 from robomesh.wire.session import Session, SessionSettings, open_session
-from robots.collision.cells import Fixture
+from robots.descriptions.cells import Fixture
 from services.console import app
 from services.console.websocket import shared_subscriptions
 from services.kinematics import kinematics

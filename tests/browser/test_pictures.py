@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from robots.collision.cells import Fixture
+from robots.descriptions.cells import Fixture
 from robots.schema.robot_toml import Pose
 from services.site_file.fixtures import Fixture as FixtureRow
 from services.site_file.fixtures import fixture_shape, fixture_to_site

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from robots.collision import Cell, allowed_positions, build_cell, outside_nearest, own_contacts
-from robots.collision.cells import CellDescription, CellRobot, Fixture
+from robots.descriptions.cells import CellDescription, CellRobot, Fixture
 from robots.kinematics.joints import FloatArray
 from robots.kinematics.kinematic_tree import Shape
 from robots.kinematics.views import reach

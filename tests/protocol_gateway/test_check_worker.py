@@ -15,7 +15,7 @@ from protocol_gateway.checking.worker import begin
 from protocol_gateway.checking.worker_messages import Checked, CheckMotion
 from protocol_gateway.seam.errors import CheckError
 from robomesh import reason_codes as codes
-from robots.collision.cells import CellDescription, CellRobot, Fixture
+from robots.descriptions.cells import CellDescription, CellRobot, Fixture
 from robots.kinematics.kinematic_tree import Shape
 from robots.schema.robot_toml import JointSettings, StatedModel
 from robots.shapes.mesh import Material, Mesh, Part

@@ -15,7 +15,7 @@ from protocol_gateway.control.clocks import read_clocks
 from robomesh.contract.messages import PROTOBUF
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
-from robots.collision.cells import CellDescription, CellRobot, Fixture
+from robots.descriptions.cells import CellDescription, CellRobot, Fixture
 from robots.schema.poses import pose_matrix
 from robots.schema.robot_toml import Pose, Units
 from services.site_file import fixtures

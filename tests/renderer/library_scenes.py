@@ -10,7 +10,7 @@ from renderer.cache import prepared_once
 from renderer.drawing import Drawing
 from renderer.mesh import Mesh
 from renderer.opengl import open_context
-from robots.collision.cells import CellDescription, CellRobot
+from robots.descriptions.cells import CellDescription, CellRobot
 from robots.descriptions.description import load
 from robots.descriptions.glb import link_meshes
 from robots.descriptions.urdf.write import to_urdf

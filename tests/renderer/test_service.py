@@ -21,7 +21,7 @@ from robomesh import reason_codes as codes
 from robomesh.errors import NoAnswerError
 from robomesh.schemas.robomesh_pb2 import ControllerState, Event, KeyFrameRequest, VideoFrames
 from robomesh.wire.session import open_session
-from robots.collision.cells import Fixture
+from robots.descriptions.cells import Fixture
 from services.site_file.fixtures import Fixture as FixtureRow
 from services.site_file.fixtures import fixture_shape
 from tests.cells import single_arm

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from robots.collision.cells import CellDescription, CellRobot, Fixture
+from robots.descriptions.cells import CellDescription, CellRobot, Fixture
 from robots.kinematics.joints import FloatArray
 from robots.kinematics.kinematic_tree import Shape
 from robots.schema.poses import rpy_rotation

@@ -18,7 +18,7 @@ from robots.collision import (
     own_nearest,
     unshaped,
 )
-from robots.collision.cells import CellDescription, Fixture
+from robots.descriptions.cells import CellDescription, Fixture
 from robots.kinematics.kinematic_tree import Shape
 from robots.schema.errors import JointCountError, MeshError
 from robots.schema.poses import rpy_rotation

@@ -16,9 +16,9 @@ from robots.collision import (
     own_contacts,
     path_encounters,
 )
-from robots.collision.cells import CellDescription, CellRobot
 from robots.collision.distance import arm_obstacles
 from robots.collision.path import SAMPLE_M, placements_along, sampled_path, travelled
+from robots.descriptions.cells import CellDescription, CellRobot
 from robots.kinematics.joints import FloatArray
 from tests.robots.arms import TELESCOPE
 from tests.robots.boxes import bar_arm, block, cell_of, globe, placed

@@ -7,7 +7,7 @@ import pytest
 
 from robots.bodies.geometry import hull_body
 from robots.collision import build_cell, outside_nearest
-from robots.collision.cells import CellDescription, CellRobot
+from robots.descriptions.cells import CellDescription, CellRobot
 from robots.descriptions.description import load
 from robots.descriptions.glb import link_mesh
 from robots.kinematics.joints import FloatArray

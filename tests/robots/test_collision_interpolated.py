@@ -7,10 +7,10 @@ import pytest
 
 from robots.checks.check import check_plan
 from robots.collision import Cell, allowed_positions, build_cell, outside_nearest, path_encounters
-from robots.collision.cells import CellDescription, CellRobot
 from robots.collision.distance import Gauge
 from robots.collision.path import placements_along
 from robots.collision.swept_volumes import sweeps_of, swept_region
+from robots.descriptions.cells import CellDescription, CellRobot
 from robots.programs.steps import CheckResult, Step, StepKind, ViolationKind
 from tests.robots.boxes import bar_arm, block, cell_of, placed, two_cheeks
 

@@ -7,7 +7,7 @@ import pinocchio
 import pytest
 
 from robots.collision import allowed_positions, build_cell, own_contacts
-from robots.collision.cells import CellDescription, CellRobot
+from robots.descriptions.cells import CellDescription, CellRobot
 from robots.descriptions.description import EXAMPLES, from_values, known_names, library_names, load
 from robots.descriptions.example_robots import example_folder
 from robots.descriptions.glb import link_meshes

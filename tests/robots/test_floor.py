@@ -10,9 +10,9 @@ import pytest
 from robomesh import reason_codes as codes
 from robots.checks.check import check_plan, check_program
 from robots.collision import build_cell, outside_clearance, outside_nearest, path_encounters
-from robots.collision.cells import FLOOR, CellDescription, CellRobot, Floor
 from robots.collision.floor import heights_above
 from robots.collision.path import placements_along
+from robots.descriptions.cells import FLOOR, CellDescription, CellRobot, Floor
 from robots.programs.steps import Step, StepKind, ViolationKind
 from tests.robots.boxes import block, placed
 

@@ -8,7 +8,7 @@ import pytest
 
 from robots.checks.jog import next_part
 from robots.collision import build_cell
-from robots.collision.cells import CellDescription, CellRobot
+from robots.descriptions.cells import CellDescription, CellRobot
 from robots.descriptions.description import load
 from robots.descriptions.urdf.write import to_urdf
 from robots.kinematics.inverse import build_solver

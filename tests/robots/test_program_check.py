@@ -11,8 +11,8 @@ from robots.checks.check import check_plan, check_program
 from robots.checks.tool_chain import samples_between, tool_chain, tools_and_jacobians
 from robots.checks.violations import MOST_VIOLATIONS, Runs
 from robots.collision import Cell, build_cell
-from robots.collision.cells import CellDescription, CellRobot
 from robots.collision.path import SAMPLE_M, placements_along, travelled
+from robots.descriptions.cells import CellDescription, CellRobot
 from robots.kinematics.model import tool_jacobian, tool_placement
 from robots.kinematics.motion import Motion
 from robots.kinematics.singularity import reach_of, singularity_margin, singularity_margins

@@ -17,7 +17,7 @@ from robots.bodies.surfaces import winding_number
 from robots.bodies.verdicts import Kind
 from robots.collision import build_cell, own_contacts, own_nearest, path_encounters, pending
 from robots.collision.cell import Cell
-from robots.collision.cells import CellDescription, CellRobot
+from robots.descriptions.cells import CellDescription, CellRobot
 from robots.descriptions.description import load
 from robots.descriptions.importing import import_robot
 from robots.descriptions.save_description import write_folder

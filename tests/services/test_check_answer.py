@@ -4,7 +4,7 @@ import numpy as np
 
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.collision import Cell, build_cell
-from robots.collision.cells import CellDescription, CellRobot
+from robots.descriptions.cells import CellDescription, CellRobot
 from services.kinematics.check import check_answer
 from tests.robots.boxes import block, placed
 

@@ -13,7 +13,7 @@ from robomesh.files.worker import Worker
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
 from robots.collision import build_cell, outside_clearance, own_nearest
-from robots.collision.cells import CellDescription, CellRobot, Fixture
+from robots.descriptions.cells import CellDescription, CellRobot, Fixture
 from robots.kinematics.model import tool_placement
 from services import kinematics
 from services.kinematics import answers

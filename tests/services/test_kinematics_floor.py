@@ -6,7 +6,7 @@ import pytest
 from renderer.appearance import floor_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.collision import build_cell
-from robots.collision.cells import CellDescription, CellRobot, Floor
+from robots.descriptions.cells import CellDescription, CellRobot, Floor
 from services.kinematics.descriptions import add_surroundings
 from services.kinematics.floor import floor_event
 from services.watch.rules import RULES

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from robots.collision import build_cell, distances, outside_clearance, unshaped
-from robots.collision.cells import CellDescription, Floor
 from robots.descriptions import description
+from robots.descriptions.cells import CellDescription, Floor
 from robots.descriptions.glb import link_mesh
 from robots.shapes.mesh import bounds
 from services.errors import SiteFileError

@@ -194,7 +194,7 @@ def _cell(robot: str, site: Path | None, *, exact: bool) -> tuple["Cell", str]:
     import numpy as np
 
     from robots.collision import build_cell
-    from robots.collision.cells import CellDescription, CellRobot
+    from robots.descriptions.cells import CellDescription, CellRobot
     from robots.descriptions.description import load
     from services.site_file import site as site_file
     from services.site_file.cells import cells_of
