@@ -215,7 +215,7 @@ def main() -> None:
     arguments = parser.parse_args()
     kinds = [name for name in arguments.protocols.split(",") if name]
     if unknown := sorted({*kinds} - KINDS.keys()):
-        parser.error(f"--protocols {unknown[0]}: {', '.join(KINDS)} are right")
+        parser.error(f"--protocols {unknown[0]}: must be one or more of {', '.join(KINDS)}")
     result: dict[str, Any] = {"cores": os.cpu_count(), "states": [], "stops": []}
     for name in kinds:
         if not name.endswith("-motion"):

@@ -110,7 +110,7 @@ def part_of(protocol: str, part: Literal["probe", "simulated"], wanted: type[_Pa
         problem = f"cannot be imported: {error}"
     raise GatewaySettingsError(
         f"protocol {protocol!r}: {part} = {name!r}, of the package {kind.distribution}, {problem}; "
-        f"'module:name' of a {wanted.__module__}.{wanted.__name__} is right"
+        f"it must be 'module:name' of a {wanted.__module__}.{wanted.__name__}"
     )
 
 

@@ -14,7 +14,7 @@ def split_address(text: str) -> tuple[str, int]:
     """
     host, colon, port = text.rpartition(":")
     if not colon or not host or not port.isdigit() or int(port) > 65535:
-        raise ListenError(f"{text!r} is not an address: HOST:PORT is right, as in 127.0.0.1:8080")
+        raise ListenError(f"{text!r} is not an address: must be HOST:PORT, as in 127.0.0.1:8080")
     return host.strip("[]"), int(port)
 
 

@@ -109,7 +109,7 @@ OPERATOR_TOO_LONG = Code("key.operator_too_long", "operator {name}: a name has a
 FAULT_UNKNOWN = Code("fault.unknown", "fault '{name}' is unknown; there are {names}")
 FAULT_TIMES = Code(
     "fault.times",
-    "fault '{given}': NAME@BEGIN+LENGTH is right, both in seconds, as in {name}@2.5+10",
+    "fault '{given}': must be NAME@BEGIN+LENGTH, both in seconds, as in {name}@2.5+10",
 )
 KEY_TOO_LONG = Code("request.key_too_long", "the key has {count} characters", "at most {most} are allowed")
 PAGE_TOO_MANY = Code(
@@ -1111,11 +1111,11 @@ INVERSE_AXIS = Code(
     "inverse.axis", "not this orientation: at this position, the tool's axis is at least {angle} off"
 )
 POSE_NOT_NUMBERS = Code("pose.not_numbers", "the pose takes 16 numbers, 4 rows of 4, tool to base in metres")
-POSE_SIZE = Code("pose.size", "the pose has {count} numbers; 16 are right, 4 rows of 4")
-POSE_SHAPE = Code("pose.shape", "the pose has numbers of shape {shape}; 16 are right, 4 rows of 4")
+POSE_SIZE = Code("pose.size", "the pose has {count} numbers; it must have 16, 4 rows of 4")
+POSE_SHAPE = Code("pose.shape", "the pose has numbers of shape {shape}; it must have 16, 4 rows of 4")
 POSE_NOT_FINITE = Code("pose.not_finite", "the pose holds {value}; every number must be finite")
-POSE_LAST_ROW = Code("pose.last_row", "the pose has the last row {row}; 0 0 0 1 is right")
-POSE_TOO_FAR = Code("pose.too_far", "the pose is {distance_m:.3g} m away; less than {limit_m:g} m is right")
+POSE_LAST_ROW = Code("pose.last_row", "the pose has the last row {row}; it must be 0 0 0 1")
+POSE_TOO_FAR = Code("pose.too_far", "the pose is {distance_m:.3g} m away; it must be less than {limit_m:g} m")
 POSE_NO_ROTATION = Code(
     "pose.no_rotation",
     "the pose has no rotation in its first 3 rows and columns: the rows must have length 1 and be at right "
@@ -1123,7 +1123,7 @@ POSE_NO_ROTATION = Code(
 )
 POSE_MIRRORED = Code(
     "pose.mirrored",
-    "the pose is mirrored: the determinant of its first 3 rows and columns is -1; 1 is right",
+    "the pose is mirrored: the determinant of its first 3 rows and columns is -1; it must be 1",
 )
 POSE_NEAR_NOT_FINITE = Code(
     "pose.near_not_finite",

@@ -29,7 +29,7 @@ _VERSIONS = range(2, 100)
 
 def _check(number: int, most: int, what: str) -> None:
     if not 1 <= number <= most:
-        raise ValueError(f"{what} {number}: 1 to {most} are right")
+        raise ValueError(f"{what} {number}: must be 1 to {most}")
 
 
 @dataclass(frozen=True, slots=True)

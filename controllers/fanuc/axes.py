@@ -62,7 +62,7 @@ def signal_bits(text: str) -> SignalBits:
         if 0 <= found.last - found.first < MOST_SIGNALS:
             return found
     raise GatewaySettingsError(
-        f"io {text!r}: DI, DO, RI, RO, UI or UO with at most {MOST_SIGNALS} numbers is right, as in DI[1-16]"
+        f"io {text!r}: must be DI, DO, RI, RO, UI or UO with at most {MOST_SIGNALS} numbers, as in DI[1-16]"
     )
 
 
@@ -157,13 +157,13 @@ class Axes:
                 f"{', '.join(map(str, numbers))} were given"
             )
         if not all(1 <= each <= joints for each in settings.reversed):
-            raise GatewaySettingsError(f"fanuc reversed: numbers of joints, 1 to {joints}, are right")
+            raise GatewaySettingsError(f"fanuc reversed: must be numbers of joints, 1 to {joints}")
         self.used = tuple(each - 1 for each in numbers)
         linear = [
             number for number, each in zip(numbers, joint_types, strict=True) if each is not JointType.ROTARY
         ]
         if settings.j23 and {2, 3} & {*linear}:
-            raise GatewaySettingsError("fanuc j23: only axes that turn can be coupled, so 0 is right")
+            raise GatewaySettingsError("fanuc j23: must be 0, because only rotary axes can be coupled")
         self._j23 = settings.j23 or 0
         # Of a degree or a millimetre, in SI.
         units = np.array([math.radians(1.0) if each is JointType.ROTARY else 1e-3 for each in joint_types])

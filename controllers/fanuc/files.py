@@ -213,7 +213,7 @@ def _axes(lines: Sequence[str]) -> tuple[list[float | None], list[str]]:
         axes.append(_number(match[3]))
     every = found["Joint"] + found["EXTAXS:"]
     if not found["Joint"] or len(every) > AXES:
-        raise ValueError(f"{len(every)} axes; 1 to {AXES} are right")
+        raise ValueError(f"{len(every)} axes: must be 1 to {AXES}")
     return every, rest
 
 

@@ -60,7 +60,7 @@ def read(file: File) -> bytes:
 
 def _word(text: str) -> bytes:
     if not text.isascii() or (text and not text.isprintable()):
-        raise ValueError("only printable ASCII characters are right")
+        raise ValueError("must have only printable ASCII characters")
     return text.encode()
 
 

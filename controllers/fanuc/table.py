@@ -131,7 +131,7 @@ class Fanuc(Table):
             if key in self.model_fields_set:
                 raise ValueError(f"fanuc.{key} needs the protocol 'fanuc-ftp', this robot's is 'snpx'")
         if self.rate is not None and self.rate < 1.0:
-            raise ValueError(f"fanuc.rate {self.rate:g}: with the protocol 'snpx' 1 to 100 is right")
+            raise ValueError(f"fanuc.rate {self.rate:g}: must be 1 to 100 with the protocol 'snpx'")
 
     def _check_ftp(self, stale_after_s: float | None) -> None:
         for key in ("assignments", "motion", "speed"):
@@ -147,8 +147,8 @@ class Fanuc(Table):
             )
         if stale_after_s is not None and stale_after_s < 2.0 / rate:
             raise ValueError(
-                f"stale_after_s {stale_after_s:g}: with {rate:g} positions a second {2.0 / rate:g} or more "
-                "is right; otherwise the joints are stale between two of them"
+                f"stale_after_s {stale_after_s:g}: must be {2.0 / rate:g} or more with {rate:g} positions a "
+                "second; otherwise the joints are stale between two of them"
             )
 
     def in_folder(self, folder: Path) -> "Fanuc":

@@ -58,7 +58,7 @@ def check_declared(joints: Sequence[OpcUaJoint], joint_types: Sequence[JointType
         )
     for number, (joint, joint_type) in enumerate(zip(joints, joint_types, strict=False), 1):
         if bool(joint.axis) is bool(joint.node):
-            raise GatewaySettingsError(f"opcua joint {number}: either axis or node is right")
+            raise GatewaySettingsError(f"opcua joint {number}: must have either axis or node")
         if joint.unit:
             scale = BY_NUMBER[number_of(_UNITS[joint.unit])]
             if scale.linear is not (joint_type is JointType.PRISMATIC):

@@ -119,8 +119,8 @@ class PackageStream:
 
     def _lose(self, begin: int, length: int, kind: int, longest: int) -> Malformed:
         reason = (
-            f"a package of type {kind} announces {length} bytes, "
-            f"{self._header.size} to {longest} are right; the rest of the connection cannot be read"
+            f"a package of type {kind} announces {length} bytes: "
+            f"must be {self._header.size} to {longest}; the rest of the connection cannot be read"
         )
         text = hexadecimal(self._buffer[begin : begin + self._header.size])
         event = Malformed(self._offset + begin, text, reason, fatal=True)

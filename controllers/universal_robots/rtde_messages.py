@@ -297,7 +297,7 @@ class RtdeStream:
                 return ProtocolVersionAnswered(_accepted(payload))
             case PackageType.URCONTROL_VERSION:
                 if len(payload) != _VERSION.size:
-                    raise ValueError(f"{len(payload)} bytes of a version, 16 are right")
+                    raise ValueError(f"{len(payload)} bytes of a version: must be 16")
                 return ControllerVersion(*_VERSION.unpack(payload))
             case PackageType.SET_UP_OUTPUTS:
                 numbered = self.version > 1
@@ -320,7 +320,7 @@ class RtdeStream:
 
 def _accepted(payload: bytes) -> bool:
     if len(payload) != 1 or payload[0] > 1:
-        raise ValueError(f"answer {payload[:8].hex(' ') or 'without a byte'}, 00 or 01 is right")
+        raise ValueError(f"answer {payload[:8].hex(' ') or 'without a byte'}: must be 00 or 01")
     return payload == b"\x01"
 
 
@@ -345,7 +345,7 @@ def read_text(payload: bytes, version: int) -> TextReceived:
     text, rest = _counted(payload)
     source, level = _counted(rest)
     if len(level) != 1:
-        raise ValueError(f"{len(level)} bytes after the texts, one is right")
+        raise ValueError(f"{len(level)} bytes after the texts: must be 1")
     return TextReceived(level[0], _text(text), _text(source))
 
 

@@ -171,7 +171,7 @@ class RtdeReader:
         )
         if other:
             return Failed(
-                f"the controller's field {other} has the type {types[other]}, {self._fields[other]} is right"
+                f"the controller's field {other} has the type {types[other]}: must be {self._fields[other]}"
             )
         if unknown:
             self._missing += unknown

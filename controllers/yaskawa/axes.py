@@ -77,7 +77,7 @@ def instance_of(group: str) -> int:
     match = re.fullmatch(r"([RBS])([1-9]\d?)", group)
     first, count = _GROUPS[match[1]] if match else (0, 0)
     if match is None or int(match[2]) > count:
-        raise GatewaySettingsError(f"group {group!r}: R1 to R8, B1 to B8 and S1 to S24 are right")
+        raise GatewaySettingsError(f"group {group!r}: must be R1 to R8, B1 to B8 or S1 to S24")
     return first + int(match[2]) - 1
 
 

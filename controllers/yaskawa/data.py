@@ -54,7 +54,7 @@ def position(data: bytes) -> Position:
         ValueError: If no controller sends data of this length.
     """
     if len(data) < _POSITION.size:
-        raise ValueError(f"a position with {len(data)} bytes; 44, 48 and 52 are right")
+        raise ValueError(f"a position with {len(data)} bytes: must be 44, 48 or 52")
     data_type, form, tool, user_frame, extended_form = _POSITION.unpack_from(data)
     return Position(data_type, form, tool, user_frame, extended_form, _words(data[_POSITION.size :]))
 
@@ -77,7 +77,7 @@ def axis_names(data: bytes) -> tuple[str, ...]:
         ValueError: If no controller sends data of this length.
     """
     if len(data) % _NAME_BYTES or not _FEWEST_AXES <= len(data) // _NAME_BYTES <= _MOST_AXES:
-        raise ValueError(f"names of axes with {len(data)} bytes; 24, 28 and 32 are right")
+        raise ValueError(f"names of axes with {len(data)} bytes: must be 24, 28 or 32")
     names = [data[at : at + _NAME_BYTES] for at in range(0, len(data), _NAME_BYTES)]
     return tuple((text(each) or "?") if each.strip(b"\0 ") else "" for each in names)
 
@@ -151,8 +151,8 @@ def alarm(data: bytes) -> Alarm:
         ValueError: If no controller sends data of this length.
     """
     if len(data) not in (_ALARM.size, _ALARM_WITH_SUB_CODES):
-        right = f"{_ALARM.size} and {_ALARM_WITH_SUB_CODES} are right"
-        raise ValueError(f"an alarm with {len(data)} bytes; {right}")
+        sizes = f"{_ALARM.size} or {_ALARM_WITH_SUB_CODES}"
+        raise ValueError(f"an alarm with {len(data)} bytes: must be {sizes}")
     code, sub_code, kind, time, name = _ALARM.unpack_from(data)
     return Alarm(code, sub_code, kind, text(time), text(name))
 
@@ -212,11 +212,11 @@ def io_byte(data: bytes) -> int:
 def _words(data: bytes) -> tuple[int, ...]:
     count, rest = divmod(len(data), 4)
     if rest or count not in _WORDS:
-        raise ValueError(f"values of axes with {len(data)} bytes; 24, 28 and 32 are right")
+        raise ValueError(f"values of axes with {len(data)} bytes: must be 24, 28 or 32")
     return _WORDS[count].unpack(data)
 
 
 def _exactly(data: bytes, size: int, what: str) -> bytes:
     if len(data) != size:
-        raise ValueError(f"{what} with {len(data)} bytes; {size} are right")
+        raise ValueError(f"{what} with {len(data)} bytes: must be {size}")
     return data

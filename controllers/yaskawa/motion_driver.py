@@ -601,7 +601,7 @@ class HsesMotionDriver(HsesDriver):
         if (extra := self._other_axes(place)) is not None:
             return extra
         if place.tool > _LAST_TOOL:
-            detail = f"the controller reports tool {place.tool}; 0 to {_LAST_TOOL} are right"
+            detail = f"the controller reports tool {place.tool}; it must be 0 to {_LAST_TOOL}"
             return hses_codes.AXES(detail=detail)
         if self._motion.sent:
             return hses_codes.MOVES()

@@ -66,10 +66,10 @@ class JsonLines:
     ) -> None:
         given = options if isinstance(options, Mapping) else {}
         if unknown := sorted(given.keys() - {"limit"}):
-            raise GatewaySettingsError(f"driver {unknown[0]!r} is unknown; 'limit' is right")
+            raise GatewaySettingsError(f"driver {unknown[0]!r} is unknown; the only option is 'limit'")
         self._limit = given.get("limit", LONGEST_LINE)
         if not isinstance(self._limit, int) or self._limit < 1:
-            raise GatewaySettingsError(f"driver limit = {self._limit!r}: a number of bytes is right")
+            raise GatewaySettingsError(f"driver limit = {self._limit!r}: must be a number of bytes above 0")
         self._joints = len(joint_types)
         self._rest, self._offset = b"", 0
 

@@ -161,7 +161,7 @@ class Signal:
     def __post_init__(self) -> None:
         if len(self.name) > _LONGEST_NAME or not _SIGNAL_NAME.fullmatch(self.name):
             raise ValueError(
-                f"signal {self.name!r}: lower-case words with dots between them are right, "
+                f"signal {self.name!r}: must be lower-case words with dots between them, "
                 f"at most {_LONGEST_NAME} characters"
             )
 

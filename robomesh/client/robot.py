@@ -298,7 +298,7 @@ class AsyncRobot:
             task = "5d" if len((await self.description()).joints) < 6 else "6d"
         tasks = {"5d": schema.InverseRequest.POSITION_AND_AXIS_5D, "6d": schema.InverseRequest.POSE_6D}
         if task not in tasks:
-            raise ValueError(f"task={task!r}: '5d' or '6d' are right")
+            raise ValueError(f"task={task!r}: must be '5d' or '6d'")
         request = schema.InverseRequest(
             pose=_flat(pose), task=tasks[task], near=numbers(near), all_solutions=all_solutions
         )

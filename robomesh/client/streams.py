@@ -57,9 +57,9 @@ def check_options(buffer: int, on_stale: OnStale) -> None:
         ValueError: If one is invalid.
     """
     if not isinstance(buffer, int) or not 1 <= buffer <= _MOST_KEPT:
-        raise ValueError(f"buffer={buffer!r}: a whole number from 1 to {_MOST_KEPT} is right")
+        raise ValueError(f"buffer={buffer!r}: must be a whole number from 1 to {_MOST_KEPT}")
     if on_stale not in ("raise", "yield"):
-        raise ValueError(f"on_stale={on_stale!r}: 'raise' or 'yield' are right")
+        raise ValueError(f"on_stale={on_stale!r}: must be 'raise' or 'yield'")
 
 
 class Reading(Generic[T]):

@@ -123,7 +123,7 @@ class Fixture(BaseModel):
         given = [name for name in _SHAPES if getattr(self, name) is not None]
         if len(given) != 1:
             raise ValueError(
-                f"{' and '.join(given) or 'no shape'} given: exactly one of {', '.join(_SHAPES)} is right"
+                f"{' and '.join(given) or 'no shape'} given: must be exactly one of {', '.join(_SHAPES)}"
             )
         return self
 

@@ -85,7 +85,7 @@ class LegacyClients(BaseModel):
         for each in commanders:
             if names.setdefault(each.address, each.name) != each.name:
                 raise ValueError(
-                    f"{each.address} commands as {names[each.address]} and as {each.name}: one name is right"
+                    f"{each.address} commands as {names[each.address]} and as {each.name}: give it one name"
                 )
         return commanders
 

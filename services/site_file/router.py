@@ -74,7 +74,7 @@ class Router(BaseModel):
         for each in connect:
             if "/" not in each.partition("=")[0] and not _SITE_LINK.fullmatch(each):
                 raise ValueError(
-                    f"{each!r}: an endpoint is right, as in tls/10.1.0.1:7447, or a site that accepts ours, "
+                    f"{each!r}: must be an endpoint, as in tls/10.1.0.1:7447, or a site that accepts ours, "
                     "as in beijing or beijing=tls/10.1.0.1:7447"
                 )
         return connect
@@ -227,8 +227,8 @@ def _links(text: str, keys: Keys) -> list[Link]:
     identity = read_identity(tls.certificate)
     if identity is None or not identity.routers:
         raise KeysError(
-            f"{tls.certificate} does not say where site {site} is: "
-            f'connect = ["{site}=tls/HOST:PORT"] is right under [router]'
+            f"{tls.certificate} does not say where site {site} is: write "
+            f'connect = ["{site}=tls/HOST:PORT"] under [router]'
         )
     return [Link(endpoint=each, tls=tls, site=site) for each in identity.routers]
 

@@ -70,9 +70,9 @@ def test_lost_properties_are_printed(box: Path, capsys: pytest.CaptureFixture[st
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["out.dxf"], "ending '.dxf' is not written; .glb, .stl, .obj, .ply, .wrl, .3ds are"),
-        (["out.stl", "--up", "x"], "--up x: y or z is right"),
-        (["out.stl", "--scale", "-1"], "--scale -1.0: a number above 0 is right"),
+        (["out.dxf"], "ending '.dxf' is unknown; must be one of .glb, .stl, .obj, .ply, .wrl, .3ds"),
+        (["out.stl", "--up", "x"], "--up x: must be y or z"),
+        (["out.stl", "--scale", "-1"], "--scale -1.0: must be a number above 0"),
         (["box.wrl"], "box.wrl: is the input file; name another output"),
         (["none/out.stl"], "cannot be written: No such file or directory"),
     ],

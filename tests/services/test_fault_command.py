@@ -76,7 +76,7 @@ def test_a_simulator_for_a_robot_without_a_site_is_refused_in_one_line():
     done = robomesh("simulate", "--for", "arm", "--listen", "127.0.0.1:0")
     assert (done.returncode, done.stderr) == (
         2,
-        "robomesh: --for arm: SITE/ROBOT is right, as in demo/pt600\n",
+        "robomesh: --for arm: must be SITE/ROBOT, as in demo/pt600\n",
     )
 
 

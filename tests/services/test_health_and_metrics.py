@@ -263,7 +263,7 @@ def test_every_alarm_says_what_to_do():
 
 @pytest.mark.parametrize(
     ("given", "expected"),
-    [("0.0.0.0:9100", "others can reach"), ("nonsense", "HOST:PORT is right")],
+    [("0.0.0.0:9100", "others can reach"), ("nonsense", "must be HOST:PORT")],
     ids=["beyond loopback", "no address"],
 )
 @pytest.mark.slow

@@ -60,14 +60,14 @@ POSE = TOOL.tolist()
         ("nonsense", "'nonsense' is no request"),
         ([1], "'[1]' is no request"),
         ({"task": "6d"}, "is no request"),
-        ({"pose": POSE, "nar": []}, "'nar': all, near, pose, seed, task are right"),
-        ({"pose": POSE, "task": "7d"}, "task '7d': 6d, 5d, 3d are right"),
-        ({"pose": POSE, "seed": -1}, "seed -1: a whole number from 0"),
-        ({"pose": POSE, "all": 1}, "all 1: true or false is right"),
-        ({"pose": POSE, "near": ["a"]}, "near ['a']: a number a joint"),
+        ({"pose": POSE, "nar": []}, "'nar': must be one of all, near, pose, seed, task"),
+        ({"pose": POSE, "task": "7d"}, "task '7d': must be one of 6d, 5d, 3d"),
+        ({"pose": POSE, "seed": -1}, "seed -1: must be a whole number from 0"),
+        ({"pose": POSE, "all": 1}, "all 1: must be true or false"),
+        ({"pose": POSE, "near": ["a"]}, "near ['a']: must be a number for each joint"),
         ({"pose": POSE, "near": [0.0]}, "this robot takes (5,)"),
         ('{"pose": ' + str(POSE) + ', "near": [0, 0, 0, 0, NaN]}', "not finite"),
-        ({"pose": [1.0]}, "the pose has 1 numbers; 16 are right"),
+        ({"pose": [1.0]}, "the pose has 1 numbers; it must have 16"),
     ],
 )
 def test_an_invalid_line_gets_an_error_and_the_next_an_answer(
@@ -109,10 +109,10 @@ def test_arguments_and_printed_solutions_are_in_degrees_and_millimetres(
 @pytest.mark.parametrize(
     ("words", "error"),
     [
-        (["1", "2"], "2 numbers; 3 or 6 are right: X Y Z in mm"),
+        (["1", "2"], "2 numbers; must be 3 or 6: X Y Z in mm"),
         (["1", "2", "up"], "'up' is no number"),
         (["1", "2", "inf"], "'inf' is not a finite number"),
-        (["1", "2", "3", "--task", "4d"], "task '4d': 6d, 5d, 3d are right"),
+        (["1", "2", "3", "--task", "4d"], "task '4d': must be one of 6d, 5d, 3d"),
         (["1", "2", "3", "--task", "6d"], "--task 6d takes six numbers"),
         (["1", "2", "3", "--robot", "pt60"], "did you mean 'pt600'"),
     ],

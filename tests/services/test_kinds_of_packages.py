@@ -148,10 +148,13 @@ def test_a_probe_of_a_package_knows_its_controller(lines, capsys):
         ({"probe": "bad:NONE"}, ["probe = 'bad:NONE', of the package the-bad, cannot", "controllers.prob"]),
         (
             {"probe": "no_such:PROBE"},
-            ["No module named 'no_such'; 'module:name' of a controllers.probing.Pr"],
+            ["No module named 'no_such'; it must be 'module:name' of a controllers.probing.Pr"],
         ),
         ({"probe": "bad"}, ["of the package the-bad, cannot be imported"]),
-        ({"probe": "bad:Kind"}, ["of the package the-bad, is of the type type; 'module:name' of a"]),
+        (
+            {"probe": "bad:Kind"},
+            ["of the package the-bad, is of the type type; it must be 'module:name' of a"],
+        ),
         ({"probe": 3}, ["of the package the-bad, cannot be imported"]),
         ({"probe": "lines:ASKS"}, ["its probe, of the package the-bad, fails: TypeError"]),
     ],
@@ -223,7 +226,7 @@ def test_the_help_of_a_packages_protocol_has_its_options(lines, capsys):
         ),
         (
             {"simulated": "bad:BAD"},
-            "is of the type Kind; 'module:name' of a protocol_gateway.seam.simulated.S",
+            "is of the type Kind; it must be 'module:name' of a protocol_gateway.seam.simulated.S",
         ),
         (
             {"simulated": "lines:TAKES_ROBOT"},

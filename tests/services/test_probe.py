@@ -232,10 +232,10 @@ def test_a_web_server_is_no_controller(monkeypatch):
 @pytest.mark.parametrize(
     ("address", "words"),
     [
-        ("10.0.0.7:30004", "tcp://HOST:PORT is right"),
-        ("tcp://10.0.0.7", "tcp://HOST:PORT is right"),
-        ("http://10.0.0.7:80", "tcp://HOST:PORT is right"),
-        ("tcp://10.0.0.7:0", "tcp://HOST:PORT is right"),
+        ("10.0.0.7:30004", "must be tcp://HOST:PORT"),
+        ("tcp://10.0.0.7", "must be tcp://HOST:PORT"),
+        ("http://10.0.0.7:80", "must be tcp://HOST:PORT"),
+        ("tcp://10.0.0.7:0", "must be tcp://HOST:PORT"),
         ("udp://127.0.0.1:53", "of UDP ports only 10040 is known"),
     ],
 )

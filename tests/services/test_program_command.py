@@ -148,12 +148,12 @@ def test_a_plan_is_a_program_of_joint_moves_that_plans_to_itself(folder: Path, c
         ),
         (
             ["check", "good", "--start", "1 2 x"],
-            "--start '1 2 x': 5 numbers from -100000 to 100000 are right (waist shoulder elbow wrist roll)",
+            "--start '1 2 x': must be 5 numbers from -100000 to 100000 (waist shoulder elbow wrist roll)",
         ),
         (["check", "good", "--plot", "a.pdf"], "a.pdf: not saved, a picture's name must end in .png or .svg"),
         (
             ["from-dxf", "good", "--layer", "a", "--tolerance", "0"],
-            "--tolerance 0: from 0.001 to 100 mm is right",
+            "--tolerance 0: must be 0.001 to 100 mm",
         ),
     ],
 )

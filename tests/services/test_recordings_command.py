@@ -140,8 +140,8 @@ def test_a_plot_of_too_many_values_shows_the_first_64(tmp_path):
         (["out.csv", "--from", "9"], "--from 9: moving.mcap goes from 0 to 2.000 s"),
         (["out.mp4", "--view", "inside"], "no view 'inside'; there are"),
         (["out.mp4", "--size", "161x120"], "--size 161x120: even, and from 64 to 4096 a side"),
-        (["out.mp4", "--size", "big"], "--size big: WIDTHxHEIGHT is right"),
-        (["out.mp4", "--fps", "0"], "--fps 0: from 1 to 120 is right"),
+        (["out.mp4", "--size", "big"], "--size big: must be WIDTHxHEIGHT"),
+        (["out.mp4", "--fps", "0"], "--fps 0: must be 1 to 120"),
         (["none/out.csv"], "cannot be written: No such file or directory"),
     ],
 )

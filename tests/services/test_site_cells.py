@@ -95,8 +95,11 @@ def test_a_fixture_whose_part_is_outside_of_its_folder_is_refused_for_no_check_w
         (IN_A + TABLE + TABLE, "fixture a/table and fixture a/table have one name: each needs its own"),
         (IN_A + TABLE.replace("table", "arm"), "robot arm and fixture a/arm have one name"),
         (IN_A + TABLE.replace("table", "Table"), "fixture.Table.name = 'Table': fixture 'Table' cannot be"),
-        (IN_A + TABLE + "sphere = 3.0", "box and sphere given: exactly one of box, cylinder, sphere, mesh"),
-        (IN_A + TABLE.replace("box", "# "), "fixture.table: no shape given: exactly one of"),
+        (
+            IN_A + TABLE + "sphere = 3.0",
+            "box and sphere given: must be exactly one of box, cylinder, sphere, mesh",
+        ),
+        (IN_A + TABLE.replace("box", "# "), "fixture.table: no shape given: must be exactly one of"),
         (IN_A + TABLE.replace("600", "-600"), "fixture.table.box.1 = -600.0: should be greater than 0"),
         (
             IN_A + TABLE.replace("box", "size"),

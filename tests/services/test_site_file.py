@@ -140,7 +140,7 @@ def test_old_client_programs_attach_where_the_file_says(tmp_path):
         (', commanders = [{ address = "10.0.0.9", operator = "a/b" }]', "operator = 'a/b'"),
         (
             ', commanders = [{ address = "10.0.0.9", operator = "li" }, "10.0.0.9"]',
-            "10.0.0.9 commands as li and as 10.0.0.9: one name is right",
+            "10.0.0.9 commands as li and as 10.0.0.9: give it one name",
         ),
         (", port = 5401", "legacy_clients.port is not a key"),
     ],
@@ -242,7 +242,7 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path):
 
 @pytest.mark.parametrize("text", ["", "host", ":1", "host:", "host:x", "host:70000"])
 def test_an_invalid_address_is_refused(text):
-    with pytest.raises(ListenError, match="HOST:PORT is right"):
+    with pytest.raises(ListenError, match="must be HOST:PORT"):
         split_address(text)
 
 

@@ -29,7 +29,7 @@ def _code(text: str) -> tuple[int, str]:
     except ValueError:
         from controllers.simulated.errors import SimulatorError
 
-        raise SimulatorError(f"--code {text}: NUMBER=TYPE is right, as in 2=ABSOLUTE.DEG") from None
+        raise SimulatorError(f"--code {text}: must be NUMBER=TYPE, as in 2=ABSOLUTE.DEG") from None
 
 
 UNIT = Simulated(text="the old text protocol", robot="pt600", listen="127.0.0.1:5400", prepare=_prepare)

@@ -21,7 +21,7 @@ _STEP_M, _STEP_RAD = 0.005, 0.02
 _MOST_STEPS = 1000
 # Largest deviation of the tool from its line.
 _OFF_M, _OFF_RAD = 1e-4, 1e-3
-NEAR_SINGULAR = "the tool's line is too near a singular position: movej is right"
+NEAR_SINGULAR = "the tool's line is too near a singular position: use movej"
 # A joint that does not move at a place of a path [rad per unit].
 _STILL = 1e-9
 

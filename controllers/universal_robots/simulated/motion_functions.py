@@ -176,7 +176,7 @@ class MotionFunctions:
         """Begin a motion on a path with a script's a, v, t and r."""
         acceleration, speed, time_s = (positive(each) for each in (*given[:2], given[2] or 1.0))
         if number(given[3]) != 0.0:
-            raise ScriptError("a blend radius is not simulated: r = 0 is right")
+            raise ScriptError("a blend radius is not simulated: r must be 0")
         if given[2]:
             speed, acceleration = speed_for(max(path.length, _SHORTEST), acceleration, time_s)
         self._programs.begin_move(
@@ -267,7 +267,7 @@ def number(value: Value) -> float:
         ScriptError: If the value is none.
     """
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ScriptError(f"a number is right, not {text_of(value)[:40]}")
+        raise ScriptError(f"expected a number, not {text_of(value)[:40]}")
     return float(value)
 
 
@@ -278,7 +278,7 @@ def positive(value: Value) -> float:
         ScriptError: If the value is none.
     """
     if number(value) <= 0.0:
-        raise ScriptError(f"a number above 0 is right, not {value:g}")
+        raise ScriptError(f"expected a number above 0, not {value:g}")
     return float(value)
 
 
@@ -289,7 +289,7 @@ def vector(value: Value) -> tuple[float, ...]:
         ScriptError: If the value is not a list, or a pose, of six.
     """
     if not isinstance(value, tuple) or len(value) != JOINTS:
-        raise ScriptError("a list of six numbers is right")
+        raise ScriptError("expected a list of six numbers")
     return tuple(number(each) for each in value)
 
 

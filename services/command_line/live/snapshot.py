@@ -38,7 +38,7 @@ def run(robot: str, view: str, out: Path, size: tuple[int, int], router: str) ->
         except cv2.error:
             done = False
         if not done:
-            raise NoPictureError(f"{out}: unknown picture format {out.suffix!r}; .png and .jpg are right")
+            raise NoPictureError(f"{out}: unknown picture format {out.suffix!r}; must be .png or .jpg")
         data = encoded.tobytes()
     try:
         out.write_bytes(data)

@@ -44,7 +44,7 @@ def run(robot: str, view: str, out: Path, wanted: Wanted, router: str, as_json: 
     if out.suffix.lower() != ".mp4":
         raise VideoError(f"{out}: video is written as .mp4")
     if not 0 <= wanted.seconds < float("inf"):
-        raise VideoError(f"--seconds {wanted.seconds:g}: 0 (until Ctrl-C) or more is right")
+        raise VideoError(f"--seconds {wanted.seconds:g}: must be 0 (until Ctrl-C) or more")
     file = _File(out)
     try:
         discovery.run(_save(robot, view, file, wanted, router))

@@ -168,7 +168,7 @@ def _seconds(text: str) -> float:
     """
     match = re.fullmatch(r"(\d+(?:\.\d+)?)([smh])", text.strip())
     if match is None:
-        raise NoSuchAlarmError(f"--for {text}: a number with s, m or h is right, as in 30m or 8h")
+        raise NoSuchAlarmError(f"--for {text}: must be a number with s, m or h, as in 30m or 8h")
     return float(match[1]) * _UNITS_S[match[2]]
 
 

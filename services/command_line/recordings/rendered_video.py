@@ -100,9 +100,9 @@ def _check(rendering: Rendering) -> None:
     if not all(_SMALLEST_PX <= side <= _LARGEST_PX and side % 2 == 0 for side in (width, height)):
         raise ExportError(f"--size {width}x{height}: even, and from {_SMALLEST_PX} to {_LARGEST_PX} a side")
     if not 1.0 <= rendering.fps <= 120.0:
-        raise ExportError(f"--fps {rendering.fps:g}: from 1 to 120 is right")
+        raise ExportError(f"--fps {rendering.fps:g}: must be 1 to 120")
     if rendering.samples not in (0, 2, 4, 8):
-        raise ExportError(f"--samples {rendering.samples}: 0, 2, 4 or 8 is right")
+        raise ExportError(f"--samples {rendering.samples}: must be 0, 2, 4 or 8")
 
 
 def _robot(file: RecordingFile) -> RobotState:

@@ -77,7 +77,7 @@ def _write(picture: NDArray[np.uint8], out: Path) -> None:
     except cv2.error:
         done = False
     if not done:
-        raise PictureError(f"{out}: no picture format {out.suffix!r}; .png and .jpg are right")
+        raise PictureError(f"{out}: no picture format {out.suffix!r}; must be .png or .jpg")
     try:
         out.write_bytes(encoded.tobytes())
     except OSError as error:

@@ -55,7 +55,7 @@ def _numbers(words: Sequence[str]) -> list[float]:
         if not isfinite(numbers[-1]):
             raise RequestError(f"{word!r} is not a finite number")
     if len(numbers) not in (3, 6):
-        raise RequestError(f"{len(numbers)} numbers; 3 or 6 are right: {_NUMBERS}")
+        raise RequestError(f"{len(numbers)} numbers; must be 3 or 6: {_NUMBERS}")
     return numbers
 
 
@@ -63,7 +63,7 @@ def _task(word: Any) -> Task:
     try:
         return Task(word)
     except ValueError:
-        raise RequestError(f"task {word!r}: {', '.join(Task)} are right") from None
+        raise RequestError(f"task {word!r}: must be one of {', '.join(Task)}") from None
 
 
 def _print_result(solver: InverseSolver, result: InverseResult) -> None:
@@ -121,15 +121,15 @@ def _answer(solver: InverseSolver, line: str, task: Task | None, all_solutions: 
     except (ValueError, RecursionError):
         unknown = None
     if unknown is None or "pose" not in request:
-        raise RequestError(f"{line[:200]!r} is no request; {_EXAMPLE} is right, in rad and m")
+        raise RequestError(f"{line[:200]!r} is no request; write one as in {_EXAMPLE}, in rad and m")
     if unknown:
-        raise RequestError(f"{unknown[0]!r}: {', '.join(sorted(_KEYS))} are right")
+        raise RequestError(f"{unknown[0]!r}: must be one of {', '.join(sorted(_KEYS))}")
     seed, near, every = request.get("seed", 0), request.get("near"), request.get("all", all_solutions)
     if type(seed) is not int or not 0 <= seed < 2**64:
-        raise RequestError(f"seed {seed!r}: a whole number from 0 to {2**64 - 1} is right")
+        raise RequestError(f"seed {seed!r}: must be a whole number from 0 to {2**64 - 1}")
     if type(every) is not bool:
-        raise RequestError(f"all {every!r}: true or false is right")
+        raise RequestError(f"all {every!r}: must be true or false")
     if near is not None and not (isinstance(near, list) and all(map(_is_number, near))):
-        raise RequestError(f"near {str(near)[:200]}: a number a joint is right, in rad and m")
+        raise RequestError(f"near {str(near)[:200]}: must be a number for each joint, in rad and m")
     asked = _task(request["task"]) if "task" in request else task or natural_task(solver.chain.joints)
     return solve(solver, request["pose"], task=asked, near=near, all_solutions=every, seed=seed)

@@ -37,7 +37,7 @@ def fk(
     from services.command_line.terminal.output import print_json
 
     if requests != "-":
-        raise RequestError(f"{requests!r}: '-' is right, and one JSON request a line on standard input")
+        raise RequestError(f"{requests!r}: must be '-', with one JSON request a line on standard input")
     model = build_model(load(robot))
     failed = False
     for line in request_lines():
@@ -91,7 +91,7 @@ def _joint_positions(line: str) -> list[float]:
         return found
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
         raise RequestError(
-            f'{line[:200]!r} is no request; {{"joints": [0.1, 0.2]}} is right, in rad and m'
+            f'{line[:200]!r} is no request; write one as in {{"joints": [0.1, 0.2]}}, in rad and m'
         ) from None
 
 

@@ -72,11 +72,11 @@ def convert(
 
     ending = target.suffix.lower()
     if ending not in _WRITERS:
-        raise ConversionError(f"{target}: ending {ending!r} is not written; {', '.join(_WRITERS)} are")
+        raise ConversionError(f"{target}: ending {ending!r} is unknown; must be one of {', '.join(_WRITERS)}")
     if up not in (None, "y", "z"):
-        raise ConversionError(f"--up {up}: y or z is right")
+        raise ConversionError(f"--up {up}: must be y or z")
     if scale is not None and not (isfinite(scale) and scale > 0):
-        raise ConversionError(f"--scale {scale}: a number above 0 is right")
+        raise ConversionError(f"--scale {scale}: must be a number above 0")
     if target.exists() and source.exists() and target.samefile(source):
         raise ConversionError(f"{target}: is the input file; name another output")
     mesh = _read(source)

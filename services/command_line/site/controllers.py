@@ -75,7 +75,7 @@ def controller_addresses(site: Site, options: Sequence[str]) -> dict[str, Contro
 def _other_port(robot: str, text: str) -> tuple[str, int]:
     name, _, port = text.partition("=")
     if not name or not port.isascii() or not port.isdecimal() or not 0 < int(port) < 65536:
-        raise ControllerError(f"--controller {robot}: {text!r}: NAME=PORT is right, as in primary=30011")
+        raise ControllerError(f"--controller {robot}: {text!r}: must be NAME=PORT, as in primary=30011")
     return name, int(port)
 
 

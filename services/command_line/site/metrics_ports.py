@@ -67,8 +67,8 @@ def ports(listen: tuple[str, int]) -> dict[str, int]:
     host, first = listen
     if first and first + len(SERVICES) - 1 > _MOST:
         raise ListenError(
-            f"metrics {host}:{first}: {len(SERVICES)} services take a port each from there: "
-            f"at most {_MOST - len(SERVICES) + 1} is right"
+            f"metrics {host}:{first}: {len(SERVICES)} services take a port each from there; "
+            f"the port must be at most {_MOST - len(SERVICES) + 1}"
         )
     return {name: first + number if first else 0 for number, name in enumerate(SERVICES)}
 

@@ -197,7 +197,7 @@ def _split(address: str, known: Mapping[str, Probe]) -> tuple[str, str, int]:
     except ListenError:
         port = 0
     if scheme not in _schemes(known) or port == 0:
-        raise ProbeError(f"{address!r}: tcp://HOST:PORT is right, as in tcp://10.0.0.7:30004")
+        raise ProbeError(f"{address!r}: must be tcp://HOST:PORT, as in tcp://10.0.0.7:30004")
     return scheme, host, port
 
 

@@ -211,7 +211,7 @@ def _faults_mesh(faults_for: str, site: Path | None, connect: str) -> "Mesh | No
         return None
     site_name, slash, robot_name = faults_for.partition("/")
     if not slash:
-        raise ControllerError(f"--for {faults_for}: SITE/ROBOT is right, as in demo/pt600")
+        raise ControllerError(f"--for {faults_for}: must be SITE/ROBOT, as in demo/pt600")
     return Mesh(
         site=check_name(site_name, "site"),
         robot=check_name(robot_name, "robot"),

@@ -230,15 +230,15 @@ def _numbers(option: str, text: str, names: str) -> list[float]:
     count = len(names.split())
     if len(found) != count or not all(isfinite(each) and abs(each) <= 1e5 for each in found):
         raise ProgramFileError(
-            f"{option} {text!r}: {count} number{'s' if count > 1 else ''} from -100000 to 100000 "
-            f"are right ({names})"
+            f"{option} {text!r}: must be {count} number{'s' if count > 1 else ''} from -100000 to 100000 "
+            f"({names})"
         )
     return found
 
 
 def _between(option: str, value: float, lowest: float, highest: float) -> float:
     if not lowest <= value <= highest:
-        raise ProgramFileError(f"{option} {value:g}: from {lowest:g} to {highest:g} mm is right")
+        raise ProgramFileError(f"{option} {value:g}: must be {lowest:g} to {highest:g} mm")
     return value
 
 

@@ -68,7 +68,7 @@ class AuthService:
                 f"`robomesh accounts add {self.path} NAME --role admin`"
             )
         if open_to_others(self.path):
-            log.warning("%s is readable by other users of this machine: chmod 600 is right", self.path)
+            log.warning("%s is readable by other users of this machine: run chmod 600 on it", self.path)
         self.sessions = Sessions(found.accounts, on_end=self._publish_end)
         self.tokens = ViewTokens(found.tokens, self.publish_event)
         self._refusals = RefusalEvents(self.publish_event, "account.refused")

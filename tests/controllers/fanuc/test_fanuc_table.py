@@ -29,7 +29,7 @@ def test_a_controller_of_fanuc_with_two_groups_is_two_robots():
         ({"controller": "udp://10.0.0.7:60008"}, "protocol 'snpx' needs tcp://10.0.0.7:60008"),
         ({"protocol": "unit", "fanuc": {}}, "fanuc needs the protocol 'fanuc-ftp' or 'snpx'"),
         ({"fanuc": {"user": "li"}}, "fanuc.user needs the protocol 'fanuc-ftp'"),
-        ({"fanuc": {"rate": 0.5}}, "fanuc.rate 0.5: with the protocol 'snpx' 1 to 100 is right"),
+        ({"fanuc": {"rate": 0.5}}, "fanuc.rate 0.5: must be 1 to 100 with the protocol 'snpx'"),
         ({"fanuc": {"j23": 2}}, "Input should be -1, 0 or 1"),
         ({"fanuc": {"assignments": "yes"}}, "'own' or 'pendant'"),
         ({"fanuc": {"io": ["GI[1]"]}}, r"as in DI\[1-16\]"),
@@ -89,7 +89,7 @@ def test_a_position_a_second_by_ftp_is_not_stale_before_the_next(fanuc, robot, r
 @pytest.mark.parametrize(
     ("robot", "problem"),
     [
-        ({"stale_after_s": 1.0}, "with 1 positions a second 2 or more is right"),
+        ({"stale_after_s": 1.0}, "must be 2 or more with 1 positions a second"),
         ({"fanuc": {"rate": 3}}, "with the protocol 'fanuc-ftp' at most 2"),
         ({"fanuc": {"rate": 0.1}}, "greater than or equal to 0.2"),
         ({"fanuc": {"motion": True, "assignments": "own", "j23": 1}}, "fanuc.assignments needs"),

@@ -388,7 +388,7 @@ def test_nothing_is_ever_commanded():
 def test_settings_that_do_not_fit_are_refused(tmp_path):
     with pytest.raises(GatewaySettingsError, match="no type codes"):
         fanuc_ftp_driver(SIX, {1: "COMMAND"})
-    with pytest.raises(GatewaySettingsError, match="user or password: only printable"):
+    with pytest.raises(GatewaySettingsError, match="user or password: must have only printable"):
         fanuc_ftp_driver(SIX, {}, options=FanucSettings(user="a\r\nDELE x"))
     path = tmp_path / "password"
     missing = FanucSettings(user="li", password_file=str(path))

@@ -136,7 +136,7 @@ def test_only_needed_values_have_to_be_finite():
         ),
         (packed(b"U", b"\x01" + struct.pack(">7d", float("-inf"), *Q)), "timestamp is not finite"),
         (packed(b"X", b"abc"), "unknown type 88"),
-        (packed(b"V", b"\x01\x02"), "answer 01 02, 00 or 01 is right"),
+        (packed(b"V", b"\x01\x02"), "answer 01 02: must be 00 or 01"),
         (packed(b"V"), "without a byte"),
         (packed(b"S", b"\x07"), "answer 07"),
         (packed(b"v", b"\x00" * 15), "15 bytes of a version"),
@@ -164,7 +164,7 @@ def test_impossible_length_ends_the_stream_at_once_without_a_buffer(header):
     (first, lost) = stream.receive(good + bytes.fromhex(header))
     assert stream.decode(first) == StartAnswered(True)
     assert (lost.fatal, lost.offset, stream.lost) == (True, 4, True)
-    assert "3 to 4096 are right" in lost.reason
+    assert "must be 3 to 4096" in lost.reason
     assert stream.receive(good * 1000) == []
 
 
@@ -251,7 +251,7 @@ def test_controller_without_version_2_is_read_with_version_1():
         ),
         (
             (packed(b"V", ACCEPTED), VERSION_5, packed(b"O", b"\x01DOUBLE,VECTOR6D,UINT8")),
-            "field robot_mode has the type UINT8, INT32 is right",
+            "field robot_mode has the type UINT8: must be INT32",
         ),
         (
             (

@@ -88,7 +88,7 @@ def test_status_job_system_torques_and_names_have_their_lengths():
 def test_an_alarm_has_sub_codes_on_later_controllers(more):
     head = struct.pack("<3I", 4107, 3, 1) + b"2026/11/26 09:30" + "異常".encode("shift_jis").ljust(32, b"\0")
     assert payloads.alarm(head + bytes(more)) == payloads.Alarm(4107, 3, 1, "2026/11/26 09:30", "異常")
-    with pytest.raises(ValueError, match="60 and 268 are right"):
+    with pytest.raises(ValueError, match="must be 60 or 268"):
         payloads.alarm(head + bytes(more) + b"\0")
 
 

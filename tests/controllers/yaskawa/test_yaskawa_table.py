@@ -32,7 +32,7 @@ def test_a_controller_with_two_arms_is_two_robots_of_different_groups():
             {"protocol": "unit", "controller": "tcp://10.0.0.7:1", "yaskawa": {}},
             "yaskawa needs the protocol 'hses'",
         ),
-        ({"yaskawa": {"group": "R9"}}, "R1 to R8, B1 to B8 and S1 to S24 are right"),
+        ({"yaskawa": {"group": "R9"}}, "must be R1 to R8, B1 to B8 or S1 to S24"),
         ({"yaskawa": {"axes": [9]}}, "less than or equal to 8"),
         ({"yaskawa": {"rate": 1000}}, "less than or equal to 100"),
         ({"yaskawa": {"pulses": [1]}}, "Extra inputs"),

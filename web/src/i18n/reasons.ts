@@ -177,7 +177,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   [
     "fault.times",
     [
-      "fault '{given}': NAME@BEGIN+LENGTH is right, both in seconds, as in {name}@2.5+10",
+      "fault '{given}': must be NAME@BEGIN+LENGTH, both in seconds, as in {name}@2.5+10",
       "故障“{given}”：应为 NAME@BEGIN+LENGTH，均以秒为单位，例如 {name}@2.5+10",
     ],
   ],
@@ -1796,21 +1796,21 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   ],
   [
     "pose.size",
-    ["the pose has {count} numbers; 16 are right, 4 rows of 4", "位姿有 {count} 个数；应为 16 个，4 行 4 列"],
+    ["the pose has {count} numbers; it must have 16, 4 rows of 4", "位姿有 {count} 个数；应为 16 个，4 行 4 列"],
   ],
   [
     "pose.shape",
     [
-      "the pose has numbers of shape {shape}; 16 are right, 4 rows of 4",
+      "the pose has numbers of shape {shape}; it must have 16, 4 rows of 4",
       "位姿的形状为 {shape}；应为 16 个数，4 行 4 列",
     ],
   ],
   ["pose.not_finite", ["the pose holds {value}; every number must be finite", "位姿含有 {value}；每个数须为有限数值"]],
-  ["pose.last_row", ["the pose has the last row {row}; 0 0 0 1 is right", "位姿的最后一行为 {row}；应为 0 0 0 1"]],
+  ["pose.last_row", ["the pose has the last row {row}; it must be 0 0 0 1", "位姿的最后一行为 {row}；应为 0 0 0 1"]],
   [
     "pose.too_far",
     [
-      "the pose is {distance_m} m away; less than {limit_m} m is right",
+      "the pose is {distance_m} m away; it must be less than {limit_m} m",
       "位姿远在 {distance_m} m 处；应小于 {limit_m} m",
     ],
   ],
@@ -1824,7 +1824,7 @@ const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]
   [
     "pose.mirrored",
     [
-      "the pose is mirrored: the determinant of its first 3 rows and columns is -1; 1 is right",
+      "the pose is mirrored: the determinant of its first 3 rows and columns is -1; it must be 1",
       "位姿是镜像：前 3 行 3 列的行列式为 -1；应为 1",
     ],
   ],

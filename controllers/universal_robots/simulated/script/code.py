@@ -139,7 +139,7 @@ class _Compiler:
             main.code = self._compiled(self._statement)
         self._skip_newlines()
         if self._peek.kind != "end of the script":
-            self._fail("one program is right")
+            self._fail("expected the end of the script")
         return Program(main, self._functions, secondary)
 
     # ------------------------------------------------------------------ tokens
@@ -161,11 +161,11 @@ class _Compiler:
 
     def _need(self, text: str) -> None:
         if not self._take(text):
-            self._fail(f"{text!r} is right")
+            self._fail(f"expected {text!r}")
 
     def _need_name(self) -> str:
         if self._peek.kind != "name":
-            self._fail("a name is right")
+            self._fail("expected a name")
         return self._next().text
 
     def _end_statement(self) -> None:
@@ -173,15 +173,15 @@ class _Compiler:
         if self._peek.kind == "newline":
             self._next()
         elif self._peek.kind not in ("name", "keyword"):
-            self._fail("the end of the line is right")
+            self._fail("expected the end of the line")
 
     def _skip_newlines(self) -> None:
         while self._peek.kind == "newline":
             self._next()
 
-    def _fail(self, right: str) -> None:
+    def _fail(self, problem: str) -> None:
         token = self._peek
-        raise ScriptError(f"unexpected {token.text or token.kind!r}: {right}", token.line)
+        raise ScriptError(f"unexpected {token.text or token.kind!r}: {problem}", token.line)
 
     def _deeper(self, call: Callable[[], None]) -> None:
         self._depth += 1
@@ -430,7 +430,7 @@ class _Compiler:
                 self._emit("load", name)
             case _:
                 self._at -= 1
-                self._fail("a value is right")
+                self._fail("expected a value")
 
     def _items(self) -> int:
         """Compile the items of a list after its bracket; return their number."""
@@ -451,7 +451,7 @@ class _Compiler:
                 names.append(self._next().text)
                 self._next()
             elif names:
-                self._fail("a name is right, as of the argument before")
+                self._fail("expected a name, as in the argument before")
             else:
                 count += 1
             self._expression()

@@ -297,7 +297,7 @@ def _replaced(items: Value, places: list[Value], value: Value) -> Value:
 
 def _number(value: Value) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ScriptError(f"a number is right, not {text_of(value)[:40]}")
+        raise ScriptError(f"expected a number, not {text_of(value)[:40]}")
     return value
 
 
