@@ -99,7 +99,7 @@ def fault(parts: Collection[str], *, first: bool) -> str | None:
     """Return why this folder's bundle cannot be used here, in one line; None: it can.
 
     Args:
-        parts: What is to be installed.
+        parts: Parts to install.
         first: Compare every file with its sum: nothing is installed yet, and nothing was edited.
     """
     try:
@@ -140,7 +140,7 @@ def project_files() -> Iterator[Path]:
 
 
 def platform_tags(machine: str) -> Iterator[str]:
-    """Yield pip's options for the platforms whose wheels run on a machine."""
+    """Yield pip's options for all platforms with wheels that run on a machine."""
     for tag in (
         f"manylinux2014_{machine}",
         *(f"manylinux_2_{minor}_{machine}" for minor in range(GLIBC, 4, -1)),

@@ -29,7 +29,10 @@ PACKAGES = (
     "benchmarks",
     "tests",
     "examples",
+    "deploy",
 )
+PROGRAMS = (Path("dev"),)
+"""Python programs without a suffix."""
 
 # A docstring begins with a verb in the imperative, or with a noun phrase.
 QUESTION_WORD = re.compile(
@@ -44,6 +47,8 @@ IDIOM = re.compile(
     goes?\ lost|foreign|door|lies|stands?|mind:|does\ well|is\ none|long\ since|in\ vain)\b""",
     re.IGNORECASE | re.VERBOSE,
 )
+# Functions and methods with a text for people as their first argument.
+PRINTS = {"debug", "info", "warning", "error", "exception", "critical", "exit", "say"}
 # What is quoted is a name, not prose: code, keys, addresses, the words of a command.
 QUOTED = re.compile(r"``[^`]*``|`[^`]*`|https?://\S+|\]\([^)]*\)")
 FENCE = re.compile(r"^(```|~~~).*?^\1\s*?$", re.MULTILINE | re.DOTALL)
@@ -93,17 +98,23 @@ def comments(path: Path, source: str) -> Iterator[Text]:
 
 
 def messages(path: Path, tree: ast.Module) -> Iterator[Text]:
-    """Yield the texts that people read: of errors that are raised, of log lines, and of a command's help."""
+    """Yield the texts that people read: of errors, log lines, status lines, and a command's help."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
             yield from (Text(path, node.lineno, text) for each in node.exc.args for text in _literal(each))
         elif isinstance(node, ast.Call):
-            called = node.func.attr if isinstance(node.func, ast.Attribute) else ""
-            if called in ("debug", "info", "warning", "error", "exception", "critical") and node.args:
+            if _called(node) in PRINTS and node.args:
                 yield from (Text(path, node.lineno, text) for text in _literal(node.args[0]))
             for keyword in node.keywords:
                 if keyword.arg == "help":
                     yield from (Text(path, node.lineno, text) for text in _literal(keyword.value))
+
+
+def _called(call: ast.Call) -> str:
+    """Return the name of the called function or method."""
+    if isinstance(call.func, ast.Name):
+        return call.func.id
+    return call.func.attr if isinstance(call.func, ast.Attribute) else ""
 
 
 def _literal(node: ast.expr) -> Iterator[str]:
@@ -146,10 +157,10 @@ def texts() -> dict[str, list[Text]]:
         path = Path(name)
         if not (ROOT / path).is_file() or path.name.endswith("_pb2.py"):
             continue
-        if path.suffix not in (".py", ".md", ".proto", ".ts", ".tsx", ".css"):
+        if path not in PROGRAMS and path.suffix not in (".py", ".md", ".proto", ".ts", ".tsx", ".css"):
             continue
         source = (ROOT / path).read_text(encoding="utf-8")
-        if path.suffix == ".py" and path.parts[0] in PACKAGES:
+        if path in PROGRAMS or (path.suffix == ".py" and path.parts[0] in PACKAGES):
             tree = ast.parse(source)
             kinds["docstrings"] += docstrings(path, tree)
             kinds["comments"] += comments(path, source)
