@@ -1,6 +1,7 @@
-"""Driver of controllers that speak the unit protocol: SI above, degrees and millimetres below.
+"""Driver of controllers that speak the unit protocol.
 
-The paper's controllers send only ABSOLUTE.DEG. Everything else is optional.
+It converts the protocol's degrees and millimetres to SI units, and back. The controllers of the paper send
+only ABSOLUTE.DEG; all other records are optional.
 """
 
 from collections.abc import Callable, Hashable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Driver that also moves the arm, by RMI: one program for each motion, which ends with it.
+"""Driver of FANUC controllers that also moves the robot.
 
     channel        port                          carries        sent
     -----------    ---------------------------   ------------   ------------------------------------------
@@ -7,15 +7,17 @@
     rmi_session    that of FRC_Connect's answer  motion, stop   FRC_Initialize, one FRC_JointMotionJRep,
                                                                 FRC_Abort, FRC_Disconnect
 
-RMI is connected while the robot is controlled, and to deliver a stop. A motion:
+The driver connects to RMI while the robot is controlled, and to send a stop that is pending. Each motion is
+one program, which the driver starts and ends:
 
     NONE --command--> SENT --answer--> RUNS --answer--> ENDING --answer to FRC_Abort--> NONE
           FRC_Initialize   the instruction    FRC_Abort
 
-Between motions nothing of the gateway is in the controller, so a program that runs then is another one. While
-a motion is open, no question is sent by RMI, because the controller refuses a command before it has answered
-the one before: the state is read by SNPX. What does not go as expected ends the motion by FRC_Abort, and
-latches a stop. No motion is sent again; FRC_Abort is, until it is answered.
+- Between motions the controller has no program of the gateway. A program that runs then is another client's.
+- During a motion the driver reads the state by SNPX only. It cannot ask by RMI: the controller refuses a
+  command until it has answered the previous one.
+- If a state or an answer is not as expected, the driver sends FRC_Abort, and the gateway latches a stop.
+- The driver sends each motion once. It repeats FRC_Abort until the controller has ended the program.
 """
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
@@ -110,7 +112,7 @@ _OF_SESSION = ("connect", "join", "leave", "initialize", "abort", "again", "watc
 
 @dataclass
 class _Sent:
-    """What is remembered of a motion that was commanded.
+    """Data of a motion that was commanded.
 
     Attributes:
         instruction: Its message.

@@ -1,4 +1,4 @@
-"""Driver that also moves the arm: a program for each motion, a dead man in the controller, two ways to stop.
+"""Driver of Universal Robots controllers that also moves the arm.
 
     channel      port    carries           sent
     ---------    -----   ---------------   -----------------------------------------------------------
@@ -8,9 +8,19 @@
     inputs       30004   motion            two registers, 50 times a second while a motion runs
     scripts      30001   motion            the program of a motion
 
-A program is sent only while the newest state says that no program runs, and only in remote control. It must
-be seen to have started within START_S. What does not go as expected gives the motion up: its permission and
-the beats end, so that the controller stops the arm, and the gateway latches a stop. It is never sent again.
+Each motion is one program. The program moves the arm only while the driver writes the motion's number, its
+permission, into one register, and a new number, the beat, into the other. If the beats end, the controller
+stops the program.
+
+Start: The driver sends a program only in remote control, and only if the newest state shows that no program
+runs. A state must show the new program within START_S.
+
+Stop: The driver ends the permission and the beats, and sends "stop" to the dashboard. Either ends the
+program. The dashboard does so in remote control only; it then also ends a program of another client.
+
+Error: If a state does not show the motion as expected, or a needed connection ends, the driver ends the
+permission and the beats. The controller then stops the arm, and the gateway latches a stop. The driver never
+sends a motion again.
 """
 
 import secrets
@@ -104,7 +114,7 @@ _FAULTS = frozenset({SafetyMode.VIOLATION, SafetyMode.FAULT})
 
 @dataclass
 class _Sent:
-    """What is remembered of a motion that was sent."""
+    """Data of a motion that was sent."""
 
     number: int
     sent_s: float

@@ -1,19 +1,20 @@
-"""Driver that also moves the arm: one motion to absolute pulses at a time, and HOLD as the stop.
+"""Driver of Yaskawa controllers that also moves the robot.
 
     channel   carries   sent
     -------   -------   ------------------------------------------------------------------
     hses      reading   the questions of the driver that only reads; HOLD, as a second way
-    stop      stop      HOLD; the status ten times a second
+    stop      stop      HOLD; the question for the status, ten times a second
     motion    motion    the motions
 
-All are sockets to the same port, so each has its own numbers and answers. UDP loses, doubles and delays:
+The driver sends one motion at a time, to absolute pulses. Its stop is HOLD. Each channel is a socket of its
+own, to the same port of the controller, so each numbers its own messages. UDP loses, doubles and delays them:
 
-- A question is repeated, and so is HOLD until the status shows it.
-- A motion is sent once. Without an answer its fate is read from the status and the positions. If they do not
-  show it, or show anything else than the motion, the driver sets HOLD and the gateway latches a stop. A
-  controller on HOLD refuses a motion that arrives late.
-- The end of HOLD is sent once, by RESET, and only if nothing of the gateway's can go on then. Whether a held
-  motion does is not known, so HOLD ends over one only while the servos are off.
+- The driver repeats a question. It repeats HOLD until the status shows it.
+- The driver sends a motion once. Without an answer it looks for the motion in the status and the positions.
+  If they do not show the motion, or show something else, the driver sets HOLD and the gateway latches a stop.
+  A controller on HOLD refuses a motion that arrives late.
+- The driver sends the end of HOLD once, at RESET. A held motion of the gateway may continue then. If there
+  may be one, the driver ends HOLD only while the servos are off.
 """
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
@@ -100,7 +101,7 @@ class _Hold(Enum):
 
 @dataclass
 class _Sent:
-    """What is remembered of a motion that was sent.
+    """Data of a motion that was sent.
 
     Attributes:
         answered: The controller has accepted it.
