@@ -1,7 +1,7 @@
 """All reasons: code, English sentence, and advice.
 
 The sentence is the problem, then a colon and the advice. Words in braces are parameters; `{cause}` is the
-sentence of another reason. The page translates these codes (`web/src/i18n/reasons.ts`).
+sentence of another reason. The page has their Chinese (`web/src/i18n/zh.json`).
 
 `{detail}` is a text of another author: the operating system, a third-party reader, a controller; or the
 problem of a file, which has too many forms for codes.

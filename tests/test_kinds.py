@@ -23,7 +23,7 @@ def test_nothing_outside_the_kinds_names_one():
     named = [
         f"{file.relative_to(ROOT)}: {found[0]}"
         for folder in OUTSIDE
-        for ending in ("py", "ts", "tsx", "proto", "css")
+        for ending in ("py", "ts", "tsx", "json", "proto", "css")
         for file in sorted((ROOT / folder).rglob(f"*.{ending}"))
         if not {"gen", "node_modules"} & {*file.parts} and (found := NAMES.search(file.read_text("utf-8")))
     ]

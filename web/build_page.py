@@ -8,7 +8,6 @@ type check, formatter, linter and what the tests use are installed only where so
 
 import json
 import os
-import re
 import runpy
 import subprocess
 import sys
@@ -31,7 +30,7 @@ BIOME = MODULES / "@biomejs" / "biome" / "bin" / "biome"
 _SCHEMAS = tuple(
     ROOT / "robomesh" / name for name in ("contract/topics.py", "reasons.py", "schemas/robomesh_pb2.py")
 )
-# Reasons that only a kind of controllers has, in both languages.
+# Reasons that only a kind of controllers has, with their Chinese.
 _CODES = sorted((ROOT / "controllers").glob("*/codes.py"))
 
 
@@ -142,7 +141,7 @@ def write_types() -> None:
         raise PageBuildError(f"protoc-gen-es: {response.error}")
     for file in response.file:
         _write(file.name, file.content)
-    _write("reasons-of-kinds.ts", reasons_of_kinds())
+    _write("reasons-of-kinds.json", reasons_of_kinds())
 
 
 def _write(name: str, content: str) -> None:
@@ -153,20 +152,15 @@ def _write(name: str, content: str) -> None:
 
 
 def reasons_of_kinds() -> str:
-    """Return the module with the reasons of all kinds of controllers: code, English and Chinese."""
-    rows = {}
+    """Return the Chinese of the reasons of all kinds of controllers, by the keys of the page's catalogues."""
+    chinese = {}
     with _importable():
         # Not imported: their packages import what a build does not have.
         for file in _CODES:
             for each in runpy.run_path(str(file)).values():
                 if type(each).__name__ == "Code":
-                    rows[each.name] = (re.sub(r"\{(\w+):[^}]*\}", r"{\1}", each.sentence), each.chinese)
-    pairs = json.dumps([*rows.items()], ensure_ascii=False, indent=1)
-    return (
-        "/** Sentences of reasons that only a kind of controllers has, by code: English, Chinese. */\n"
-        "export const SENTENCES_OF_KINDS: readonly (readonly [string, readonly [string, string]])[] = "
-        f"{pairs};\n"
-    )
+                    chinese[f"reason.{each.name}"] = each.chinese
+    return json.dumps({"zh": chinese}, ensure_ascii=False, indent=1)
 
 
 def _schema_files() -> list[Any]:

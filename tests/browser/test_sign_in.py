@@ -120,7 +120,8 @@ def test_an_operator_signs_in_has_control_in_its_own_name_and_signs_out_in_all_t
 def test_the_page_counts_the_seconds_until_the_next_attempt_and_shows_an_unknown_code_in_english(open_tab):
     page = open_tab()
     expect(page.get_by_role("heading", name="Console of hall")).to_be_visible()
-    wait = {"code": "account.wait", "values": {"seconds": "40"}, "causes": [], "text": "too many attempts"}
+    sentence = "too many attempts: try again in 40 s"
+    wait = {"code": "account.wait", "values": {"seconds": "40"}, "causes": [], "text": sentence}
     page.route("**/account/sign-in", lambda route: route.fulfill(status=429, json=answer(wait, seconds=40)))
     sign_in(page, "li")
     counted = re.compile(r"^Not signed in: too many attempts: try again in [123]\d s$")

@@ -1,56 +1,72 @@
-"""The page has a sentence in each language for every reason of the table."""
-
-import re
-import runpy
-from ast import literal_eval
-from pathlib import Path
+"""Reasons on the page: in English the mesh's own sentence, in Chinese the catalogue's."""
 
 import pytest
+from google.protobuf.json_format import MessageToDict
 
-from robomesh import reason_codes
-from robomesh.reasons import Code
+from robomesh import reason_codes as codes
+from robomesh.messages import reason_message
+from robomesh.reasons import Reason
+from tests import page_modules
 
-SENTENCES = Path(__file__).resolve().parents[2] / "web/src/i18n/reasons.ts"
-TEXT = r"""("(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*')"""
-ROW = re.compile(rf"^  \[\s*{TEXT},\s*\[\s*{TEXT},\s*{TEXT},?\s*\],?\s*\],$", re.MULTILINE)
-ROWS = {
-    literal_eval(code): (literal_eval(english), literal_eval(chinese))
-    for code, english, chinese in ROW.findall(SENTENCES.read_text("utf-8"))
-}
-TABLE = {each.name: each for each in vars(reason_codes).values() if isinstance(each, Code)}
+pytestmark = pytest.mark.slow
 
-
-KINDS = sorted((SENTENCES.parents[3] / "controllers").glob("*/codes.py"))
-
-
-def parameters(sentence):
-    return set(re.findall(r"\{(\w+)\}", sentence))
-
-
-def test_the_page_has_the_codes_of_the_table():
-    assert ROWS.keys() == TABLE.keys()
+SCRIPT = """
+answer(asked.map(([language, reason, seconds]) => {
+  page.language.value = language;
+  const given = { values: {}, causes: [], text: "", ...reason };
+  given.causes = given.causes.map((cause) => ({ values: {}, causes: [], text: "", ...cause }));
+  return page.reasonText(seconds ? page.withValue(given, "seconds", seconds) : given);
+}));
+"""
+LIMIT = codes.JOINT_LIMIT(name="elbow", value="-131.0°", limit="-120.0°")
+HELD = codes.LEASE_HELD(holder="עלי")
 
 
-def test_its_english_is_the_table_s():
-    wrong = {
-        name: english
-        for name, (english, _) in ROWS.items()
-        if english != re.sub(r"\{(\w+):[^}]*\}", r"{\1}", TABLE[name].sentence)
-    }
-    assert wrong == {}
+@pytest.fixture(scope="module")
+def module(tmp_path_factory):
+    return page_modules.bundle(
+        tmp_path_factory.mktemp("reasons"), reasons="i18n/reasons.ts", texts="i18n/texts.ts"
+    )
 
 
-def test_its_chinese_has_the_same_parameters():
-    for name, (english, chinese) in ROWS.items():
-        assert parameters(chinese) == parameters(english), name
-        assert re.search("[\u4e00-\u9fff]", chinese) or re.fullmatch(r"(\{\w+\}|[：，])+", chinese), name
+def shown(module, reason, *seconds):
+    """Return a reason's sentence on the page, in English and Chinese."""
+    row = MessageToDict(reason_message(reason))
+    return page_modules.ask(module, SCRIPT, [[language, row, *seconds] for language in ("en", "zh")])
 
 
-@pytest.mark.parametrize("file", KINDS, ids=lambda file: file.parent.name)
-def test_a_kind_s_own_reasons_have_chinese_with_the_same_parameters(file):
-    codes = [each for each in runpy.run_path(str(file)).values() if isinstance(each, Code)]
-    assert codes
-    for each in codes:
-        assert each.name not in TABLE, each.name
-        assert parameters(each.chinese) == each.parameters, each.name
-        assert re.search("[\u4e00-\u9fff]", each.chinese), each.name
+def test_numbers_have_the_page_s_minus_sign(module):
+    english, chinese = shown(module, LIMIT)
+    assert english == str(LIMIT).replace("-", "−")
+    assert chinese == "关节 elbow 的 −131.0° 超出限位 −120.0°"
+
+
+def test_a_hyphen_of_the_sentence_stays(module):
+    reason = codes.NUMBER_TOO_LARGE(word="speed", name="x", given="-7", most=5)
+    assert shown(module, reason)[0] == "'speed': x is −7; must be between -5 and 5"
+
+
+def test_a_name_from_right_to_left_is_isolated_also_in_a_cause(module):
+    for text in shown(module, codes.PROGRAM_CONTROL_ENDED(HELD)):
+        assert "\u2068עלי\u2069" in text
+        assert "U+2068" not in text
+
+
+def test_a_cause_is_in_the_page_s_language(module):
+    assert shown(module, codes.PROGRAM_LINE(LIMIT, line=3))[1] == f"第 3 行：{shown(module, LIMIT)[1]}"
+
+
+def test_an_unknown_code_shows_its_english(module):
+    for code in ("future.code", "constructor"):
+        assert shown(module, Reason(code, {}, (), "something new")) == ["something new"] * 2
+
+
+def test_a_stop_without_a_reason_names_only_its_sender(module):
+    assert shown(module, codes.PROGRAM_STOPPED(by="li", reason="console")) == ["stopped by li", "由 li 停止"]
+
+
+def test_seconds_are_counted_down(module):
+    assert shown(module, codes.ACCOUNT_WAIT(seconds=30), "29") == [
+        "too many attempts: try again in 29 s",
+        "尝试次数过多：请在 29 秒后重试",
+    ]

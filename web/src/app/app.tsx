@@ -8,7 +8,7 @@ import { FleetPage } from "../features/fleet/fleet-page";
 import { ControllerStateSchema } from "../gen/robomesh_pb";
 import { a } from "../i18n/account";
 import { whenText } from "../i18n/format";
-import { language, type TextName, t } from "../i18n/texts";
+import { type TextName, t } from "../i18n/texts";
 import { mustSignIn } from "../mesh/account";
 import { hello, lostAt, reachable } from "../mesh/connection";
 import { controlNotice, heldLease, release } from "../mesh/control";
@@ -88,7 +88,7 @@ export function App() {
         <StopPlace robots={mustSignIn.value ? [] : robots} />
       </Bar>
       <Banners />
-      <main id="page" tabIndex={-1} lang={language.value === "zh" ? "zh-Hans" : "en"}>
+      <main id="page" tabIndex={-1} lang={t("language_tag")}>
         {mustSignIn.value ? (
           <SignIn />
         ) : robot && notFound ? (

@@ -35,7 +35,7 @@ export function Bar({ children }: { children: ComponentChildren }) {
       <div class="bar-end">
         {mustSignIn.value || <AlarmBadge />}
         <AccountMenu />
-        <button class="quiet in-settings" onClick={switchLanguage} title={t("language_hint")}>
+        <button class="quiet in-settings" onClick={() => switchLanguage()} title={t("language_hint")}>
           {t("language")}
         </button>
         <button

@@ -1,7 +1,7 @@
 import "@preact/signals";
 import { render } from "preact";
 import { isolateForeignTexts } from "../i18n/foreign-text";
-import { language } from "../i18n/texts";
+import { declareLanguage } from "../i18n/texts";
 import { fetchAccount, reportActivity, signedOut } from "../mesh/account";
 import { keepConnected } from "../mesh/connection";
 import { followThisTab } from "../mesh/control";
@@ -12,7 +12,7 @@ import "./styles";
 
 isolateForeignTexts();
 applyTheme();
-document.documentElement.lang = language.value === "zh" ? "zh-Hans" : "en";
+declareLanguage();
 followThisTab();
 renewWhileBusy();
 const maySee = async () => {

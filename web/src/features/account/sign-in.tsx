@@ -2,7 +2,7 @@
 
 import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { a, endText } from "../../i18n/account";
-import { reasonText } from "../../i18n/reasons";
+import { reasonText, withValue } from "../../i18n/reasons";
 import { switchLanguage, t } from "../../i18n/texts";
 import { endedBy, me, signIn } from "../../mesh/account";
 import { RefusedRequest } from "../../mesh/refusal";
@@ -39,7 +39,7 @@ export function SignIn() {
     <section class="sign-in" aria-label={a("sign_in")}>
       {/* For narrow screens, where the bar has no space for them. */}
       <p class="sign-in-look">
-        <button class="quiet" onClick={switchLanguage} title={t("language_hint")}>
+        <button class="quiet" onClick={() => switchLanguage()} title={t("language_hint")}>
           {t("language")}
         </button>
         <button class="quiet" onClick={switchTheme}>
@@ -98,7 +98,7 @@ export function SignIn() {
 /** Return the reason in words, with the seconds that are left to wait. */
 function textOf({ reason, message }: RefusedRequest, left: number): string {
   if (!reason || left === 0) return message;
-  return reasonText({ ...reason, values: { ...reason.values, seconds: String(left) } }, message);
+  return reasonText(withValue(reason, "seconds", String(left)), message);
 }
 
 /** Return the whole seconds until a time, counted down. */

@@ -1,14 +1,12 @@
 // Language and theme, kept in this browser only.
 
 import { s } from "../../i18n/settings";
-import { language, switchLanguage } from "../../i18n/texts";
+import { LANGUAGES, language, languageName, switchLanguage } from "../../i18n/texts";
 import { setSound, sound } from "../../panels/alarm-sound";
 import { Choice } from "../../ui/choice";
 import { Panel } from "../../ui/panel";
 import { switchTheme, theme } from "../../ui/theme";
 import { Facts } from "./facts";
-
-const LANGUAGES = { en: "English", zh: "中文" } as const;
 
 export function Appearance() {
   return (
@@ -20,10 +18,10 @@ export function Appearance() {
             <Choice
               key="language"
               label={s("language")}
-              values={["en", "zh"] as const}
+              values={LANGUAGES}
               chosen={language.value}
-              text={(name) => LANGUAGES[name]}
-              choose={(name) => name !== language.value && switchLanguage()}
+              text={languageName}
+              choose={switchLanguage}
             />,
           ],
           [
