@@ -39,13 +39,13 @@ if __name__ == "__main__":
 from benchmarks.renderer_peers import drawn, reason
 from renderer.cameras import Camera
 from renderer.drawing import Drawing
-from renderer.glb import Surface, read_glb
 from renderer.mesh import MOST_TRIANGLES, Mesh, prepared_surfaces
 from renderer.opengl import open_context
 from renderer.scene import Part, Scene
 from robots.descriptions.description import load
 from robots.descriptions.glb import link_meshes
 from robots.kinematics.model import build_model, link_placements
+from robots.shapes.files.gltf import Surface, read_glb
 
 ROBOT = "pt600"
 SIZES = {"480p": (854, 480), "720p": (1280, 720)}
@@ -220,10 +220,10 @@ def mesh_of(glb: bytes, count: str, *, whole: bool = False, exact: bool = False)
 
 def subdivided(surface: Surface) -> Surface:
     """Divide each triangle into four."""
-    faces = surface.triangles
+    faces = surface.indices
     sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     unique, numbers = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
-    ab, bc, ca = numbers.reshape(3, -1) + len(surface.positions)
+    ab, bc, ca = numbers.reshape(3, -1) + len(surface.vertices)
     a, b, c = faces.T
     pieces = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
 
@@ -235,10 +235,10 @@ def subdivided(surface: Surface) -> Surface:
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return replace(
         surface,
-        positions=halved(surface.positions),
+        vertices=halved(surface.vertices),
         normals=normals,
         colors=None if surface.colors is None else halved(surface.colors),
-        triangles=np.concatenate([np.stack(piece, axis=1) for piece in pieces]),
+        indices=np.concatenate([np.stack(piece, axis=1) for piece in pieces]),
     )
 
 

@@ -14,7 +14,7 @@ from renderer.mesh import Mesh, prepared
 from robomesh.files.atomic_write import open_atomically, write_atomically
 
 # Incremented with each change of the preparation of meshes.
-_VERSION = 8
+_VERSION = 9
 
 
 def cache_folder() -> Path:

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.creases import FloatArray, IntArray, crease_normals, sharp_edges, weld
-from renderer.glb import Surface, read_glb
+from renderer.errors import GlbError
 from renderer.occlusion import open_sky
 from renderer.simplification import simplified
 from renderer.vertex_light import SCALES, ordered
+from robots.schema.errors import MeshError
+from robots.shapes.files.gltf import TRIANGLES, Surface, read_glb
 
 # Of the finest level: more take memory and time to prepare, and are seen only from very near.
 MOST_TRIANGLES = 16_000
@@ -87,16 +89,20 @@ def prepared(glb: bytes, *, color: str = "", most_triangles: int = MOST_TRIANGLE
     Raises:
         GlbError: If it is not GLB.
     """
-    return prepared_surfaces(read_glb(glb), color=color, most_triangles=most_triangles)
+    try:
+        surfaces = read_glb(glb)
+    except MeshError as error:
+        raise GlbError(str(error)) from None
+    return prepared_surfaces(surfaces, color=color, most_triangles=most_triangles)
 
 
 def prepared_surfaces(
     given: Sequence[Surface], *, color: str = "", most_triangles: int = MOST_TRIANGLES
 ) -> Mesh:
     """Return a mesh prepared from the surfaces of a GLB file; arguments as for `prepared`."""
-    surfaces = [surface for surface in given if len(surface.triangles)]
+    surfaces = [surface for surface in given if surface.mode == TRIANGLES and len(surface.indices)]
     plain = srgb(color) if color else _PLAIN_COLOR
-    kept = _MOST_BOUNDED / max(sum(len(surface.triangles) for surface in surfaces), 1)
+    kept = _MOST_BOUNDED / max(sum(len(surface.indices) for surface in surfaces), 1)
     error, bodies = _limited([_Body.of(surface, plain, kept) for surface in surfaces], most_triangles)
     corners = _joined([body.corners() for body in bodies], 3)
     vertices, numbers = _unique(_vertices(bodies))
@@ -144,17 +150,17 @@ class _Body:
 
     @classmethod
     def of(cls, surface: Surface, plain: tuple[float, float, float, float], kept: float) -> "_Body":
-        positions, triangles = _simplified(*weld(surface.positions, surface.triangles), kept)
+        positions, triangles = _simplified(*weld(surface.vertices, surface.indices), kept)
         color = np.array(surface.color or plain)
         colors = np.tile(color, (len(triangles), 3, 1))
-        untouched = len(triangles) == len(surface.triangles)
+        untouched = len(triangles) == len(surface.indices)
         if untouched and surface.colors is not None:
-            colors = surface.colors[surface.triangles] * (color if surface.color else 1.0)
+            colors = surface.colors[surface.indices] * (color if surface.color else 1.0)
         elif surface.colors is not None:
             # Without triangles that have no area, corners are not known: the mean is better than white.
             colors = colors * surface.colors.mean(axis=0)
         if untouched and surface.normals is not None:
-            normals = surface.normals[surface.triangles]
+            normals = surface.normals[surface.indices]
         else:
             normals = crease_normals(positions, triangles)
         return cls(

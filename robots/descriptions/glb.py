@@ -8,7 +8,6 @@ import hashlib
 import json
 import logging
 import os
-import struct
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
@@ -18,7 +17,9 @@ import numpy as np
 
 from robomesh.files.atomic_write import write_atomically
 from robots.kinematics.kinematic_tree import Shape, tree_of
+from robots.schema.errors import MeshError
 from robots.schema.robot_toml import RobotDescription
+from robots.shapes.files.gltf import glb_chunks
 from robots.shapes.files.read import read_mesh
 from robots.shapes.files.write_glb import glb_of
 from robots.shapes.mesh import PAINT, Y_UP_TO_Z_UP, Color, Mesh, Part, Wire, transformed_mesh
@@ -38,7 +39,7 @@ __all__ = [
 logger = logging.getLogger(__name__)
 
 # Part of each cache key. Increment it when the same mesh file should give another GLB.
-_VERSION = 6
+_VERSION = 7
 # Links are sent to phones too, and no screen shows more.
 MOST_TRIANGLES = 200_000
 
@@ -78,18 +79,17 @@ def shapes_glb(shapes: tuple[Shape, ...], *, cache: Path | None = None) -> bytes
 
 
 def main_colors(meshes: Mapping[str, bytes]) -> dict[str, Color]:
-    """Return the colour that covers most of each GLB of ours."""
+    """Return the main colour of each GLB that robomesh wrote."""
     found = {name: _main_color_of(glb) for name, glb in meshes.items()}
     return {name: color for name, color in found.items() if color is not None}
 
 
 def _main_color_of(glb: bytes) -> Color | None:
-    """Return the colour that covers most of a mesh of ours; None: it has none, or is of another program."""
+    """Return the main colour of a GLB; None: it has none, or another program wrote it."""
     try:
-        (size,) = struct.unpack_from("<I", glb, 12)
-        own = json.loads(glb[20 : 20 + size])["asset"]["extras"]["robomesh"]
-        red, green, blue = (float(each) for each in own["main_color"])
-    except (ValueError, KeyError, TypeError, struct.error):
+        document, _ = glb_chunks(glb, "the GLB")
+        red, green, blue = map(float, document["asset"]["extras"]["robomesh"]["main_color"])
+    except (MeshError, ValueError, KeyError, TypeError):
         return None
     return red, green, blue
 

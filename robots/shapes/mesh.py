@@ -161,7 +161,7 @@ def transformed(part: Part, placement: FloatArray) -> Part:
     return replace(
         part,
         vertices=part.vertices @ linear.T + placement[:3, 3],
-        normals=unit(part.normals @ _normal_transform(linear).T),
+        normals=unit(part.normals @ normal_transform(linear).T),
         triangles=triangles,
     )
 
@@ -176,7 +176,7 @@ def transformed_mesh(mesh: Mesh, placement: FloatArray) -> Mesh:
     )
 
 
-def _normal_transform(linear: FloatArray) -> FloatArray:
+def normal_transform(linear: FloatArray) -> FloatArray:
     """Return the cofactor matrix: parallel to the inverse transpose, but defined for singular matrices."""
     one, other = linear[[1, 2, 0]], linear[[2, 0, 1]]
     # Not numpy.cross, which is slow for files with thousands of parts.

@@ -255,8 +255,8 @@ READERS: Mapping[str, Reader] = {
     "3ds": Reader(read_3ds, _three_ds_corpus),
     "wrl": Reader(read_vrml, _vrml_corpus),
     "toml": Reader(_read_toml, _toml_corpus),
-    # Other people's readers behind ours.
     "glb": Reader(read_mesh, lambda: iter([glb_of(_box())])),
+    # Other people's readers behind ours.
     "stl": Reader(read_mesh, lambda: iter([write_stl(_box()), _STL])),
     "obj": Reader(read_mesh, lambda: iter([write_obj(_box(), "none.mtl")[0].encode()])),
     "ply": Reader(read_mesh, lambda: iter([write_ply(_box()), _PLY])),

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from renderer.errors import GlbError
-from renderer.glb import read_glb
 from robomesh.bounded_json import MOST_DEPTH, _check_depth, loads
 from robomesh.contract.messages import JSON, decode_request
 from robomesh.errors import MessageError
 from robomesh.schemas.robomesh_pb2 import ViewRequest
+from robots.schema.errors import MeshError
+from robots.shapes.files.gltf import read_glb
 
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.text(st.sampled_from('a"\\[]{}\n\u20ac')),
@@ -66,5 +66,5 @@ def test_messages_and_meshes_that_are_nested_too_deeply_are_refused():
         decode_request(ViewRequest, b'{"of": %s}' % nested(900).encode(), JSON)
     chunk = nested(900).encode()
     parts = (b"glTF", 2, 20 + len(chunk), len(chunk), b"JSON", chunk)
-    with pytest.raises(GlbError, match="nested too deeply"):
+    with pytest.raises(MeshError, match="nested too deeply"):
         read_glb(struct.pack(f"<4sIII4s{len(chunk)}s", *parts))

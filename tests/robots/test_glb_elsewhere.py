@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from renderer.glb import read_glb
 from robots.descriptions.description import load
 from robots.descriptions.glb import link_mesh, link_meshes, main_colors
 from robots.descriptions.urdf.viewers import prefixed
 from robots.descriptions.urdf.write import to_urdf
 from robots.kinematics.kinematic_tree import tree_of
+from robots.shapes.files.gltf import read_glb
 from robots.shapes.files.read import read_mesh
 from robots.shapes.files.write_glb import glb_of
 from robots.shapes.mesh import Material, Mesh, Part, Wire, bounds
@@ -112,7 +112,7 @@ def test_our_readers_turn_it_back_to_the_same_numbers(tmp_path: Path) -> None:
         np.testing.assert_array_equal(bounds(again), bounds(mesh))
         assert again.up == "z"
         (surface,) = read_glb(path.read_bytes())
-        np.testing.assert_array_equal(surface.positions, mesh.parts[0].vertices)
+        np.testing.assert_array_equal(surface.vertices, mesh.parts[0].vertices)
         np.testing.assert_allclose(surface.normals, mesh.parts[0].normals, atol=1e-7)
 
 

@@ -6,27 +6,19 @@ axis and the names of textures and of other files are kept here, because the lib
 
 import re
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 from urllib.parse import unquote
 
-from robomesh import bounded_json
 from robots.schema.errors import MeshError
 from robots.schema.xml_text import XmlError, xml_text
 from robots.shapes.files.text_repair import check_instances, counted_from_first, plain_text
 
 # A robot's link is far smaller. The console reads uploaded files, so the limits must be firm.
 MAX_BYTES = 1 << 30
-MAX_VALUES = 100_000_000
-# Points and triangle corners, counted once for each node that draws them.
-MAX_DRAWN = 30_000_000
 # trimesh makes a mesh for each material, which takes milliseconds.
 _MOST_MATERIALS = 2000
-_JSON_CHUNK = 0x4E4F534A
-# In `asset.extras["robomesh"]` of our GLB; before 2026-11 it was {"up": "z"}, and nothing was turned.
-TURNED_MARK = {"up": "y", "content_up": "z"}
 
 
 @dataclass(frozen=True)
@@ -36,10 +28,7 @@ class Declared:
     Attributes:
         unit_m: Length of the file's unit [m]; None if the file does not state one.
         up: Upward axis, "y" or "z"; empty if the file does not state one.
-        turned: Our writer turned the content from z up to y up; turning it back gives `up`.
         textures: Image by material name.
-        base_colors: Linear colour and opacity by material name; trimesh would round them to bytes.
-        linear: The colours are linear light, not sRGB.
         missing: Names of material files that do not exist or may not be read.
         files: Files that this file names, existing or not, in its folder or below.
         rewritten: Content to read instead of the file, if the libraries cannot read the file itself.
@@ -47,10 +36,7 @@ class Declared:
 
     unit_m: float | None = None
     up: str = ""
-    turned: bool = False
     textures: Mapping[str, str] = field(default_factory=dict)
-    base_colors: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    linear: bool = False
     missing: tuple[str, ...] = ()
     files: tuple[Path, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -137,7 +123,7 @@ def _obj(path: Path, data: bytes) -> Declared:
     text = plain_text(data)
     rewritten = counted_from_first(path, text)
     for found in _named("mtllib", text)[:100]:
-        library = _below(path, found)
+        library = below(path, found)
         files += [library] if library is not None else []
         if library is not None and library.is_file():
             textures |= _mtl_textures(library)
@@ -154,7 +140,7 @@ def _obj(path: Path, data: bytes) -> Declared:
         warnings.append(f"{left_out} lines or points are left out")
     return Declared(
         textures=textures,
-        files=(*files, *_textures_below(path, textures)),
+        files=(*files, *textures_below(path, textures.values())),
         missing=tuple(missing),
         warnings=tuple(warnings),
         rewritten=None if rewritten.encode() == data else rewritten.encode(),
@@ -181,7 +167,7 @@ def _check_obj_numbers(path: Path, text: str) -> None:
         raise MeshError(path, f"a face uses vertex {number}; there are at most {count}", place=f"line {line}")
 
 
-def _below(path: Path, address: str) -> Path | None:
+def below(path: Path, address: str) -> Path | None:
     """Return the path that an address in a file names; None outside the file's folder.
 
     trimesh reads no files outside the folder either.
@@ -194,8 +180,9 @@ def _below(path: Path, address: str) -> Path | None:
     return found if found.is_relative_to(path.parent.resolve()) else None
 
 
-def _textures_below(path: Path, textures: Mapping[str, str]) -> list[Path]:
-    places = (_below(path, unquote(texture)) for texture in textures.values() if ":" not in texture)
+def textures_below(path: Path, textures: Iterable[str]) -> list[Path]:
+    """Return the paths of textures in a file's folder or below."""
+    places = (below(path, unquote(texture)) for texture in textures if ":" not in texture)
     return [place for place in places if place is not None]
 
 
@@ -237,170 +224,9 @@ def _dae(path: Path, data: bytes) -> Declared:
     )
 
 
-def _gltf(path: Path, data: bytes) -> Declared:
-    return _gltf_declared(path, _json(path, data))
-
-
-def _glb(path: Path, data: bytes) -> Declared:
-    if len(data) < 20 or data[:4] != b"glTF":
-        raise MeshError(path, "is not a GLB file: one begins with 'glTF'")
-    version, length, size, kind = struct.unpack_from("<IIII", data, 4)
-    if version != 2:
-        raise MeshError(path, f"is glTF version {version}; only version 2 is read", place="byte 4")
-    if kind != _JSON_CHUNK or 20 + size > len(data) or length > len(data):
-        raise MeshError(path, f"is truncated or damaged: declares {length} bytes, has {len(data)}")
-    return _gltf_declared(path, _json(path, data[20 : 20 + size]))
-
-
-def _json(path: Path, data: bytes) -> dict[str, Any]:
-    try:
-        document = bounded_json.loads(data)
-    except (ValueError, RecursionError) as error:
-        raise MeshError(path, f"its JSON is invalid: {error}") from error
-    if not isinstance(document, dict):
-        raise MeshError(path, "its JSON is not an object")
-    return document
-
-
-def _gltf_declared(path: Path, document: dict[str, Any]) -> Declared:
-    required = [str(name) for name in _list(document, "extensionsRequired")]
-    packed = [name for name in required if "draco" in name.lower() or "meshopt" in name.lower()]
-    if packed:
-        raise MeshError(path, f"is compressed with {', '.join(packed)}; export it without compression")
-    counts = [item.get("count", 0) for item in _list(document, "accessors") if isinstance(item, dict)]
-    if any(not isinstance(count, int) or not 0 <= count <= MAX_VALUES for count in counts):
-        raise MeshError(path, f"an accessor's count is {max(map(str, counts))}; it must be 0 to {MAX_VALUES}")
-    bare = sum(
-        item.get("count", 0)
-        for item in _list(document, "accessors")
-        if isinstance(item, dict) and "bufferView" not in item
-    )
-    if bare > MAX_VALUES // 100:
-        raise MeshError(path, f"accessors of {bare} values have no data in the file")
-    _check_tree(path, [node for node in _list(document, "nodes") if isinstance(node, dict)])
-    _check_drawn(path, document)
-    asset = document.get("asset")
-    extras = asset.get("extras") if isinstance(asset, dict) else None
-    own = extras.get("robomesh") if isinstance(extras, dict) else None
-    addresses = [
-        str(item["uri"])
-        for item in _list(document, "buffers")
-        if isinstance(item, dict) and isinstance(item.get("uri"), str)
-    ]
-    outside = [address for address in addresses if not address.startswith("data:")]
-    files: list[Path] = []
-    for address in outside:
-        place = _below(path, unquote(address))
-        if place is not None and place.is_file():
-            files.append(place)
-        else:
-            raise MeshError(path, f"buffer {address!r}: no such file in this folder", missing=address)
-    textures = _gltf_textures(document)
-    return Declared(
-        unit_m=1.0,
-        up="z" if own else "y",
-        turned=isinstance(own, dict) and own.items() >= TURNED_MARK.items(),
-        textures=textures,
-        base_colors=_gltf_base_colors(document),
-        linear=True,
-        files=(*files, *_textures_below(path, textures)),
-    )
-
-
-def _check_tree(path: Path, nodes: list[dict[str, Any]]) -> None:
-    """Check that no node has two parents and that no node is its own ancestor.
-
-    With one parent each, a walk visits no node twice, and only a cycle can make it endless.
-
-    Raises:
-        MeshError: If the nodes are no forest, or are nested deeper than 1000.
-    """
-    parents: dict[int, int] = {}
-    for number, node in enumerate(nodes):
-        for child in _list(node, "children"):
-            if child in parents:
-                raise MeshError(path, f"node {child} has two parents; glTF allows one")
-            parents[child] = number
-    for start in range(len(nodes)):
-        seen, number = 0, start
-        while number in parents:
-            number, seen = parents[number], seen + 1
-            if seen > min(1000, len(nodes)):
-                raise MeshError(path, f"node {start} is nested deeper than 1000, or is its own ancestor")
-
-
-def _check_drawn(path: Path, document: dict[str, Any]) -> None:
-    """Reject a small file with many nodes and primitives that all draw the same values.
-
-    Raises:
-        MeshError: If they draw more than MAX_DRAWN points and corners.
-    """
-
-    def count(number: object) -> int:
-        accessors = _list(document, "accessors")
-        known = (
-            isinstance(number, int) and 0 <= number < len(accessors) and isinstance(accessors[number], dict)
-        )
-        return int(accessors[number].get("count", 0)) if known else 0  # type: ignore[call-overload]
-
-    sizes = []
-    for mesh in _list(document, "meshes"):
-        primitives = _list(mesh, "primitives") if isinstance(mesh, dict) else []
-        shapes = [shape for shape in primitives if isinstance(shape, dict)]
-        attributes = [shape.get("attributes") for shape in shapes]
-        points = [count(each.get("POSITION")) for each in attributes if isinstance(each, dict)]
-        sizes.append(sum(points) + sum(count(shape.get("indices")) for shape in shapes))
-    meshes = [node.get("mesh") for node in _list(document, "nodes") if isinstance(node, dict)]
-    drawn = sum(sizes[each] for each in meshes if isinstance(each, int) and 0 <= each < len(sizes))
-    if drawn > MAX_DRAWN:
-        raise MeshError(path, f"draws {drawn} points and corners; at most {MAX_DRAWN} are read")
-
-
-def _gltf_base_colors(document: dict[str, Any]) -> dict[str, tuple[float, ...]]:
-    found: dict[str, tuple[float, ...]] = {}
-    twice: set[str] = set()
-    for material in _list(document, "materials"):
-        try:
-            name, factor = material["name"], material["pbrMetallicRoughness"]["baseColorFactor"]
-            values = tuple(float(value) for value in factor)
-        except (KeyError, TypeError, ValueError):
-            continue
-        if name in found:
-            twice.add(name)
-        if len(values) == 4:
-            found[name] = values
-    return {name: values for name, values in found.items() if name not in twice}
-
-
-def _gltf_textures(document: dict[str, Any]) -> dict[str, str]:
-    textures, images = _list(document, "textures"), _list(document, "images")
-    found = {}
-    for material in _list(document, "materials"):
-        if not isinstance(material, dict):
-            continue
-        name = str(material.get("name", ""))
-        extras = material.get("extras")
-        if isinstance(extras, dict) and isinstance(extras.get("texture"), str):
-            found[name] = extras["texture"]
-        try:
-            index = material["pbrMetallicRoughness"]["baseColorTexture"]["index"]
-            image = images[textures[index]["source"]]
-            found[name] = str(image.get("uri") or image.get("name") or "image in the file")[:200]
-        except (KeyError, IndexError, TypeError, AttributeError):
-            continue
-    return found
-
-
-def _list(document: dict[str, Any], key: str) -> list[Any]:
-    value = document.get(key, [])
-    return value if isinstance(value, list) else []
-
-
 _READERS: Mapping[str, Callable[[Path, bytes], Declared]] = {
     "stl": _stl,
     "ply": _ply,
     "obj": _obj,
     "dae": _dae,
-    "glb": _glb,
-    "gltf": _gltf,
 }

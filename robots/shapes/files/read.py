@@ -8,6 +8,7 @@ from typing import Any
 
 from robots.schema.errors import MeshError
 from robots.shapes.files.dxf import read_dxf
+from robots.shapes.files.gltf import read_gltf
 from robots.shapes.files.step import read_step
 from robots.shapes.files.text_repair import plain_text
 from robots.shapes.files.three_ds.read import read_3ds
@@ -27,8 +28,8 @@ READERS: Mapping[str, Callable[..., Mesh]] = {
     ".obj": read_trimesh,
     ".ply": read_trimesh,
     ".dae": read_trimesh,
-    ".glb": read_trimesh,
-    ".gltf": read_trimesh,
+    ".glb": read_gltf,
+    ".gltf": read_gltf,
     ".step": read_step,
     ".stp": read_step,
     ".iges": read_step,
@@ -63,7 +64,7 @@ def read_mesh(path: Path, progress: Progress | None = None, *, within: Path | No
     options: dict[str, Any] = {"progress": progress, "within": within, "kind": kind.lstrip(".")}
     taken = inspect.signature(reader).parameters
     mesh = reader(path, **{name: value for name, value in options.items() if name in taken})
-    if READERS.get(ending) is reader and (kind == ending or reader is not read_trimesh):
+    if READERS.get(ending) is reader and (kind == ending or reader not in (read_trimesh, read_gltf)):
         return mesh
     return replace(
         mesh,

@@ -20,7 +20,7 @@ import numpy as np
 from robomesh.extras import is_missing, missing
 from robots.schema.errors import MeshError
 from robots.shapes.files.declared_size import content
-from robots.shapes.files.trimesh_formats import read_trimesh
+from robots.shapes.files.gltf import read_gltf
 from robots.shapes.mesh import Mesh, transformed_mesh
 
 # Largest distance of a triangle from the surface [mm], and largest angle between neighbours [rad].
@@ -94,7 +94,7 @@ def read_step(
             )
         if done.returncode or not glb.is_file():
             raise MeshError(path, f"cannot be read as {form}: {_reason(done.stdout + done.stderr, form)}")
-        mesh = read_trimesh(glb)
+        mesh = read_gltf(glb)
     if not mesh.triangle_count:
         raise MeshError(path, "has no solid or surface that can be drawn")
     mesh = transformed_mesh(mesh, np.diag([made_m / unit_m] * 3 + [1.0]))

@@ -1,4 +1,4 @@
-"""Reader of STL, OBJ, PLY, DAE, GLB and glTF files, based on trimesh.
+"""Reader of STL, OBJ, PLY and DAE files, based on trimesh.
 
 Every triangle of the file is kept and placed by the file's nodes, in the file's axes and units. Missing
 normals are computed, smooth up to 30 degrees.
@@ -8,7 +8,7 @@ import importlib
 import io
 import logging
 import warnings as warnings_module
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,6 @@ import numpy as np
 from robots.schema.errors import MeshError
 from robots.shapes.files.declared_size import Declared, read_declared
 from robots.shapes.mesh import (
-    Y_UP_TO_Z_UP,
     Color,
     FloatArray,
     IndexArray,
@@ -36,7 +35,7 @@ _CREASE = np.radians(30)
 
 
 def read_trimesh(path: Path, *, kind: str = "") -> Mesh:
-    """Return the content of an STL, OBJ, PLY, DAE, GLB or glTF file, in the file's units and axes.
+    """Return the content of an STL, OBJ, PLY or DAE file, in the file's units and axes.
 
     Other files that it names are read below its folder only; files elsewhere count as missing.
 
@@ -48,10 +47,24 @@ def read_trimesh(path: Path, *, kind: str = "") -> Mesh:
     """
     kind = kind or path.suffix.lower().lstrip(".")
     declared = read_declared(path, kind)
-    found = _drawn(path, kind, declared)
+    mesh = mesh_of(path, _drawn(path, kind, declared), declared)
+    if not mesh.parts and not mesh.wires and kind == "stl":
+        raise MeshError(path, "is not an STL file: it has no facet")
+    return mesh
+
+
+def mesh_of(path: Path, found: Sequence[Part | Wire], declared: Declared) -> Mesh:
+    """Return the mesh of a file's shapes, without those that draw nothing.
+
+    Raises:
+        MeshError: If a vertex is not finite.
+    """
     parts = tuple(part for part in found if isinstance(part, Part) and len(part.triangles))
     wires = tuple(wire for wire in found if isinstance(wire, Wire) and len(wire.vertices))
-    _check(path, kind, parts, wires)
+    shapes: list[Part | Wire] = [*parts, *wires]
+    for shape in shapes:
+        if not np.isfinite(shape.vertices).all():
+            raise MeshError(path, f"{shape.name!r} has a vertex with a non-finite coordinate")
     warnings = declared.warnings
     textures = sorted({part.material.texture for part in parts} - {""})
     if textures:
@@ -104,26 +117,15 @@ def _reason(error: Exception) -> str:
     return f"{first} ({type(error).__name__})" if first else type(error).__name__
 
 
-def _check(path: Path, kind: str, parts: tuple[Part, ...], wires: tuple[Wire, ...]) -> None:
-    shapes: list[Part | Wire] = [*parts, *wires]
-    for shape in shapes:
-        if not np.isfinite(shape.vertices).all():
-            raise MeshError(path, f"{shape.name!r} has a vertex with a non-finite coordinate")
-    if not parts and not wires and kind == "stl":
-        raise MeshError(path, "is not an STL file: it has no facet")
-
-
 def _parts(scene: Any, declared: Declared) -> Iterator[Part | Wire]:
     for node in scene.graph.nodes_geometry:
         placement, key = scene.graph[node]
         shape = scene.geometry[key]
         matrix = np.asarray(placement, dtype=np.float64)
-        if declared.turned:
-            matrix = Y_UP_TO_Z_UP @ matrix
         if hasattr(shape, "faces"):
             yield transformed(_part(str(key), shape, declared), matrix)
         else:
-            yield placed(_wire(str(key), shape, declared), matrix)
+            yield placed(_points(str(key), shape), matrix)
 
 
 def _part(name: str, shape: Any, declared: Declared) -> Part:
@@ -132,28 +134,36 @@ def _part(name: str, shape: Any, declared: Declared) -> Part:
     if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(vertices):
         raise ValueError(f"a triangle uses vertex {triangles.max()}; there are {len(vertices)}")
     # The cache holds the file's normals. The public property would compute smooth normals if there are none.
-    given = shape._cache.cache.get("vertex_normals")
-    if given is not None:
-        given = np.asarray(given)
-        given = given if given.shape == vertices.shape and np.isfinite(given).all() else None
+    given = np.asarray(shape._cache.cache.get("vertex_normals", np.zeros((0, 3))))
     visual = shape.visual
     material, two_sided = _material(visual, declared)
     colors = None
     if visual.kind == "face":
-        colors = _rgba(visual.face_colors, declared)[np.repeat(np.arange(len(triangles)), 3)]
+        colors = _rgba(visual.face_colors)[np.repeat(np.arange(len(triangles)), 3)]
     elif visual.kind == "vertex":
-        colors = _rgba(visual.vertex_colors, declared)
+        colors = _rgba(visual.vertex_colors)
     elif visual.kind == "texture" and "color" in getattr(visual, "vertex_attributes", {}):
-        colors = _rgba(visual.vertex_attributes["color"], declared)
+        colors = _rgba(visual.vertex_attributes["color"])
+    return part_of(Part(name, material, vertices, given, triangles, two_sided, colors))
+
+
+def part_of(part: Part) -> Part:
+    """Return a part with normals, if it lacks some, and with a single colour as its material's."""
+    vertices, triangles, colors = part.vertices, part.triangles, part.colors
+    whole = part.normals.shape == vertices.shape and np.isfinite(part.normals).all()
+    given = part.normals if whole else None
     if given is None and colors is None:
         vertices, given, triangles = creased(*welded(vertices, triangles), _CREASE)
     elif given is None or (colors is not None and len(colors) != len(vertices)):
         vertices, given, triangles, colors = _unrolled(vertices, given, triangles, colors)
+    material = part.material
     if colors is not None and _uniform(colors):
         red, green, blue, opacity = colors[0].tolist()
         material = replace(material, diffuse=(red, green, blue), transparency=1 - opacity)
         colors = None
-    return Part(name, material, vertices, given, triangles, two_sided=two_sided, colors=colors)
+    return replace(
+        part, material=material, vertices=vertices, normals=given, triangles=triangles, colors=colors
+    )
 
 
 def _unrolled(
@@ -175,22 +185,13 @@ def _uniform(colors: FloatArray) -> bool:
     return len(colors) > 0 and bool((colors == colors[0]).all())
 
 
-def _rgba(values: Any, declared: Declared) -> FloatArray:
+def _rgba(values: Any) -> FloatArray:
     """Return (n, 4) sRGB colours with opacity, 0 to 1."""
     values = np.asarray(values)
     scale = np.iinfo(values.dtype).max if values.dtype.kind in "ui" else 1.0
     colors = np.ones((len(values), 4))
     colors[:, : values.shape[1]] = np.clip(values.astype(np.float64)[:, :4] / scale, 0, 1)
-    if declared.linear:
-        colors[:, :3] = srgb_of_linear(colors[:, :3])
     return colors
-
-
-def srgb_of_linear(values: FloatArray) -> FloatArray:
-    """Convert linear light, 0 to 1, to sRGB."""
-    low = values <= 0.0031308
-    result: FloatArray = np.where(low, 12.92 * values, 1.055 * np.maximum(values, 0) ** (1 / 2.4) - 0.055)
-    return result
 
 
 def _material(visual: Any, declared: Declared) -> tuple[Material, bool]:
@@ -200,7 +201,7 @@ def _material(visual: Any, declared: Declared) -> tuple[Material, bool]:
     name = str(getattr(found, "name", "") or "")
     texture = declared.textures.get(name, "")
     if hasattr(found, "baseColorFactor"):
-        return _physical(found, name, texture, declared), bool(getattr(found, "doubleSided", False))
+        return _physical(found, name, texture), bool(getattr(found, "doubleSided", False))
     written = getattr(found, "kwargs", None) or {}
     diffuse = tuple(written["kd"]) if "kd" in written else np.asarray(found.diffuse)[:3] / 255
     specular = tuple(written["ks"]) if "ks" in written else (0.0, 0.0, 0.0)
@@ -221,21 +222,17 @@ def _material(visual: Any, declared: Declared) -> tuple[Material, bool]:
     )
 
 
-def _physical(found: Any, name: str, texture: str, declared: Declared) -> Material:
-    base = declared.base_colors.get(name, found.baseColorFactor)
-    rgba = _rgba(np.asarray([base if base is not None else (1.0, 1.0, 1.0, 1.0)]), declared)[0]
+def _physical(found: Any, name: str, texture: str) -> Material:
+    base = found.baseColorFactor
+    rgba = _rgba([(1.0, 1.0, 1.0, 1.0) if base is None else base])[0]
     # Textures are not drawn, so a textured material without a base colour gets the default grey.
     diffuse = (0.8, 0.8, 0.8) if texture and base is None else rgba[:3]
     glow = found.emissiveFactor
-    emissive = (0.0, 0.0, 0.0) if glow is None else np.asarray(glow, dtype=np.float64)[:3]
-    if declared.linear:
-        emissive = srgb_of_linear(np.clip(np.asarray(emissive), 0, 1))
-    blended = not declared.linear or str(found.alphaMode or "OPAQUE") == "BLEND"
     return Material(
         name=name,
         diffuse=_color(diffuse),
-        emissive=_color(emissive),
-        transparency=_clipped(1 - float(rgba[3])) if blended else 0.0,
+        emissive=_color((0.0, 0.0, 0.0) if glow is None else np.asarray(glow, dtype=np.float64)[:3]),
+        transparency=_clipped(1 - float(rgba[3])),
         texture=texture,
     )
 
@@ -253,13 +250,8 @@ def _color(values: Any) -> Color:
     return red, green, blue
 
 
-def _wire(name: str, shape: Any, declared: Declared) -> Wire:
-    """Lines of a path, or points."""
+def _points(name: str, shape: Any) -> Wire:
     vertices = np.array(shape.vertices, dtype=np.float64).reshape(-1, 3)
-    if not hasattr(shape, "entities"):
-        given = np.asarray(shape.colors) if getattr(shape, "colors", None) is not None else np.zeros((0, 4))
-        colors = _rgba(given, declared) if len(given) == len(vertices) > 0 else None
-        return Wire(name, Material(), vertices, np.zeros((0, 2), dtype=np.int64), colors)
-    runs = [np.asarray(entity.points, dtype=np.int64) for entity in shape.entities]
-    pairs = [np.column_stack([run[:-1], run[1:]]) for run in runs]
-    return Wire(name, Material(), vertices, np.concatenate([np.zeros((0, 2), dtype=np.int64), *pairs]))
+    given = np.asarray(shape.colors) if getattr(shape, "colors", None) is not None else np.zeros((0, 4))
+    colors = _rgba(given) if len(given) == len(vertices) > 0 else None
+    return Wire(name, Material(), vertices, np.zeros((0, 2), dtype=np.int64), colors)

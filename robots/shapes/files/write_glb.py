@@ -13,13 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.shapes.files.declared_size import TURNED_MARK
+from robots.shapes.files.gltf import BINARY_CHUNK, JSON_CHUNK, LINES, POINTS, TRIANGLES, TURNED_MARK
 from robots.shapes.mesh import Y_UP_TO_Z_UP, Color, FloatArray, Material, Mesh, Part, Wire
 
-_JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _FLOAT, _UINT = 5126, 5125
 _VERTICES, _INDICES = 34962, 34963
-_POINTS, _LINES, _TRIANGLES = 0, 1, 4
 # Metallic and roughness factors of some materials; the older mesh formats cannot state them.
 _FINISHES = {"paint": (0.0, 0.45), "casting": (0.25, 0.6), "steel": (0.85, 0.3), "rubber": (0.0, 0.9)}
 
@@ -55,10 +53,10 @@ def glb_of(mesh: Mesh) -> bytes:
     document = _Document()
     for part in merged(mesh.parts):
         if len(part.triangles):
-            _add(document, part, part.triangles, _TRIANGLES, part.two_sided)
+            _add(document, part, part.triangles, TRIANGLES, part.two_sided)
     for wire in mesh.wires:
         if len(wire.vertices):
-            _add(document, wire, wire.segments, _LINES if len(wire.segments) else _POINTS, False)
+            _add(document, wire, wire.segments, LINES if len(wire.segments) else POINTS, False)
     return _packed(document, _main_color(mesh))
 
 
@@ -173,9 +171,9 @@ def _packed(document: _Document, main: Color | None) -> bytes:
             content[key] = items
     text = json.dumps(content, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<II", len(text), _JSON_CHUNK) + text
+    chunks = struct.pack("<II", len(text), JSON_CHUNK) + text
     if document.binary:
-        chunks += struct.pack("<II", len(document.binary), _BINARY_CHUNK) + document.binary
+        chunks += struct.pack("<II", len(document.binary), BINARY_CHUNK) + document.binary
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 

@@ -16,7 +16,6 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from renderer.appearance import Appearance, appearance_of, frame_placements, placements_at
-from renderer.glb import glb_to_z_up, read_glb
 from renderer.views import camera_of
 from robomesh.contract.keys import FREE, parse_key
 from robomesh.extras import missing
@@ -26,6 +25,7 @@ from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.series import known_values, units_of
 from robomesh.recordings.values import values_of
 from robomesh.schemas import robomesh_pb2 as schema
+from robots.shapes.files.gltf import glb_to_z_up, read_glb
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.meshes import recorded_mesh
 from services.command_line.recordings.plots import COLORS, panels_of
