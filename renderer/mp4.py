@@ -5,15 +5,14 @@ only forwards pictures can serve MP4 too.
 """
 
 import struct
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from renderer.errors import Mp4Error
 from renderer.h264_sps import picture_size
+from robomesh.h264 import DELIMITER, IDR_SLICE, PICTURE_PARAMETERS, SEQUENCE_PARAMETERS, nal_units
 
 # Ticks per second of all times in the file, the usual value for video.
 TIMESCALE = 90_000
-_IDR, _SPS, _PPS, _DELIMITER = 5, 7, 8, 9
 _MATRIX = struct.pack(">9I", 0x10000, 0, 0, 0, 0x10000, 0, 0, 0, 0x40000000)
 # sample_depends_on, sample_is_non_sync_sample: a key frame depends on nothing.
 _KEY_FLAGS, _OTHER_FLAGS = 0x02000000, 0x01010000
@@ -79,29 +78,17 @@ class FragmentedMp4:
 
 def _unpack(packet: bytes) -> _Unpacked:
     picture, sps, pps, key_frame = b"", b"", b"", False
-    for unit in nal_units(packet):
-        kind = unit[0] & 0x1F
-        if kind == _SPS:
+    for kind, unit in nal_units(packet):
+        if kind == SEQUENCE_PARAMETERS:
             sps = unit
-        elif kind == _PPS:
+        elif kind == PICTURE_PARAMETERS:
             pps = unit
-        elif kind != _DELIMITER:  # MP4's samples already delimit pictures
-            key_frame |= kind == _IDR
+        elif kind != DELIMITER:  # MP4's samples already delimit pictures
+            key_frame |= kind == IDR_SLICE
             picture += struct.pack(">I", len(unit)) + unit
     if not picture:
         raise Mp4Error(f"a packet of {len(packet)} bytes contains no H.264 picture (Annex B)")
     return _Unpacked(picture, sps, pps, key_frame)
-
-
-def nal_units(packet: bytes) -> Iterator[bytes]:
-    """Yield the NAL units of Annex B bytes."""
-    at = packet.find(b"\0\0\1")
-    while at >= 0:
-        start, at = at + 3, packet.find(b"\0\0\1", at + 3)
-        # Zeros before a start code belong to it; a unit never ends with a zero.
-        unit = (packet[start:at] if at >= 0 else packet[start:]).rstrip(b"\0")
-        if unit:
-            yield unit
 
 
 def _box(kind: bytes, *content: bytes) -> bytes:

@@ -11,6 +11,7 @@ from typing import Any
 from google.protobuf.message import Message
 
 from robomesh import reason_codes as codes
+from robomesh.h264 import holds_key_frame
 from robomesh.recordings.changes import (
     CHANGES,
     DamagedChangesError,
@@ -24,7 +25,6 @@ from robomesh.recordings.files import describe_deleted, describe_file, describe_
 from robomesh.recordings.folder import files_in, find_file, robot_of
 from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.series import MOST_POINTS, POINTS, SeriesReader, known_values
-from robomesh.recordings.video import holds_key_frame
 from robomesh.schemas import robomesh_pb2 as schema
 from services.recorder.robot_series import RobotSeries
 

@@ -22,7 +22,7 @@ from robomesh.contract.keys import robot_key
 from robomesh.contract.messages import decode
 from robomesh.contract.topics import History, Topic, topic
 from robomesh.errors import MessageError
-from robomesh.recordings.video import holds_key_frame
+from robomesh.recordings.h264 import holds_key_frame
 from robomesh.schemas import robomesh_pb2 as schema
 
 log = logging.getLogger(__name__)
