@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from renderer.errors import Mp4Error
 from renderer.h264_sps import picture_size
-from robomesh.h264 import DELIMITER, IDR_SLICE, PICTURE_PARAMETERS, SEQUENCE_PARAMETERS, nal_units
+from robomesh.recordings.h264 import DELIMITER, IDR_SLICE, PICTURE_PARAMETERS, SEQUENCE_PARAMETERS, nal_units
 
 # Ticks per second of all times in the file, the usual value for video.
 TIMESCALE = 90_000

@@ -11,7 +11,6 @@ from typing import Any
 from google.protobuf.message import Message
 
 from robomesh import reason_codes as codes
-from robomesh.h264 import holds_key_frame
 from robomesh.recordings.changes import (
     CHANGES,
     DamagedChangesError,
@@ -23,6 +22,7 @@ from robomesh.recordings.channel_names import SUFFIX
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.files import describe_deleted, describe_file, describe_unreadable
 from robomesh.recordings.folder import files_in, find_file, robot_of
+from robomesh.recordings.h264 import holds_key_frame
 from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.series import MOST_POINTS, POINTS, SeriesReader, known_values
 from robomesh.schemas import robomesh_pb2 as schema
