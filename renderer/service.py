@@ -31,7 +31,7 @@ from robomesh import reason_codes as codes
 from robomesh.contract.keys import CLOSE, FAR, FREE, WHOLE_SITE
 from robomesh.contract.quotas import DEFAULT_QUOTAS, Quota, Quotas
 from robomesh.errors import RefusedError
-from robomesh.requests.requests.server import Answerer, Request
+from robomesh.requests.server import Answerer, Request
 from robomesh.schemas.robomesh_pb2 import Event, KeyFrameAnswer, ViewAnswer, ViewRequest
 from robomesh.wire.session import Session
 

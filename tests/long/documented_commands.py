@@ -108,6 +108,7 @@ COMMANDS = {
     "./dev test tests/robots": How(says="passed"),
     "./dev test tests/controllers/test_conformance_of_motion.py -v -rs": How(says="passed"),
     "./dev test tests/services/test_zenohd.py": How(says="skipped"),
+    "./dev test tests/services/test_catalogues.py": How(says="passed"),
     "./dev test --quick": How(says="passed"),
     "./dev run python tests/check_prose.py --list 40": How(),
     "./dev run robomesh robot check <name>": How(typed=("./dev run robomesh robot check pt600",)),

@@ -4,7 +4,7 @@ import pytest
 from google.protobuf.json_format import MessageToDict
 
 from robomesh import reason_codes as codes
-from robomesh.messages import reason_message
+from robomesh.contract.messages import reason_message
 from robomesh.reasons import Reason
 from tests import page_modules
 
