@@ -9,7 +9,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache, lru_cache, partial
-from importlib.metadata import EntryPoint, distribution, entry_points
+from importlib.metadata import EntryPoint, EntryPoints, PackageNotFoundError, distribution, entry_points
 from inspect import signature
 from typing import Any, Literal, TypeVar, cast
 
@@ -29,7 +29,10 @@ _Part = TypeVar("_Part")
 def own_kinds() -> Mapping[str, Kind]:
     """Return robomesh's own kinds by protocol; an installation may leave out the folder of one."""
     kinds = {}
-    found = distribution("robomesh").entry_points.select(group=ENTRY_POINTS)
+    try:
+        found = distribution("robomesh").entry_points.select(group=ENTRY_POINTS)
+    except PackageNotFoundError:
+        found = EntryPoints()
     # Installers order them differently; ours is first.
     for each in sorted(found, key=lambda each: (each.name != "unit", each.name)):
         try:

@@ -2,6 +2,7 @@
 
 import re
 import sys
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import pytest
@@ -48,5 +49,18 @@ def test_a_kind_whose_folder_is_missing_is_no_protocol(monkeypatch):
         assert own_kinds().keys() == others
         with pytest.raises(GatewaySettingsError, match="unknown protocol 'snpx'; known: unit"):
             kind_of("snpx")
+    finally:
+        own_kinds.cache_clear()
+
+
+def test_sources_that_are_not_installed_say_so(monkeypatch):
+    def absent(name):
+        raise PackageNotFoundError(name)
+
+    own_kinds.cache_clear()
+    monkeypatch.setattr("protocol_gateway.kinds.distribution", absent)
+    try:
+        with pytest.raises(GatewaySettingsError, match="install robomesh again"):
+            own_kinds()
     finally:
         own_kinds.cache_clear()
