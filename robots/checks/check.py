@@ -231,7 +231,7 @@ def _limit_violation(line: int, limits: Sequence[Reason], begin_s: float, until_
 def _timing(joints: Joints, start: FloatArray, target: FloatArray, speed: float, samples: int) -> _Timing:
     motion = straight_motion(joints, start, target, speed=speed)
     if motion is None:
-        return _Timing(0.0, np.zeros(1), np.zeros(1))
+        return _Timing(0.0, np.zeros(samples), np.zeros(samples))
     table = motion.duration * _TABLE
     times = np.interp(np.linspace(0.0, 1.0, samples), motion.progress(table)[0], table)
     times[0], times[-1] = 0.0, motion.duration

@@ -106,6 +106,12 @@ def test_retreat_is_allowed_but_coming_nearer_again_is_a_violation(shelf: Cell) 
     assert standing.ok
 
 
+def test_a_way_of_the_size_of_rounding_is_checked(arm_cell: Cell) -> None:
+    step = Step(line=1, kind=StepKind.MOVE, target=np.array([1e-14, 0.0]))
+    result = check_plan(arm_cell, "arm", STRETCHED, (step,), others={})
+    assert (result.ok, result.duration_s) == (True, 0.0)
+
+
 def test_contact_at_the_start_is_reported(shelf: Cell) -> None:
     result = checked(shelf, "move_joints 0 0\n", np.array([MEETS + 0.05, 0.0]))
     (touch,) = result.violations
