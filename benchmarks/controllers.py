@@ -39,6 +39,7 @@ from latency import free_port, process, service, summary, until_connectable
 from plant import until
 
 import robomesh
+from benchmarks.burners import burning
 from robomesh.contract.endpoints import client_config
 from robomesh.schemas import robomesh_pb2 as schema
 
@@ -340,19 +341,6 @@ def answer_bare(endpoint: str) -> None:
         answering = session.declare_queryable("bare", lambda query: query.reply("bare", b""))
         time.sleep(3600)
         answering.undeclare()
-
-
-@contextlib.contextmanager
-def burning(processes: int) -> Iterator[None]:
-    with contextlib.ExitStack() as stack:
-        for _ in range(processes):
-            stack.enter_context(process(burn, ()))
-        yield
-
-
-def burn() -> None:
-    while True:
-        sum(range(10_000))
 
 
 # ---------------------------------------------------------------------------------- site

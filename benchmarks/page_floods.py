@@ -38,8 +38,9 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidStatus
 from websockets.frames import Frame, Opcode
 
+from benchmarks.burners import burn
 from benchmarks.latency import process, service, until_connectable
-from benchmarks.stops_beside import MOST_STOPS, ROBOTS, burn, controllers, summary
+from benchmarks.stops_beside import MOST_STOPS, ROBOTS, controllers, summary
 from robomesh.schemas.robomesh_pb2 import FromPage, ToPage
 from services.console.accounts import passwords
 from services.console.accounts.auth_service import change_account

@@ -16,7 +16,6 @@ is answered within 500 ms; no growth of the heap.
 import argparse
 import contextlib
 import json
-import multiprocessing
 import os
 import statistics
 import sys
@@ -33,6 +32,7 @@ if __name__ == "__main__":
     # Import from the root: a program in this folder has the same name as a package.
     sys.path[0] = str(Path(__file__).parents[1])
 
+from benchmarks.burners import burning
 from tests.browser.conftest import ARGUMENTS, CHROMIUM, PATIENCE_MS
 from tests.site import running_site
 from web import build_page
@@ -203,7 +203,7 @@ def used(processes: CDPSession) -> dict[str, float]:
 
 def busy(browser: Browser, address: str, seconds: float) -> dict[str, Any]:
     """Measure how late the main thread answers a timer while other processes use the cores [ms]."""
-    with opened(browser, address) as (page, _), burning():
+    with opened(browser, address) as (page, _), burning(BURNERS):
         drawn = page.evaluate(DRAWN)
         late = np.array(page.evaluate(LATENESS, [seconds, TIMER_MS]))
         later = page.evaluate(DRAWN)
@@ -214,25 +214,6 @@ def busy(browser: Browser, address: str, seconds: float) -> dict[str, Any]:
         "timers": len(late),
         "pictures_per_s": {name: round((later[name] - drawn[name]) / seconds, 2) for name in later},
     }
-
-
-@contextlib.contextmanager
-def burning() -> Iterator[None]:
-    """Run processes that never wait."""
-    burners = [multiprocessing.Process(target=burn, daemon=True) for _ in range(BURNERS)]
-    for burner in burners:
-        burner.start()
-    try:
-        yield
-    finally:
-        for burner in burners:
-            burner.kill()
-            burner.join()
-
-
-def burn() -> None:
-    while True:
-        pass
 
 
 def heap(browser: Browser, address: str, minutes: float) -> dict[str, Any]:

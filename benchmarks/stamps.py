@@ -18,13 +18,11 @@ import asyncio
 import contextlib
 import csv
 import json
-import multiprocessing
 import subprocess
 import sys
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Iterator
 from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
@@ -36,6 +34,7 @@ if __name__ == "__main__":
     # Import from the root: a program in this folder has the same name as a package.
     sys.path[0] = str(Path(__file__).parents[1])
 
+from benchmarks.burners import burning
 from benchmarks.soak import ROBOMESH, SITE, Ports, site_file, up
 from robomesh.schemas.robomesh_pb2 import RecorderRequest, Recording
 from robomesh.wire.session import Session, SessionSettings, open_session
@@ -67,25 +66,6 @@ def main() -> None:
     else:
         for key, value in result.items():
             print(f"{key:>12} {value}")
-
-
-@contextlib.contextmanager
-def burning(count: int) -> Iterator[None]:
-    """Run processes that use all the CPU that they get."""
-    processes = [multiprocessing.Process(target=burn, daemon=True) for _ in range(count)]
-    for process in processes:
-        process.start()
-    try:
-        yield
-    finally:
-        for process in processes:
-            process.kill()
-            process.join()
-
-
-def burn() -> None:
-    while True:
-        sum(range(100_000))
 
 
 class Seen:

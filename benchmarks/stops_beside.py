@@ -41,6 +41,7 @@ if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[1])
 
 from benchmarks import floods
+from benchmarks.burners import burn
 from benchmarks.floods import FLOODS
 from benchmarks.latency import process, service, until_connectable
 from robomesh.contract.topics import Role
@@ -396,11 +397,6 @@ def beside(load: Load, where: Site, asked: Any) -> Iterator[None]:
         while load.name in FLOODS and asked[0] < before + 1000 and time.monotonic() < deadline:
             time.sleep(0.01)
         yield
-
-
-def burn() -> None:
-    while True:
-        sum(range(1000))
 
 
 def flood(load: str, where: Site, index: int, asked: Any) -> None:
