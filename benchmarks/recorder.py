@@ -43,11 +43,11 @@ from robomesh.contract import topics
 from robomesh.contract.endpoints import client_config
 from robomesh.contract.header import Header, pack
 from robomesh.errors import NoAnswerError
-from robomesh.recordings.capture import Capture
 from robomesh.recordings.files import describe_file
 from robomesh.recordings.reading import RecordingFile
-from robomesh.recordings.recover import State, state_of
-from robomesh.recordings.reindex import index
+from robomesh.recordings.writing.capture import Capture
+from robomesh.recordings.writing.recover import State, state_of
+from robomesh.recordings.writing.reindex import index
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import SessionSettings, open_session
 

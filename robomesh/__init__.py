@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from robomesh.client.blocking import Arm, Mesh, Recording, Robot, open_recording
-    from robomesh.client.commands import CommandResult, JogResult, StopResult
-    from robomesh.client.control import AsyncArm
     from robomesh.client.mesh import AsyncMesh, RobotNotFoundError, Service
-    from robomesh.client.notes import Note
-    from robomesh.client.recorded_values import RecordedJoints, RecordedValues
-    from robomesh.client.recording import AsyncRecording, RecordedSample
-    from robomesh.client.recording_list import RecordedTopic, RecordingInfo
-    from robomesh.client.robot import AsyncRobot, CheckResult, InverseResult, Violation
-    from robomesh.client.samples import Alarm, Event, JointState, Sample, SignalState
-    from robomesh.client.streams import AsyncStream, StaleError, Stream
+    from robomesh.client.recordings.arrays import RecordedJoints, RecordedValues
+    from robomesh.client.recordings.descriptions import RecordedTopic, RecordingInfo
+    from robomesh.client.recordings.recording import AsyncRecording, RecordedSample
+    from robomesh.client.robot.commands import CommandResult, JogResult, StopResult
+    from robomesh.client.robot.control import AsyncArm
+    from robomesh.client.robot.notes import Note
+    from robomesh.client.robot.robot import AsyncRobot, CheckResult, InverseResult, Violation
+    from robomesh.client.robot.samples import Alarm, Event, JointState, Sample, SignalState
+    from robomesh.client.robot.streams import AsyncStream, StaleError, Stream
     from robomesh.errors import (
         BusyError,
         KeyNameError,
@@ -42,16 +42,16 @@ if TYPE_CHECKING:
 # Imported when they are used: the services import parts of this package, and need no client.
 _MODULES = {
     "client.blocking": ("Arm", "Mesh", "Recording", "Robot", "open_recording"),
-    "client.commands": ("CommandResult", "JogResult", "StopResult"),
-    "client.control": ("AsyncArm",),
+    "client.robot.commands": ("CommandResult", "JogResult", "StopResult"),
+    "client.robot.control": ("AsyncArm",),
     "client.mesh": ("AsyncMesh", "RobotNotFoundError", "Service"),
-    "client.notes": ("Note",),
-    "client.recorded_values": ("RecordedJoints", "RecordedValues"),
-    "client.recording": ("AsyncRecording", "RecordedSample"),
-    "client.recording_list": ("RecordedTopic", "RecordingInfo"),
-    "client.robot": ("AsyncRobot", "CheckResult", "InverseResult", "Violation"),
-    "client.samples": ("Alarm", "Event", "JointState", "Sample", "SignalState"),
-    "client.streams": ("AsyncStream", "StaleError", "Stream"),
+    "client.robot.notes": ("Note",),
+    "client.recordings.arrays": ("RecordedJoints", "RecordedValues"),
+    "client.recordings.recording": ("AsyncRecording", "RecordedSample"),
+    "client.recordings.descriptions": ("RecordedTopic", "RecordingInfo"),
+    "client.robot.robot": ("AsyncRobot", "CheckResult", "InverseResult", "Violation"),
+    "client.robot.samples": ("Alarm", "Event", "JointState", "Sample", "SignalState"),
+    "client.robot.streams": ("AsyncStream", "StaleError", "Stream"),
     "errors": (
         "RobomeshError",
         "BusyError",

@@ -10,18 +10,18 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal, Self, TypeVar
 
-from robomesh.client.commands import CommandResult, JogResult, Progress, StopResult
-from robomesh.client.control import AsyncArm
 from robomesh.client.event_loop import EventLoopThread
 from robomesh.client.mesh import AsyncMesh, Service
-from robomesh.client.notes import Note
-from robomesh.client.recorded_values import RecordedJoints, RecordedValues
-from robomesh.client.recording import AsyncRecording, RecordedSample
-from robomesh.client.recording_list import RecordingInfo
-from robomesh.client.recording_source import DiskSource
-from robomesh.client.robot import AsyncRobot, CheckResult, InverseResult, Matrix
-from robomesh.client.samples import Alarm, Event, JointState, Sample, SignalState
-from robomesh.client.streams import AsyncStream, OnStale, Stream
+from robomesh.client.recordings.arrays import RecordedJoints, RecordedValues
+from robomesh.client.recordings.descriptions import RecordingInfo
+from robomesh.client.recordings.recording import AsyncRecording, RecordedSample
+from robomesh.client.recordings.sources import DiskSource
+from robomesh.client.robot.commands import CommandResult, JogResult, Progress, StopResult
+from robomesh.client.robot.control import AsyncArm
+from robomesh.client.robot.notes import Note
+from robomesh.client.robot.robot import AsyncRobot, CheckResult, InverseResult, Matrix
+from robomesh.client.robot.samples import Alarm, Event, JointState, Sample, SignalState
+from robomesh.client.robot.streams import AsyncStream, OnStale, Stream
 from robomesh.contract.endpoints import DEFAULT_ROUTER
 from robomesh.errors import ForkedError, SessionError
 from robomesh.schemas import robomesh_pb2 as schema

@@ -7,13 +7,18 @@ from pathlib import Path
 from typing import Any, Self
 
 from robomesh.client.connection import connected, connection_settings
-from robomesh.client.recorder import RecorderFile
-from robomesh.client.recording import AsyncRecording
-from robomesh.client.recording_list import RecordingInfo, find_recording, list_recordings, recording_info
-from robomesh.client.recording_source import MeshSource
-from robomesh.client.robot import AsyncRobot, events_of
-from robomesh.client.samples import Alarm, Event, alarm_of
-from robomesh.client.streams import AsyncStream
+from robomesh.client.recordings.descriptions import (
+    RecordingInfo,
+    find_recording,
+    list_recordings,
+    recording_info,
+)
+from robomesh.client.recordings.recorder_file import RecorderFile
+from robomesh.client.recordings.recording import AsyncRecording
+from robomesh.client.recordings.sources import MeshSource
+from robomesh.client.robot.robot import AsyncRobot, events_of
+from robomesh.client.robot.samples import Alarm, Event, alarm_of
+from robomesh.client.robot.streams import AsyncStream
 from robomesh.contract.endpoints import DEFAULT_ROUTER
 from robomesh.contract.keys import ROOT, WHOLE_SITE, PresenceKey
 from robomesh.errors import RobomeshError, SessionError

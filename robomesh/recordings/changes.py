@@ -18,7 +18,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.files.atomic_write import write_atomically
-from robomesh.recordings.channel_names import SUFFIX
+from robomesh.recordings.names import SUFFIX
 from robomesh.schemas.robomesh_pb2 import Recording, RecordingChange, RecordingRequest
 from robomesh.texts import DIRECTION, is_file_title, one_line
 

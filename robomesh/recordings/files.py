@@ -15,10 +15,10 @@ from robomesh.contract.keys import parse_key
 from robomesh.contract.messages import reason_message
 from robomesh.reasons import Reason
 from robomesh.recordings.changes import DamagedChangesError, read_changes, set_labels
-from robomesh.recordings.channel_names import is_recorders, robot_channels
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.layout import layout_of
 from robomesh.recordings.metadata import OneRecording, lost_in
+from robomesh.recordings.names import is_recorders, robot_channels
 from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.records import number_in
 from robomesh.schemas import robomesh_pb2 as schema

@@ -25,7 +25,7 @@ from robomesh.contract import keys, topics
 from robomesh.contract.keys import PresenceKey
 from robomesh.errors import NoAnswerError
 from robomesh.listen_address import check_page_reach, split_address
-from robomesh.recordings.values import live_topics
+from robomesh.recordings.series.values import live_topics
 from robomesh.schemas.robomesh_pb2 import Event, ToPage
 from robomesh.service.health import own_version
 from robomesh.wire.session import Session

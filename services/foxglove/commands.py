@@ -17,9 +17,9 @@ from foxglove import MessageSchema, Schema, ServiceRequest, ServiceSchema
 
 from robomesh import bounded_json
 from robomesh import reason_codes as codes
-from robomesh.client.commands import CommandResult, Progress, request_stop
-from robomesh.client.control import AsyncArm
-from robomesh.client.robot import AsyncRobot
+from robomesh.client.robot.commands import CommandResult, Progress, request_stop
+from robomesh.client.robot.control import AsyncArm
+from robomesh.client.robot.robot import AsyncRobot
 from robomesh.contract.keys import robot_key
 from robomesh.contract.messages import JSON, decode_request
 from robomesh.errors import MessageError, MotionError, RefusedError, RobomeshError

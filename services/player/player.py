@@ -13,7 +13,7 @@ from robomesh import reason_codes as codes
 from robomesh.contract.keys import WHOLE_SITE
 from robomesh.errors import RefusedError
 from robomesh.recordings.errors import RecordingError
-from robomesh.recordings.folder import find_file
+from robomesh.recordings.names import find_file
 from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.presence import OPERATOR

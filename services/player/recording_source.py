@@ -13,11 +13,11 @@ from robomesh.contract.keys import parse_key
 from robomesh.contract.topics import History
 from robomesh.errors import RobomeshError
 from robomesh.publications.publisher import LIST_LENGTH
-from robomesh.recordings.channel_names import robot_channels
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.h264 import holds_key_frame
-from robomesh.recordings.publisher_time import PublisherTimes
+from robomesh.recordings.names import robot_channels
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
+from robomesh.recordings.series.publisher_time import PublisherTimes
 from robomesh.schemas import robomesh_pb2 as schema
 from services.player.errors import ReplayError
 from services.player.republish import NameMapping, renamed

@@ -18,13 +18,12 @@ from robomesh.recordings.changes import (
     read_changes,
     recording_path,
 )
-from robomesh.recordings.channel_names import SUFFIX
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.files import describe_deleted, describe_file, describe_unreadable
-from robomesh.recordings.folder import files_in, find_file, robot_of
 from robomesh.recordings.h264 import holds_key_frame
+from robomesh.recordings.names import SUFFIX, files_in, find_file, robot_of
 from robomesh.recordings.reading import RecordingFile
-from robomesh.recordings.series import MOST_POINTS, POINTS, SeriesReader, known_values
+from robomesh.recordings.series.downsampling import MOST_POINTS, POINTS, SeriesReader, known_values
 from robomesh.schemas import robomesh_pb2 as schema
 from services.recorder.robot_series import RobotSeries
 

@@ -13,10 +13,10 @@ from robomesh.contract.keys import check_chunk
 from robomesh.errors import KeyNameError, RefusedError
 from robomesh.publications.wall_clock import WallClock
 from robomesh.reasons import Reason
-from robomesh.recordings.capture import Capture
-from robomesh.recordings.channel_names import SUFFIX
 from robomesh.recordings.errors import CaptureError
 from robomesh.recordings.files import set_problem
+from robomesh.recordings.names import SUFFIX
+from robomesh.recordings.writing.capture import Capture
 from robomesh.schemas import robomesh_pb2 as schema
 from services.recorder.disk import Disk, ended_by
 from services.recorder.file_writer import STATES, OnPublication, Part

@@ -35,10 +35,9 @@ from robomesh.recordings.changes import (
     set_labels,
     write_changes,
 )
-from robomesh.recordings.channel_names import SUFFIX
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.files import describe_deleted, describe_unreadable
-from robomesh.recordings.folder import files_in, find_file, is_file_name, robot_of
+from robomesh.recordings.names import SUFFIX, files_in, find_file, is_file_name, robot_of
 from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
 from services.recorder.disk import error_text

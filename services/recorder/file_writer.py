@@ -7,8 +7,8 @@ from collections.abc import Callable
 from robomesh.contract.header import Header
 from robomesh.contract.topics import TOPICS, Topic
 from robomesh.publications.wall_clock import WallClock
-from robomesh.recordings.capture import Capture
 from robomesh.recordings.changes import set_labels
+from robomesh.recordings.writing.capture import Capture
 from robomesh.schemas import robomesh_pb2 as schema
 from services.recorder.disk import Disk, RecordingLevel, is_recorded
 

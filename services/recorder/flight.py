@@ -16,10 +16,10 @@ from robomesh import reason_codes as codes
 from robomesh.contract.messages import decode
 from robomesh.contract.topics import Topic
 from robomesh.errors import MessageError, RefusedError
-from robomesh.recordings.capture import Capture, is_being_written
-from robomesh.recordings.channel_names import SUFFIX
 from robomesh.recordings.errors import CaptureError
-from robomesh.recordings.recover import State, state_of
+from robomesh.recordings.names import SUFFIX
+from robomesh.recordings.writing.capture import Capture, is_being_written
+from robomesh.recordings.writing.recover import State, state_of
 from robomesh.schemas import robomesh_pb2 as schema
 from services.recorder.captures import Files, check_name
 from services.recorder.disk import error_text

@@ -13,11 +13,11 @@ from robomesh import reason_codes as codes
 from robomesh.contract.keys import CLOSE, FAR, FREE, WHOLE_SITE, robot_key
 from robomesh.errors import MessageError, RefusedError
 from robomesh.reasons import Reason
-from robomesh.recordings.capture import Capture
 from robomesh.recordings.changes import set_labels
-from robomesh.recordings.channel_names import INDEXING, ROBOT_DESCRIPTION, SUFFIX
 from robomesh.recordings.errors import RecordingsError
-from robomesh.recordings.recover import State
+from robomesh.recordings.names import INDEXING, ROBOT_DESCRIPTION, SUFFIX
+from robomesh.recordings.writing.capture import Capture
+from robomesh.recordings.writing.recover import State
 from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session

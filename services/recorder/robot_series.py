@@ -15,11 +15,10 @@ import numpy as np
 from robomesh import reason_codes as codes
 from robomesh.contract.keys import check_name
 from robomesh.errors import KeyNameError
-from robomesh.recordings.capture import is_being_written
-from robomesh.recordings.channel_names import SUFFIX
 from robomesh.recordings.errors import RecordingError
+from robomesh.recordings.names import SUFFIX
 from robomesh.recordings.reading import RecordingFile
-from robomesh.recordings.series import (
+from robomesh.recordings.series.downsampling import (
     MOST_POINTS,
     MOST_VALUES,
     POINTS,
@@ -29,7 +28,8 @@ from robomesh.recordings.series import (
     topics_of_values,
     units_of,
 )
-from robomesh.recordings.values import topic_of
+from robomesh.recordings.series.values import topic_of
+from robomesh.recordings.writing.capture import is_being_written
 from robomesh.schemas import robomesh_pb2 as schema
 from services.recorder.flight import FOLDER
 

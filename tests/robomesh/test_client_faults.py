@@ -12,8 +12,8 @@ import pytest
 import zenoh
 
 import robomesh
-from robomesh.client.commands import numbers, program_text
 from robomesh.client.event_loop import EventLoopThread
+from robomesh.client.robot.commands import numbers, program_text
 from robomesh.contract.endpoints import client_config
 from robomesh.contract.header import Header, pack
 from robomesh.schemas import robomesh_pb2 as schema

@@ -5,8 +5,8 @@ import asyncio
 import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from robomesh.client.robot import AsyncRobot
-from robomesh.client.streams import StaleError
+from robomesh.client.robot.robot import AsyncRobot
+from robomesh.client.robot.streams import StaleError
 from robomesh.contract.topics import stale_after_s
 from robomesh.errors import UnknownTopicError
 from robomesh.schemas import robomesh_pb2 as schema

@@ -10,7 +10,7 @@ import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
-from robomesh.client import recorder
+from robomesh.client.recordings import recorder_file as recorder
 from robomesh.schemas.robomesh_pb2 import FromPage
 from services.console.http import meshes
 from services.console.serving import uvicorn_server

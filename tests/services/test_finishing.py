@@ -8,7 +8,7 @@ import signal
 import psutil
 import pytest
 
-from robomesh.recordings.recover import State, state_of
+from robomesh.recordings.writing.recover import State, state_of
 from services.recorder import finishing
 from services.recorder.finishing import Finisher, Job
 from tests.conftest import run
@@ -39,7 +39,7 @@ def worker_process():
     """Return the worker process of this process, or None."""
     for each in psutil.Process().children():
         with contextlib.suppress(psutil.NoSuchProcess):  # it has ended meanwhile
-            if "robomesh.recordings.reindex" in each.cmdline():
+            if "robomesh.recordings.writing.reindex" in each.cmdline():
                 return each
     return None
 

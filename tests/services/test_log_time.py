@@ -7,7 +7,7 @@ from mcap.reader import make_reader
 
 from robomesh.contract.header import Header, pack
 from robomesh.publications.wall_clock import WallClock
-from robomesh.recordings.capture import Capture
+from robomesh.recordings.writing.capture import Capture
 from robomesh.wire.session import open_session
 from services.recorder import captures, subscriptions
 from tests.conftest import run

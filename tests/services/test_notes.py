@@ -11,7 +11,7 @@ from mcap_protobuf.decoder import DecoderFactory
 
 from robomesh import reason_codes as codes
 from robomesh.client.mesh import AsyncMesh
-from robomesh.client.robot import AsyncRobot
+from robomesh.client.robot.robot import AsyncRobot
 from robomesh.contract.quotas import Quotas
 from robomesh.errors import NoAnswerError
 from robomesh.schemas import robomesh_pb2 as schema

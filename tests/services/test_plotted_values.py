@@ -9,7 +9,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from robomesh.contract.messages import decode
 from robomesh.contract.topics import SCHEMAS
-from robomesh.recordings.values import live_topics, prismatic_joints, signal_units, unit_of, values_of
+from robomesh.recordings.series.values import live_topics, prismatic_joints, signal_units, unit_of, values_of
 from robomesh.schemas import robomesh_pb2 as schema
 from tests import page_modules
 from web import build_page

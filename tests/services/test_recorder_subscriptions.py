@@ -9,8 +9,8 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from robomesh.contract.header import Header, pack
 from robomesh.contract.topics import TOPICS, topic
-from robomesh.recordings.capture import Capture
 from robomesh.recordings.reading import RecordingFile
+from robomesh.recordings.writing.capture import Capture
 from robomesh.schemas.robomesh_pb2 import Event, EventList, RecordingQuery
 from robomesh.wire.session import open_session
 from services.recorder import subscriptions

@@ -12,7 +12,7 @@ import pytest
 from mcap.reader import make_reader
 
 from robomesh import reason_codes as codes
-from robomesh.client.recorder import RecorderFile
+from robomesh.client.recordings.recorder_file import RecorderFile
 from robomesh.recordings import changes as changes_of
 from robomesh.recordings.changes import changes_path, read_changes
 from robomesh.recordings.reading import RecordingFile

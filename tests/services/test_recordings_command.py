@@ -13,8 +13,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from robomesh.errors import QuotaError
-from robomesh.recordings.capture import Capture
-from robomesh.recordings.series import Series
+from robomesh.recordings.series.downsampling import Series
+from robomesh.recordings.writing.capture import Capture
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
 from services.command_line.main import run
@@ -204,7 +204,7 @@ def test_recovery_of_an_open_recording_is_refused(tmp_path, capsys):
 
 
 def test_a_recording_of_a_site_has_one_name_for_every_command(mesh, router, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("robomesh.client.recorder._LONGEST_WAIT_S", 0.1)
+    monkeypatch.setattr("robomesh.client.recordings.recorder_file._LONGEST_WAIT_S", 0.1)
     refusals = [None, QuotaError("more than one name may have: ask again in 30.0 s", again_s=30.0)]
 
     def check(client):

@@ -8,9 +8,9 @@ import zenoh
 
 import robomesh
 from robomesh import reason_codes as codes
-from robomesh.client.recorder import RecorderFile
-from robomesh.client.recording_list import recording_info
-from robomesh.client.recording_source import MeshSource
+from robomesh.client.recordings.descriptions import recording_info
+from robomesh.client.recordings.recorder_file import RecorderFile
+from robomesh.client.recordings.sources import MeshSource
 from robomesh.contract.endpoints import client_config
 from robomesh.errors import QuotaError
 from robomesh.recordings.layout import layout_of
@@ -41,7 +41,7 @@ def read(mesh, folder, use, *, name="trial.mcap"):
 
 
 def test_the_mesh_and_the_disk_give_equal_arrays_values_events_and_messages(mesh, folder, monkeypatch):
-    monkeypatch.setattr("robomesh.client.recorder._MESSAGES", 7)  # many answers
+    monkeypatch.setattr("robomesh.client.recordings.recorder_file._MESSAGES", 7)  # many answers
     names = ("joints/waist/position", "controller/rate_hz")
 
     async def use(recording):
@@ -68,8 +68,8 @@ def test_the_mesh_and_the_disk_give_equal_arrays_values_events_and_messages(mesh
 
 
 def test_a_used_up_quota_makes_a_reader_wait(mesh, folder, monkeypatch):
-    monkeypatch.setattr("robomesh.client.recorder._MESSAGES", 100)
-    monkeypatch.setattr("robomesh.client.recorder._LONGEST_WAIT_S", 0.1)
+    monkeypatch.setattr("robomesh.client.recordings.recorder_file._MESSAGES", 100)
+    monkeypatch.setattr("robomesh.client.recordings.recorder_file._LONGEST_WAIT_S", 0.1)
     refusals = [None, QuotaError("more than one name may have: ask again in 30.0 s", again_s=30.0)]
 
     def check(quota, asker):
@@ -82,7 +82,7 @@ def test_a_used_up_quota_makes_a_reader_wait(mesh, folder, monkeypatch):
 
 
 def test_a_file_that_is_replaced_while_it_is_read_is_noticed(mesh, folder, monkeypatch):
-    monkeypatch.setattr("robomesh.client.recorder._MESSAGES", 50)
+    monkeypatch.setattr("robomesh.client.recordings.recorder_file._MESSAGES", 50)
 
     async def use(recording):
         pages = recording.sample_pages("joints")
@@ -102,7 +102,7 @@ def test_a_file_that_is_replaced_while_it_is_read_is_noticed(mesh, folder, monke
 def test_a_file_that_gets_its_index_during_a_fetch_is_fetched_again(
     mesh, folder, tmp_path, monkeypatch, times
 ):
-    monkeypatch.setattr("robomesh.client.recorder._PIECE", 20_000)
+    monkeypatch.setattr("robomesh.client.recordings.recorder_file._PIECE", 20_000)
     (tmp_path / "out").mkdir()
     shares = []
 

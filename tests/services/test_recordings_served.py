@@ -374,7 +374,7 @@ def test_values_as_csv_equal_the_files_numbers(http, folder, monkeypatch):
             if number == 10:
                 file.put("kinematics", state, number / 100)
             file.put("joints", joints(waist=number / 7), number / 100)
-    monkeypatch.setattr("robomesh.client.recorder._MESSAGES", 7)  # many answers
+    monkeypatch.setattr("robomesh.client.recordings.recorder_file._MESSAGES", 7)  # many answers
     answer = http.get("/recordings/site/tool.mcap/values.csv")
     header, *rows = csv.reader(io.StringIO(answer.text))
     assert header[:5] == ["time", "received", "sequence", "t [s]", "waist [rad]"]
@@ -392,7 +392,7 @@ def test_csv_keeps_states_of_equal_times_and_skips_invalid_messages(http, folder
             file.put("joints", joints(waist=number), 0.5)
             file.put("joints", joints(waist=number), 0.5)
             file.put("joints", invalid, 0.5)
-    monkeypatch.setattr("robomesh.client.recorder._MESSAGES", 7)
+    monkeypatch.setattr("robomesh.client.recordings.recorder_file._MESSAGES", 7)
     answer = http.get("/recordings/site/still.mcap/values.csv")
     _, *rows = csv.reader(io.StringIO(answer.text))
     # One row for each state: states with equal times and values are not merged.

@@ -10,7 +10,7 @@ import zenoh
 from protocol_gateway import gateway
 from protocol_gateway.audit.log import Outcome
 from protocol_gateway.audit.search import Query, find
-from robomesh.client.robot import AsyncRobot
+from robomesh.client.robot.robot import AsyncRobot
 from robomesh.contract.endpoints import bundle, router_config
 from robomesh.contract.topics import Role
 from robomesh.wire.session import SessionSettings, open_session

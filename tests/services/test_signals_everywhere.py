@@ -11,7 +11,7 @@ from prometheus_client import CollectorRegistry, generate_latest
 
 import robomesh as client
 from robomesh.recordings.reading import RecordingFile
-from robomesh.recordings.series import SeriesReader, known_values
+from robomesh.recordings.series.downsampling import SeriesReader, known_values
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.service.metrics import SessionMetrics
 from robomesh.wire.session import open_session

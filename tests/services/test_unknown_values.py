@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 from foxglove_schemas_protobuf.Log_pb2 import Log
 
-from robomesh.client import samples
+from robomesh.client.robot import samples
 from robomesh.contract.activity import activity_words
 from robomesh.contract.enum_names import enum_name, enum_word
 from robomesh.contract.topics import REQUESTS, TOPICS
-from robomesh.recordings.values import values_of
+from robomesh.recordings.series.values import values_of
 from robomesh.schemas import robomesh_pb2 as schema
 from services.foxglove import messages as foxglove
 from tests import page_modules

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from robomesh.recordings.values import fixed_angles
+from robomesh.recordings.series.values import fixed_angles
 
 MeshUri = Callable[[str], str | None]
 

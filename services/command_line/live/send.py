@@ -9,9 +9,9 @@ from typing import Any, NamedTuple, TypeVar
 import typer
 
 from robomesh import reason_codes as codes
-from robomesh.client.commands import CommandResult, Progress, program_text, request_stop
-from robomesh.client.control import AsyncArm
-from robomesh.client.robot import AsyncRobot
+from robomesh.client.robot.commands import CommandResult, Progress, program_text, request_stop
+from robomesh.client.robot.control import AsyncArm
+from robomesh.client.robot.robot import AsyncRobot
 from robomesh.contract.keys import check_chunk
 from robomesh.errors import CodedError, MotionError, NoAnswerError, RefusedError
 from robomesh.schemas import robomesh_pb2 as schema

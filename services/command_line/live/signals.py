@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from typing import Any
 
-from robomesh.client.samples import utc
+from robomesh.client.robot.samples import utc
 from robomesh.contract.keys import is_replay, robot_key
 from robomesh.publications.subscription import Sample
 from robomesh.schemas import robomesh_pb2 as schema

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from robomesh.client.notes import Note, read_notes, withdraw_note, write_note
+from robomesh.client.robot.notes import Note, read_notes, withdraw_note, write_note
 from robomesh.contract.endpoints import DEFAULT_ROUTER
 from robomesh.contract.keys import check_name
 from robomesh.wire.session import Session

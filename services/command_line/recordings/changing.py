@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
-from robomesh.client.recorder import RecorderFile
+from robomesh.client.recordings.recorder_file import RecorderFile
 from robomesh.contract.keys import check_chunk
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.recordings.listing import found, show

@@ -5,7 +5,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from robomesh.client.recorder import Fetched, RecorderFile
+from robomesh.client.recordings.recorder_file import Fetched, RecorderFile
 from robomesh.errors import QuotaError
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.listing import attached_for, found

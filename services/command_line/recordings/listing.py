@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from robomesh import reason_codes as codes
-from robomesh.client.recorder import RecorderFile
-from robomesh.client.recording_list import (
+from robomesh.client.recordings.descriptions import (
     RecordingInfo,
     describe_recording,
     find_recording,
     list_recordings,
 )
+from robomesh.client.recordings.recorder_file import RecorderFile
 from robomesh.contract.enum_names import enum_word
 from robomesh.contract.messages import to_json
 from robomesh.errors import RobomeshError, SessionError

@@ -7,9 +7,9 @@ import numpy as np
 
 from robomesh.contract.topics import topic
 from robomesh.extras import missing
-from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordingFile
-from robomesh.recordings.series import MOST_VALUES, Series, SeriesReader, known_values
+from robomesh.recordings.series.downsampling import MOST_VALUES, Series, SeriesReader, known_values
+from robomesh.recordings.series.publisher_time import PublisherTimes
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.span import Span, decoded, topics_of

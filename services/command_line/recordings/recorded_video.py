@@ -7,8 +7,8 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from renderer.mp4 import FragmentedMp4
 from robomesh.recordings.h264 import holds_key_frame
-from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
+from robomesh.recordings.series.publisher_time import PublisherTimes
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.span import Span, decoded, needed
 from services.command_line.terminal.output import progress

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from robomesh.recordings import recover as files
-from robomesh.recordings.capture import is_being_written
 from robomesh.recordings.files import describe_file
+from robomesh.recordings.writing import recover as files
+from robomesh.recordings.writing.capture import is_being_written
 from services.command_line.recordings.errors import ExportError
 from services.command_line.terminal.output import print_json, print_line, progress
 

@@ -17,8 +17,8 @@ from renderer.overlay import write_over
 from renderer.requested_views import ViewSpec
 from renderer.robot_state import Ages, RobotState
 from renderer.studio import Studio
-from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
+from robomesh.recordings.series.publisher_time import PublisherTimes
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.meshes import recorded_mesh

@@ -20,10 +20,10 @@ from renderer.views import camera_of
 from robomesh.contract.keys import FREE, parse_key
 from robomesh.extras import missing
 from robomesh.recordings.h264 import is_key_frame
-from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
-from robomesh.recordings.series import known_values, units_of
-from robomesh.recordings.values import values_of
+from robomesh.recordings.series.downsampling import known_values, units_of
+from robomesh.recordings.series.publisher_time import PublisherTimes
+from robomesh.recordings.series.values import values_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.shapes.files.gltf import glb_to_z_up, read_glb
 from services.command_line.recordings.errors import ExportError

@@ -4,7 +4,7 @@ from typing import NamedTuple, TypeVar
 
 from google.protobuf.message import DecodeError, Message
 
-from robomesh.recordings.channel_names import robot_channels
+from robomesh.recordings.names import robot_channels
 from robomesh.recordings.reading import RecordingFile
 from services.command_line.recordings.errors import ExportError
 

@@ -9,7 +9,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.message import Message
 
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
-from robomesh.recordings.table import Table, is_due, table_of
+from robomesh.recordings.series.table import Table, is_due, table_of
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.span import Span, decoded, needed, topics_of

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robomesh import reason_codes as codes
-from robomesh.client.robot import AsyncRobot
+from robomesh.client.robot.robot import AsyncRobot
 from robomesh.files.atomic_write import write_atomically
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.terminal import discovery

@@ -77,7 +77,7 @@ def foxglove(
 def _write_layout(path: Path, robots: list[str], router: str) -> None:
     import json
 
-    from robomesh.client.robot import AsyncRobot
+    from robomesh.client.robot.robot import AsyncRobot
     from services.command_line.terminal import discovery
     from services.viewer_layout import viewer_layout
 

@@ -5,7 +5,7 @@ from urllib.parse import quote
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from robomesh.client.robot import AsyncRobot
+from robomesh.client.robot.robot import AsyncRobot
 from robomesh.errors import RobomeshError
 from robomesh.wire.session import Session
 from services.console.common.error_responses import as_text, refused_on_the_mesh

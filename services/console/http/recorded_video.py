@@ -28,13 +28,13 @@ from starlette.routing import Route
 from starlette.types import Scope
 
 from robomesh import reason_codes as codes
-from robomesh.client.recorder import RecorderFile
+from robomesh.client.recordings.recorder_file import RecorderFile
 from robomesh.contract.keys import check_chunk
 from robomesh.contract.messages import reason_message, to_json
 from robomesh.errors import CodedError
 from robomesh.files.worker import Worker
 from robomesh.reasons import Reason
-from robomesh.recordings.channel_names import SUFFIX
+from robomesh.recordings.names import SUFFIX
 from robomesh.wire.session import Session
 from services.console.common.error_responses import Handler, as_text, refused_error, with_error_responses
 from services.console.common.errors import RefusedRequest

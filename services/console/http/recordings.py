@@ -24,10 +24,10 @@ from starlette.routing import Route
 from starlette.types import Scope
 
 from robomesh import reason_codes as codes
-from robomesh.client.recorder import RangeMessage, RecorderFile
-from robomesh.recordings.channel_names import SUFFIX, robot_channels
+from robomesh.client.recordings.recorder_file import RangeMessage, RecorderFile
 from robomesh.recordings.errors import RecordingError
-from robomesh.recordings.table import Table, is_due, table_of
+from robomesh.recordings.names import SUFFIX, robot_channels
+from robomesh.recordings.series.table import Table, is_due, table_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session
 from services.console.common.error_responses import (

@@ -6,9 +6,9 @@ from collections.abc import AsyncIterator, Sequence
 from datetime import UTC, datetime
 from typing import NamedTuple
 
-from robomesh.client.recorder import RecorderFile
+from robomesh.client.recordings.recorder_file import RecorderFile
 from robomesh.recordings.changes import CHANGES, changes_json
-from robomesh.recordings.channel_names import SUFFIX
+from robomesh.recordings.names import SUFFIX
 from robomesh.schemas import robomesh_pb2 as schema
 
 _FIRST_YEAR, _LAST_YEAR = 1980, 2107  # of a ZIP's time

@@ -10,14 +10,14 @@ from mcap_protobuf.decoder import DecoderFactory
 
 from robomesh.contract.header import Header
 from robomesh.contract.topics import TOPICS, topic
-from robomesh.recordings import indexed_writer
-from robomesh.recordings.capture import Capture
-from robomesh.recordings.channel_names import ROBOT_DESCRIPTION
 from robomesh.recordings.errors import CaptureError
 from robomesh.recordings.files import describe_file
 from robomesh.recordings.layout import layout_of
-from robomesh.recordings.recover import State, close_in_place, is_ours, recover, state_of
-from robomesh.recordings.reindex import index, rewrite
+from robomesh.recordings.names import ROBOT_DESCRIPTION
+from robomesh.recordings.writing import indexed_writer
+from robomesh.recordings.writing.capture import Capture
+from robomesh.recordings.writing.recover import State, close_in_place, is_ours, recover, state_of
+from robomesh.recordings.writing.reindex import index, rewrite
 from tests.recordings import write_recording
 
 ABOUT = {"site": "site", "robot": "arm", "name": "trial", "started_by": "request"}

@@ -6,7 +6,7 @@ import pytest
 
 from robomesh.contract.header import Header
 from robomesh.contract.topics import topic
-from robomesh.recordings.capture import Capture, is_being_written
+from robomesh.recordings.writing.capture import Capture, is_being_written
 
 KEY = "robomesh/site/arm/joints"
 

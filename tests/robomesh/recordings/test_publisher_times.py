@@ -8,9 +8,9 @@ import pytest
 from mcap.writer import Writer
 from mcap_protobuf.schema import register_schema
 
-from robomesh.recordings.publisher_time import PublisherTimes
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
-from robomesh.recordings.series import SeriesReader
+from robomesh.recordings.series.downsampling import SeriesReader
+from robomesh.recordings.series.publisher_time import PublisherTimes
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.recordings.export import Wanted
 from services.command_line.recordings.export import run as export

@@ -11,9 +11,9 @@ from mcap.writer import Writer
 from robomesh.recordings import layout, records
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.files import describe_file
-from robomesh.recordings.folder import find_file
 from robomesh.recordings.h264 import holds_key_frame
 from robomesh.recordings.layout import layout_of
+from robomesh.recordings.names import find_file
 from robomesh.recordings.reading import RecordingFile
 from tests.recordings import START_NS, write_recording
 

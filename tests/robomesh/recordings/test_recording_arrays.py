@@ -22,10 +22,10 @@ import robomesh
 from robomesh import reason_codes as codes
 from robomesh.contract.header import Header
 from robomesh.contract.topics import topic
-from robomesh.recordings.capture import Capture
 from robomesh.recordings.errors import CaptureError
 from robomesh.recordings.reading import RecordingFile
-from robomesh.recordings.recover import recover
+from robomesh.recordings.writing.capture import Capture
+from robomesh.recordings.writing.recover import recover
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.recordings.span import Span
 from services.command_line.recordings.tables import write_table
@@ -86,8 +86,8 @@ def test_joints_have_the_rows_and_times_of_the_csv_table(path, tmp_path):
 def test_units_are_read_again_after_a_read_of_the_description_that_failed(path, monkeypatch):
     recording = robomesh.open_recording(path)
     with monkeypatch.context() as broken:
-        broken.setattr("robomesh.client.recording._MOST_BYTES", -1)
-        broken.setattr("robomesh.client.recording._MOST_TIMES_THE_FILE", 0)
+        broken.setattr("robomesh.client.recordings.recording._MOST_BYTES", -1)
+        broken.setattr("robomesh.client.recordings.recording._MOST_TIMES_THE_FILE", 0)
         with pytest.raises(robomesh.RecordingError, match="one after the other"):
             recording.joints()
     assert recording.joints().units == ("rad", "m")
@@ -267,8 +267,8 @@ def test_a_small_file_whose_states_lack_most_joints_does_not_fill_the_memory(tmp
 
 
 def test_a_small_file_that_unpacks_to_much_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("robomesh.client.recording._MOST_BYTES", 1 << 20)
-    monkeypatch.setattr("robomesh.client.recording._MOST_TIMES_THE_FILE", 0)
+    monkeypatch.setattr("robomesh.client.recordings.recording._MOST_BYTES", 1 << 20)
+    monkeypatch.setattr("robomesh.client.recordings.recording._MOST_TIMES_THE_FILE", 0)
     path = _write(tmp_path / "long.mcap", [joints(waist=0.0, elbow=0.0)] * 60_000)
     recording = robomesh.open_recording(path)
     with pytest.raises(robomesh.RecordingError, match="one after the other"):
@@ -417,8 +417,8 @@ def test_long_metadata_of_another_program_is_not_kept(tmp_path):
 
 
 def test_messages_without_bytes_count_too(tmp_path, monkeypatch):
-    monkeypatch.setattr("robomesh.client.recording._MOST_BYTES", 10_000)
-    monkeypatch.setattr("robomesh.client.recording._MOST_TIMES_THE_FILE", 0)
+    monkeypatch.setattr("robomesh.client.recordings.recording._MOST_BYTES", 10_000)
+    monkeypatch.setattr("robomesh.client.recordings.recording._MOST_TIMES_THE_FILE", 0)
     path = _file(tmp_path / "empty.mcap", lambda writer, channel: _put(writer, channel, [b""] * 1000))
     with pytest.raises(robomesh.RecordingError, match="one after the other"):
         robomesh.open_recording(path).joints()

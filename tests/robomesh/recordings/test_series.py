@@ -7,8 +7,8 @@ from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorP
 
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.reading import RecordingFile
-from robomesh.recordings.series import SeriesReader, known_values
-from robomesh.recordings.values import unit_of, values_of
+from robomesh.recordings.series.downsampling import SeriesReader, known_values
+from robomesh.recordings.series.values import unit_of, values_of
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.recordings import START_NS, Written, joints, write_recording
 

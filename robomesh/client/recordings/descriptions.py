@@ -8,11 +8,11 @@ from datetime import datetime
 from pathlib import Path
 
 from robomesh import reason_codes as codes
-from robomesh.client.samples import utc
+from robomesh.client.robot.samples import utc
 from robomesh.contract.keys import WHOLE_SITE, robot_key
 from robomesh.errors import RobomeshError
-from robomesh.recordings.channel_names import topic_name
 from robomesh.recordings.errors import RecordingError
+from robomesh.recordings.names import topic_name
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session
 
@@ -208,8 +208,8 @@ def describe_recording(path: Path) -> RecordingInfo:
     Raises:
         RecordingError: If no part of it can be read.
     """
-    from robomesh.recordings.capture import is_being_written
     from robomesh.recordings.files import describe_file
+    from robomesh.recordings.writing.capture import is_being_written
 
     message = describe_file(path)
     if message.problem and is_being_written(path):

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from google.protobuf.message import Message
 
-from robomesh.client.recorder import RecorderFile
-from robomesh.client.recording_list import RecordingInfo, describe_recording
+from robomesh.client.recordings.descriptions import RecordingInfo, describe_recording
+from robomesh.client.recordings.recorder_file import RecorderFile
 from robomesh.contract.topics import SCHEMAS
 from robomesh.errors import RefusedError
 from robomesh.recordings.errors import RecordingError
-from robomesh.recordings.publisher_time import Recorded
+from robomesh.recordings.series.publisher_time import Recorded
 
 if TYPE_CHECKING:
     from robomesh.recordings.reading import RecordedMessage
@@ -115,7 +115,7 @@ class DiskSource:
     async def value_names(self) -> list[str]:
         """See `Source`."""
         from robomesh.recordings.reading import RecordingFile
-        from robomesh.recordings.series import known_values
+        from robomesh.recordings.series.downsampling import known_values
 
         with RecordingFile(self._path) as file:
             return known_values(file)

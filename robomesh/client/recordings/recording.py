@@ -12,15 +12,15 @@ from typing import Any
 from google.protobuf.message import DecodeError, Message
 
 from robomesh import reason_codes as codes
-from robomesh.client.recorded_values import JointsCollector, RecordedJoints, RecordedValues, ValuesCollector
-from robomesh.client.recording_source import Page, Source
-from robomesh.client.samples import Event, event_of, joint_types, utc
+from robomesh.client.recordings.arrays import JointsCollector, RecordedJoints, RecordedValues, ValuesCollector
+from robomesh.client.recordings.sources import Page, Source
+from robomesh.client.robot.samples import Event, event_of, joint_types, utc
 from robomesh.contract.keys import parse_key
 from robomesh.errors import KeyNameError, MessageError
-from robomesh.recordings.channel_names import robot_channels
 from robomesh.recordings.errors import RecordingError
-from robomesh.recordings.publisher_time import Recorded
-from robomesh.recordings.values import topic_of
+from robomesh.recordings.names import robot_channels
+from robomesh.recordings.series.publisher_time import Recorded
+from robomesh.recordings.series.values import topic_of
 from robomesh.schemas import robomesh_pb2 as schema
 
 log = logging.getLogger(__name__)

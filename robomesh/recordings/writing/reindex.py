@@ -1,7 +1,7 @@
 """Rewriting of one or several consecutive closed recordings: 1 MiB zstd chunks, an index, verified, renamed.
 
-`python -m robomesh.recordings.reindex` is a worker process, so that the recorder never waits for it. It
-reports its progress, a number from 0 to 1.
+`python -m robomesh.recordings.writing.reindex` is a worker process, so that the recorder never waits for it.
+It reports its progress, a number from 0 to 1.
 """
 
 import contextlib
@@ -18,11 +18,11 @@ from mcap.records import Attachment, Channel, Metadata, Schema, Statistics
 
 from robomesh.files.worker import answer_all, report
 from robomesh.recordings import records
-from robomesh.recordings.capture import is_being_written
-from robomesh.recordings.channel_names import INDEXING
 from robomesh.recordings.errors import CaptureError
-from robomesh.recordings.indexed_writer import Copied, IndexedWriter
 from robomesh.recordings.metadata import is_about, is_end
+from robomesh.recordings.names import INDEXING
+from robomesh.recordings.writing.capture import is_being_written
+from robomesh.recordings.writing.indexed_writer import Copied, IndexedWriter
 
 _STEP_BYTES = 8 << 20
 # Longest unreadable end of a file after a kill or a power cut; a longer one is damage.

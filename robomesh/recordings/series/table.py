@@ -9,8 +9,8 @@ from types import MappingProxyType
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from robomesh.recordings.publisher_time import PublisherTimes, Recorded
-from robomesh.recordings.values import prismatic_joints
+from robomesh.recordings.series.publisher_time import PublisherTimes, Recorded
+from robomesh.recordings.series.values import prismatic_joints
 from robomesh.schemas import robomesh_pb2 as schema
 
 # The tool's position is recorded less often than the joints; an older one is omitted.

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from robomesh import reason_codes as codes
-from robomesh.client.commands import (
+from robomesh.client.robot.commands import (
     CommandResult,
     JogResult,
     Progress,
@@ -23,7 +23,7 @@ from robomesh.client.commands import (
     program_text,
     request_stop,
 )
-from robomesh.client.motion_reports import MotionReports
+from robomesh.client.robot.motion_reports import MotionReports
 from robomesh.contract.keys import robot_key
 from robomesh.errors import BusyError, MessageError, MotionError, NoAnswerError, RefusedError, RobomeshError
 from robomesh.schemas import robomesh_pb2 as schema

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.message import Message
 
-from robomesh.client.samples import PRISMATIC, ROTARY
+from robomesh.client.robot.samples import PRISMATIC, ROTARY
 from robomesh.recordings.errors import RecordingError
-from robomesh.recordings.publisher_time import PublisherTimes, Recorded
-from robomesh.recordings.values import signal_units, unit_of, values_of
+from robomesh.recordings.series.publisher_time import PublisherTimes, Recorded
+from robomesh.recordings.series.values import signal_units, unit_of, values_of
 from robomesh.schemas.robomesh_pb2 import Signals
 
 if TYPE_CHECKING:

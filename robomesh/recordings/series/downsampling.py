@@ -12,11 +12,11 @@ from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 
 from robomesh import reason_codes as codes
-from robomesh.recordings.channel_names import robot_channels, topic_name
 from robomesh.recordings.errors import RecordingError
-from robomesh.recordings.publisher_time import PublisherTimes
+from robomesh.recordings.names import robot_channels, topic_name
 from robomesh.recordings.reading import RecordingFile
-from robomesh.recordings.values import (
+from robomesh.recordings.series.publisher_time import PublisherTimes
+from robomesh.recordings.series.values import (
     has_values,
     prismatic_joints,
     signal_units,

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from robomesh import reason_codes as codes
-from robomesh.client.samples import utc
+from robomesh.client.robot.samples import utc
 from robomesh.contract.keys import WHOLE_SITE, check_chunk, robot_key
 from robomesh.errors import MessageError
 from robomesh.schemas import robomesh_pb2 as schema

@@ -13,10 +13,10 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.message import Message
 
 from robomesh import reason_codes as codes
-from robomesh.client.commands import StopResult, numbers, program_text, request_stop
-from robomesh.client.control import AsyncArm
-from robomesh.client.notes import Note, read_notes, withdraw_note, write_note
-from robomesh.client.samples import (
+from robomesh.client.robot.commands import StopResult, numbers, program_text, request_stop
+from robomesh.client.robot.control import AsyncArm
+from robomesh.client.robot.notes import Note, read_notes, withdraw_note, write_note
+from robomesh.client.robot.samples import (
     ROTARY,
     Event,
     JointState,
@@ -27,7 +27,7 @@ from robomesh.client.samples import (
     joint_types,
     sample_fields,
 )
-from robomesh.client.streams import AsyncStream, OnStale, Reading, check_options
+from robomesh.client.robot.streams import AsyncStream, OnStale, Reading, check_options
 from robomesh.contract.keys import check_chunk, check_name, robot_key
 from robomesh.contract.topics import OF_ARM, stale_after_s, topic
 from robomesh.errors import MessageError, NoAnswerError

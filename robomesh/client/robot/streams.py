@@ -11,7 +11,7 @@ from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import replace
 from typing import Generic, Literal, Self, TypeVar
 
-from robomesh.client.samples import Sample
+from robomesh.client.robot.samples import Sample
 from robomesh.contract.header import Header
 from robomesh.errors import MessageError, RobomeshError, UnknownTopicError
 from robomesh.files.forked import check_owner

@@ -14,10 +14,10 @@ from mcap.reader import make_reader
 from mcap.records import Metadata
 
 from robomesh.recordings import records
-from robomesh.recordings.capture import is_being_written
 from robomesh.recordings.errors import CaptureError
 from robomesh.recordings.metadata import about_name, end_record, is_about
-from robomesh.recordings.reindex import rewrite
+from robomesh.recordings.writing.capture import is_being_written
+from robomesh.recordings.writing.reindex import rewrite
 
 
 class State(Enum):

@@ -1,0 +1,1 @@
+"""Recordings for asynchronous programs, of this machine and of the sites' recorders."""

@@ -1,0 +1,1 @@
+"""One robot for asynchronous programs: streams of its topics, requests, control with a lease."""
