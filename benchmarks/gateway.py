@@ -28,7 +28,7 @@ from latency import STEP_DEG, STEPS, process, summary
 from legacy_clients import serve_old_programs
 from plant import RATE_HZ, cpu_s, paced, rss_mib, running_controllers, running_site, until
 
-from protocol_gateway.unit_driver import UnitDriver
+from controllers.unit.driver import UnitDriver
 from robomesh.contract.endpoints import client_config
 from robomesh.contract.header import unpack
 from robots.kinematics.joints import JointType

@@ -1,1 +1,1 @@
-"""Gateway between controllers and the mesh: protocol core, drivers, link, authority, audit log."""
+"""Gateway between controllers and the mesh: the service. Drivers belong to `controllers`."""

@@ -3,20 +3,20 @@
 import asyncio
 import gc
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import AsyncExitStack
 from functools import partial
 
-from protocol_gateway.cell_changes import CellChanges, CellsOfGateway
+from protocol_gateway.cells.gateway_cells import GatewayCells
 from protocol_gateway.checking.cell_occupancy import CellOccupancy
-from protocol_gateway.checking.checker import Checker, make_checkers
+from protocol_gateway.checking.checker import make_checkers
 from protocol_gateway.checking.policy import Policy
+from protocol_gateway.configuration.settings import RobotSettings, Settings, check
 from protocol_gateway.link.metrics import measure_links
-from protocol_gateway.robot import Robot
-from protocol_gateway.settings import RobotSettings, Settings, check
+from protocol_gateway.robot.parts import CellCheck
+from protocol_gateway.robot.robot import Robot
 from protocol_gateway.telemetry.signals import measure_signals
 from robomesh import reason_codes as codes
-from robomesh.contract.quotas import Quota
 from robomesh.schemas.robomesh_pb2 import Event
 from robomesh.service.loop_turns import turns_of
 from robomesh.wire.session import Session
@@ -51,9 +51,11 @@ async def serve(session: Session, settings: Settings) -> None:
                 each,
                 audit_path=path,
                 rotate_bytes=settings.audit_rotate_bytes,
-                checker=checkers[each.name],
-                planner=planners[each.name],
-                cell_occupancy=cells.setdefault(names, CellOccupancy()),
+                cell_check=CellCheck(
+                    checker=checkers[each.name],
+                    planner=planners[each.name],
+                    occupancy=cells.setdefault(names, CellOccupancy()),
+                ),
             )
             stack.push_async_callback(robot.close)
             robots.append(robot)
@@ -62,9 +64,7 @@ async def serve(session: Session, settings: Settings) -> None:
         measure_links(session, {name: each.link for name, each in by_name.items()})
         measure_signals(session, {name: each.signals for name, each in by_name.items()})
         _measure_robots(session, by_name)
-        content = CellsOfGateway(
-            session, settings.site, _cells(session, settings, by_name, cells, (checkers, planners))
-        )
+        content = GatewayCells(session, settings, by_name, cells, (checkers, planners))
         # A collection over all permanent objects would pause every robot for 20 ms.
         gc.collect()
         gc.freeze()
@@ -77,35 +77,6 @@ async def serve(session: Session, settings: Settings) -> None:
             for robot in robots:
                 tasks.create_task(robot.run())
             tasks.create_task(content.run())
-
-
-def _cells(
-    session: Session,
-    settings: Settings,
-    robots: Mapping[str, Robot],
-    occupancies: Mapping[frozenset[str], CellOccupancy],
-    checkers: Sequence[Mapping[str, Checker]],
-) -> dict[str, CellChanges]:
-    """Return the content of each robot's cell, one for all of its robots; empty without a file of cells."""
-    if settings.cell_file is None:
-        return {}
-    changes = settings.quotas.cell_changes_a_minute
-    quota = Quota("cell_changes", a_minute=changes)
-    found: dict[str, CellChanges] = {}
-    for names, occupancy in occupancies.items():
-        own = {name: robots[name] for name in sorted(names & robots.keys())}
-        cell = CellChanges(
-            session,
-            settings.site,
-            robots=own,
-            elsewhere=names - robots.keys(),
-            file=settings.cell_file,
-            occupancy=occupancy,
-            checkers={checker for each in checkers for name in own for checker in [each[name]]},
-            quota=quota,
-        )
-        found |= dict.fromkeys(own, cell)
-    return found
 
 
 def _report_long_turn(robots: Mapping[str, Robot], took_s: float, what: object) -> None:

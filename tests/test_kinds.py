@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from controllers.probing import Probe
-from protocol_gateway.kinds import kind_of, own_kinds, part_of
+from protocol_gateway.configuration.kinds import kind_of, own_kinds, part_of
 from protocol_gateway.seam.errors import GatewaySettingsError
 from protocol_gateway.seam.simulated import Simulated
 
@@ -58,7 +58,7 @@ def test_sources_that_are_not_installed_say_so(monkeypatch):
         raise PackageNotFoundError(name)
 
     own_kinds.cache_clear()
-    monkeypatch.setattr("protocol_gateway.kinds.distribution", absent)
+    monkeypatch.setattr("protocol_gateway.configuration.kinds.distribution", absent)
     try:
         with pytest.raises(GatewaySettingsError, match="install robomesh again"):
             own_kinds()

@@ -3,7 +3,7 @@
 from protocol_gateway.seam.kind import Kind
 
 UNIT = Kind(
-    driver="protocol_gateway.unit_driver:UnitDriver",
+    driver="controllers.unit.driver:UnitDriver",
     key="",
     probe="controllers.unit.probe:UNIT",
     simulated="controllers.unit.simulated.start:UNIT",

@@ -12,12 +12,12 @@ Source: Chen, Zhang, Xue 2001, section 5, figures 7 and 8.
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from protocol_gateway.authority.entries import entry_of
 from protocol_gateway.authority.entry import Entry, Outcome
 from protocol_gateway.control.control import Control
-from protocol_gateway.core.codes import CodeTable
+from protocol_gateway.core.codes import code_table
 from protocol_gateway.core.records import Error, write_unit
 from protocol_gateway.core.stream import Malformed, StreamEvent, Unit, printable
 from protocol_gateway.legacy.commander import Commander
@@ -47,6 +47,7 @@ class LegacyClients:
     """Server of one robot's old client programs.
 
     Args:
+        type_codes: The controller's type codes, as in the site file.
         audit: Writes the entry of a refused unit, without waiting for the disk.
         publish: Publishes the number of clients.
     """
@@ -54,7 +55,7 @@ class LegacyClients:
     def __init__(
         self,
         settings: LegacySettings,
-        table: CodeTable,
+        type_codes: Mapping[int, str],
         joints: Joints,
         control: Control,
         *,
@@ -63,7 +64,7 @@ class LegacyClients:
         publish: Callable[[], None],
     ) -> None:
         self._settings = settings
-        self._table = table
+        self._table = code_table(type_codes)
         self._joints = joints
         self._control = control
         self._journal, self._audit, self._publish = journal, audit, publish

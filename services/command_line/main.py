@@ -51,7 +51,7 @@ def run(arguments: list[str]) -> int:
         discard(sys.stdout)
         return 0
     except ModuleNotFoundError as error:
-        from protocol_gateway.kinds import kind_with
+        from protocol_gateway.configuration.kinds import kind_with
 
         # `cv2.typing` comes with `cv2`.
         module = (error.name or "").partition(".")[0]

@@ -17,9 +17,9 @@ from pydantic import (
     model_validator,
 )
 
+from protocol_gateway.configuration.controller_proofs import StopProof
+from protocol_gateway.configuration.kinds import is_known, kind_of, own_kinds, protocols
 from protocol_gateway.core.codes import code_table
-from protocol_gateway.kinds import is_known, kind_of, own_kinds, protocols
-from protocol_gateway.proofs import StopProof
 from protocol_gateway.seam import Recovery
 from protocol_gateway.seam.errors import CodeTableError, GatewaySettingsError
 from protocol_gateway.seam.kind import Kind

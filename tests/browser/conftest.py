@@ -15,8 +15,8 @@ import zenoh
 from controllers.simulated.fault_requests import Mesh
 from controllers.unit.simulated import service as simulator
 from protocol_gateway import gateway
+from protocol_gateway.configuration.settings import RobotSettings
 from protocol_gateway.legacy.settings import LegacySettings
-from protocol_gateway.settings import RobotSettings
 from robomesh.contract.endpoints import router_config
 from robomesh.contract.keys import WHOLE_SITE
 from robomesh.contract.messages import reason_message

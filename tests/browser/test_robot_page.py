@@ -11,8 +11,8 @@ from playwright.sync_api import expect
 from controllers.universal_robots.modes import RobotMode
 from controllers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
 from protocol_gateway import gateway
+from protocol_gateway.configuration.settings import RobotSettings
 from protocol_gateway.seam import Recovery
-from protocol_gateway.settings import RobotSettings
 from robomesh.wire.session import SessionSettings, open_session
 from services.kinematics import kinematics
 from tests.browser.robot_page import (

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from protocol_gateway.kinds import own_kinds
+from protocol_gateway.configuration.kinds import own_kinds
 from services.command_line.site.services import SERVICES, Options
 from services.site_file.site import load
 

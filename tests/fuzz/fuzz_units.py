@@ -19,6 +19,7 @@ if __name__ == "__main__":
 
 from google.protobuf.message import Message
 
+from controllers.unit.driver import UnitDriver
 from protocol_gateway.core.codes import TYPES, code_table
 from protocol_gateway.core.records import Error
 from protocol_gateway.core.stream import Unit, UnitStream
@@ -28,7 +29,6 @@ from protocol_gateway.seam import JointsReceived
 from protocol_gateway.telemetry.journal import Journal
 from protocol_gateway.telemetry.signals import Signals
 from protocol_gateway.telemetry.telemetry import Telemetry
-from protocol_gateway.unit_driver import UnitDriver
 from robots.descriptions.description import load
 from robots.kinematics.joints import joints_of
 from tests.fuzz.fuzzing import Finding, campaign, cut

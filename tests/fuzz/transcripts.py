@@ -40,7 +40,7 @@ DRIVERS = {
     "FanucMotionDriver": "controllers.fanuc.motion_driver",
     "FtpDriver": "controllers.fanuc.ftp_driver",
     "OpcUaDriver": "controllers.opcua.driver",
-    "UnitDriver": "protocol_gateway.unit_driver",
+    "UnitDriver": "controllers.unit.driver",
 }
 FUZZERS = (
     "universal_robots.fuzz_ur_motion",

@@ -2,6 +2,7 @@
 
 from contextlib import asynccontextmanager
 
+from controllers.unit.driver import UnitDriver
 from protocol_gateway.audit.log import AuditLog, read_entries
 from protocol_gateway.authority.lease_rules import Authority
 from protocol_gateway.authority.preconditions import Controller
@@ -12,7 +13,6 @@ from protocol_gateway.link.link import LinkState, LinkStatus
 from protocol_gateway.seam import Activity, Mode, StatusReceived
 from protocol_gateway.seam.errors import LinkDownError
 from protocol_gateway.telemetry.journal import Journal
-from protocol_gateway.unit_driver import UnitDriver
 from robomesh import reason_codes as codes
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.descriptions.description import load

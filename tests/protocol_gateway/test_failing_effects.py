@@ -6,6 +6,7 @@ import errno
 
 import pytest
 
+from controllers.unit.driver import UnitDriver
 from protocol_gateway.authority.effects import Finding, Program
 from protocol_gateway.authority.events import LeaseEnded, LinkLost, LinkRestored, MotionObserved
 from protocol_gateway.authority.lease_rules import Authority
@@ -15,7 +16,6 @@ from protocol_gateway.control.control import Control, Ports
 from protocol_gateway.link.link import LinkState, LinkStatus
 from protocol_gateway.seam import Activity, Mode, StatusReceived
 from protocol_gateway.seam.errors import AuditError, LinkDownError
-from protocol_gateway.unit_driver import UnitDriver
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest

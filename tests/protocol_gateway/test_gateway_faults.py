@@ -11,7 +11,7 @@ import pytest
 import zenoh
 
 from protocol_gateway.audit.log import read_entries
-from protocol_gateway.robot import Robot
+from protocol_gateway.robot.robot import Robot
 from robomesh.contract.endpoints import router_config
 from robomesh.wire.session import SessionSettings
 from tests.conftest import free_port, last_value, run

@@ -6,10 +6,10 @@ import time
 
 import pytest
 
+from controllers.unit.driver import UnitDriver
 from protocol_gateway.link.link import ControllerLink, LinkSettings, LinkState
 from protocol_gateway.seam import JointsReceived, MalformedReceived, Refused, UnknownReceived
 from protocol_gateway.seam.errors import LinkCloggedError, LinkDownError
-from protocol_gateway.unit_driver import UnitDriver
 from robots.kinematics.joints import JointType
 from tests.conftest import free_port, run
 from tests.protocol_gateway.scripted_controller import endless_joints

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from controllers.unit.driver import UnitDriver
 from protocol_gateway.authority import effects, events
 from protocol_gateway.authority.effects import Finding, Program, Seen
 from protocol_gateway.authority.lease_rules import Authority, Now
@@ -13,7 +14,6 @@ from protocol_gateway.authority.robot_authority import RobotAuthority
 from protocol_gateway.control.control import Control, Ports
 from protocol_gateway.link.link import LinkState, LinkStatus
 from protocol_gateway.seam import Activity, Mode, StatusReceived
-from protocol_gateway.unit_driver import UnitDriver
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from robots.descriptions.description import load

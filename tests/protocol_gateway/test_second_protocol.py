@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from protocol_gateway.kinds import driver_maker, protocols
+from protocol_gateway.configuration.kinds import driver_maker, protocols
 from protocol_gateway.seam import (
     Hold,
     JointsReceived,
@@ -198,12 +198,12 @@ def test_the_example_reports_what_it_can_read_and_names_what_it_cannot(installed
 OLD = """
 import logging
 logging.basicConfig()
-from protocol_gateway.kinds import driver_maker
+from protocol_gateway.configuration.kinds import driver_maker
 from protocol_gateway.seam import Stop
 driver = driver_maker("json-lines")((), {}, relay=None, options=None)
 print(driver.command(driver.prepare(Stop()), 0.0)[0].data, driver.timer_ended({}, 0.0))
 from protocol_gateway.drivers.only_reads import OnlyReads
-from protocol_gateway.kinds import _with_new_names
+from protocol_gateway.configuration.kinds import _with_new_names
 class Reads(OnlyReads):
     __slots__ = ()
     def timer_ended(self, now_s):

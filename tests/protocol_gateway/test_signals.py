@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from protocol_gateway import set_up_file
 from protocol_gateway.driver_parts.signal_names import SHARED, numbered, of_axes, of_joints
 from protocol_gateway.link.timestamping import Received
 from protocol_gateway.seam import Signal, SignalsReceived
+from protocol_gateway.telemetry import set_up_file
 from protocol_gateway.telemetry.journal import Journal
 from protocol_gateway.telemetry.signals import MOST_SIGNALS, Signals
 from tests.conftest import run

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from protocol_gateway import cell_changes
+from protocol_gateway.cells import changes as cell_changes
 from robomesh import reason_codes as codes
 from robomesh.errors import RobomeshError
 from robomesh.schemas import robomesh_pb2 as schema

@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from controllers import probing
-from protocol_gateway.kinds import kind_with, part_of
+from protocol_gateway.configuration.kinds import kind_with, part_of
 from protocol_gateway.seam.errors import GatewaySettingsError
 from protocol_gateway.seam.simulated import Simulated
 from services.command_line.doctor import machine

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from protocol_gateway.kinds import driver_maker, kind_of, own_kinds, part_of
+from protocol_gateway.configuration.kinds import driver_maker, kind_of, own_kinds, part_of
 from protocol_gateway.seam.errors import GatewaySettingsError
 from protocol_gateway.seam.simulated import Simulated
 from robomesh.errors import UnavailableError

@@ -11,7 +11,7 @@ from typing import Annotated, Any, cast
 
 import typer
 
-from protocol_gateway.kinds import own_kinds
+from protocol_gateway.configuration.kinds import own_kinds
 from protocol_gateway.seam.kind import Kind, named
 from robomesh.contract.topic_schema import Role
 from robots.schema.bounded_toml import read_toml

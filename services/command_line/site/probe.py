@@ -16,7 +16,7 @@ import typer
 
 from controllers import probing
 from controllers.probing import Asked, Found, Probe, ProbeError
-from protocol_gateway.kinds import kind_of, own_kinds, part_of, protocols
+from protocol_gateway.configuration.kinds import kind_of, own_kinds, part_of, protocols
 from protocol_gateway.seam.errors import GatewaySettingsError
 from robomesh.errors import ListenError, RobomeshError
 from robomesh.extras import is_missing, missing

@@ -57,8 +57,8 @@ class Service:
 
 
 def _gateway(site: "Site", options: Options) -> Any:
+    from protocol_gateway.configuration.settings import RobotSettings
     from protocol_gateway.gateway import Settings
-    from protocol_gateway.settings import RobotSettings
     from services.command_line.site.controllers import controller_addresses, legacy_settings
     from services.site_file.cells import cells_of
 

@@ -11,7 +11,7 @@ from typer.core import TyperCommand
 from typer.main import get_command
 
 from controllers.simulated.fault_table import FAULTS
-from protocol_gateway.kinds import is_known, kind_of, own_kinds, part_of, protocols
+from protocol_gateway.configuration.kinds import is_known, kind_of, own_kinds, part_of, protocols
 from protocol_gateway.seam.errors import GatewaySettingsError
 from protocol_gateway.seam.simulated import Common, Option, Simulated
 from robomesh.contract.endpoints import DEFAULT_ROUTER

@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from protocol_gateway.kinds import part_of
+from protocol_gateway.configuration.kinds import part_of
 from protocol_gateway.seam.simulated import Simulated
 from robomesh.client.connection import addresses
 from robomesh.contract.keys import robot_key

@@ -19,7 +19,7 @@ from controllers.universal_robots.rtde_messages import PackageType, Recipe, pack
 from controllers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
 from controllers.universal_robots.simulated.fields import INPUTS as INPUT_TYPES
 from controllers.universal_robots.simulated.fields import OFFERED
-from protocol_gateway.kinds import driver_maker
+from protocol_gateway.configuration.kinds import driver_maker
 from protocol_gateway.link.timers import Timers
 from protocol_gateway.seam import (
     Activity,

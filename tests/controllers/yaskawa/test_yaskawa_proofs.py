@@ -14,7 +14,7 @@ from robots.schema.poses import axis_rotation
 from tests.conftest import run
 from tests.controllers.yaskawa.test_hses_driver import YASKAWA, controller
 from tests.protocol_gateway.gateway_site import STATE, gateway, until
-from tests.protocol_gateway.test_proofs import ARM, RECORD
+from tests.protocol_gateway.test_controller_proofs import ARM, RECORD
 from tests.protocol_gateway.wire import wire
 
 

@@ -5,45 +5,42 @@ import contextlib
 import logging
 import time
 from collections.abc import Awaitable, Callable, Hashable
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from protocol_gateway import set_up_file
 from protocol_gateway.audit.log import AuditLog, Entry
 from protocol_gateway.audit.persisted_state import ROTATE
 from protocol_gateway.audit.search import Query, SearchServer, find
 from protocol_gateway.authority import events
 from protocol_gateway.authority.entry import audit_entry
-from protocol_gateway.authority.lease_rules import Authority
 from protocol_gateway.authority.preconditions import Controller
-from protocol_gateway.authority.robot_authority import HEED_TIMEOUT_S, RobotAuthority
-from protocol_gateway.checking.cell_occupancy import CellOccupancy
-from protocol_gateway.checking.checker import Checker
-from protocol_gateway.checking.policy import Policy
+from protocol_gateway.authority.robot_authority import HEED_TIMEOUT_S
+from protocol_gateway.configuration.settings import RobotSettings
 from protocol_gateway.control.audit_trail import AuditTrail
-from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.clocks import read_clocks
 from protocol_gateway.control.control import Control, Ports
 from protocol_gateway.control.jog import Jogs
+from protocol_gateway.control.mesh_requests import MeshRequests
 from protocol_gateway.control.program import Programs
-from protocol_gateway.core.codes import code_table
-from protocol_gateway.kinds import driver_maker
 from protocol_gateway.legacy.clients import LegacyClients
 from protocol_gateway.link.link import (
     JOINT_COUNT,
     JOINT_VALUES,
     ControllerLink,
-    LinkSettings,
     LinkState,
     LinkStatus,
 )
 from protocol_gateway.link.status import transition_events
-from protocol_gateway.mesh_requests import MeshRequests
-from protocol_gateway.proofs import Proofs
-from protocol_gateway.seam import Activity, Carries, Channel
-from protocol_gateway.seam.errors import GatewaySettingsError
-from protocol_gateway.settings import RobotSettings
+from protocol_gateway.robot.parts import (
+    CellCheck,
+    link_settings,
+    make_authority,
+    make_checks,
+    make_driver,
+    make_proofs,
+)
+from protocol_gateway.seam import Activity, Carries, Channel, Driver
+from protocol_gateway.telemetry import set_up_file
 from protocol_gateway.telemetry.journal import Journal
 from protocol_gateway.telemetry.signals import Signals
 from protocol_gateway.telemetry.state_messages import controller_state, lease_state, timestamp
@@ -55,17 +52,16 @@ from robomesh.contract.topics import Role
 from robomesh.publications.publisher import LIST_LENGTH, Publisher
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.wire.presence import PresenceWatch
 from robomesh.wire.session import Session
 from robots.descriptions.description import load
-from robots.kinematics.joints import joints_of
+from robots.kinematics.joints import Joints, joints_of
 
 log = logging.getLogger(__name__)
 
 _S = schema.Event.Severity
 
 _POLL_S = 0.1
-# Share of the stale time after which the link is silent: monitors must hear of it within the whole time.
-_SHOWN_WITHIN = 0.95
 _HEARTBEAT_S = 1.0
 _RETRY_S = 1.0
 _KEEP_SET_UP_S = 1.0
@@ -87,80 +83,70 @@ class Robot:
         *,
         audit_path: Path,
         rotate_bytes: int,
-        checker: Checker,
-        planner: Checker,
-        cell_occupancy: CellOccupancy,
+        cell_check: CellCheck,
     ) -> None:
         description = load(settings.description)
         joints = joints_of(description)
-        relay = None if settings.legacy_clients is None else self._relay
-        try:
-            driver = driver_maker(settings.protocol)(
-                joints.types, settings.codes, relay=relay, options=settings.options
-            )
-        except GatewaySettingsError as error:
-            raise GatewaySettingsError(f"robot {settings.name}: {error}") from None
-        if unknown := sorted(settings.ports.keys() - driver.ports):
-            raise GatewaySettingsError(
-                f"robot {settings.name}: ports {unknown[0]!r}: protocol {settings.protocol!r} has "
-                f"{', '.join(map(repr, sorted(driver.ports))) or 'no further ports'}"
-            )
-        if missing := sorted(each.value for each in settings.recover - driver.capabilities.recoveries):
-            has = sorted(each.value for each in driver.capabilities.recoveries)
-            raise GatewaySettingsError(
-                f"robot {settings.name}: recover {missing[0]!r}: this robot has "
-                f"{', '.join(map(repr, has)) or 'no recoveries'}"
-            )
-        self._settings = settings
-        self._legacy: LegacyClients | None = None
-        self._capabilities = driver.capabilities
-        self._proofs = Proofs(
-            f"{site}/{settings.name}",
-            description,
-            driver.capabilities,
-            protocol=settings.protocol,
-            simulated=settings.simulated,
-            verified=settings.verified,
-            stop=settings.stop_proven,
-            experimental=settings.experimental,
-        )
+        driver = make_driver(settings, joints, self._relay)
+        self._settings, self._capabilities = settings, driver.capabilities
+        self._session, self._site = session, site
+        self._proofs = make_proofs(site, settings, description, driver)
         self._read_only = self._proofs.read_only("")
         self._reported_unproven: Reason | None = None
-        self._no_joints = driver.capabilities.no_joints
+        self._missing_channels: set[str] = set()
+        # Ids of other gateways that serve this robot.
+        self._others: set[str] = set()
 
-        def publisher(topic: str) -> Publisher:
-            return session.declare_publisher(site, settings.name, topic)
-
-        self._controller_topic = publisher("controller")
-        self._lease_topic = publisher("lease")
-        self._audit_topic = publisher("audit")
-        self._program_topic = publisher("program")
+        publisher = self._publisher
+        self._controller_topic, self._lease_topic = publisher("controller"), publisher("lease")
+        self._audit_topic, self._program_topic = publisher("audit"), publisher("program")
         self._journal = Journal(publisher("events"), settings.name)
         self._set_up_path = audit_path.with_suffix(".tool")
         confirmed = set_up_file.read(self._set_up_path)
         self._signals = Signals(publisher("signals"), self._journal, joints.names, confirmed)
-        self._telemetry = Telemetry(
+        self._telemetry = self._make_telemetry(joints)
+        self._link = self._make_link(driver, joints)
+        self._link_status = self._link.status
+        self._audit = AuditLog(audit_path, on_written=self._on_written, rotate_bytes=rotate_bytes)
+        self._audit_trail = AuditTrail(self._audit, self._journal)
+        authority = make_authority(self._audit, joints, driver, read_only=self._read_only is not None)
+        self._checks = make_checks(settings, cell_check, joints, authority, self._controller)
+        self._control = Control(authority, self._ports(), self._checks)
+        self._programs = self._make_programs()
+        self._jogs = self._make_jogs(joints)
+        self._legacy = self._make_legacy_clients(joints)
+        self._requests = self._make_requests()
+        session.answer(site, settings.name, "audit/find", SearchServer(audit_path).answer)
+        self._operators, self._gateways = self._presence(Role.OPERATOR), self._presence(Role.GATEWAY)
+        self._report_startup()
+
+    # ------------------------------------------------------------------ parts
+
+    def _publisher(self, topic: str, *, together: bool = False) -> Publisher:
+        return self._session.declare_publisher(self._site, self._settings.name, topic, together=together)
+
+    def _presence(self, role: Role) -> PresenceWatch:
+        return self._session.watch_presence(presence_key(self._site, self._settings.name, role.value, "*"))
+
+    def _make_telemetry(self, joints: Joints) -> Telemetry:
+        return Telemetry(
             joints,
-            fast=session.declare_publisher(site, settings.name, "joints", together=True),
-            slow=session.declare_publisher(site, settings.name, "joints/slow", together=True),
-            raw=publisher("raw"),
+            fast=self._publisher("joints", together=True),
+            slow=self._publisher("joints/slow", together=True),
+            raw=self._publisher("raw"),
             signals=self._signals,
             journal=self._journal,
-            stale_after_s=settings.stale_after_s,
-            status_stale_s=STALE_S if driver.capabilities.slow_hz is None else SLOW_STALE_S,
+            stale_after_s=self._settings.stale_after_s,
+            status_stale_s=STALE_S if self._capabilities.slow_hz is None else SLOW_STALE_S,
             on_status=self._on_controller_status,
             on_activity=self._on_activity,
             on_refused=self._on_refused,
             stop_expected=self._stop_expected,
         )
-        self._link = ControllerLink(
-            LinkSettings(
-                host=settings.host,
-                port=settings.port,
-                ports=settings.ports,
-                stale_after_s=_SHOWN_WITHIN * settings.stale_after_s,
-                reconnect_after_s=settings.reconnect_after_s,
-            ),
+
+    def _make_link(self, driver: Driver, joints: Joints) -> ControllerLink:
+        return ControllerLink(
+            link_settings(self._settings),
             driver,
             joints,
             on_event=self._telemetry.on_event,
@@ -169,14 +155,9 @@ class Robot:
             on_fate_unknown=lambda why: self._control.handle(events.FateUnknown(why)),
             tolerates=self._tolerates,
         )
-        self._missing_channels: set[str] = set()
-        self._link_status = self._link.status
-        self._audit = AuditLog(audit_path, on_written=self._on_written, rotate_bytes=rotate_bytes)
-        self._audit_trail = AuditTrail(self._audit, self._journal)
-        robot_authority = RobotAuthority(
-            self._persisted_authority(), joints, driver.prepare, orphan=self._audit.state.mover
-        )
-        ports = Ports(
+
+    def _ports(self) -> Ports:
+        return Ports(
             audit_trail=self._audit_trail,
             latch=self._audit.latch,
             journal=self._journal,
@@ -187,71 +168,53 @@ class Robot:
             controlled=self._link.controlled,
             other_gateway=self._other_gateway,
         )
-        self._checks = Checks(
-            settings.name,
-            Policy(settings.check),
-            cell=[robot.name for robot in settings.surroundings.robots],
-            checker=checker,
-            planner=planner,
-            cell_occupancy=cell_occupancy,
-            joints=joints,
-            robot_authority=robot_authority,
-            controller=self._controller,
-            within_s=settings.check_within_s,
-        )
-        self._control = Control(robot_authority, ports, self._checks)
-        self._programs = Programs(
+
+    def _make_programs(self) -> Programs:
+        return Programs(
             self._control,
             self._checks,
             journal=self._journal,
             controller=self._controller,
             publish=self._publish_state,
-            publish_source=publisher("program/source").put,
+            publish_source=self._publisher("program/source").put,
         )
-        self._jogs = Jogs(
+
+    def _make_jogs(self, joints: Joints) -> Jogs:
+        return Jogs(
             self._control,
             self._checks,
             joints=joints,
             journal=self._journal,
             controller=self._controller,
-            can_jog=driver.capabilities.jogs,
-            tool_speed=settings.jog_speed,
+            can_jog=self._capabilities.jogs,
+            tool_speed=self._settings.jog_speed,
         )
-        if settings.legacy_clients is not None:
-            table = code_table(settings.codes)
-            self._legacy = LegacyClients(
-                settings.legacy_clients,
-                table,
-                joints,
-                self._control,
-                journal=self._journal,
-                audit=self._audit_trail.write_later,
-                publish=self._publish_state,
-            )
-        self._requests = MeshRequests(
-            session,
-            site,
-            settings.name,
+
+    def _make_legacy_clients(self, joints: Joints) -> LegacyClients | None:
+        if self._settings.legacy_clients is None:
+            return None
+        return LegacyClients(
+            self._settings.legacy_clients,
+            self._settings.codes,
+            joints,
+            self._control,
+            journal=self._journal,
+            audit=self._audit_trail.write_later,
+            publish=self._publish_state,
+        )
+
+    def _make_requests(self) -> MeshRequests:
+        return MeshRequests(
+            self._session,
+            self._site,
+            self._settings.name,
             control=self._control,
             programs=self._programs,
             jogs=self._jogs,
             audit=self._audit_trail.write_later,
         )
-        session.answer(site, settings.name, "audit/find", SearchServer(audit_path).answer)
-        self._operators = session.watch_presence(presence_key(site, settings.name, Role.OPERATOR.value, "*"))
-        self._gateways = session.watch_presence(presence_key(site, settings.name, Role.GATEWAY.value, "*"))
-        self._session, self._identity = session, session.identity
-        # Ids of other gateways that serve this robot.
-        self._others: set[str] = set()
-        self._report_startup()
 
-    def _persisted_authority(self) -> Authority:
-        """Return the authority from the audit log, without the stop if the robot is read-only.
-
-        No operator could reset the stop of a read-only robot.
-        """
-        authority = self._audit.state.authority
-        return replace(authority, stop=None) if self._read_only else authority
+    # ----------------------------------------------------------------- service
 
     def _report_startup(self) -> None:
         if self._audit.damage:
@@ -398,7 +361,7 @@ class Robot:
     async def _watch_gateways(self) -> None:
         """Follow which other gateways serve this robot."""
         async for who, alive in self._gateways:
-            if who.id != self._identity:
+            if who.id != self._session.identity:
                 (self._others.add if alive else self._others.discard)(who.id)
 
     def _other_gateway(self) -> Reason | None:
@@ -511,7 +474,7 @@ class Robot:
             status=self._telemetry.status(now_s),
             fault=self._telemetry.fault(now_s),
             positions=self._telemetry.positions(now_s) if unproven is None else None,
-            positions_stale=self._no_joints or self._telemetry.positions_stale(now_s),
+            positions_stale=self._capabilities.no_joints or self._telemetry.positions_stale(now_s),
             unproven=unproven,
             invalid=self._telemetry.invalid(now_s),
             software=software,

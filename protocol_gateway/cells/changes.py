@@ -26,15 +26,15 @@ from protocol_gateway.authority.entries import MESH, entry_of
 from protocol_gateway.authority.entry import Entry, Outcome
 from protocol_gateway.checking.cell_occupancy import CellOccupancy
 from protocol_gateway.checking.checker import Checker
-from protocol_gateway.robot import Robot
+from protocol_gateway.configuration.settings import CellFile
+from protocol_gateway.robot.robot import Robot
 from protocol_gateway.seam.errors import AuditError, CheckError
-from protocol_gateway.settings import CellFile
 from robomesh import reason_codes as codes
-from robomesh.contract.keys import ROOT, robot_key
+from robomesh.contract.keys import robot_key
 from robomesh.contract.messages import reason_message
 from robomesh.contract.quotas import Quota
-from robomesh.contract.topics import Role, check_operator
-from robomesh.errors import MessageError, RefusedError, RobomeshError
+from robomesh.contract.topics import check_operator
+from robomesh.errors import RefusedError, RobomeshError
 from robomesh.publications.publisher import Publisher
 from robomesh.reasons import Reason
 from robomesh.requests.server import Request
@@ -50,7 +50,6 @@ _S = schema.Event.Severity
 # Reading meshes and building hulls takes seconds.
 _PREPARE_TIMEOUT_S = 60.0
 SHOWN_WITHIN_S = 30.0
-_NEWEST = 512
 _LONGEST_REASON = 200
 
 
@@ -381,40 +380,3 @@ def _reason_of(error: Exception) -> Reason:
             return codes.CELL_CHECK_FAILED(error.reason)
     log.exception("a change of a cell failed")
     return codes.CELL_CHECK_FAILED(codes.OTHER(detail=f"{type(error).__name__}: {error}"))
-
-
-class CellsOfGateway:
-    """All cells of a gateway, by their robots."""
-
-    def __init__(self, session: Session, site: str, cells: Mapping[str, CellChanges]) -> None:
-        self._session, self._site, self._cells = session, site, cells
-
-    async def run(self) -> None:
-        """Follow what kinematics shows, until cancelled."""
-        if not self._cells:
-            return
-        for cell in dict.fromkeys(self._cells.values()):
-            cell.serve()
-        async with asyncio.TaskGroup() as group:
-            group.create_task(self._follow_shown())
-            group.create_task(self._follow_presence())
-
-    async def _follow_shown(self) -> None:
-        key = f"{ROOT}/{self._site}/*/cell/shown"
-        async for sample in self._session.subscribe(key, newest=_NEWEST):
-            cell = self._cells.get(sample.parsed.robot)
-            if cell is None:
-                continue
-            try:
-                shown = sample.message()
-            except MessageError as error:
-                log.warning("%s: %s", sample.key, error)
-                continue
-            assert isinstance(shown, schema.CellShown)
-            cell.on_shown(sample.parsed.robot, shown)
-
-    async def _follow_presence(self) -> None:
-        key = f"{ROOT}/{self._site}/*/alive/{Role.KINEMATICS.value}/*"
-        async for who, alive in self._session.watch_presence(key):
-            if (cell := self._cells.get(who.robot)) is not None:
-                cell.on_presence(who.robot, who.id, alive=alive)

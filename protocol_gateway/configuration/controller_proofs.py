@@ -1,4 +1,4 @@
-"""Proofs of a robot and its real controller: its joints are those of the model, and its stop ends motions.
+"""Proofs of a robot and its real controller: its joints are those of the model, its stop ends motions.
 
 A proof is valid for the model, the driver and the software of the controller with which it was made.
 """
@@ -31,7 +31,7 @@ class StopProof:
     date: date
 
 
-class Proofs:
+class ControllerProofs:
     """Proofs of one robot.
 
     Args:

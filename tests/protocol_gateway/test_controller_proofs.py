@@ -5,7 +5,7 @@ from datetime import date
 
 import pytest
 
-from protocol_gateway.proofs import Proofs, StopProof
+from protocol_gateway.configuration.controller_proofs import ControllerProofs, StopProof
 from protocol_gateway.seam import COMMANDS, Capabilities, Hold
 from robomesh import reason_codes as codes
 from robots.descriptions.description import load, parse
@@ -34,7 +34,7 @@ RECORD = VerificationRecord(
 
 def proofs(capabilities=READS, **settings):
     given = {"protocol": "rtde", "simulated": False, "verified": RECORD, "stop": False, "experimental": True}
-    return Proofs("hall/arm", ARM, capabilities, **given | settings)
+    return ControllerProofs("hall/arm", ARM, capabilities, **given | settings)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from controllers.unit.driver import UNITS, UnitDriver
 from protocol_gateway.seam import (
     Activity,
     Hold,
@@ -23,7 +24,6 @@ from protocol_gateway.seam import (
     UnknownReceived,
 )
 from protocol_gateway.seam.errors import CommandError
-from protocol_gateway.unit_driver import UNITS, UnitDriver
 from robots.kinematics.joints import JointType
 
 R, P = JointType.ROTARY, JointType.PRISMATIC

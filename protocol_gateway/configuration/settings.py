@@ -9,9 +9,9 @@ import numpy as np
 
 from protocol_gateway.audit.log import ROTATE_BYTES
 from protocol_gateway.checking.policy import Policy
-from protocol_gateway.kinds import is_known, protocols
+from protocol_gateway.configuration.controller_proofs import StopProof
+from protocol_gateway.configuration.kinds import is_known, protocols
 from protocol_gateway.legacy.settings import LegacySettings
-from protocol_gateway.proofs import StopProof
 from protocol_gateway.seam import Recovery
 from protocol_gateway.seam.errors import GatewaySettingsError
 from robomesh.contract.keys import check_name
@@ -36,7 +36,7 @@ class RobotSettings:
         host: Host of the controller, with `port`.
         ports: Ports of the controller's other interfaces, where they are not the usual ones:
             {"primary": 30011}.
-        protocol: Protocol of the controller, by its name in `protocol_gateway.kinds`.
+        protocol: Protocol of the controller, by its name in `protocol_gateway.configuration.kinds`.
         options: Settings of the protocol's driver; None: it has none.
         codes: Type codes, where the controller sends numbers: {2: "ABSOLUTE.DEG", 101: "COMMAND:home"}.
         accept_unknown: States that the controller never reports and that are not required: "mode", "homed".

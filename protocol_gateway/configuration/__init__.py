@@ -1,0 +1,1 @@
+"""Settings of a gateway, the kinds of controllers that they name, and the proofs that they require."""
