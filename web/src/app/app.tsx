@@ -18,6 +18,7 @@ import { stopRequestText } from "../mesh/robot-state";
 import { dismissStop, stop, stopAgain, stopNotice, unsentStop } from "../mesh/stop";
 import { useTopic } from "../mesh/topics";
 import { RobotNotFound } from "../panels/robot-not-found";
+import { Button } from "../ui/button";
 import { guardMovedControls } from "../ui/moved-controls";
 import { NoticeLine } from "../ui/notice-line";
 import { type Route, robotOf, route } from "../ui/route";
@@ -46,9 +47,7 @@ function NotLoaded() {
   return (
     <div class="empty" role="alert">
       <p>{t("page_not_loaded")}</p>
-      <button class="action" onClick={() => location.reload()}>
-        {t("load_again")}
-      </button>
+      <Button text={t("load_again")} onClick={() => location.reload()} />
     </div>
   );
 }
@@ -145,14 +144,8 @@ function StopPlace({ robots }: { robots: readonly string[] }) {
       {stopNotice.value && (
         <div class={`stop-notice ${stopNotice.value.kind}`}>
           <NoticeLine notice={stopNotice.value} />
-          {unsentStop.value && reachable.value && (
-            <button class="action" onClick={stopAgain}>
-              {t("stop_again")}
-            </button>
-          )}
-          <button class="quiet" onClick={dismissStop}>
-            {t("dismiss")}
-          </button>
+          {unsentStop.value && reachable.value && <Button text={t("stop_again")} onClick={stopAgain} />}
+          <Button quiet text={t("dismiss")} onClick={dismissStop} />
         </div>
       )}
       {robot && robots[0] ? (

@@ -5,6 +5,7 @@ import { a } from "../i18n/account";
 import type { Me } from "../mesh/account";
 import { me, post } from "../mesh/account";
 import { RefusedRequest } from "../mesh/refusal";
+import { Button } from "../ui/button";
 import { PasswordField } from "../ui/password-field";
 import "./account-form.css";
 
@@ -73,14 +74,8 @@ export function ChangePassword({ close }: { close: () => void }) {
         {outcome?.text ?? "\u00a0"}
       </p>
       <div class="account-row">
-        <button type="button" class="action" onClick={close}>
-          {a(outcome?.done ? "close" : "cancel")}
-        </button>
-        {!outcome?.done && (
-          <button type="submit" class="action primary" disabled={busy}>
-            {a(busy ? "changing" : "change")}
-          </button>
-        )}
+        <Button text={a(outcome?.done ? "close" : "cancel")} type="button" onClick={close} />
+        {!outcome?.done && <Button primary text={a(busy ? "changing" : "change")} type="submit" disabled={busy} />}
       </div>
     </form>
   );

@@ -11,6 +11,7 @@ import type { Notice } from "../mesh/control";
 import { operator, reasonOf, setOperator } from "../mesh/control";
 import type { NoteTime } from "../mesh/notes";
 import { LONGEST_TEXT, writeNote } from "../mesh/notes";
+import { Button } from "../ui/button";
 import { NoticeLine } from "../ui/notice-line";
 import "./note-form.css";
 
@@ -74,12 +75,8 @@ export function NoteForm(props: {
       )}
       <div class="note-row">
         <NoticeLine notice={notice} idle={cannot} />
-        <button type="button" class="action" onClick={props.close}>
-          {t("cancel")}
-        </button>
-        <button type="submit" class="action primary" disabled={busy || cannot !== "" || !text.trim()}>
-          {n("save")}
-        </button>
+        <Button text={t("cancel")} type="button" onClick={props.close} />
+        <Button primary text={n("save")} type="submit" disabled={busy || cannot !== "" || !text.trim()} />
       </div>
     </form>
   );

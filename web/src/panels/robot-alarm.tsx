@@ -7,6 +7,7 @@ import { Event_Severity as Severity } from "../gen/robomesh_pb";
 import { stampFull, stampWhen } from "../i18n/format";
 import { t } from "../i18n/texts";
 import { DISOBEYED, disobeys, msBefore } from "../mesh/robot-state";
+import { Button } from "../ui/button";
 
 const SHOWN_MS = 600_000; // unless it is dismissed before
 
@@ -33,9 +34,7 @@ export function RobotAlarm({ state, events }: { state: ControllerState | undefin
         <span title={stampFull(event.timestamp)}>
           {event.code === DISOBEYED ? t("disobeyed", { time }) : t("critical_at", { time, text: event.text })}
         </span>
-        <button class="quiet" onClick={() => setDismissed(at)}>
-          {t("dismiss")}
-        </button>
+        <Button quiet text={t("dismiss")} onClick={() => setDismissed(at)} />
       </div>
     </div>
   );

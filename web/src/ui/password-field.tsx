@@ -2,6 +2,7 @@
 
 import { useId, useState } from "preact/hooks";
 import { a } from "../i18n/account";
+import { Button } from "./button";
 import "./password-field.css";
 
 export function PasswordField(props: {
@@ -36,9 +37,13 @@ export function PasswordField(props: {
           onKeyDown={updateCaps}
           onKeyUp={updateCaps}
         />
-        <button type="button" class="quiet" aria-pressed={shown} onClick={() => setShown(!shown)}>
-          {a(shown ? "hide" : "show")}
-        </button>
+        <Button
+          quiet
+          text={a(shown ? "hide" : "show")}
+          type="button"
+          aria-pressed={shown}
+          onClick={() => setShown(!shown)}
+        />
       </span>
       {caps && (
         <span class="state warning" role="status">

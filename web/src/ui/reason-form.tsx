@@ -3,6 +3,7 @@
 import type { ComponentChildren } from "preact";
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { t } from "../i18n/texts";
+import { Button } from "./button";
 
 export function ReasonForm(props: {
   title: string;
@@ -53,12 +54,8 @@ export function ReasonForm(props: {
         />
       </label>
       <div class="reason-row">
-        <button type="button" class="action" onClick={props.close}>
-          {t("cancel")}
-        </button>
-        <button type="submit" class="action primary" disabled={missing}>
-          {props.does}
-        </button>
+        <Button text={t("cancel")} type="button" onClick={props.close} />
+        <Button primary text={props.does} type="submit" disabled={missing} />
       </div>
     </form>
   );

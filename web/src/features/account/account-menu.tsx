@@ -5,6 +5,7 @@ import { a, roleText } from "../../i18n/account";
 import { commandSuspended, isMonitor, me, signOut } from "../../mesh/account";
 import { hello } from "../../mesh/connection";
 import { ChangePassword } from "../../panels/change-password";
+import { Button } from "../../ui/button";
 import { useDismissal } from "../../ui/dismissal";
 import "./account-menu.css";
 
@@ -36,15 +37,9 @@ export function AccountMenu() {
             <p class="dim">
               {isMonitor.value ? a("may_watch") : commandSuspended.value ? a("rests") : a("may_command", { operator })}
             </p>
-            <button class="action" onClick={() => setChanging(true)}>
-              {a("change_password")}
-            </button>
-            <button class="action" onClick={() => void signOut(true)}>
-              {a("sign_out_everywhere")}
-            </button>
-            <button class="action primary" onClick={() => void signOut(false)}>
-              {a("sign_out")}
-            </button>
+            <Button text={a("change_password")} onClick={() => setChanging(true)} />
+            <Button text={a("sign_out_everywhere")} onClick={() => void signOut(true)} />
+            <Button primary text={a("sign_out")} onClick={() => void signOut(false)} />
           </>
         )}
       </div>

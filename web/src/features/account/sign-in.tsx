@@ -6,6 +6,7 @@ import { reasonText, withValue } from "../../i18n/reasons";
 import { switchLanguage, t } from "../../i18n/texts";
 import { endedBy, me, signIn } from "../../mesh/account";
 import { RefusedRequest } from "../../mesh/refusal";
+import { Button } from "../../ui/button";
 import { PasswordField } from "../../ui/password-field";
 import { switchTheme, theme } from "../../ui/theme";
 import "../../panels/account-form.css";
@@ -39,12 +40,8 @@ export function SignIn() {
     <section class="sign-in" aria-label={a("sign_in")}>
       {/* For narrow screens, where the bar has no space for them. */}
       <p class="sign-in-look">
-        <button class="quiet" onClick={() => switchLanguage()} title={t("language_hint")}>
-          {t("language")}
-        </button>
-        <button class="quiet" onClick={switchTheme}>
-          {t(theme.value === "dark" ? "theme_light" : "theme_dark")}
-        </button>
+        <Button quiet text={t("language")} onClick={() => switchLanguage()} title={t("language_hint")} />
+        <Button quiet text={t(theme.value === "dark" ? "theme_light" : "theme_dark")} onClick={switchTheme} />
       </p>
       <form
         onSubmit={(event) => {
@@ -79,9 +76,7 @@ export function SignIn() {
         <p class="sign-in-problem" role="alert">
           {problem && (!waitUntil || left > 0) && a("not_signed_in", { text: textOf(problem, left) })}
         </p>
-        <button class="action primary" type="submit" disabled={busy || left > 0}>
-          {a(busy ? "signing_in" : "sign_in")}
-        </button>
+        <Button primary text={a(busy ? "signing_in" : "sign_in")} type="submit" disabled={busy || left > 0} />
         <p class="dim">{a("forgotten")}</p>
       </form>
       <footer>

@@ -6,6 +6,7 @@ import { c } from "../../i18n/cell";
 import { reasonText } from "../../i18n/reasons";
 import { isEngineer } from "../../mesh/account";
 import { reasonOf } from "../../mesh/control";
+import { Button } from "../../ui/button";
 import { Panel } from "../../ui/panel";
 import { ReasonForm } from "../../ui/reason-form";
 import {
@@ -60,17 +61,16 @@ export function ContentPanel({ robotKey }: { robotKey: string }) {
       title={c("fixtures")}
       name="cell-content"
       end={
-        <button
+        <Button
+          quiet
+          text={c("undo")}
           type="button"
-          class="quiet"
           disabled={!may || !state?.previous || review !== null}
           onClick={() => {
             beginUndo();
             void look();
           }}
-        >
-          {c("undo")}
-        </button>
+        />
       }
     >
       <ul class="cell-rows">
@@ -88,9 +88,7 @@ export function ContentPanel({ robotKey }: { robotKey: string }) {
       {state?.cell && (
         <div class="cell-add" role="group" aria-label={c("add")}>
           {(["box", "cylinder", "sphere"] as const).map((kind) => (
-            <button type="button" class="action" key={kind} disabled={!may} onClick={() => add(kind)}>
-              {c(`add_${kind}`)}
-            </button>
+            <Button key={kind} text={c(`add_${kind}`)} type="button" disabled={!may} onClick={() => add(kind)} />
           ))}
         </div>
       )}
@@ -110,20 +108,22 @@ export function ContentPanel({ robotKey }: { robotKey: string }) {
         </ReasonForm>
       ) : (
         <div class="cell-actions">
-          <button
+          <Button
+            text={c("discard")}
             type="button"
-            class="action"
             disabled={!draft.value || busy}
             onClick={() => {
               discard();
               setSaid({ text: "", kind: "" });
             }}
-          >
-            {c("discard")}
-          </button>
-          <button type="button" class="action primary" disabled={!may || !isEdited.value} onClick={() => void look()}>
-            {c("review")}
-          </button>
+          />
+          <Button
+            primary
+            text={c("review")}
+            type="button"
+            disabled={!may || !isEdited.value}
+            onClick={() => void look()}
+          />
         </div>
       )}
       <p class={`notice ${said.kind}`} role="status">
@@ -161,9 +161,7 @@ function Row(props: { name: string; kind: string; detail: string; mark: Mark }) 
       </button>
       {mark && <span class="cell-mark">{c(mark)}</span>}
       {mark === "removed" && old && (
-        <button type="button" class="quiet" disabled={!mayEdit.value} onClick={() => keep(old)}>
-          {c("keep")}
-        </button>
+        <Button quiet text={c("keep")} type="button" disabled={!mayEdit.value} onClick={() => keep(old)} />
       )}
     </li>
   );

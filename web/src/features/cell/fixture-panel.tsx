@@ -3,6 +3,7 @@
 import { useId, useState } from "preact/hooks";
 import type { CellFixture, CellFloor } from "../../gen/robomesh_pb";
 import { c } from "../../i18n/cell";
+import { Button } from "../../ui/button";
 import { Choice, Toggle } from "../../ui/choice";
 import { Panel } from "../../ui/panel";
 import { change, changeFixture, chosen, FLOOR, mayEdit, published, remove, rename, shownContent } from "./cell-draft";
@@ -53,17 +54,16 @@ export function FixturePanel() {
       <Shape fixture={fixture} set={set} />
       <Name key={`${name} name`} name={name} />
       <div class="cell-actions">
-        <button
+        <Button
+          destructive
+          text={c("remove")}
           type="button"
-          class="action destructive"
           disabled={!mayEdit.value}
           onClick={() => {
             remove(name);
             chosen.value = "";
           }}
-        >
-          {c("remove")}
-        </button>
+        />
       </div>
     </Panel>
   );

@@ -3,6 +3,7 @@
 import { useEffect } from "preact/hooks";
 import type { DefineText } from "../../i18n/define";
 import { d } from "../../i18n/define";
+import { Button } from "../../ui/button";
 import type { PairRow } from "./collision-plan";
 import {
   isPlanned,
@@ -87,9 +88,7 @@ function PlanState({ rows }: { rows: readonly PairRow[] }) {
           <span class="shape warning" aria-hidden="true" />
           {d("plan_failed", { text: planError.value })}
         </p>
-        <button class="quiet" onClick={planAgain}>
-          {d("plan_again")}
-        </button>
+        <Button quiet text={d("plan_again")} onClick={planAgain} />
       </div>
     );
   }

@@ -2,6 +2,7 @@
 
 import { useId } from "preact/hooks";
 import { d } from "../../i18n/define";
+import { Button } from "../../ui/button";
 import { problemsAt } from "./checks";
 import type { Joint } from "./description";
 import { jointUnit } from "./description";
@@ -25,9 +26,7 @@ export function DhTable() {
     <>
       <div class="dh-head">
         <h3>{d("dh_head")}</h3>
-        <button class="quiet" title={d("paste_hint")} onClick={() => openPasteTable()}>
-          {d("paste_button")}
-        </button>
+        <Button quiet text={d("paste_button")} title={d("paste_hint")} onClick={() => openPasteTable()} />
       </div>
       <section
         class="dh-scroll"

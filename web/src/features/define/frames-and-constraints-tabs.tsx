@@ -1,6 +1,7 @@
 // Named frames on links, and limits on sums of joint positions.
 
 import { d } from "../../i18n/define";
+import { Button } from "../../ui/button";
 import type { Constraint, NamedFrame, Range } from "./description";
 import { angleUnit, jointUnit, linkNames } from "./description";
 import { draft, editDraft, endUndoStep } from "./draft";
@@ -9,16 +10,15 @@ import { NumberField, PoseFields, ProblemWords, Section, SelectField, TextField 
 
 function RemoveButton({ name, remove }: { name: string; remove: () => void }) {
   return (
-    <button
-      class="quiet"
+    <Button
+      quiet
+      text={d("remove")}
       aria-label={d("remove_what", { name })}
       onClick={() => {
         endUndoStep();
         remove();
       }}
-    >
-      {d("remove")}
-    </button>
+    />
   );
 }
 

@@ -3,6 +3,7 @@
 import { signal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { d } from "../../i18n/define";
+import { Button } from "../../ui/button";
 import { problemsAt } from "./checks";
 import type { Description, Joint } from "./description";
 import { linkName } from "./description";
@@ -201,14 +202,13 @@ export function KinematicChain() {
         {announced.value}
       </p>
       <div class="chain-tools" role="group" aria-label={d("chain_tools")}>
-        <button
-          class="quiet"
+        <Button
+          quiet
+          text={d("insert")}
           disabled={selected === null}
           title={d("insert_before")}
           onClick={() => add(selected ?? 0)}
-        >
-          {d("insert")}
-        </button>
+        />
         <button
           class="quiet sign"
           disabled={selected === null || selected === 0}
@@ -227,9 +227,7 @@ export function KinematicChain() {
         >
           ↓
         </button>
-        <button class="quiet" disabled={selected === null} onClick={() => remove(selected ?? 0, count)}>
-          {d("remove")}
-        </button>
+        <Button quiet text={d("remove")} disabled={selected === null} onClick={() => remove(selected ?? 0, count)} />
       </div>
     </section>
   );

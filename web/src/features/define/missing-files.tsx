@@ -1,6 +1,7 @@
 // Missing files that other files refer to, until they are added or skipped.
 
 import { d } from "../../i18n/define";
+import { Button } from "../../ui/button";
 import { FileButton } from "../../ui/file-button";
 import { chosen, continueWithoutMissing, skippedFiles, takeFiles, waitingUrdf } from "./dropped-files";
 import { missingFiles } from "./mesh-files";
@@ -31,9 +32,7 @@ export function MissingFiles() {
       </div>
       <div class="missing-actions">
         <FileButton label={d("choose_files")} multiple take={(files) => void takeFiles(chosen(files))} />
-        <button class="quiet" onClick={continueWithout}>
-          {d("go_on_without")}
-        </button>
+        <Button quiet text={d("go_on_without")} onClick={continueWithout} />
       </div>
     </section>
   );

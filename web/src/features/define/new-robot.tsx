@@ -3,6 +3,7 @@
 import { useEffect } from "preact/hooks";
 import { d } from "../../i18n/define";
 import { whenText } from "../../i18n/format";
+import { Button } from "../../ui/button";
 import { FileButton } from "../../ui/file-button";
 import { empty } from "./description";
 import { hasStoredDraft, newDrafts, openDraft, restoreDraft } from "./draft";
@@ -28,9 +29,7 @@ export function NewRobot() {
         <p class="dim">{d("start_words")}</p>
         {newDrafts().map(({ id, name, at }) => (
           <p key={id} class="start-draft">
-            <button class="action" onClick={() => restoreDraft("", id)}>
-              {d("continue_draft", { name, time: whenText(at) })}
-            </button>
+            <Button text={d("continue_draft", { name, time: whenText(at) })} onClick={() => restoreDraft("", id)} />
           </p>
         ))}
       </div>
@@ -52,9 +51,7 @@ export function NewRobot() {
         <section class="panel" aria-label={d("start_empty")}>
           <h2>{d("start_empty")}</h2>
           <p class="dim">{d("start_empty_words")}</p>
-          <button class="action" onClick={startEmpty}>
-            {d("start_empty_button")}
-          </button>
+          <Button text={d("start_empty_button")} onClick={startEmpty} />
         </section>
       </div>
       <section class="start-robots" aria-label={d("start_robot")}>

@@ -1,6 +1,7 @@
 // The chosen part: a joint's motion, a link's appearance, the tool's pose.
 
 import { d } from "../../i18n/define";
+import { Button } from "../../ui/button";
 import { Choice } from "../../ui/choice";
 import { FileButton } from "../../ui/file-button";
 import type { Body, Description, Joint } from "./description";
@@ -135,15 +136,14 @@ function BodyDetails({ body, description }: { body: Body; description: Descripti
           take={(files) => void takeShapeFor(chosen(files), find)}
         />
         {body.mesh && (
-          <button
-            class="quiet"
+          <Button
+            quiet
+            text={d("mesh_remove")}
             onClick={() => {
               endUndoStep();
               set("mesh", (own) => void (own.mesh = own.collision_mesh = ""));
             }}
-          >
-            {d("mesh_remove")}
-          </button>
+          />
         )}
       </div>
       {body.mesh && <MeshDetails path={path} body={body} set={set} />}
@@ -251,15 +251,14 @@ function MeshDetails({ path, body, set }: { path: string; body: Body; set: SetBo
         <p class="dim small">
           {d("guess", { guess: info.guess })}
           {info.scale !== body.mesh_scale && (
-            <button
-              class="quiet"
+            <Button
+              quiet
+              text={d("use_guess")}
               onClick={() => {
                 endUndoStep();
                 set("mesh_scale", (own) => void (own.mesh_scale = info.scale));
               }}
-            >
-              {d("use_guess")}
-            </button>
+            />
           )}
         </p>
       )}

@@ -3,6 +3,7 @@
 import { signal } from "@preact/signals";
 import { useEffect, useId, useMemo, useRef, useState } from "preact/hooks";
 import { d } from "../../i18n/define";
+import { Button } from "../../ui/button";
 import { Choice } from "../../ui/choice";
 import { numberText } from "../../ui/number-text";
 import { Select } from "../../ui/select";
@@ -182,12 +183,8 @@ function PasteDialog({ description, text: given, start }: { description: Descrip
         )}
       </div>
       <div class="paste-end">
-        <button class="action" onClick={close}>
-          {d("cancel")}
-        </button>
-        <button class="action primary" disabled={values === 0} onClick={fill}>
-          {d("paste_fill")}
-        </button>
+        <Button text={d("cancel")} onClick={close} />
+        <Button primary text={d("paste_fill")} disabled={values === 0} onClick={fill} />
       </div>
     </dialog>
   );

@@ -2,6 +2,7 @@
 
 import { Matrix4 } from "three";
 import { d } from "../../i18n/define";
+import { Button } from "../../ui/button";
 import { numberText } from "../../ui/number-text";
 import { Unit } from "../../ui/unit";
 import { checkError, checked, checking } from "./checks";
@@ -27,20 +28,22 @@ export function PositionsPanel() {
       <div class="panel-head">
         <h2>{d("joints")}</h2>
         <div class="panel-end">
-          <button
-            class="quiet"
+          <Button
+            quiet
+            text={d("home_from")}
             disabled={joints.length === 0}
             onClick={() =>
               editDraft(({ description }) => {
                 for (const joint of description.joint) joint.home = positionOf(joint);
               })
             }
-          >
-            {d("home_from")}
-          </button>
-          <button class="quiet" disabled={joints.length === 0} onClick={() => (sliderPositions.value = new Map())}>
-            {d("to_home")}
-          </button>
+          />
+          <Button
+            quiet
+            text={d("to_home")}
+            disabled={joints.length === 0}
+            onClick={() => (sliderPositions.value = new Map())}
+          />
         </div>
       </div>
       <div class="sliders">

@@ -4,6 +4,7 @@ import { useState } from "preact/hooks";
 import { d } from "../../i18n/define";
 import { whenText } from "../../i18n/format";
 import { t } from "../../i18n/texts";
+import { Button } from "../../ui/button";
 import { outcomeRole } from "../../ui/notice-line";
 import { robotLink } from "../../ui/route";
 import {
@@ -39,43 +40,32 @@ export function Toolbar() {
         </span>
       </div>
       <div class="toolbar-group">
-        <button class="action" disabled={!canUndo.value} onClick={undo} title={`${d("undo")} (Ctrl+Z)`}>
-          {d("undo")}
-        </button>
-        <button class="action" disabled={!canRedo.value} onClick={redo} title={`${d("redo")} (Ctrl+Shift+Z)`}>
-          {d("redo")}
-        </button>
+        <Button text={d("undo")} disabled={!canUndo.value} onClick={undo} title={`${d("undo")} (Ctrl+Z)`} />
+        <Button text={d("redo")} disabled={!canRedo.value} onClick={redo} title={`${d("redo")} (Ctrl+Shift+Z)`} />
       </div>
       <div class="toolbar-group">
         {/* biome-ignore lint/a11y/useValidAnchor: it navigates; the click clears the draft first. */}
         <a class="action" href="#/define" onClick={startNewDraft}>
           {d("new")}
         </a>
-        <button class="action" disabled={busy.value !== ""} onClick={() => void download()}>
-          {d("download")}
-        </button>
+        <Button text={d("download")} disabled={busy.value !== ""} onClick={() => void download()} />
         {running ? (
-          <button class="action" disabled={busy.value !== ""} onClick={() => void stop()}>
-            {d("stop_simulated")}
-          </button>
+          <Button text={d("stop_simulated")} disabled={busy.value !== ""} onClick={() => void stop()} />
         ) : (
-          <button
-            class="action"
+          <Button
+            text={d(isUnsaved.value || !siteName ? "save_start" : "start")}
             disabled={busy.value !== "" || !canStart}
             title={canStart ? "" : d("cannot_start")}
             onClick={() => void start()}
-          >
-            {d(isUnsaved.value || !siteName ? "save_start" : "start")}
-          </button>
+          />
         )}
-        <button
-          class="action primary"
+        <Button
+          primary
+          text={d("save")}
           disabled={busy.value !== "" || (!isUnsaved.value && siteName !== "")}
           onClick={() => void save(false)}
           title="Ctrl+S"
-        >
-          {d("save")}
-        </button>
+        />
       </div>
     </div>
   );
@@ -95,18 +85,12 @@ export function Outcomes() {
               <button class="action small-action" onClick={discardDraft}>
                 {d("discard")}
               </button>
-              <button class="quiet" onClick={() => setSure(false)}>
-                {d("cancel")}
-              </button>
+              <Button quiet text={d("cancel")} onClick={() => setSure(false)} />
             </>
           ) : (
             <>
-              <button class="quiet" onClick={() => setSure(true)}>
-                {d("discard")}
-              </button>
-              <button class="quiet" onClick={() => (restoredFrom.value = null)}>
-                {d("keep")}
-              </button>
+              <Button quiet text={d("discard")} onClick={() => setSure(true)} />
+              <Button quiet text={d("keep")} onClick={() => (restoredFrom.value = null)} />
             </>
           )}
         </div>
@@ -123,9 +107,7 @@ export function Outcomes() {
           <button class="action small-action" onClick={() => void save(done.thenStart, done.name)}>
             {d("save_over")}
           </button>
-          <button class="quiet" onClick={() => (outcome.value = null)}>
-            {d("cancel")}
-          </button>
+          <Button quiet text={d("cancel")} onClick={() => (outcome.value = null)} />
         </div>
       )}
       {done?.kind === "started" && (
@@ -162,17 +144,11 @@ function FileNotices() {
           <li key={text}>{text}</li>
         ))}
       </ul>
-      <button class="quiet" onClick={() => (fileNotices.value = [])}>
-        {t("dismiss")}
-      </button>
+      <Button quiet text={t("dismiss")} onClick={() => (fileNotices.value = [])} />
     </div>
   );
 }
 
 function Close() {
-  return (
-    <button class="quiet" onClick={() => (outcome.value = null)}>
-      {t("dismiss")}
-    </button>
-  );
+  return <Button quiet text={t("dismiss")} onClick={() => (outcome.value = null)} />;
 }

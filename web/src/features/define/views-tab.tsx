@@ -3,6 +3,7 @@
 import { useState } from "preact/hooks";
 import { d } from "../../i18n/define";
 import { viewText } from "../../i18n/texts";
+import { Button } from "../../ui/button";
 import type { View } from "./description";
 import { draft, editDraft, endUndoStep } from "./draft";
 import { ProblemWords, SelectField, TextField } from "./fields";
@@ -32,21 +33,19 @@ export function ViewsTab() {
               <strong>{viewText(name)}</strong>
               <span class="dim small">{d(given[name] ? "view_own" : "view_auto")}</span>
             </span>
-            <button
-              class="quiet"
+            <Button
+              quiet
+              text={d("view_look")}
               aria-label={d("view_look_at", { view: viewText(name) })}
               onClick={() => (requestedView.value = { name })}
-            >
-              {d("view_look")}
-            </button>
-            <button
-              class="quiet"
+            />
+            <Button
+              quiet
+              text={d("view_set")}
               aria-label={d("view_set_of", { view: viewText(name) })}
               disabled={!currentCamera.value}
               onClick={() => setFromCamera(name)}
-            >
-              {d("view_set")}
-            </button>
+            />
             {given[name] && (
               <span class="view-more">
                 <SelectField
@@ -65,15 +64,14 @@ export function ViewsTab() {
                     requestedView.value = { name };
                   }}
                 />
-                <button
-                  class="quiet"
+                <Button
+                  quiet
+                  text={d((USUAL_VIEWS as readonly string[]).includes(name) ? "view_reset" : "remove")}
                   onClick={() => {
                     endUndoStep();
                     editDraft(({ description }) => void delete description.view[name]);
                   }}
-                >
-                  {d((USUAL_VIEWS as readonly string[]).includes(name) ? "view_reset" : "remove")}
-                </button>
+                />
               </span>
             )}
           </li>

@@ -7,6 +7,7 @@ import { e } from "../../i18n/events";
 import { stampFull, stampTime, stampWhen } from "../../i18n/format";
 import type { Alarm } from "../../mesh/alarms";
 import { isUnacknowledged, nameOf, State } from "../../mesh/alarms";
+import { Button } from "../../ui/button";
 import { PriorityMark } from "../../ui/priority-mark";
 import { robotLink } from "../../ui/route";
 
@@ -77,33 +78,27 @@ export function AlarmLine(props: {
       </div>
       <span class="alarm-actions">
         {open && (
-          <button
-            class="action"
+          <Button
+            text={e("acknowledge")}
             disabled={!able}
             aria-label={e("acknowledge_of", { text: title ?? text })}
             onClick={props.acknowledge}
-          >
-            {e("acknowledge")}
-          </button>
+          />
         )}
         {state === State.SHELVED ? (
-          <button
-            class="action"
+          <Button
+            text={e("unshelve")}
             disabled={!able}
             aria-label={e("unshelve_of", { text: title ?? text })}
             onClick={props.unshelve}
-          >
-            {e("unshelve")}
-          </button>
+          />
         ) : (
-          <button
-            class="action"
+          <Button
+            text={e("shelve")}
             disabled={!able}
             aria-label={e("shelve_of", { text: title ?? text })}
             onClick={props.shelve}
-          >
-            {e("shelve")}
-          </button>
+          />
         )}
       </span>
     </li>

@@ -26,6 +26,7 @@ import { hello } from "../../mesh/connection";
 import type { Notice } from "../../mesh/control";
 import { operator, reasonOf, setOperator } from "../../mesh/control";
 import { setSound, sound } from "../../panels/alarm-sound";
+import { Button } from "../../ui/button";
 import { Choice, Toggle } from "../../ui/choice";
 import { NoticeLine } from "../../ui/notice-line";
 import { Select } from "../../ui/select";
@@ -136,21 +137,24 @@ export function AlarmPanel() {
           <div class="list-actions">
             {!hello.value?.operator && <Name />}
             {openChosen.length > 0 ? (
-              <button class="action primary" disabled={!able} onClick={() => void run(openChosen, Action.ACKNOWLEDGE)}>
-                {e("acknowledge_selected", { count: openChosen.length })}
-              </button>
+              <Button
+                primary
+                text={e("acknowledge_selected", { count: openChosen.length })}
+                disabled={!able}
+                onClick={() => void run(openChosen, Action.ACKNOWLEDGE)}
+              />
             ) : (
-              <button
-                class="action"
+              <Button
+                text={e("acknowledge_shown", { count: open.length })}
                 disabled={!able || open.length === 0}
                 onClick={() => void run(open, Action.ACKNOWLEDGE)}
-              >
-                {e("acknowledge_shown", { count: open.length })}
-              </button>
+              />
             )}
-            <button class="action" disabled={!able || chosen.length === 0} onClick={() => setShelving(chosen)}>
-              {e("shelve_selected")}
-            </button>
+            <Button
+              text={e("shelve_selected")}
+              disabled={!able || chosen.length === 0}
+              onClick={() => setShelving(chosen)}
+            />
           </div>
         )}
       </div>

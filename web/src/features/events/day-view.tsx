@@ -5,6 +5,7 @@ import type { DayTextName } from "../../i18n/day";
 import { d, lastedText } from "../../i18n/day";
 import { count, DASH, dateOf, timeOfDay, timeText, whenText, zoneOf } from "../../i18n/format";
 import { lostAt } from "../../mesh/connection";
+import { Button } from "../../ui/button";
 import { saveFile } from "../../ui/save-file";
 import type { DayLine, Totals } from "./day";
 import { exported, linesOf, spanOfDay, totalsOf, wordsOf } from "./day";
@@ -26,9 +27,7 @@ export function DayView({ robotKey, events }: { robotKey: string; events: readon
   return (
     <>
       <div class="day-head">
-        <button class="action" aria-label={d("earlier")} title={d("earlier")} onClick={() => step(-1)}>
-          ←
-        </button>
+        <Button text="←" aria-label={d("earlier")} title={d("earlier")} onClick={() => step(-1)} />
         <input
           type="date"
           aria-label={d("day")}
@@ -36,15 +35,13 @@ export function DayView({ robotKey, events }: { robotKey: string; events: readon
           max={dateOf(Date.now())}
           onChange={(event) => spanOfDay(event.currentTarget.value) && setDate(event.currentTarget.value)}
         />
-        <button
-          class="action"
+        <Button
+          text="→"
           aria-label={d("later")}
           title={d("later")}
           disabled={!span || span.to > Date.now()}
           onClick={() => step(1)}
-        >
-          →
-        </button>
+        />
         {span && <span class="dim small">{zoneOf(span.from)}</span>}
         {answers && <Sentences robotKey={robotKey} date={date} answers={answers} events={events} />}
       </div>
@@ -116,12 +113,8 @@ function Sentences(props: { robotKey: string; date: string; answers: DayAnswers;
   };
   return (
     <span class="day-save">
-      <button class="action" title={d("save_hint")} onClick={() => save(false)}>
-        {d("as_text")}
-      </button>
-      <button class="action" title={d("save_hint")} onClick={() => save(true)}>
-        {d("as_csv")}
-      </button>
+      <Button text={d("as_text")} title={d("save_hint")} onClick={() => save(false)} />
+      <Button text={d("as_csv")} title={d("save_hint")} onClick={() => save(true)} />
     </span>
   );
 }

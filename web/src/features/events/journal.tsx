@@ -14,6 +14,7 @@ import { reasonOf } from "../../mesh/control";
 import { fleetRobots } from "../../mesh/known-robots";
 import { mayWithdraw, readNotes, WRITTEN, withdrawNote, withdrawnIds } from "../../mesh/notes";
 import { Withdrawable } from "../../panels/note-form";
+import { Button } from "../../ui/button";
 import { Choice, Toggle } from "../../ui/choice";
 import { Mark, outcomeMark, severityMark } from "../../ui/event-mark";
 import { NoticeLine } from "../../ui/notice-line";
@@ -307,9 +308,7 @@ function Details({ entry, withdrawn, close }: { entry: Entry; withdrawn: boolean
         ))}
       </dl>
       {audit && <SeenPicture site={entry.site} robot={entry.robot} entry={audit} />}
-      <button class="quiet" onClick={close}>
-        {e("close")}
-      </button>
+      <Button quiet text={e("close")} onClick={close} />
       {event?.code === WRITTEN && event.note && !withdrawn && mayWithdraw(event.note) && (
         <Withdraw robotKey={`robomesh/${entry.site}/${entry.robot}`} note={event.note} />
       )}
@@ -323,9 +322,7 @@ function Withdraw({ robotKey, note }: { robotKey: string; note: Note }) {
   const withdraw = () => withdrawNote(robotKey, note).catch((error: unknown) => setProblem(reasonOf(error)));
   return (
     <>
-      <button class="quiet destructive" title={n("withdraw_hint")} onClick={() => void withdraw()}>
-        {n("withdraw")}
-      </button>
+      <Button quiet destructive text={n("withdraw")} title={n("withdraw_hint")} onClick={() => void withdraw()} />
       {problem && <NoticeLine notice={{ kind: "refused", text: problem }} />}
     </>
   );

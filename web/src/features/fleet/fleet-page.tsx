@@ -14,6 +14,7 @@ import { stateWord } from "../../mesh/robot-state";
 import { isClockOff, isMeshStale, isSilent, reportAge, useMesh } from "../../mesh/site-health";
 import { ageOf, now } from "../../mesh/topics";
 import { AliveServices } from "../../panels/alive-services";
+import { Button } from "../../ui/button";
 import { State } from "../../ui/state";
 import { RunningReplays } from "./replays";
 import { RobotTile } from "./tile";
@@ -153,9 +154,7 @@ function NoMatch({ all }: { all: number }) {
   return (
     <div class="empty">
       <p>{f("no_match", { count: all })}</p>
-      <button class="action" onClick={clear}>
-        {f("clear")}
-      </button>
+      <Button text={f("clear")} onClick={clear} />
     </div>
   );
 }

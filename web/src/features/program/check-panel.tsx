@@ -5,6 +5,7 @@ import { whenText } from "../../i18n/format";
 import { p } from "../../i18n/program";
 import { reasonText } from "../../i18n/reasons";
 import { t } from "../../i18n/texts";
+import { Button } from "../../ui/button";
 import { Panel } from "../../ui/panel";
 import { draft, goToLine } from "./draft";
 import { distanceText, seconds } from "./number-format";
@@ -22,11 +23,7 @@ export function CheckPanel({ moved }: { moved: boolean }) {
     <Panel
       name="check-panel"
       title={p("check")}
-      end={
-        <button class="quiet" disabled={!draft.value?.text.trim()} onClick={checkNow}>
-          {p("check_again")}
-        </button>
-      }
+      end={<Button quiet text={p("check_again")} disabled={!draft.value?.text.trim()} onClick={checkNow} />}
     >
       <Verdict moved={moved} />
       {violations.length > 0 && (

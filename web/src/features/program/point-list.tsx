@@ -3,6 +3,7 @@
 import { useState } from "preact/hooks";
 import type { Words } from "../../i18n/program";
 import { p } from "../../i18n/program";
+import { Button } from "../../ui/button";
 import { draft, goToLine, replace } from "./draft";
 import { description, livePositions } from "./program-robot";
 import type { Point } from "./program-text";
@@ -61,12 +62,18 @@ export function PointList({ tell }: { tell: (words: Words) => void }) {
           <span class="point-value dim small" title={point.numbers.join(" ")}>
             {p(`by_${point.kind}`)} {point.numbers.join(" ")}
           </span>
-          <button class="quiet" aria-label={p("go_to_point", { name: point.name })} onClick={() => goTo(point, tell)}>
-            {p("go_to")}
-          </button>
-          <button class="quiet" aria-label={p("delete_point", { name: point.name })} onClick={() => remove(point)}>
-            {p("delete")}
-          </button>
+          <Button
+            quiet
+            text={p("go_to")}
+            aria-label={p("go_to_point", { name: point.name })}
+            onClick={() => goTo(point, tell)}
+          />
+          <Button
+            quiet
+            text={p("delete")}
+            aria-label={p("delete_point", { name: point.name })}
+            onClick={() => remove(point)}
+          />
         </li>
       ))}
     </ul>

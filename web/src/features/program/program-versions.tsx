@@ -6,6 +6,7 @@ import { ProgramVersion_Change as Change } from "../../gen/robomesh_pb";
 import { s } from "../../i18n/stored-programs";
 import { t } from "../../i18n/texts";
 import { mayAct } from "../../mesh/account";
+import { Button } from "../../ui/button";
 import { ReasonForm } from "../../ui/reason-form";
 import { Difference } from "./difference";
 import { download, draft } from "./draft";
@@ -31,23 +32,17 @@ export function Versions(props: {
     <>
       <div class="stored-tools">
         <h3>{title}</h3>
-        <button
-          class="action"
+        <Button
+          text={s("rename")}
           disabled={!mayAct.value || isDeleted(program)}
           onClick={() => (setName(title), setForm(form === "rename" ? "" : "rename"))}
-        >
-          {s("rename")}
-        </button>
-        <button
-          class="action"
+        />
+        <Button
+          text={s("delete")}
           disabled={!mayAct.value || isDeleted(program)}
           onClick={() => setForm(form === "delete" ? "" : "delete")}
-        >
-          {s("delete")}
-        </button>
-        <button class="action" onClick={() => download(content.text, title)}>
-          {s("export")}
-        </button>
+        />
+        <Button text={s("export")} onClick={() => download(content.text, title)} />
       </div>
       {form === "rename" && (
         <form
@@ -65,12 +60,8 @@ export function Versions(props: {
             value={name}
             onInput={(event) => setName(event.currentTarget.value)}
           />
-          <button type="button" class="action" onClick={() => setForm("")}>
-            {t("cancel")}
-          </button>
-          <button type="submit" class="action primary" disabled={!name.trim() || name === title}>
-            {s("rename")}
-          </button>
+          <Button text={t("cancel")} type="button" onClick={() => setForm("")} />
+          <Button primary text={s("rename")} type="submit" disabled={!name.trim() || name === title} />
         </form>
       )}
       {form === "delete" && (
@@ -121,16 +112,12 @@ export function Versions(props: {
             ))}
           </select>
         </label>
-        <button class="action" onClick={() => open(content)}>
-          {s("open_version")}
-        </button>
-        <button
-          class="action"
+        <Button text={s("open_version")} onClick={() => open(content)} />
+        <Button
+          text={s("restore", { version: version.number })}
           disabled={!mayAct.value || (isCurrent && !isDeleted(program))}
           onClick={() => void restore(robotKey, content)}
-        >
-          {s("restore", { version: version.number })}
-        </button>
+        />
       </div>
       <Difference
         key={`${version.number} ${against}`}
@@ -160,12 +147,8 @@ export function Conflict(props: { robotKey: string; mine: ProgramContent; theirs
       </p>
       <p class="stored-words">{s("conflict_words", values)}</p>
       <div class="stored-tools">
-        <button class="action" onClick={() => open(theirs)}>
-          {s("use_theirs")}
-        </button>
-        <button class="action primary" onClick={() => void useMine()}>
-          {s("use_mine")}
-        </button>
+        <Button text={s("use_theirs")} onClick={() => open(theirs)} />
+        <Button primary text={s("use_mine")} onClick={() => void useMine()} />
       </div>
       <Difference oldText={theirs.text} newText={mine.text} whole={null} />
     </>
@@ -180,12 +163,8 @@ export function RunText({ content }: { content: ProgramContent }) {
     <>
       <div class="stored-tools">
         <h3>{s("ran", { name })}</h3>
-        <button class="action" onClick={() => download(text, name)}>
-          {s("export")}
-        </button>
-        <button class="action" onClick={() => open(content)}>
-          {s("open_version")}
-        </button>
+        <Button text={s("export")} onClick={() => download(text, name)} />
+        <Button text={s("open_version")} onClick={() => open(content)} />
       </div>
       <p class="stored-words dim">{s("ran_by", { author: version?.author ?? "", time: timeOf(version) })}</p>
       <Difference oldText={text} newText={text} whole={text} />

@@ -5,6 +5,7 @@ import { p } from "../../i18n/program";
 import { s } from "../../i18n/stored-programs";
 import { t } from "../../i18n/texts";
 import { mayAct } from "../../mesh/account";
+import { Button } from "../../ui/button";
 import { Toggle } from "../../ui/choice";
 import { FileButton } from "../../ui/file-button";
 import { Panel } from "../../ui/panel";
@@ -28,13 +29,9 @@ export function StoredPanel({ robotKey }: { robotKey: string }) {
       end={
         <>
           {now && now.kind !== "list" && (
-            <button class="quiet" onClick={() => (shown.value = { kind: "list" })}>
-              {s("to_list")}
-            </button>
+            <Button quiet text={s("to_list")} onClick={() => (shown.value = { kind: "list" })} />
           )}
-          <button class="quiet" onClick={back}>
-            {s("back_to_text")}
-          </button>
+          <Button quiet text={s("back_to_text")} onClick={back} />
         </>
       }
     >
@@ -90,26 +87,22 @@ function List({ robotKey }: { robotKey: string }) {
                   {s("row", { version, author, time: timeOf(current) })}
                 </span>
               </span>
-              <button class="action" aria-label={s("versions_of", { name })} onClick={() => showVersion(robotKey, id)}>
-                {s("versions")}
-              </button>
-              <button
-                class="action"
+              <Button
+                text={s("versions")}
+                aria-label={s("versions_of", { name })}
+                onClick={() => showVersion(robotKey, id)}
+              />
+              <Button
+                text={s("open")}
                 aria-label={s("open_named", { name })}
                 disabled={isDeleted(program)}
                 onClick={() => (losesText() ? setAsking(id) : openProgram(id))}
-              >
-                {s("open")}
-              </button>
+              />
               {asking === id && (
                 <p class="stored-ask" role="alert">
                   <span>{s("loses", { name: draft.value?.name ?? "" })}</span>
-                  <button class="action" onClick={() => setAsking("")}>
-                    {t("cancel")}
-                  </button>
-                  <button class="action primary" onClick={() => openProgram(id)}>
-                    {s("open_anyway")}
-                  </button>
+                  <Button text={t("cancel")} onClick={() => setAsking("")} />
+                  <Button primary text={s("open_anyway")} onClick={() => openProgram(id)} />
                 </p>
               )}
             </li>

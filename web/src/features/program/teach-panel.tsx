@@ -5,6 +5,7 @@ import { jointText, jointTitle, jointUnit } from "../../i18n/format";
 import type { Words } from "../../i18n/program";
 import { noWords, p } from "../../i18n/program";
 import { targetProblem } from "../../mesh/target-check";
+import { Button } from "../../ui/button";
 import { Choice } from "../../ui/choice";
 import { JointTrack } from "../../ui/joint-track";
 import { JointValue } from "../../ui/joint-value";
@@ -52,17 +53,11 @@ export function TeachPanel() {
       }
     >
       <div class="teach-row">
-        <button class="action" disabled={!live} onClick={() => live && add(live)}>
-          {p("add_live")}
-        </button>
+        <Button text={p("add_live")} disabled={!live} onClick={() => live && add(live)} />
         {taught ? (
-          <button class="action" onClick={() => teach(null)}>
-            {p("end_ghost")}
-          </button>
+          <Button text={p("end_ghost")} onClick={() => teach(null)} />
         ) : (
-          <button class="action" disabled={!live} onClick={startGhost}>
-            {p("begin_ghost")}
-          </button>
+          <Button text={p("begin_ghost")} disabled={!live} onClick={startGhost} />
         )}
       </div>
       {taught && (
@@ -75,9 +70,7 @@ export function TeachPanel() {
               text={(each) => p(`by_${each}`)}
               choose={setMethod}
             />
-            <button class="action primary" disabled={taughtProblem.value !== ""} onClick={() => add(taught)}>
-              {p("add_ghost")}
-            </button>
+            <Button primary text={p("add_ghost")} disabled={taughtProblem.value !== ""} onClick={() => add(taught)} />
           </div>
           {method === "joints" ? <Sliders positions={taught} /> : <PosePanel />}
           <NoticeLine notice={problem ? { kind: "refused", text: problem } : null} idle={p("moves_nothing")} />

@@ -2,6 +2,7 @@
 
 import { useEffect } from "preact/hooks";
 import { p } from "../../i18n/program";
+import { Button } from "../../ui/button";
 import { Panel } from "../../ui/panel";
 import { clearanceAtMoment, duration, lineAtMoment, moment, path, playing } from "./checked-motion";
 import { MotionCurves } from "./motion-curves";
@@ -40,11 +41,7 @@ export function Timeline() {
     <Panel
       name="timeline"
       title={p("timeline")}
-      end={
-        <button class="quiet" disabled={time === null} onClick={hideMoment}>
-          {p("hide_ghost")}
-        </button>
-      }
+      end={<Button quiet text={p("hide_ghost")} disabled={time === null} onClick={hideMoment} />}
     >
       <div class="scrub-row">
         <button class="action play" disabled={!any} onClick={play} aria-label={p(playing.value ? "pause" : "play")}>

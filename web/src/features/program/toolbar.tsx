@@ -4,6 +4,7 @@ import type { Words } from "../../i18n/program";
 import { p } from "../../i18n/program";
 import { s } from "../../i18n/stored-programs";
 import { mayAct } from "../../mesh/account";
+import { Button } from "../../ui/button";
 import { FileButton } from "../../ui/file-button";
 import { canRedo, canUndo, download, draft, FILE_ENDING, isUnsaved, redo, rename, startProgram, undo } from "./draft";
 import { readProgramFile } from "./program-files";
@@ -58,47 +59,36 @@ export function Toolbar({ tell }: { tell: (words: Words) => void }) {
           />
         </label>
         <div class="program-buttons">
-          <button
-            class="action primary"
+          <Button
+            primary
+            text={s(now?.base && isNew ? "save_as" : "save")}
             onClick={() => void save()}
             disabled={!now?.text || saving.value || !mayAct.value || (!isUnsaved.value && now.base !== null)}
             title={mayAct.value ? s("save_hint") : s("monitor")}
-          >
-            {s(now?.base && isNew ? "save_as" : "save")}
-          </button>
-          <button
-            class="action"
+          />
+          <Button
+            text={s("programs")}
             aria-pressed={shown.value !== null}
             title={s("programs_hint")}
             onClick={() => {
               shown.value = shown.value ? null : { kind: "list" };
             }}
-          >
-            {s("programs")}
-          </button>
-          <button class="action" onClick={begin} disabled={!now || !description.value} title={p("new_hint")}>
-            {p("new")}
-          </button>
+          />
+          <Button text={p("new")} onClick={begin} disabled={!now || !description.value} title={p("new_hint")} />
           <FileButton
             label={p("open")}
             disabled={!now}
             accept={`${FILE_ENDING},.txt,text/plain`}
             take={([file]) => file && void openFile(file)}
           />
-          <button
-            class="action"
+          <Button
+            text={p("save")}
             onClick={() => now && download(now.text, now.name)}
             disabled={!now?.text}
             title={p("save_hint")}
-          >
-            {p("save")}
-          </button>
-          <button class="action" disabled={!canUndo.value} onClick={undo}>
-            {p("undo")}
-          </button>
-          <button class="action" disabled={!canRedo.value} onClick={redo}>
-            {p("redo")}
-          </button>
+          />
+          <Button text={p("undo")} disabled={!canUndo.value} onClick={undo} />
+          <Button text={p("redo")} disabled={!canRedo.value} onClick={redo} />
         </div>
       </div>
       <StoreLine />
@@ -126,12 +116,11 @@ function StoreLine() {
         {words || "\u00a0"}
       </span>
       {isNewer && now && (
-        <button
-          class="quiet"
+        <Button
+          quiet
+          text={s("compare")}
           onClick={() => void showVersion(now.robotKey, base.id, 0, isUnsaved.value ? null : base.version)}
-        >
-          {s("compare")}
-        </button>
+        />
       )}
     </p>
   );

@@ -3,6 +3,7 @@
 import type { Signal } from "@preact/signals";
 import { sizeText } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
+import { Button } from "../../ui/button";
 import type { Row } from "./recordings-of-sites";
 
 /** As the console allows. */
@@ -37,12 +38,11 @@ export function BulkDownload(props: {
             {r("zip")}
           </a>
         )}
-        <button class="action" onClick={() => (chosen.value = new Set([...chosen.value, ...all]))}>
-          {r("choose_all", { count: all.length })}
-        </button>
-        <button class="action" onClick={() => (chosen.value = new Set())}>
-          {r("choose_none")}
-        </button>
+        <Button
+          text={r("choose_all", { count: all.length })}
+          onClick={() => (chosen.value = new Set([...chosen.value, ...all]))}
+        />
+        <Button text={r("choose_none")} onClick={() => (chosen.value = new Set())} />
       </span>
     </div>
   );

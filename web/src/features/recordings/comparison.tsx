@@ -3,6 +3,7 @@
 import { eventText } from "../../i18n/event-text";
 import { momentText } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
+import { Button } from "../../ui/button";
 import type { RecordingName } from "../../ui/route";
 import { recordingsLink } from "../../ui/route";
 import type { RecordedEvent } from "./recorder-requests";
@@ -48,9 +49,7 @@ export function Comparison(props: {
             <Events name="second" label={r("align_choose_second")} events={secondEvents} />
           </>
         )}
-        <button type="reset" class="action" disabled={shift === 0} onClick={() => setShift(0)}>
-          {r("align_starts")}
-        </button>
+        <Button text={r("align_starts")} type="reset" disabled={shift === 0} onClick={() => setShift(0)} />
         <a class="action" href={recordingsLink(props.first)}>
           {r("compare_end")}
         </a>

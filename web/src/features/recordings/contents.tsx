@@ -5,6 +5,7 @@ import type { Recording } from "../../gen/robomesh_pb";
 import { count } from "../../i18n/format";
 import { durationS, lostText, sizeText, startedText, topicOf } from "../../i18n/recording-format";
 import { r, viewName } from "../../i18n/recordings";
+import { Button } from "../../ui/button";
 import { Panel } from "../../ui/panel";
 import type { RecordingName } from "../../ui/route";
 import { RangeExport } from "./range-export";
@@ -116,9 +117,10 @@ function Copyable({ text }: { text: string }) {
     <div class="copyable">
       <code tabIndex={0}>{text}</code>
       {"clipboard" in navigator && (
-        <button class="action" onClick={() => void navigator.clipboard.writeText(text).then(() => setCopied(true))}>
-          {r(copied ? "copied" : "copy")}
-        </button>
+        <Button
+          text={r(copied ? "copied" : "copy")}
+          onClick={() => void navigator.clipboard.writeText(text).then(() => setCopied(true))}
+        />
       )}
     </div>
   );

@@ -12,6 +12,7 @@ import { r } from "../../i18n/recordings";
 import { t } from "../../i18n/texts";
 import { WRITTEN } from "../../mesh/notes";
 import { NoteForm, Withdrawable } from "../../panels/note-form";
+import { Button } from "../../ui/button";
 import { Choice } from "../../ui/choice";
 import { severityMark } from "../../ui/event-mark";
 import { Panel } from "../../ui/panel";
@@ -125,9 +126,13 @@ export function EventList(props: {
         <>
           {rows.length > 0 && <span class="dim">{count(rows.length)}</span>}
           {props.robotKey && (
-            <button class="quiet" aria-expanded={noting} title={n("note_hint")} onClick={() => setNoting(!noting)}>
-              {n("note")}
-            </button>
+            <Button
+              quiet
+              text={n("note")}
+              aria-expanded={noting}
+              title={n("note_hint")}
+              onClick={() => setNoting(!noting)}
+            />
           )}
         </>
       }

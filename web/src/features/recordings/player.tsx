@@ -11,6 +11,7 @@ import type { MomentState } from "../../mesh/replay-moment";
 import { useMomentState } from "../../mesh/replay-moment";
 import { useTopic } from "../../mesh/topics";
 import { SceneView, viewsOf } from "../../scene/scene-view";
+import { Button } from "../../ui/button";
 import { ReplayTag } from "../../ui/replay-tag";
 import type { RecordingName } from "../../ui/route";
 import { recordingsLink } from "../../ui/route";
@@ -76,9 +77,7 @@ export function Player({ first, second }: { first: RecordingName; second: Record
           <p class="player-trouble" role="alert">
             <span class="shape warning" aria-hidden="true" />
             <span>{trouble}</span>
-            <button class="action" onClick={openReplay.again}>
-              {r("open_again")}
-            </button>
+            <Button text={r("open_again")} onClick={openReplay.again} />
           </p>
         )}
         {second && (

@@ -8,6 +8,7 @@ import { fileUrl, momentText } from "../../i18n/recording-format";
 import { r, viewName } from "../../i18n/recordings";
 import type { Notice } from "../../mesh/control";
 import { RefusedRequest, readRefusal } from "../../mesh/refusal";
+import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import type { RecordingName } from "../../ui/route";
 
@@ -86,13 +87,9 @@ export function RangeExport(props: {
               ))}
             </select>
             {now ? (
-              <button class="action" onClick={() => running.current?.abort()}>
-                {r("cancel")}
-              </button>
+              <Button text={r("cancel")} onClick={() => running.current?.abort()} />
             ) : (
-              <button class="action" disabled={invalid} onClick={() => void render()}>
-                {r("range_mp4")}
-              </button>
+              <Button text={r("range_mp4")} disabled={invalid} onClick={() => void render()} />
             )}
           </>
         )}
@@ -171,13 +168,11 @@ function Seconds(props: {
           }}
         />
       </label>
-      <button
-        class="action"
+      <Button
+        text={r("range_now")}
         aria-label={r("range_here", { what: props.label })}
         onClick={() => props.set(rounded(props.here()))}
-      >
-        {r("range_now")}
-      </button>
+      />
     </span>
   );
 }

@@ -21,6 +21,7 @@ import { r } from "../../i18n/recordings";
 import { mayAct } from "../../mesh/account";
 import { reasonOf } from "../../mesh/control";
 import { Action, askRecorder } from "../../mesh/recorder";
+import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import type { RecordingName } from "../../ui/route";
 import { recordingsLink } from "../../ui/route";
@@ -113,23 +114,19 @@ export function RecordingCard(props: {
                 {r("compare_with", { name: first.name })}
               </a>
             ) : (
-              <button class="action" aria-pressed={isFirst} title={r("compare_hint")} onClick={compare}>
-                {r("compare")}
-              </button>
+              <Button text={r("compare")} aria-pressed={isFirst} title={r("compare_hint")} onClick={compare} />
             )}
           </>
         )}
         <Download {...mine} name={name} kind="MCAP" hint={r("download_mcap_hint")} />
         {!empty && <Download {...mine} name={name} kind="CSV" hint={r("download_csv_hint")} rest="/values.csv" />}
         {mayAct.value && !(open && isOfFlight(recording)) && (
-          <button
-            class="action"
+          <Button
+            text={r("edit")}
             aria-expanded={editing}
             aria-label={r("edit_of", { name })}
             onClick={() => setEditing(!editing)}
-          >
-            {r("edit")}
-          </button>
+          />
         )}
       </div>
       {editing && <RecordingEditor row={props.row} close={() => setEditing(false)} />}
@@ -170,9 +167,12 @@ function Stop({ row, name }: { row: Row; name: string }) {
   };
   return (
     <>
-      <button class="action" disabled={busy} aria-label={r("stop_of", { name })} onClick={() => void stop()}>
-        {r("stop_recording")}
-      </button>
+      <Button
+        text={r("stop_recording")}
+        disabled={busy}
+        aria-label={r("stop_of", { name })}
+        onClick={() => void stop()}
+      />
       {problem && <NoticeLine notice={{ kind: "refused", text: problem }} />}
     </>
   );

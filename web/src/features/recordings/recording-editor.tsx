@@ -3,6 +3,7 @@
 import { useState } from "preact/hooks";
 import { r } from "../../i18n/recordings";
 import { reasonOf } from "../../mesh/control";
+import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import { ReasonForm } from "../../ui/reason-form";
 import { deleteRecording, saveLabels } from "./recording-changes";
@@ -73,12 +74,8 @@ export function RecordingEditor({ row, close }: { row: Row; close: () => void })
           />
         </label>
         <div class="editor-row">
-          <button type="submit" class="action primary" disabled={busy || !name.trim()}>
-            {r("save")}
-          </button>
-          <button type="button" class="action" disabled={busy} onClick={close}>
-            {r("cancel")}
-          </button>
+          <Button primary text={r("save")} type="submit" disabled={busy || !name.trim()} />
+          <Button text={r("cancel")} type="button" disabled={busy} onClick={close} />
           {!seen.recording.open && (
             <button type="button" class="action editor-delete" disabled={busy} onClick={() => setDeleting(true)}>
               {r("delete")}

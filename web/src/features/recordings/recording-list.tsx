@@ -8,6 +8,7 @@ import type { Notice } from "../../mesh/control";
 import { reasonOf } from "../../mesh/control";
 import { fleetRobots } from "../../mesh/known-robots";
 import { Action, askRecorder } from "../../mesh/recorder";
+import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import type { RecordingName } from "../../ui/route";
 import { BulkDownload, rowKey } from "./bulk-download";
@@ -91,9 +92,7 @@ export function RecordingList() {
       {first.value && (
         <p class="compare-line" role="status">
           <span>{r("compare_second", { name: first.value.name })}</span>
-          <button class="action" onClick={() => (first.value = null)}>
-            {r("cancel")}
-          </button>
+          <Button text={r("cancel")} onClick={() => (first.value = null)} />
         </p>
       )}
       <BulkDownload rows={rows} shown={shown} chosen={chosen} />
@@ -184,9 +183,11 @@ function SiteLine({ site, answer: { list, problem }, named }: { site: string; an
                   ))}
                 </select>
               )}
-              <button class="action" disabled={notice?.kind === "busy"} onClick={() => void save()}>
-                {robots.length > 1 ? r("save_last") : r("save_of", { robot: chosen })}
-              </button>
+              <Button
+                text={robots.length > 1 ? r("save_last") : r("save_of", { robot: chosen })}
+                disabled={notice?.kind === "busy"}
+                onClick={() => void save()}
+              />
             </span>
           )}
         </>

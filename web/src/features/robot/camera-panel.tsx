@@ -6,6 +6,7 @@ import { clock } from "../../i18n/format";
 import { t, viewText } from "../../i18n/texts";
 import { viewsOf } from "../../scene/scene-view";
 import { isRemote, topicSelection } from "../../scene/topic-selection";
+import { Button } from "../../ui/button";
 import type { VideoPlace } from "../../ui/layout";
 import { PLACES } from "../../ui/layout";
 import { Panel } from "../../ui/panel";
@@ -109,17 +110,17 @@ export function CameraPanel(props: {
           <p class="picture-word dim">{isOff ? t("video_is_off") : t("camera_waiting", { view: viewText(shown) })}</p>
         )}
         <div class="picture-tools">
-          <button class="quiet" disabled={!live.any} onClick={() => void savePicture()}>
-            {t("save_still")}
-          </button>
+          <Button quiet text={t("save_still")} disabled={!live.any} onClick={() => void savePicture()} />
           {shown !== OWN_VIEW && !isOff && (
-            <button class="quiet" aria-pressed={recording.on} disabled={!live.any} onClick={recording.toggle}>
-              {recording.on ? t("recording_video", { time: clock(recording.seconds) }) : t("record_video")}
-            </button>
+            <Button
+              quiet
+              text={recording.on ? t("recording_video", { time: clock(recording.seconds) }) : t("record_video")}
+              aria-pressed={recording.on}
+              disabled={!live.any}
+              onClick={recording.toggle}
+            />
           )}
-          <button class="quiet" onClick={() => void toggleFull(picture.current)}>
-            {t("full_screen")}
-          </button>
+          <Button quiet text={t("full_screen")} onClick={() => void toggleFull(picture.current)} />
         </div>
       </div>
       {words && <p class="footnote dim">{words}</p>}

@@ -3,6 +3,7 @@
 import { signal } from "@preact/signals";
 import { useMemo, useState } from "preact/hooks";
 import { p } from "../../i18n/plots";
+import { Button } from "../../ui/button";
 import type { Layout, LayoutProblem } from "../../ui/layout";
 import { DEFAULT_LAYOUT, layoutText, PANELS, readLayout } from "../../ui/layout";
 import { layoutQuery, setLayoutQuery } from "../../ui/route";
@@ -63,9 +64,7 @@ export function LayoutPanel(props: LayoutState & { site: string }) {
             <span class="shape warning" aria-hidden="true" />
             {p("layout_wrong", { why: p(problem.text, problem.values) })}
           </p>
-          <button class="action" onClick={() => setLayoutQuery("")}>
-            {p("layout_reset")}
-          </button>
+          <Button text={p("layout_reset")} onClick={() => setLayoutQuery("")} />
         </div>
       )}
       {shown.value && (
@@ -86,19 +85,13 @@ export function LayoutPanel(props: LayoutState & { site: string }) {
               {p(each === "video" ? "panel_video" : "panel_plots")}
             </label>
           ))}
-          {navigator.clipboard && (
-            <button class="action" onClick={() => void copy()}>
-              {p(told ? "copied" : "copy_link")}
-            </button>
-          )}
+          {navigator.clipboard && <Button text={p(told ? "copied" : "copy_link")} onClick={() => void copy()} />}
           {!problem && (
-            <button
-              class="action"
+            <Button
+              text={p("layout_reset")}
               disabled={layoutText(layout) === layoutText(DEFAULT_LAYOUT)}
               onClick={() => setLayoutQuery("")}
-            >
-              {p("layout_reset")}
-            </button>
+            />
           )}
           <button class="quiet layout-close" onClick={() => (shown.value = false)}>
             {p("close")}

@@ -12,6 +12,7 @@ import { now } from "../../mesh/topics";
 import { readerOf, topicsOfValues, unitOf } from "../../mesh/values";
 import { ValueChoice } from "../../panels/value-choice";
 import { jointsTopic } from "../../scene/topic-selection";
+import { Button } from "../../ui/button";
 import { Toggle } from "../../ui/choice";
 import type { Plot } from "../../ui/layout";
 import { MOST_FIELDS, MOST_PLOTS, RANGES } from "../../ui/layout";
@@ -132,11 +133,7 @@ function PlotCard(props: {
       <div class="plot-head">
         <Legend {...{ fields, feed, description, common, unit, frozen, moment, seconds }} />
         <div class="plot-tools">
-          {zoomed && (
-            <button class="quiet" onClick={() => zoom(null)}>
-              {p("whole")}
-            </button>
-          )}
+          {zoomed && <Button quiet text={p("whole")} onClick={() => zoom(null)} />}
           <select
             aria-label={p("range", { number })}
             value={seconds}

@@ -14,6 +14,7 @@ import { presence } from "../../mesh/connection";
 import { Action, askRecorder } from "../../mesh/recorder";
 import { ageOf, isStale, useTopic } from "../../mesh/topics";
 import { viewsOf } from "../../scene/scene-view";
+import { Button } from "../../ui/button";
 import { recordingsLink } from "../../ui/route";
 import "../../ui/replay.css";
 import "./record-panel.css";
@@ -85,9 +86,11 @@ export function RecordPanel({ robotKey, description }: { robotKey: string; descr
         <div class="record-row">
           <strong class="record-name">{recording.name}</strong>
           <Counts recording={recording} />
-          <button class="action" disabled={busy} onClick={() => void does(Action.TRACE_OFF, r("record_stopping"))}>
-            {r("record_stop")}
-          </button>
+          <Button
+            text={r("record_stop")}
+            disabled={busy}
+            onClick={() => void does(Action.TRACE_OFF, r("record_stopping"))}
+          />
         </div>
       ) : (
         <Start
@@ -144,9 +147,7 @@ function Start(props: {
           ))}
         </select>
       </label>
-      <button class="action primary" disabled={props.busy} type="submit">
-        {r("record_start")}
-      </button>
+      <Button primary text={r("record_start")} disabled={props.busy} type="submit" />
       {props.last}
     </form>
   );

@@ -11,6 +11,7 @@ import { ask } from "../../mesh/connection";
 import type { Notice } from "../../mesh/control";
 import { reasonOf } from "../../mesh/control";
 import { useTopic } from "../../mesh/topics";
+import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import { setLayoutQuery } from "../../ui/route";
 import { Select } from "../../ui/select";
@@ -101,37 +102,39 @@ export function SavedLayouts(props: { site: string; text: string }) {
           }}
         />
       </label>
-      <button type="submit" class="action primary" title={cannot} disabled={!able || there?.text === text}>
-        {there ? p("replace_layout") : p("save_layout")}
-      </button>
-      <button
+      <Button
+        primary
+        text={there ? p("replace_layout") : p("save_layout")}
+        type="submit"
+        title={cannot}
+        disabled={!able || there?.text === text}
+      />
+      <Button
+        text={p("rename_layout")}
         type="button"
-        class="action"
         title={cannot}
         disabled={!able || !opened || wanted === chosen || (there !== undefined && there !== opened)}
         onClick={() => void rename()}
-      >
-        {p("rename_layout")}
-      </button>
+      />
       {deleting && opened ? (
         <>
-          <button type="button" class="action" onClick={() => setDeleting(false)}>
-            {p("keep_layout")}
-          </button>
-          <button type="button" class="action destructive" disabled={!able} onClick={() => void remove()}>
-            {p("delete_named", { name: chosen })}
-          </button>
+          <Button text={p("keep_layout")} type="button" onClick={() => setDeleting(false)} />
+          <Button
+            destructive
+            text={p("delete_named", { name: chosen })}
+            type="button"
+            disabled={!able}
+            onClick={() => void remove()}
+          />
         </>
       ) : (
-        <button
+        <Button
+          text={p("delete_layout")}
           type="button"
-          class="action"
           title={cannot}
           disabled={!able || !opened}
           onClick={() => setDeleting(true)}
-        >
-          {p("delete_layout")}
-        </button>
+        />
       )}
       <NoticeLine notice={notice} idle={byWhom(there ?? opened) || cannot} />
     </form>

@@ -5,6 +5,7 @@ import { timeText } from "../../i18n/format";
 import { s } from "../../i18n/settings";
 import { me, post } from "../../mesh/account";
 import type { Notice } from "../../mesh/control";
+import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
 import { Select } from "../../ui/select";
@@ -103,24 +104,18 @@ function Row({ account, change }: { account: Account; change: Change }) {
         ) : openForm === "remove" ? (
           <>
             <span>{s("remove_sure", { name })}</span>
-            <button class="action destructive" onClick={() => run("remove")}>
-              {s("remove")}
-            </button>
-            <button class="quiet" onClick={() => setOpen(null)}>
-              {s("cancel")}
-            </button>
+            <Button destructive text={s("remove")} onClick={() => run("remove")} />
+            <Button quiet text={s("cancel")} onClick={() => setOpen(null)} />
           </>
         ) : (
           <>
-            <button class="quiet" onClick={() => setOpen("password")}>
-              {s("set_password")}
-            </button>
-            <button class="quiet" onClick={() => run(disabled ? "enable" : "disable")}>
-              {s(disabled ? "enable" : "disable")}
-            </button>
-            <button class="quiet destructive" onClick={() => setOpen("remove")}>
-              {s("remove")}
-            </button>
+            <Button quiet text={s("set_password")} onClick={() => setOpen("password")} />
+            <Button
+              quiet
+              text={s(disabled ? "enable" : "disable")}
+              onClick={() => run(disabled ? "enable" : "disable")}
+            />
+            <Button quiet destructive text={s("remove")} onClick={() => setOpen("remove")} />
           </>
         )}
       </td>
@@ -146,12 +141,8 @@ function Password(props: { of: string; set: (password: string) => void; close: (
         value={password}
         onInput={(event) => setPassword(event.currentTarget.value)}
       />
-      <button type="submit" class="action" disabled={!password}>
-        {s("set_password")}
-      </button>
-      <button type="button" class="quiet" onClick={props.close}>
-        {s("cancel")}
-      </button>
+      <Button text={s("set_password")} type="submit" disabled={!password} />
+      <Button quiet text={s("cancel")} type="button" onClick={props.close} />
     </form>
   );
 }
@@ -194,9 +185,7 @@ function AddAccount({ change }: { change: Change }) {
         onInput={(event) => setPassword(event.currentTarget.value)}
       />
       <Select label={s("role")} value={role} values={ROLES} text={(each) => s(`role_${each}`)} choose={setRole} />
-      <button type="submit" class="action" disabled={!name.trim() || !password}>
-        {s("add_do")}
-      </button>
+      <Button text={s("add_do")} type="submit" disabled={!name.trim() || !password} />
     </form>
   );
 }

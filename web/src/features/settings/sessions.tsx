@@ -5,6 +5,7 @@ import { timeText } from "../../i18n/format";
 import { s } from "../../i18n/settings";
 import { post } from "../../mesh/account";
 import type { Notice } from "../../mesh/control";
+import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
 
@@ -58,13 +59,12 @@ export function Sessions() {
             {session.this ? (
               <span class="tag">{s("session_this")}</span>
             ) : (
-              <button
-                class="quiet"
+              <Button
+                quiet
+                text={s("end_session")}
                 aria-label={s("end_session_of", { account: session.account, address: session.address })}
                 onClick={() => void end(session)}
-              >
-                {s("end_session")}
-              </button>
+              />
             )}
           </li>
         ))}

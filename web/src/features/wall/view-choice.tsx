@@ -2,6 +2,7 @@
 
 import { viewText } from "../../i18n/texts";
 import { w } from "../../i18n/wall";
+import { Button } from "../../ui/button";
 import { Toggle } from "../../ui/choice";
 import type { ViewName } from "../../ui/route";
 
@@ -26,15 +27,13 @@ export function ViewChoice(props: {
       <div class="wall-every">
         <span class="dim">{w("every")}</span>
         {every.map((view) => (
-          <button
+          <Button
             key={view}
-            class="action"
+            text={viewText(view)}
             onClick={() =>
               show(robots.flatMap(({ site, robot, views }) => (views.includes(view) ? [{ site, robot, view }] : [])))
             }
-          >
-            {viewText(view)}
-          </button>
+          />
         ))}
       </div>
       <div class="wall-robots">

@@ -7,6 +7,7 @@ import { t } from "../../i18n/texts";
 import { w } from "../../i18n/wall";
 import { addKnownRobots, fleetRobots } from "../../mesh/known-robots";
 import { useTopics } from "../../mesh/topics";
+import { Button } from "../../ui/button";
 import type { ViewName } from "../../ui/route";
 import { robotLink, wallLink } from "../../ui/route";
 import { columnsFor } from "./grid";
@@ -76,12 +77,16 @@ export function WallPage({ chosen }: { chosen: readonly ViewName[] }) {
         <h1>{t("wall")}</h1>
         <span class="dim">{shown.length === 1 ? w("picture") : w("pictures", { count: shown.length })}</span>
         <span class="wall-end">
-          <button class="action" aria-expanded={choosing} onClick={() => setChoosing(!choosing)}>
-            {choosing ? w("done") : w("choose")}
-          </button>
-          <button class="action" title={w("keys")} onClick={() => void full.toggle()}>
-            {full.on ? w("leave_full") : t("full_screen")}
-          </button>
+          <Button
+            text={choosing ? w("done") : w("choose")}
+            aria-expanded={choosing}
+            onClick={() => setChoosing(!choosing)}
+          />
+          <Button
+            text={full.on ? w("leave_full") : t("full_screen")}
+            title={w("keys")}
+            onClick={() => void full.toggle()}
+          />
         </span>
       </div>
       {choosing && <ViewChoice robots={robots} shown={shown} show={show} />}

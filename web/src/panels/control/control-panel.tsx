@@ -15,6 +15,7 @@ import { isOnlyWatched, stoppedByItself, whyNoCommand, whyNoMotion, whyNoNewMoti
 import { whyFrozen } from "../../mesh/sight";
 import type { Latest } from "../../mesh/topics";
 import { now } from "../../mesh/topics";
+import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
 import { mayNotCommand } from "./no-control";
@@ -69,44 +70,37 @@ export function ControlPanel(props: {
       <WhoControls robotKey={robotKey} holder={holder} lease={props.lease} readOnly={state?.readOnly ?? false} />
       {isMonitor.value || (
         <div class="command-row">
-          <button
-            class="action"
+          <Button
+            text={t("home")}
             data-moves
             disabled={!mine || !!why || !!lacks(Command.HOME)}
             title={mine ? lacks(Command.HOME) || why : ""}
             onClick={home}
-          >
-            {t("home")}
-          </button>
+          />
           {holding ? (
-            <button
-              class="action primary"
+            <Button
+              primary
+              text={t("resume")}
               data-moves
               disabled={!mine || !reachable.value || whyNoMotion(state) !== "" || frozen !== ""}
               onClick={() => send(Command.RESUME, t("resume"))}
-            >
-              {t("resume")}
-            </button>
+            />
           ) : (
-            <button
-              class="action"
+            <Button
+              text={t("hold")}
               data-moves
               disabled={!canSend || !!lacks(Command.HOLD)}
               title={lacks(Command.HOLD)}
               onClick={() => send(Command.HOLD, t("hold"))}
-            >
-              {t("hold")}
-            </button>
+            />
           )}
-          <button
-            class="action"
+          <Button
+            text={t(tracing ? "trace_off" : "trace_on")}
             disabled={!mine || !reachable.value || state?.readOnly || !!lacks(Command.TRACE_ON)}
             title={lacks(Command.TRACE_ON)}
             aria-pressed={tracing}
             onClick={() => (tracing ? send(Command.TRACE_OFF, t("trace_off")) : send(Command.TRACE_ON, t("trace_on")))}
-          >
-            {t(tracing ? "trace_off" : "trace_on")}
-          </button>
+          />
           <RecoverButton state={state} mine={mine} open={() => setRecovering(true)} />
         </div>
       )}

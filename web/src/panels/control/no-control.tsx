@@ -3,6 +3,7 @@
 import { useState } from "preact/hooks";
 import { a } from "../../i18n/account";
 import { isMonitor, mayAct, me, unlock } from "../../mesh/account";
+import { Button } from "../../ui/button";
 import { PasswordField } from "../../ui/password-field";
 import "../account-form.css";
 
@@ -43,9 +44,7 @@ export function NoControl() {
       <p class="sign-in-problem" role="alert">
         {problem}
       </p>
-      <button type="submit" class="action primary" disabled={busy}>
-        {a(busy ? "unlocking" : "unlock")}
-      </button>
+      <Button primary text={a(busy ? "unlocking" : "unlock")} type="submit" disabled={busy} />
     </form>
   );
 }

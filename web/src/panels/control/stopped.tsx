@@ -10,6 +10,7 @@ import type { CommandValues } from "../../mesh/command";
 import { Command } from "../../mesh/command";
 import { reachable } from "../../mesh/connection";
 import { moves, stopText } from "../../mesh/robot-state";
+import { Button } from "../../ui/button";
 
 export function Stopped(props: {
   state: ControllerState;
@@ -39,14 +40,12 @@ export function Stopped(props: {
           {needs}
         </p>
       </div>
-      <button
-        class="action"
+      <Button
+        text={what}
         disabled={!mine || moving || !reachable.value}
         title={moving ? t("reset_moving") : mine ? "" : t("reset_take")}
         onClick={() => props.send(Command.RESET, what, { stopId: stop?.id ?? 0n })}
-      >
-        {what}
-      </button>
+      />
     </div>
   );
 }

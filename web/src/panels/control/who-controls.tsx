@@ -20,6 +20,7 @@ import {
   take,
   takeOver,
 } from "../../mesh/control";
+import { Button } from "../../ui/button";
 import { ReasonForm } from "../../ui/reason-form";
 import { mayNotCommand, NoControl } from "./no-control";
 
@@ -92,19 +93,18 @@ export function WhoControls(props: {
           />
         </label>
         {mine ? (
-          <button class="action" onClick={() => void release()}>
-            {t("release")}
-          </button>
+          <Button text={t("release")} onClick={() => void release()} />
         ) : other ? (
           <>
             {other !== operator.value.trim() && (
-              <button class="action primary" disabled={props.readOnly || !reachable.value} onClick={() => open("ask")}>
-                {t("ask")}
-              </button>
+              <Button
+                primary
+                text={t("ask")}
+                disabled={props.readOnly || !reachable.value}
+                onClick={() => open("ask")}
+              />
             )}
-            <button class="action" disabled={props.readOnly || !reachable.value} onClick={() => open("take")}>
-              {t("take_over")}
-            </button>
+            <Button text={t("take_over")} disabled={props.readOnly || !reachable.value} onClick={() => open("take")} />
           </>
         ) : (
           <button
@@ -191,24 +191,17 @@ function Requests({ mine, robotKey, lease }: { mine: boolean; robotKey: string; 
         >
           {toMe && (
             <>
-              <button
-                class="action primary"
+              <Button
+                primary
+                text={t("accept")}
                 data-moves="new"
                 disabled={!reachable.value}
                 onClick={() => void accept(robotKey)}
-              >
-                {t("accept")}
-              </button>
-              <button class="action" data-moves="new" onClick={() => decline("offer")}>
-                {t("not_now")}
-              </button>
+              />
+              <Button text={t("not_now")} data-moves="new" onClick={() => decline("offer")} />
             </>
           )}
-          {mine && (
-            <button class="action" data-moves="new" onClick={() => void offer(null)}>
-              {t("withdraw")}
-            </button>
-          )}
+          {mine && <Button text={t("withdraw")} data-moves="new" onClick={() => void offer(null)} />}
         </ControlRequest>
       )}
       {shown.map((asker) => (
@@ -220,12 +213,13 @@ function Requests({ mine, robotKey, lease }: { mine: boolean; robotKey: string; 
         >
           {mine && (
             <>
-              <button class="action primary" data-moves="new" onClick={() => handOver(asker)}>
-                {t("hand_over", { name: asker.operator })}
-              </button>
-              <button class="action" data-moves="new" onClick={() => decline(idOf(asker))}>
-                {t("not_now")}
-              </button>
+              <Button
+                primary
+                text={t("hand_over", { name: asker.operator })}
+                data-moves="new"
+                onClick={() => handOver(asker)}
+              />
+              <Button text={t("not_now")} data-moves="new" onClick={() => decline(idOf(asker))} />
             </>
           )}
         </ControlRequest>
