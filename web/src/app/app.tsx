@@ -22,6 +22,7 @@ import { Button } from "../ui/button";
 import { guardMovedControls } from "../ui/moved-controls";
 import { NoticeLine } from "../ui/notice-line";
 import { type Route, robotOf, route } from "../ui/route";
+import { Warning } from "../ui/warning";
 import { Bar } from "./bar";
 
 /** Return a component that loads its page when it is first shown. */
@@ -212,23 +213,14 @@ function Banners() {
       <div class="over-page banners">
         {lost === 0 && <div class="banner connecting">{t("connecting")}</div>}
         {lost !== null && lost > 0 && (
-          <div class="banner warning" role="alert">
-            <span class="shape warning" aria-hidden="true" />
-            {t("reconnecting", { time: whenText(lost) })}
-          </div>
+          <Warning as="div" class="banner warning" role="alert" text={t("reconnecting", { time: whenText(lost) })} />
         )}
         {lost === null && hello.value?.connected === false && (
-          <div class="banner warning" role="alert">
-            <span class="shape warning" aria-hidden="true" />
-            {t("router_lost")}
-          </div>
+          <Warning as="div" class="banner warning" role="alert" text={t("router_lost")} />
         )}
       </div>
       {hello.value?.insecure && (
-        <div class="banner warning">
-          <span class="shape warning" aria-hidden="true" />
-          {hello.value.account ? a("insecure_signed_in") : t("insecure")}
-        </div>
+        <Warning as="div" class="banner warning" text={hello.value.account ? a("insecure_signed_in") : t("insecure")} />
       )}
     </>
   );

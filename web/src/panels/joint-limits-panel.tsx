@@ -7,6 +7,7 @@ import { t } from "../i18n/texts";
 import { distanceText, ownLevel, pairText, useClearanceLevel } from "../mesh/clearance";
 import type { Level } from "../mesh/robot-state";
 import { Unit } from "../ui/unit";
+import { Warning } from "../ui/warning";
 
 // Values at which a bar is full.
 const FULL_CLEARANCE_M = 0.3;
@@ -72,10 +73,7 @@ export function JointLimitsPanel(props: {
         {singularity !== undefined && fixed(singularity, 3)}
       </Margin>
       {missing.length > 0 && (
-        <li class="not-counted warning">
-          <span class="shape warning" aria-hidden="true" />
-          {t("not_counted", { robots: missing.join(", ") })}
-        </li>
+        <Warning as="li" class="not-counted warning" text={t("not_counted", { robots: missing.join(", ") })} />
       )}
     </ul>
   );

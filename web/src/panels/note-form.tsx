@@ -13,6 +13,7 @@ import type { NoteTime } from "../mesh/notes";
 import { LONGEST_TEXT, writeNote } from "../mesh/notes";
 import { Button } from "../ui/button";
 import { NoticeLine } from "../ui/notice-line";
+import { TextInput } from "../ui/text-input";
 import "./note-form.css";
 
 export function NoteForm(props: {
@@ -49,28 +50,23 @@ export function NoteForm(props: {
         if (!busy && !cannot && text.trim()) void save();
       }}
     >
-      <input
+      <TextInput
         ref={input}
-        type="text"
-        autocomplete="off"
         maxLength={LONGEST_TEXT}
         aria-label={n("text")}
         placeholder={n("note_hint")}
         value={text}
-        onInput={(event) => setText(event.currentTarget.value)}
+        set={setText}
       />
       {props.children}
       {!hello.value?.operator && (
-        <input
-          type="text"
+        <TextInput
           name="operator"
           autocomplete="username"
-          spellcheck={false}
           maxLength={40}
-          placeholder={t("operator")}
-          aria-label={t("operator")}
+          hint={t("operator")}
           value={operator.value}
-          onInput={(event) => setOperator(event.currentTarget.value)}
+          set={setOperator}
         />
       )}
       <div class="note-row">

@@ -4,6 +4,7 @@ import { useState } from "preact/hooks";
 import type { RecordingsText } from "../i18n/recordings";
 import { r } from "../i18n/recordings";
 import { labelOf } from "../i18n/value-names";
+import { TextInput } from "../ui/text-input";
 import "./value-choice.css";
 
 /** The most wanted values, by topic. */
@@ -42,13 +43,7 @@ export function ValueChoice(props: {
   return (
     <div class="values">
       <div class="values-head">
-        <input
-          type="search"
-          placeholder={r("values_filter")}
-          aria-label={r("values_filter")}
-          value={filter}
-          onInput={(event) => setFilter(event.currentTarget.value)}
-        />
+        <TextInput type="search" hint={r("values_filter")} value={filter} set={setFilter} />
         {full && <span class="dim small">{r("values_many", { count: most })}</span>}
       </div>
       <div class="values-groups">

@@ -4,6 +4,7 @@ import { useState } from "preact/hooks";
 import type { Description_Joint } from "../gen/robomesh_pb";
 import { DASH, fixed, jointTitle, jointUnit } from "../i18n/format";
 import { t } from "../i18n/texts";
+import { TextInput } from "./text-input";
 import { Unit } from "./unit";
 
 export function JointValue(props: {
@@ -49,18 +50,16 @@ export function JointValue(props: {
           {text}
         </button>
       ) : (
-        <input
+        <TextInput
           class="value-field"
-          type="text"
           inputMode="decimal"
-          autocomplete="off"
           maxLength={12}
           placeholder={text}
           aria-label={t("joint_type", { joint: jointTitle(joint) })}
           title={t("type_target")}
           ref={focus}
           value={typed}
-          onInput={(event) => type(event.currentTarget.value)}
+          set={type}
           onBlur={end}
           onKeyDown={(event) => {
             if (event.key === "Enter") enter();

@@ -2,6 +2,7 @@
 
 import { t } from "../i18n/texts";
 import type { Notice } from "../mesh/control";
+import { Warning } from "./warning";
 
 /** Return the role and the name of an outcome: a refusal interrupts a screen reader, all else waits. */
 export const outcomeRole = (refused: boolean) =>
@@ -15,10 +16,7 @@ export function NoticeLine({ notice, idle }: { notice: Notice | null; idle?: str
       {bad && <span class="shape warning" aria-hidden="true" />}
       {notice?.text ?? idle ?? "\u00a0"}
       {notice?.warning && (
-        <span class="notice-warning">
-          <span class="shape warning" aria-hidden="true" />
-          {t("warning_of_check", { text: notice.warning })}
-        </span>
+        <Warning as="span" class="notice-warning" text={t("warning_of_check", { text: notice.warning })} />
       )}
     </p>
   );

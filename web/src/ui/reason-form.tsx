@@ -4,6 +4,7 @@ import type { ComponentChildren } from "preact";
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { t } from "../i18n/texts";
 import { Button } from "./button";
+import { TextInput } from "./text-input";
 
 export function ReasonForm(props: {
   title: string;
@@ -44,14 +45,7 @@ export function ReasonForm(props: {
       {props.children}
       <label>
         <span class="dim">{t(props.required ? "reason_required" : "reason_optional")}</span>
-        <input
-          ref={input}
-          type="text"
-          autocomplete="off"
-          maxLength={120}
-          value={reason}
-          onInput={(event) => setReason(event.currentTarget.value)}
-        />
+        <TextInput ref={input} maxLength={120} value={reason} set={setReason} />
       </label>
       <div class="reason-row">
         <Button text={t("cancel")} type="button" onClick={props.close} />

@@ -1,21 +1,27 @@
 // A choice of one, where there is no space for buttons.
 
 export function Select<Value extends string>(props: {
-  label: string;
+  label?: string;
   value: Value;
   values: readonly Value[];
   text: (value: Value) => string;
   choose: (value: Value) => void;
+  class?: string;
+  id?: string;
+  "aria-invalid"?: boolean;
+  "data-path"?: string;
 }) {
+  const { label, value, values, text, choose, ...attributes } = props;
   return (
     <select
-      aria-label={props.label}
-      value={props.value}
-      onChange={(event) => props.choose(event.currentTarget.value as Value)}
+      {...(label && { "aria-label": label })}
+      {...attributes}
+      value={value}
+      onChange={(event) => choose(event.currentTarget.value as Value)}
     >
-      {props.values.map((value) => (
-        <option key={value} value={value}>
-          {props.text(value)}
+      {values.map((each) => (
+        <option key={each} value={each} selected={each === value}>
+          {text(each)}
         </option>
       ))}
     </select>

@@ -8,6 +8,7 @@ import { endedBy, me, signIn } from "../../mesh/account";
 import { RefusedRequest } from "../../mesh/refusal";
 import { Button } from "../../ui/button";
 import { PasswordField } from "../../ui/password-field";
+import { TextInput } from "../../ui/text-input";
 import { switchTheme, theme } from "../../ui/theme";
 import "../../panels/account-form.css";
 import "./sign-in.css";
@@ -58,18 +59,16 @@ export function SignIn() {
         )}
         <label>
           <span>{a("name")}</span>
-          <input
+          <TextInput
             ref={input}
-            type="text"
             name="username"
             autocomplete="username"
             autocapitalize="none"
             autocorrect="off"
-            spellcheck={false}
             maxLength={32}
             required
             value={name}
-            onInput={(event) => setName(event.currentTarget.value)}
+            set={setName}
           />
         </label>
         <PasswordField label={a("password")} kind="current-password" value={password} set={setPassword} />

@@ -4,6 +4,7 @@ import type { ComponentChildren } from "preact";
 import { useId, useState } from "preact/hooks";
 import type { Vector3 } from "../../gen/robomesh_pb";
 import { numberText, readNumber } from "../../ui/number-text";
+import { TextInput } from "../../ui/text-input";
 import { mayEdit } from "./cell-draft";
 import { type Quantity, UNITS } from "./cell-text";
 
@@ -63,16 +64,13 @@ export function NumberInput(props: {
   return (
     <span class={`cell-number ${wrong ? "wrong" : ""}`}>
       <label for={id}>{props.label}</label>
-      <input
+      <TextInput
         id={id}
-        type="text"
         inputMode="decimal"
-        autocomplete="off"
         aria-invalid={wrong}
         disabled={!mayEdit.value}
         value={typed ?? numberText(Math.round(value * 1e3) / 1e3)}
-        onInput={(event) => {
-          const text = event.currentTarget.value;
+        set={(text) => {
           setTyped(text);
           const value = valid(text);
           if (value !== null) props.set(value / factor);

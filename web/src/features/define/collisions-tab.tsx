@@ -4,6 +4,7 @@ import { useEffect } from "preact/hooks";
 import type { DefineText } from "../../i18n/define";
 import { d } from "../../i18n/define";
 import { Button } from "../../ui/button";
+import { Warning } from "../../ui/warning";
 import type { PairRow } from "./collision-plan";
 import {
   isPlanned,
@@ -84,10 +85,7 @@ function PlanState({ rows }: { rows: readonly PairRow[] }) {
   if (planError.value) {
     return (
       <div class="plan-state" role="alert">
-        <p class="problem-word">
-          <span class="shape warning" aria-hidden="true" />
-          {d("plan_failed", { text: planError.value })}
-        </p>
+        <Warning class="problem-word" text={d("plan_failed", { text: planError.value })} />
         <Button quiet text={d("plan_again")} onClick={planAgain} />
       </div>
     );

@@ -3,6 +3,7 @@
 import { useId } from "preact/hooks";
 import { d } from "../../i18n/define";
 import { Button } from "../../ui/button";
+import { Warning } from "../../ui/warning";
 import { problemsAt } from "./checks";
 import type { Joint } from "./description";
 import { jointUnit } from "./description";
@@ -133,10 +134,12 @@ function TableProblems({ id, joints }: { id: string; joints: readonly Joint[] })
   return (
     <ul id={id} class="dh-problems" aria-label={d("dh_problems")} hidden={lines.length === 0}>
       {lines.map(({ name, head, text }) => (
-        <li key={`${name} ${text}`} class="problem-word">
-          <span class="shape warning" aria-hidden="true" />
-          <span>{text.includes(name) ? text : d("cell_problem", { name, head, text })}</span>
-        </li>
+        <Warning
+          key={`${name} ${text}`}
+          as="li"
+          class="problem-word"
+          text={<span>{text.includes(name) ? text : d("cell_problem", { name, head, text })}</span>}
+        />
       ))}
     </ul>
   );

@@ -4,6 +4,9 @@ import type { ComponentChildren } from "preact";
 import { useId, useState } from "preact/hooks";
 import { d } from "../../i18n/define";
 import { numberText, readNumber } from "../../ui/number-text";
+import { Select } from "../../ui/select";
+import { TextInput } from "../../ui/text-input";
+import { Warning } from "../../ui/warning";
 import { invalidNumbers, problemsAt, setInvalidNumber } from "./checks";
 import type { Pose, Triple } from "./description";
 import { endUndoStep } from "./draft";
@@ -56,20 +59,18 @@ export function NumberField(
     <span class={`field number ${props.quiet ? "quiet-label" : ""}`}>
       <label for={id}>{props.label}</label>
       <span class={`entry ${wrong ? "wrong" : ""}`}>
-        <input
+        <TextInput
           id={id}
-          type="text"
           inputMode="decimal"
-          autocomplete="off"
           data-path={props.path}
           value={text}
           aria-invalid={wrong !== ""}
           aria-describedby={wrong ? props.describedBy : undefined}
           title={wrong}
           onFocus={() => props.onFocus?.()}
-          onInput={(event) => {
-            const value = readNumber(event.currentTarget.value);
-            setTyped(event.currentTarget.value);
+          set={(text) => {
+            const value = readNumber(text);
+            setTyped(text);
             if (value !== null) props.set(value);
           }}
           onBlur={() => {
@@ -93,17 +94,14 @@ export function TextField(
     <span class={`field ${props.quiet ? "quiet-label" : ""}`}>
       <label for={id}>{props.label}</label>
       <span class={`entry ${problems.length ? "wrong" : ""}`}>
-        <input
+        <TextInput
           id={id}
-          type="text"
-          autocomplete="off"
-          spellcheck={false}
           data-path={props.path}
           value={props.value}
           placeholder={props.placeholder ?? ""}
           aria-invalid={problems.length > 0}
           title={problems[0]?.text ?? ""}
-          onInput={(event) => props.set(event.currentTarget.value)}
+          set={props.set}
           onBlur={endUndoStep}
           onKeyDown={(event) => event.key === "Enter" && endUndoStep()}
         />
@@ -127,19 +125,15 @@ export function SelectField<Value extends string>(
     <span class={`field ${props.quiet ? "quiet-label" : ""}`}>
       <label for={id}>{props.label}</label>
       <span class={`entry ${wrong ? "wrong" : ""}`}>
-        <select
+        <Select
           id={id}
           data-path={props.path}
           value={props.value}
+          values={props.values}
+          text={props.text}
           aria-invalid={wrong}
-          onChange={(event) => props.set(event.currentTarget.value as Value)}
-        >
-          {props.values.map((value) => (
-            <option key={value} value={value} selected={value === props.value}>
-              {props.text(value)}
-            </option>
-          ))}
-        </select>
+          choose={props.set}
+        />
       </span>
     </span>
   );
@@ -196,10 +190,7 @@ export function ProblemWords({ path }: { path: string }) {
   return (
     <>
       {problemsAt(path).map(({ text }) => (
-        <p key={text} class="problem-word">
-          <span class="shape warning" aria-hidden="true" />
-          {text}
-        </p>
+        <Warning key={text} class="problem-word" text={text} />
       ))}
     </>
   );

@@ -7,6 +7,7 @@ import { Button } from "../../ui/button";
 import { Choice } from "../../ui/choice";
 import { numberText } from "../../ui/number-text";
 import { Select } from "../../ui/select";
+import { Warning } from "../../ui/warning";
 import type { Description } from "./description";
 import { COLUMN, type COLUMNS, columnUnit } from "./dh-columns";
 import { draft, editDraft, endUndoStep } from "./draft";
@@ -365,10 +366,11 @@ function Result(props: Shown & { joints: number; modified: boolean }) {
         const { head = "", meaning = "ignored" } = columns[column] ?? {};
         const name = head || d("paste_column", { number: column + 1 });
         return (
-          <p key={`${row} ${column}`} class="problem-word">
-            <span class="shape warning" aria-hidden="true" />{" "}
-            {d("paste_bad", { row, column: name, text, what: meaningText(meaning) })}
-          </p>
+          <Warning
+            key={`${row} ${column}`}
+            class="problem-word"
+            text={d("paste_bad", { row, column: name, text, what: meaningText(meaning) })}
+          />
         );
       })}
       {problems.length > MOST_PROBLEMS && (

@@ -30,6 +30,8 @@ import { Button } from "../../ui/button";
 import { Choice, Toggle } from "../../ui/choice";
 import { NoticeLine } from "../../ui/notice-line";
 import { Select } from "../../ui/select";
+import { TextInput } from "../../ui/text-input";
+import { Warning } from "../../ui/warning";
 import { AlarmLine } from "./alarm-line";
 import { ShelveForm } from "./shelve-form";
 
@@ -125,13 +127,7 @@ export function AlarmPanel() {
             choose={setOrder}
           />
           <SiteSelect site={site} sites={all.map((alarm) => alarm.site)} choose={setSite} />
-          <input
-            type="search"
-            placeholder={e("search")}
-            aria-label={e("search")}
-            value={text}
-            onInput={(event) => setText(event.currentTarget.value)}
-          />
+          <TextInput type="search" hint={e("search")} value={text} set={setText} />
         </Filters>
         {all.length > 0 && mayAct.value && (
           <div class="list-actions">
@@ -166,10 +162,7 @@ export function AlarmPanel() {
         />
       )}
       {silentSites().map((name) => (
-        <p key={name} class="banner warning">
-          <span class="shape warning" aria-hidden="true" />
-          {e("badge_silent", { sites: name })}
-        </p>
+        <Warning key={name} class="banner warning" text={e("badge_silent", { sites: name })} />
       ))}
       {drawn.length === 0 ? (
         <p class="empty">
@@ -221,17 +214,14 @@ function Name() {
   return (
     <label class="alarm-name">
       {!asker.value && <span class="name-needed">{e("name_needed")}</span>}
-      <input
-        type="text"
+      <TextInput
         name="operator"
         autocomplete="username"
-        spellcheck={false}
         maxLength={40}
-        placeholder={t("operator")}
-        aria-label={t("operator")}
+        hint={t("operator")}
         title={t("operator_hint")}
         value={operator.value}
-        onInput={(event) => setOperator(event.currentTarget.value)}
+        set={setOperator}
       />
     </label>
   );

@@ -7,6 +7,7 @@ import { count, DASH, dateOf, timeOfDay, timeText, whenText, zoneOf } from "../.
 import { lostAt } from "../../mesh/connection";
 import { Button } from "../../ui/button";
 import { saveFile } from "../../ui/save-file";
+import { Warning } from "../../ui/warning";
 import type { DayLine, Totals } from "./day";
 import { exported, linesOf, spanOfDay, totalsOf, wordsOf } from "./day";
 import type { DayAnswers } from "./day-sources";
@@ -143,10 +144,7 @@ function Hours({
         ))}
       </dl>
       {gaps.length > 0 && (
-        <p class="day-gaps state warning">
-          <span class="shape warning" aria-hidden="true" />
-          <span>{[d("incomplete"), ...gaps].join(" ")}</span>
-        </p>
+        <Warning class="day-gaps state warning" text={<span>{[d("incomplete"), ...gaps].join(" ")}</span>} />
       )}
       <div class="day-hours" tabIndex={0} role="group" aria-label={d("day")}>
         {lines.length === 0 && <p class="empty">{d(answers.day.from > Date.now() ? "future" : "nothing")}</p>}

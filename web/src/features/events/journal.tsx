@@ -20,6 +20,7 @@ import { Mark, outcomeMark, severityMark } from "../../ui/event-mark";
 import { NoticeLine } from "../../ui/notice-line";
 import { programLink } from "../../ui/route";
 import { Select } from "../../ui/select";
+import { TextInput } from "../../ui/text-input";
 import { SeenPicture } from "../../video/seen-picture";
 import { Filters, SiteSelect } from "./alarm-panel";
 import { MAX_ROBOTS, searchAuditLogs } from "./audit-log-search";
@@ -165,12 +166,12 @@ export function Journal() {
           choose={setRobot}
         />
         {kind !== "day" && (
-          <input
+          <TextInput
             type="search"
             placeholder={e("search")}
             aria-label={`${e("search")}, ${e("journal")}`}
             value={text}
-            onInput={(event) => setText(event.currentTarget.value)}
+            set={setText}
           />
         )}
         {kind === "notes" && (

@@ -15,7 +15,10 @@ import { isClockOff, isMeshStale, isSilent, reportAge, useMesh } from "../../mes
 import { ageOf, now } from "../../mesh/topics";
 import { AliveServices } from "../../panels/alive-services";
 import { Button } from "../../ui/button";
+import { Select } from "../../ui/select";
 import { State } from "../../ui/state";
+import { TextInput } from "../../ui/text-input";
+import { Warning } from "../../ui/warning";
 import { RunningReplays } from "./replays";
 import { RobotTile } from "./tile";
 
@@ -100,48 +103,17 @@ function Filter({ sites }: { sites: readonly string[] }) {
   return (
     <div class="fleet-filter">
       {sites.length > 1 && (
-        <select
-          aria-label={f("site")}
+        <Select
+          label={f("site")}
           value={site.value}
-          onChange={(event) => (site.value = event.currentTarget.value)}
-        >
-          <option value="">{f("every_site")}</option>
-          {sites.map((name) => (
-            <option key={name} value={name}>
-              {name}
-            </option>
-          ))}
-        </select>
+          values={["", ...sites]}
+          text={(name) => name || f("every_site")}
+          choose={(name) => (site.value = name)}
+        />
       )}
-      <select
-        aria-label={f("state")}
-        value={state.value}
-        onChange={(event) => (state.value = event.currentTarget.value as typeof state.value)}
-      >
-        {STATES.map((name) => (
-          <option key={name} value={name}>
-            {f(name)}
-          </option>
-        ))}
-      </select>
-      <select
-        aria-label={f("sort")}
-        value={order.value}
-        onChange={(event) => (order.value = event.currentTarget.value as typeof order.value)}
-      >
-        {ORDERS.map((name) => (
-          <option key={name} value={name}>
-            {f(name)}
-          </option>
-        ))}
-      </select>
-      <input
-        type="search"
-        placeholder={t("filter")}
-        aria-label={t("filter")}
-        value={text.value}
-        onInput={(event) => (text.value = event.currentTarget.value)}
-      />
+      <Select label={f("state")} value={state.value} values={STATES} text={f} choose={(name) => (state.value = name)} />
+      <Select label={f("sort")} value={order.value} values={ORDERS} text={f} choose={(name) => (order.value = name)} />
+      <TextInput type="search" hint={t("filter")} value={text.value} set={(typed) => (text.value = typed)} />
     </div>
   );
 }
@@ -214,10 +186,7 @@ function SiteHead({ site: name, robots }: { site: string; robots: number }) {
       <h2>{name}</h2>
       <span class="dim small">{count(robots)}</span>
       {problems.map((words) => (
-        <span key={words} class="state warning small">
-          <span class="shape warning" aria-hidden="true" />
-          {words}
-        </span>
+        <Warning key={words} as="span" class="state warning small" text={words} />
       ))}
       {!latest ? (
         <AliveServices of={`robomesh/${name}/-`} />

@@ -7,6 +7,7 @@ import { reasonText } from "../../i18n/reasons";
 import { t } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import { Panel } from "../../ui/panel";
+import { Warning } from "../../ui/warning";
 import { draft, goToLine } from "./draft";
 import { distanceText, seconds } from "./number-format";
 import { checkError, checked, checking, checkNow, errorsOf, isCurrent } from "./program-check";
@@ -45,10 +46,11 @@ function Verdict({ moved }: { moved: boolean }) {
   const busy = checking.value || (checked.value !== null && !isCurrent());
   if (checkError.value && !checking.value) {
     return (
-      <p class="verdict warning" role="alert">
-        <span class="shape warning" aria-hidden="true" />
-        <span>{p("check_failed", { text: checkError.value })}</span>
-      </p>
+      <Warning
+        class="verdict warning"
+        role="alert"
+        text={<span>{p("check_failed", { text: checkError.value })}</span>}
+      />
     );
   }
   if (!answer || !checked.value) {

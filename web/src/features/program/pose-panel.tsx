@@ -4,6 +4,7 @@ import { useEffect, useState } from "preact/hooks";
 import { DASH, fixed } from "../../i18n/format";
 import { p } from "../../i18n/program";
 import { Choice } from "../../ui/choice";
+import { TextInput } from "../../ui/text-input";
 import { dropRequestedPose, poseNumbers, poseOf, taughtPose, teachPose } from "./taught-pose";
 import { gizmoMode } from "./teach-gizmo";
 
@@ -80,14 +81,12 @@ function PoseField(props: {
       <span class="dim small">
         {props.label} [{props.unit}]
       </span>
-      <input
-        type="text"
+      <TextInput
         inputMode="decimal"
-        autocomplete="off"
         maxLength={12}
         title={p("pose_keys")}
         value={shown}
-        onInput={(event) => setTyped(event.currentTarget.value)}
+        set={setTyped}
         onBlur={(event) => typed !== null && enter(event.currentTarget.value)}
         onKeyDown={onKey}
       />

@@ -8,6 +8,7 @@ import { t } from "../../i18n/texts";
 import { mayAct } from "../../mesh/account";
 import { Button } from "../../ui/button";
 import { ReasonForm } from "../../ui/reason-form";
+import { TextInput } from "../../ui/text-input";
 import { Difference } from "./difference";
 import { download, draft } from "./draft";
 import { isDeleted, open, remove, rename, restore, shown, showVersion, timeOf } from "./stored-programs";
@@ -53,13 +54,7 @@ export function Versions(props: {
             void rename(robotKey, program, name);
           }}
         >
-          <input
-            type="text"
-            maxLength={60}
-            aria-label={s("new_name")}
-            value={name}
-            onInput={(event) => setName(event.currentTarget.value)}
-          />
+          <TextInput maxLength={60} aria-label={s("new_name")} value={name} set={setName} />
           <Button text={t("cancel")} type="button" onClick={() => setForm("")} />
           <Button primary text={s("rename")} type="submit" disabled={!name.trim() || name === title} />
         </form>

@@ -6,6 +6,7 @@ import { s } from "../../i18n/stored-programs";
 import { mayAct } from "../../mesh/account";
 import { Button } from "../../ui/button";
 import { FileButton } from "../../ui/file-button";
+import { TextInput } from "../../ui/text-input";
 import { canRedo, canUndo, download, draft, FILE_ENDING, isUnsaved, redo, rename, startProgram, undo } from "./draft";
 import { readProgramFile } from "./program-files";
 import { description } from "./program-robot";
@@ -48,15 +49,7 @@ export function Toolbar({ tell }: { tell: (words: Words) => void }) {
       <div class="program-tools" role="toolbar" aria-label={p("file")}>
         <label class="program-name">
           <span class="dim small">{p("name")}</span>
-          <input
-            type="text"
-            autocomplete="off"
-            spellcheck={false}
-            maxLength={60}
-            value={now?.name ?? ""}
-            disabled={!now}
-            onInput={(event) => rename(event.currentTarget.value)}
-          />
+          <TextInput maxLength={60} value={now?.name ?? ""} disabled={!now} set={rename} />
         </label>
         <div class="program-buttons">
           <Button

@@ -6,6 +6,7 @@ import { r } from "../../i18n/recordings";
 import { Button } from "../../ui/button";
 import type { RecordingName } from "../../ui/route";
 import { recordingsLink } from "../../ui/route";
+import { Warning } from "../../ui/warning";
 import type { RecordedEvent } from "./recorder-requests";
 
 const SHOWN_TEXT = 60;
@@ -35,12 +36,7 @@ export function Comparison(props: {
       <p>
         <strong>{words}</strong> {props.ghosted && <span class="dim">{r("ghost_of", { name })}</span>}
       </p>
-      {props.problem && (
-        <p class="state warning" role="alert">
-          <span class="shape warning" aria-hidden="true" />
-          {props.problem}
-        </p>
-      )}
+      {props.problem && <Warning class="state warning" role="alert" text={props.problem} />}
       <div class="beside-row">
         {events.length > 0 && secondEvents.length > 0 && (
           <>

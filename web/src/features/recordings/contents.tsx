@@ -8,6 +8,8 @@ import { r, viewName } from "../../i18n/recordings";
 import { Button } from "../../ui/button";
 import { Panel } from "../../ui/panel";
 import type { RecordingName } from "../../ui/route";
+import { Select } from "../../ui/select";
+import { Warning } from "../../ui/warning";
 import { RangeExport } from "./range-export";
 import { Download } from "./recording-card";
 import "./contents.css";
@@ -54,12 +56,7 @@ function Topics({ info }: { info: Recording }) {
   const lost = lostText(info);
   return (
     <>
-      {lost && (
-        <p class="contents-lost state warning">
-          <span class="shape warning" aria-hidden="true" />
-          {lost}
-        </p>
-      )}
+      {lost && <Warning class="contents-lost state warning" text={lost} />}
       <table class="topics">
         <thead>
           <tr>
@@ -96,13 +93,7 @@ function LiveVideo({ robotKey, views, title }: { robotKey: string; views: readon
   const path = [...robotKey.split("/").slice(1), chosen].map(encodeURIComponent).join("/");
   return (
     <div class="export-row">
-      <select aria-label={r("record_views")} value={chosen} onChange={(event) => setView(event.currentTarget.value)}>
-        {views.map((each) => (
-          <option key={each} value={each}>
-            {viewName(each)}
-          </option>
-        ))}
-      </select>
+      <Select label={r("record_views")} value={chosen} values={views} text={viewName} choose={setView} />
       <a class="action" href={`/video/${path}.mp4`} download={`${title}-${chosen}.mp4`} title={r("export_mp4_live")}>
         {r("export_mp4", { view: viewName(chosen) })}
       </a>

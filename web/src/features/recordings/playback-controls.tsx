@@ -10,6 +10,8 @@ import { heldLease } from "../../mesh/control";
 import type { Replay } from "../../mesh/replay";
 import { SPEEDS } from "../../mesh/replay";
 import { Toggle } from "../../ui/choice";
+import { Select } from "../../ui/select";
+import { Warning } from "../../ui/warning";
 import { EventMarks } from "./event-marks";
 import type { RecordedEvent } from "./recorder-requests";
 import "./playback-controls.css";
@@ -72,17 +74,13 @@ export function PlaybackControls(props: {
         <div class="transport-end">
           <label>
             <span class="dim small">{r("speed")}</span>
-            <select
-              aria-label={r("speed")}
+            <Select
+              label={r("speed")}
               value={String(nearest(speed))}
-              onChange={(event) => replay.setSpeed(Number(event.currentTarget.value))}
-            >
-              {SPEEDS.map((each) => (
-                <option key={each} value={String(each)}>
-                  {`${each}×`}
-                </option>
-              ))}
-            </select>
+              values={SPEEDS.map(String)}
+              text={(each) => `${each}×`}
+              choose={(each) => replay.setSpeed(Number(each))}
+            />
           </label>
           <Toggle on={loop} set={replay.setLoop}>
             {r("loop")}
@@ -91,10 +89,7 @@ export function PlaybackControls(props: {
       </div>
       <p class="transport-words small">
         {replay.problem.value ? (
-          <span class="state warning" role="alert">
-            <span class="shape warning" aria-hidden="true" />
-            {replay.problem.value}
-          </span>
+          <Warning as="span" class="state warning" role="alert" text={replay.problem.value} />
         ) : (
           <span class="dim keys-words">{r("keys")}</span>
         )}

@@ -15,6 +15,7 @@ import { Button } from "../../ui/button";
 import { ReplayTag } from "../../ui/replay-tag";
 import type { RecordingName } from "../../ui/route";
 import { recordingsLink } from "../../ui/route";
+import { Warning } from "../../ui/warning";
 import { Comparison } from "./comparison";
 import { Contents } from "./contents";
 import { EventList } from "./event-marks";
@@ -161,10 +162,5 @@ function viewsIn(info: Recording | null): readonly string[] {
 }
 
 function Trouble({ text }: { text: string }) {
-  return (
-    <span class="trouble warning">
-      <span class="shape warning" aria-hidden="true" />
-      {text}
-    </span>
-  );
+  return <Warning as="span" class="trouble warning" text={text} />;
 }

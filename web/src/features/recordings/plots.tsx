@@ -8,6 +8,7 @@ import { ValueChoice } from "../../panels/value-choice";
 import { Toggle } from "../../ui/choice";
 import { Panel } from "../../ui/panel";
 import type { RecordingName } from "../../ui/route";
+import { Warning } from "../../ui/warning";
 import type { Curve } from "./chart";
 import { Chart } from "./chart";
 import type { Window } from "./recorder-requests";
@@ -101,10 +102,7 @@ export function Plots(props: {
           />
         ))}
         {problem ? (
-          <p class="charts-word state warning">
-            <span class="shape warning" aria-hidden="true" />
-            {r("plots_refused", { text: problem })}
-          </p>
+          <Warning class="charts-word state warning" text={r("plots_refused", { text: problem })} />
         ) : !known.value || (values.length > 0 && !series.value) ? (
           <p class="charts-word dim">{r("plots_waiting")}</p>
         ) : known.value.length === 0 ? (

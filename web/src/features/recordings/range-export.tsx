@@ -11,6 +11,8 @@ import { RefusedRequest, readRefusal } from "../../mesh/refusal";
 import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import type { RecordingName } from "../../ui/route";
+import { Select } from "../../ui/select";
+import { TextInput } from "../../ui/text-input";
 
 /** A line of the console's answer. */
 interface Progress {
@@ -75,17 +77,7 @@ export function RangeExport(props: {
         )}
         {chosen && (
           <>
-            <select
-              aria-label={r("record_views")}
-              value={chosen}
-              onChange={(event) => setView(event.currentTarget.value)}
-            >
-              {views.map((each) => (
-                <option key={each} value={each}>
-                  {viewName(each)}
-                </option>
-              ))}
-            </select>
+            <Select label={r("record_views")} value={chosen} values={views} text={viewName} choose={setView} />
             {now ? (
               <Button text={r("cancel")} onClick={() => running.current?.abort()} />
             ) : (
@@ -156,11 +148,10 @@ function Seconds(props: {
     <span class="range-seconds">
       <label>
         <span class="dim small">{props.label}</span>
-        <input
-          type="text"
+        <TextInput
           inputMode="decimal"
           value={text ?? String(rounded(props.value))}
-          onInput={(event) => setText(event.currentTarget.value)}
+          set={setText}
           onChange={(event) => {
             const value = Number(event.currentTarget.value.replace(",", "."));
             if (event.currentTarget.value.trim() && Number.isFinite(value)) props.set(rounded(value));

@@ -26,6 +26,7 @@ import { NoticeLine } from "../../ui/notice-line";
 import type { RecordingName } from "../../ui/route";
 import { recordingsLink } from "../../ui/route";
 import { Silhouette } from "../../ui/silhouette";
+import { Warning } from "../../ui/warning";
 import { rowKey } from "./bulk-download";
 import { RecordingEditor } from "./recording-editor";
 import type { Row } from "./recordings-of-sites";
@@ -90,12 +91,12 @@ export function RecordingCard(props: {
         {recording.note && <p class="recording-note">{recording.note}</p>}
         {recording.cause && <p class="recording-words">{r("cause", { text: recording.cause })}</p>}
         {(lost || recording.problem || empty) && (
-          <p class="recording-words state warning">
-            <span class="shape warning" aria-hidden="true" />
-            {[reasonText(recording.problemReason, recording.problem) || (empty && r("nothing_written")), lost]
+          <Warning
+            class="recording-words state warning"
+            text={[reasonText(recording.problemReason, recording.problem) || (empty && r("nothing_written")), lost]
               .filter(Boolean)
               .join("; ")}
-          </p>
+          />
         )}
       </div>
       <div class="recording-does">

@@ -6,6 +6,7 @@ import { reasonOf } from "../../mesh/control";
 import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import { ReasonForm } from "../../ui/reason-form";
+import { TextInput } from "../../ui/text-input";
 import { deleteRecording, saveLabels } from "./recording-changes";
 import type { Row } from "./recordings-of-sites";
 
@@ -52,17 +53,11 @@ export function RecordingEditor({ row, close }: { row: Row; close: () => void })
       >
         <label>
           <span class="dim small">{r("name")}</span>
-          <input
-            type="text"
-            value={name}
-            maxLength={LONGEST_NAME}
-            autocomplete="off"
-            onInput={(event) => setName(event.currentTarget.value)}
-          />
+          <TextInput value={name} maxLength={LONGEST_NAME} set={setName} />
         </label>
         <label>
           <span class="dim small">{r("tags_hint")}</span>
-          <input type="text" value={tags} autocomplete="off" onInput={(event) => setTags(event.currentTarget.value)} />
+          <TextInput value={tags} set={setTags} />
         </label>
         <label class="editor-note">
           <span class="dim small">{r("note")}</span>

@@ -11,6 +11,9 @@ import { Action, askRecorder } from "../../mesh/recorder";
 import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import type { RecordingName } from "../../ui/route";
+import { Select } from "../../ui/select";
+import { TextInput } from "../../ui/text-input";
+import { Warning } from "../../ui/warning";
 import { BulkDownload, rowKey } from "./bulk-download";
 import { RecordingCard } from "./recording-card";
 import type { Row, SiteAnswer } from "./recordings-of-sites";
@@ -44,46 +47,36 @@ export function RecordingList() {
         <h1>{r("recordings")}</h1>
         <span class="dim">{countText(shown.length, rows.length)}</span>
         <div class="recordings-filters">
-          <input
+          <TextInput
             type="search"
             placeholder={r("search_short")}
             aria-label={r("search")}
             value={search.value}
-            onInput={(event) => (search.value = event.currentTarget.value)}
+            set={(text) => (search.value = text)}
           />
-          <select
-            aria-label={r("robot")}
+          <Select
+            label={r("robot")}
             value={robot.value}
-            onChange={(event) => (robot.value = event.currentTarget.value)}
-          >
-            <option value={EVERY}>{r("every_robot")}</option>
-            {robots.map((name) => (
-              <option key={name}>{name}</option>
-            ))}
-          </select>
+            values={[EVERY, ...robots]}
+            text={(name) => name || r("every_robot")}
+            choose={(name) => (robot.value = name)}
+          />
           {(tags.length > 0 || tag.value !== EVERY) && (
-            <select
-              aria-label={r("tag")}
+            <Select
+              label={r("tag")}
               value={tag.value}
-              onChange={(event) => (tag.value = event.currentTarget.value)}
-            >
-              <option value={EVERY}>{r("every_tag")}</option>
-              {[...new Set([...tags, tag.value])].filter(Boolean).map((name) => (
-                <option key={name}>{name}</option>
-              ))}
-            </select>
+              values={[EVERY, ...new Set([...tags, tag.value].filter(Boolean))]}
+              text={(name) => name || r("every_tag")}
+              choose={(name) => (tag.value = name)}
+            />
           )}
-          <select
-            aria-label={r("time")}
+          <Select
+            label={r("time")}
             value={span.value}
-            onChange={(event) => (span.value = event.currentTarget.value as Span)}
-          >
-            {(Object.keys(SPANS) as Span[]).map((name) => (
-              <option key={name} value={name}>
-                {r(name)}
-              </option>
-            ))}
-          </select>
+            values={Object.keys(SPANS) as Span[]}
+            text={r}
+            choose={(name) => (span.value = name)}
+          />
         </div>
       </div>
       {[...sites].map(([site, answer]) => (
@@ -177,11 +170,7 @@ function SiteLine({ site, answer: { list, problem }, named }: { site: string; an
           {list.flight && chosen && (
             <span class="save-last">
               {robots.length > 1 && (
-                <select aria-label={r("robot")} value={chosen} onChange={(event) => setOf(event.currentTarget.value)}>
-                  {robots.map((name) => (
-                    <option key={name}>{name}</option>
-                  ))}
-                </select>
+                <Select label={r("robot")} value={chosen} values={robots} text={String} choose={setOf} />
               )}
               <Button
                 text={robots.length > 1 ? r("save_last") : r("save_of", { robot: chosen })}
@@ -192,12 +181,7 @@ function SiteLine({ site, answer: { list, problem }, named }: { site: string; an
           )}
         </>
       )}
-      {problem && (
-        <span class="state warning" role="status">
-          <span class="shape warning" aria-hidden="true" />
-          {problem}
-        </span>
-      )}
+      {problem && <Warning as="span" class="state warning" role="status" text={problem} />}
       {notice && <NoticeLine notice={notice} />}
     </div>
   );

@@ -16,6 +16,7 @@ import { SceneView } from "../../scene/scene-view";
 import { Panel } from "../../ui/panel";
 import { ReplayTag } from "../../ui/replay-tag";
 import { recordingsLink } from "../../ui/route";
+import { Warning } from "../../ui/warning";
 import { usePosition } from "./open-replay";
 import { PlaybackControls } from "./playback-controls";
 import { RecordedJoints } from "./recorded-joints";
@@ -54,12 +55,7 @@ export function ReplayRobotPage({ site, robot }: RobotName) {
             </a>
           )}
         </div>
-        {gone && (
-          <p class="player-trouble" role="alert">
-            <span class="shape warning" aria-hidden="true" />
-            {r("player_gone")}
-          </p>
-        )}
+        {gone && <Warning class="player-trouble" role="alert" text={r("player_gone")} />}
       </div>
       <SceneView
         key={key}

@@ -9,6 +9,7 @@ import type { MomentState } from "../../mesh/replay-moment";
 import { useMomentState } from "../../mesh/replay-moment";
 import { viewsOf } from "../../scene/scene-view";
 import { Panel } from "../../ui/panel";
+import { Select } from "../../ui/select";
 import { useLiveVideo } from "../../video/live-video";
 import { standardView } from "../../video/requested-view";
 
@@ -48,13 +49,7 @@ export function ReplayVideo(props: {
         <>
           <span class="tag replay">{r("replay")}</span>
           {names.length > 0 && (
-            <select aria-label={t("view")} value={shown} onChange={(event) => setView(event.currentTarget.value)}>
-              {names.map((name) => (
-                <option key={name} value={name}>
-                  {viewName(name)}
-                </option>
-              ))}
-            </select>
+            <Select label={t("view")} value={shown} values={names} text={viewName} choose={setView} />
           )}
         </>
       }

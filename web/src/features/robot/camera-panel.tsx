@@ -11,6 +11,7 @@ import type { VideoPlace } from "../../ui/layout";
 import { PLACES } from "../../ui/layout";
 import { Panel } from "../../ui/panel";
 import { saveFile } from "../../ui/save-file";
+import { Select } from "../../ui/select";
 import { Age } from "../../ui/state";
 import { useLiveVideo } from "../../video/live-video";
 import type { RequestedView } from "../../video/requested-view";
@@ -82,25 +83,15 @@ export function CameraPanel(props: {
             </span>
           )}
           <Age stale={live.stale} age={live.age} />
-          <select aria-label={t("view")} value={shown} onChange={(event) => props.setView(event.currentTarget.value)}>
-            {names.map((each) => (
-              <option key={each} value={each}>
-                {viewText(each)}
-              </option>
-            ))}
-          </select>
-          <select
+          <Select label={t("view")} value={shown} values={names} text={viewText} choose={props.setView} />
+          <Select
             class="video-place"
-            aria-label={t("video_place")}
+            label={t("video_place")}
             value={props.place}
-            onChange={(event) => props.setPlace(event.currentTarget.value as VideoPlace)}
-          >
-            {PLACES.map((each) => (
-              <option key={each} value={each}>
-                {t(`video_${each}`)}
-              </option>
-            ))}
-          </select>
+            values={PLACES}
+            text={(each) => t(`video_${each}`)}
+            choose={props.setPlace}
+          />
         </>
       }
     >

@@ -26,6 +26,7 @@ import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
 import { Age } from "../../ui/state";
 import { StepButton } from "../../ui/step-button";
+import { Warning } from "../../ui/warning";
 
 const REACHED = 0.002; // rad or m: half of what the page displays
 const ABANDONED_MS = 1500;
@@ -143,10 +144,7 @@ export function JointsPanel(props: {
       end={
         <>
           {props.controller?.jointsUnproven && (
-            <strong class="joints-unproven">
-              <span class="shape warning" aria-hidden="true" />
-              {t("joints_unproven_short")}
-            </strong>
+            <Warning as="strong" class="joints-unproven" text={t("joints_unproven_short")} />
           )}
           {props.age === undefined ? <span class="dim">{t("no_data")}</span> : <Age stale={stale} age={props.age} />}
           {watching || (
@@ -240,10 +238,5 @@ export function JointsPanel(props: {
 
 function Limit({ text, refused }: { text: string; refused: boolean }) {
   if (!refused) return <span class="limit dim">{text}</span>;
-  return (
-    <strong class="limit refused">
-      <span class="shape warning" aria-hidden="true" />
-      {text}
-    </strong>
-  );
+  return <Warning as="strong" class="limit refused" text={text} />;
 }

@@ -7,6 +7,7 @@ import { Button } from "../../ui/button";
 import type { Layout, LayoutProblem } from "../../ui/layout";
 import { DEFAULT_LAYOUT, layoutText, PANELS, readLayout } from "../../ui/layout";
 import { layoutQuery, setLayoutQuery } from "../../ui/route";
+import { Warning } from "../../ui/warning";
 import { SavedLayouts } from "./saved-layouts";
 import "./layout-panel.css";
 
@@ -60,10 +61,11 @@ export function LayoutPanel(props: LayoutState & { site: string }) {
     <section class="panel layout-panel" aria-label={p("layout")}>
       {problem && (
         <div class="layout-row">
-          <p class="layout-problem" role="alert">
-            <span class="shape warning" aria-hidden="true" />
-            {p("layout_wrong", { why: p(problem.text, problem.values) })}
-          </p>
+          <Warning
+            class="layout-problem"
+            role="alert"
+            text={p("layout_wrong", { why: p(problem.text, problem.values) })}
+          />
           <Button text={p("layout_reset")} onClick={() => setLayoutQuery("")} />
         </div>
       )}

@@ -4,6 +4,7 @@ import { t } from "../../i18n/texts";
 import { isClockOff, useMesh } from "../../mesh/site-health";
 import { isRemote, selectTopics, TOPIC_SELECTIONS, topicSelection } from "../../scene/topic-selection";
 import { Choice } from "../../ui/choice";
+import { Warning } from "../../ui/warning";
 
 export function TopicChoice({ robotKey }: { robotKey: string }) {
   if (!isRemote(robotKey)) return null;
@@ -29,9 +30,10 @@ export function ClockHint({ site }: { site: string }) {
   if (!off) return null;
   const seconds = Math.abs(off.clockOffsetS ?? 0).toFixed(1);
   return (
-    <span class="trouble warning">
-      <span class="shape warning" aria-hidden="true" />
-      {t("clock_off", { host: off.host || off.service, seconds, site })}
-    </span>
+    <Warning
+      as="span"
+      class="trouble warning"
+      text={t("clock_off", { host: off.host || off.service, seconds, site })}
+    />
   );
 }

@@ -17,6 +17,7 @@ import { Toggle } from "../../ui/choice";
 import type { Plot } from "../../ui/layout";
 import { MOST_FIELDS, MOST_PLOTS, RANGES } from "../../ui/layout";
 import { Panel } from "../../ui/panel";
+import { Select } from "../../ui/select";
 import type { Frozen, Shown } from "./live-chart";
 import { LiveChart, missingOf } from "./live-chart";
 import type { Past } from "./plot-feed";
@@ -134,17 +135,13 @@ function PlotCard(props: {
         <Legend {...{ fields, feed, description, common, unit, frozen, moment, seconds }} />
         <div class="plot-tools">
           {zoomed && <Button quiet text={p("whole")} onClick={() => zoom(null)} />}
-          <select
-            aria-label={p("range", { number })}
-            value={seconds}
-            onChange={(event) => props.change({ seconds: Number(event.currentTarget.value) })}
-          >
-            {RANGES.map((each) => (
-              <option key={each} value={each}>
-                {rangeText(each)}
-              </option>
-            ))}
-          </select>
+          <Select
+            label={p("range", { number })}
+            value={String(seconds)}
+            values={RANGES.map(String)}
+            text={(each) => rangeText(Number(each))}
+            choose={(each) => props.change({ seconds: Number(each) })}
+          />
           <button
             class="toggle"
             aria-pressed={choosing}

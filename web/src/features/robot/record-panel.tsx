@@ -16,6 +16,8 @@ import { ageOf, isStale, useTopic } from "../../mesh/topics";
 import { viewsOf } from "../../scene/scene-view";
 import { Button } from "../../ui/button";
 import { recordingsLink } from "../../ui/route";
+import { Select } from "../../ui/select";
+import { TextInput } from "../../ui/text-input";
 import "../../ui/replay.css";
 import "./record-panel.css";
 import { reasonOf } from "../../mesh/control";
@@ -126,31 +128,31 @@ function Start(props: {
         props.start(name.trim().replace(/\s+/g, "-"), views ? [views] : []);
       }}
     >
-      <input
-        type="text"
-        autocomplete="off"
+      <TextInput
         maxLength={80}
         aria-label={r("record_name")}
         placeholder={r("record_name_hint")}
         value={name}
-        onInput={(event) => setName(event.currentTarget.value)}
+        set={setName}
       />
       <label>
         <span class="dim small">{r("record_views")}</span>
-        <select value={views} onChange={(event) => setViews(event.currentTarget.value)}>
-          <option value={AS_THE_SITE}>{r("record_views_site")}</option>
-          <option value={NO_VIDEO}>{r("record_views_none")}</option>
-          {viewsOf(props.description).map((view) => (
-            <option key={view.name} value={view.name}>
-              {viewText(view.name)}
-            </option>
-          ))}
-        </select>
+        <Select
+          value={views}
+          values={[AS_THE_SITE, NO_VIDEO, ...viewsOf(props.description).map(({ name }) => name)]}
+          text={sourceText}
+          choose={setViews}
+        />
       </label>
       <Button primary text={r("record_start")} disabled={props.busy} type="submit" />
       {props.last}
     </form>
   );
+}
+
+function sourceText(views: string): string {
+  if (views === AS_THE_SITE) return r("record_views_site");
+  return views === NO_VIDEO ? r("record_views_none") : viewText(views);
 }
 
 /** A link to the last recording. */

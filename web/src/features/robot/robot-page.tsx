@@ -37,6 +37,7 @@ import { RobotTags } from "../../ui/robot-tags";
 import { cellLink, programLink } from "../../ui/route";
 import { State } from "../../ui/state";
 import { Tag } from "../../ui/tag";
+import { Warning } from "../../ui/warning";
 import { CameraPanel } from "./camera-panel";
 import { EventsPanel } from "./events-panel";
 import { JointsPanel } from "./joints-panel";
@@ -264,20 +265,16 @@ function Troubles(props: { site: string; controller: Latest<ControllerState> | u
           {trouble}
         </span>
       )}
-      {flooding && (
-        <span class="trouble warning">
-          <span class="shape warning" aria-hidden="true" />
-          {t("flooding")}
-        </span>
-      )}
+      {flooding && <Warning as="span" class="trouble warning" text={t("flooding")} />}
       {message?.stop && <span class="trouble">{stopText(message, disobeys(message, events))}</span>}
       {message?.checkText && (
-        <span class="trouble warning">
-          <span class="shape warning" aria-hidden="true" />
-          {t(message.check === Check.REQUIRE ? "check_refuses" : "check_cannot", {
+        <Warning
+          as="span"
+          class="trouble warning"
+          text={t(message.check === Check.REQUIRE ? "check_refuses" : "check_cannot", {
             text: message.checkStarting ? t("check_starting") : reasonText(message.checkReason, message.checkText),
           })}
-        </span>
+        />
       )}
     </>
   );

@@ -15,6 +15,7 @@ import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import { setLayoutQuery } from "../../ui/route";
 import { Select } from "../../ui/select";
+import { TextInput } from "../../ui/text-input";
 
 const TIMEOUT_S = 10; // the answer waits for the disk
 const LONGEST_NAME = 60;
@@ -90,14 +91,11 @@ export function SavedLayouts(props: { site: string; text: string }) {
       </span>
       <label>
         <span>{p("layout_name")}</span>
-        <input
-          type="text"
-          autocomplete="off"
-          spellcheck={false}
+        <TextInput
           maxLength={LONGEST_NAME}
           value={name}
-          onInput={(event) => {
-            setName(event.currentTarget.value);
+          set={(text) => {
+            setName(text);
             setDeleting(false);
           }}
         />

@@ -9,6 +9,7 @@ import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
 import { Select } from "../../ui/select";
+import { TextInput } from "../../ui/text-input";
 
 type Role = "monitor" | "operator" | "engineer" | "admin";
 const ROLES: readonly Role[] = ["monitor", "operator", "engineer", "admin"];
@@ -133,13 +134,13 @@ function Password(props: { of: string; set: (password: string) => void; close: (
         props.set(password);
       }}
     >
-      <input
+      <TextInput
         type="password"
         autocomplete="new-password"
         aria-label={s("set_password_of", { name: props.of })}
         placeholder={s("new_password")}
         value={password}
-        onInput={(event) => setPassword(event.currentTarget.value)}
+        set={setPassword}
       />
       <Button text={s("set_password")} type="submit" disabled={!password} />
       <Button quiet text={s("cancel")} type="button" onClick={props.close} />
@@ -166,24 +167,8 @@ function AddAccount({ change }: { change: Change }) {
       }}
     >
       <strong>{s("add")}</strong>
-      <input
-        type="text"
-        autocomplete="off"
-        spellcheck={false}
-        maxLength={40}
-        placeholder={s("name")}
-        aria-label={s("name")}
-        value={name}
-        onInput={(event) => setName(event.currentTarget.value)}
-      />
-      <input
-        type="password"
-        autocomplete="new-password"
-        placeholder={s("password")}
-        aria-label={s("password")}
-        value={password}
-        onInput={(event) => setPassword(event.currentTarget.value)}
-      />
+      <TextInput maxLength={40} hint={s("name")} value={name} set={setName} />
+      <TextInput type="password" autocomplete="new-password" hint={s("password")} value={password} set={setPassword} />
       <Select label={s("role")} value={role} values={ROLES} text={(each) => s(`role_${each}`)} choose={setRole} />
       <Button text={s("add_do")} type="submit" disabled={!name.trim() || !password} />
     </form>

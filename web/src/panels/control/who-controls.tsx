@@ -22,6 +22,7 @@ import {
 } from "../../mesh/control";
 import { Button } from "../../ui/button";
 import { ReasonForm } from "../../ui/reason-form";
+import { TextInput } from "../../ui/text-input";
 import { mayNotCommand, NoControl } from "./no-control";
 
 const MOST_ASKERS_SHOWN = 3;
@@ -78,17 +79,15 @@ export function WhoControls(props: {
       <div class="take-row">
         <label class="operator">
           <span class="dim">{t("operator")}</span>
-          <input
-            type="text"
+          <TextInput
             name="operator"
             autocomplete="username"
-            spellcheck={false}
             maxLength={40}
             placeholder={t("operator")}
             title={t("operator_hint")}
             value={operator.value}
             disabled={mine || !!hello.value?.operator}
-            onInput={(event) => setOperator(event.currentTarget.value)}
+            set={setOperator}
             onKeyDown={(event) => event.key === "Enter" && !other && void take(robotKey)}
           />
         </label>
