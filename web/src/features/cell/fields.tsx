@@ -1,10 +1,10 @@
 // Inputs of a cell: numbers in SI, shown in millimetres and degrees.
 
 import type { ComponentChildren } from "preact";
-import { useId, useState } from "preact/hooks";
+import { useId } from "preact/hooks";
 import type { Vector3 } from "../../gen/robomesh_pb";
-import { numberText, readNumber } from "../../ui/number-text";
-import { TextInput } from "../../ui/text-input";
+import { NumberInput } from "../../ui/number-input";
+import { numberText } from "../../ui/number-text";
 import { mayEdit } from "./cell-draft";
 import { type Quantity, UNITS } from "./cell-text";
 
@@ -30,7 +30,7 @@ export function Vector(props: {
   return (
     <Fields label={props.label}>
       {AXES.map((axis) => (
-        <NumberInput
+        <NumberField
           key={axis}
           label={axis}
           quantity={props.quantity}
@@ -43,9 +43,8 @@ export function Vector(props: {
   );
 }
 
-/** A number in SI, entered in the unit of its quantity. Arrow keys step it; invalid text stays, marked, until it is
- * corrected or given up with Escape. */
-export function NumberInput(props: {
+/** A number in SI, entered in the unit of its quantity. */
+export function NumberField(props: {
   label: string;
   quantity: Quantity;
   positive?: boolean;
@@ -53,38 +52,17 @@ export function NumberInput(props: {
   set: (value: number) => void;
 }) {
   const id = useId();
-  const [typed, setTyped] = useState<string | null>(null);
   const { unit, factor } = UNITS[props.quantity];
-  const value = props.value * factor;
-  const valid = (text: string) => {
-    const value = readNumber(text);
-    return value === null || (props.positive && value <= 0) ? null : value;
-  };
-  const wrong = typed !== null && valid(typed) === null;
   return (
-    <span class={`cell-number ${wrong ? "wrong" : ""}`}>
+    <span class="cell-number">
       <label for={id}>{props.label}</label>
-      <TextInput
+      <NumberInput
         id={id}
-        inputMode="decimal"
-        aria-invalid={wrong}
         disabled={!mayEdit.value}
-        value={typed ?? numberText(Math.round(value * 1e3) / 1e3)}
-        set={(text) => {
-          setTyped(text);
-          const value = valid(text);
-          if (value !== null) props.set(value / factor);
-        }}
-        onBlur={() => !wrong && setTyped(null)}
-        onKeyDown={(event) => {
-          const direction = { ArrowUp: 1, ArrowDown: -1 }[event.key];
-          if (event.key === "Escape" || (event.key === "Enter" && !wrong)) setTyped(null);
-          if (!direction) return;
-          event.preventDefault();
-          setTyped(null);
-          const stepped = value + (event.shiftKey ? 10 : 1) * direction;
-          if (!props.positive || stepped > 0) props.set(stepped / factor);
-        }}
+        positive={props.positive ?? false}
+        value={props.value * factor}
+        format={(value) => numberText(Math.round(value * 1e3) / 1e3)}
+        set={(value) => props.set(value / factor)}
       />
       <span class="dim">{unit}</span>
     </span>

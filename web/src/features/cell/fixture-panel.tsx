@@ -8,7 +8,7 @@ import { Choice, Toggle } from "../../ui/choice";
 import { Panel } from "../../ui/panel";
 import { change, changeFixture, chosen, FLOOR, mayEdit, published, remove, rename, shownContent } from "./cell-draft";
 import { dragging } from "./cell-preview";
-import { Fields, NumberInput, Vector } from "./fields";
+import { Fields, NumberField, Vector } from "./fields";
 
 export function FixturePanel() {
   const name = chosen.value;
@@ -86,7 +86,7 @@ function Shape({ fixture, set }: { fixture: CellFixture; set: (edit: (fixture: C
     case "cylinder":
       return (
         <Fields label={c("size")}>
-          <NumberInput
+          <NumberField
             key={`${name} radius`}
             label={c("radius")}
             quantity="length"
@@ -94,7 +94,7 @@ function Shape({ fixture, set }: { fixture: CellFixture; set: (edit: (fixture: C
             value={shape.value.radius}
             set={(value) => set(({ shape }) => shape.case === "cylinder" && (shape.value.radius = value))}
           />
-          <NumberInput
+          <NumberField
             key={`${name} height`}
             label={c("cylinder_height")}
             quantity="length"
@@ -107,7 +107,7 @@ function Shape({ fixture, set }: { fixture: CellFixture; set: (edit: (fixture: C
     case "sphere":
       return (
         <Fields label={c("size")}>
-          <NumberInput
+          <NumberField
             key={`${name} radius`}
             label={c("radius")}
             quantity="length"
@@ -152,7 +152,7 @@ function FloorPanel({ floor }: { floor: CellFloor }) {
       </div>
       {!floor.none && floor.height !== undefined && (
         <Fields label={c("height")}>
-          <NumberInput
+          <NumberField
             label={c("height")}
             quantity="length"
             value={floor.height}

@@ -5,8 +5,9 @@ import { d } from "../../i18n/define";
 import { RefusedRequest } from "../../mesh/refusal";
 import { bodies } from "./description";
 import type { Draft } from "./draft";
-import { draft, identity } from "./draft";
+import { draft, identity, parsePath } from "./draft";
 import { shapeOf } from "./mesh-files";
+import { fileName } from "./paths";
 import { positions } from "./selection";
 import type { Checked, Problem } from "./server-requests";
 import { check } from "./server-requests";
@@ -25,11 +26,6 @@ export const checkError = signal("");
 
 /** Invalid texts of number fields, by path; the draft keeps the last valid number. */
 export const invalidNumbers = signal<ReadonlyMap<string, string>>(new Map());
-
-/** Return a field's path in the format of a problem's. */
-export function parsePath(path: string): (string | number)[] {
-  return path.split("/").map((step) => (/^\d+$/.test(step) ? Number(step) : step));
-}
 
 /** Record an invalid number; null: it is valid. */
 export function setInvalidNumber(path: string, text: string | null): void {
@@ -71,7 +67,7 @@ function shapeProblems(): Problem[] {
     const sizeText = size >= 1 ? `${Number(size.toPrecision(3))} m` : `${Number((size * 1000).toPrecision(2))} mm`;
     return {
       path: [...place, "mesh_scale"],
-      text: d("odd_size", { file: mesh.split("/").at(-1) ?? mesh, size: sizeText }),
+      text: d("odd_size", { file: fileName(mesh), size: sizeText }),
     };
   });
 }

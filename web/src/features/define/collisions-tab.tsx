@@ -16,7 +16,7 @@ import {
   planning,
   startPlanning,
 } from "./collision-plan";
-import { draft, editDraft, endUndoStep } from "./draft";
+import { draft, editDraft } from "./draft";
 import { ProblemWords } from "./fields";
 import type { PairKind } from "./server-requests";
 
@@ -40,7 +40,6 @@ const REASONS: Readonly<Record<PairKind, DefineText | null>> = {
 };
 
 function setIgnored(links: readonly [string, string], ignored: boolean): void {
-  endUndoStep();
   editDraft(({ description }) => {
     const others = description.collision.ignore.filter((pair) => !isSame(pair, links));
     description.collision.ignore = ignored ? [...others, [...links]] : others;

@@ -1,5 +1,6 @@
 // Columns of the D-H table: the row's four parameters, then the joint's limits, speed and acceleration.
 
+import type { DefineText } from "../../i18n/define";
 import { d } from "../../i18n/define";
 import { angleUnit, type Joint, jointUnit, type Range, type Units } from "./description";
 
@@ -17,33 +18,26 @@ export interface Column {
   title: () => string;
 }
 
-function symbol(key: "a" | "alpha" | "d" | "theta", head: string): Column {
-  return { key, path: key, group: "row", step: 1, head: () => head, title: () => d(`dh_${key}`) };
-}
+const parameter = (key: "a" | "alpha" | "d" | "theta", head: string): Column => ({
+  ...{ key, path: key, group: "row", step: 1 },
+  head: () => head,
+  title: () => d(`dh_${key}`),
+});
+const motion = (key: ColumnKey, path: string, step: number, head: DefineText, title: DefineText): Column => ({
+  ...{ key, path, group: "motion", step },
+  head: () => d(head),
+  title: () => d(title),
+});
 
 export const COLUMNS: readonly Column[] = [
-  symbol("a", "a"),
-  symbol("alpha", "α"),
-  symbol("d", "d"),
-  symbol("theta", "θ"),
-  { key: "lower", path: "limits/0", group: "motion", step: 1, head: () => d("head_lower"), title: () => d("lower") },
-  { key: "upper", path: "limits/1", group: "motion", step: 1, head: () => d("head_upper"), title: () => d("upper") },
-  {
-    key: "max_speed",
-    path: "max_speed",
-    group: "motion",
-    step: 10,
-    head: () => d("head_speed"),
-    title: () => d("max_speed"),
-  },
-  {
-    key: "max_acceleration",
-    path: "max_acceleration",
-    group: "motion",
-    step: 10,
-    head: () => d("head_acceleration"),
-    title: () => d("max_acceleration"),
-  },
+  parameter("a", "a"),
+  parameter("alpha", "α"),
+  parameter("d", "d"),
+  parameter("theta", "θ"),
+  motion("lower", "limits/0", 1, "head_lower", "lower"),
+  motion("upper", "limits/1", 1, "head_upper", "upper"),
+  motion("max_speed", "max_speed", 10, "head_speed", "max_speed"),
+  motion("max_acceleration", "max_acceleration", 10, "head_acceleration", "max_acceleration"),
 ];
 
 export const COLUMN = Object.fromEntries(COLUMNS.map((column) => [column.key, column])) as Record<ColumnKey, Column>;
@@ -64,12 +58,6 @@ export function columnUnit({ key }: Pick<Column, "key">, { type }: Pick<Joint, "
     default:
       return jointUnit(type, units);
   }
-}
-
-export function jointValue(joint: Joint, key: ColumnKey): number {
-  if (key === "lower") return joint.limits[0];
-  if (key === "upper") return joint.limits[1];
-  return joint[key];
 }
 
 export function setJointValue(joint: Joint, key: ColumnKey, value: number): void {

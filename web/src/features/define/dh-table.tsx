@@ -7,8 +7,8 @@ import { Warning } from "../../ui/warning";
 import { problemsAt } from "./checks";
 import type { Joint } from "./description";
 import { jointUnit } from "./description";
-import { COLUMNS, type Column, columnUnit, jointValue, setJointValue } from "./dh-columns";
-import { draft, editDraft } from "./draft";
+import { COLUMNS, type Column, columnUnit } from "./dh-columns";
+import { draft } from "./draft";
 import { NumberField } from "./fields";
 import { isTable, openPasteTable } from "./paste-table";
 import { choosePart, chosenPart } from "./selection";
@@ -104,17 +104,10 @@ function Cell(props: {
         quiet
         path={path}
         label={d("field_of", { field: `${column.head()}, ${unit}`, name: joint.name })}
-        value={jointValue(joint, column.key)}
         describedBy={props.words}
         {...(props.showUnit && { unit })}
         step={/^(m|rad)/.test(unit) && !unit.startsWith("mm") ? 0.01 : column.step}
         onFocus={() => (chosenPart.value = index)}
-        set={(value) =>
-          editDraft(({ description }) => {
-            const row = description.joint[index];
-            if (row) setJointValue(row, column.key, value);
-          }, path)
-        }
       />
     </td>
   );

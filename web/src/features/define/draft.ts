@@ -76,6 +76,36 @@ export function editDraft(change: (draft: Draft) => void, as = ""): void {
   draft.value = after;
 }
 
+/** Return the steps of a path in a description, "joint/2/limits/0", as in the server's problems. */
+export function parsePath(path: string): (string | number)[] {
+  return path.split("/").map((step) => (/^\d+$/.test(step) ? Number(step) : step));
+}
+
+type Values = { [step: string | number]: unknown };
+
+function parentOf(path: string, of: Description): [Values | undefined, string | number] {
+  const steps = parsePath(path);
+  const last = steps.pop() ?? "";
+  const parent = steps.reduce<unknown>((at, step) => (at as Values | undefined)?.[step], of);
+  return [parent as Values | undefined, last];
+}
+
+/** Return the description's value at a path; undefined: it has none. */
+export function valueAt(path: string): unknown {
+  if (!draft.value) return undefined;
+  const [parent, last] = parentOf(path, draft.value.description);
+  return parent?.[last];
+}
+
+/** Change the description's value at a path: one undo step with changes of the same path just before, or of its own. */
+export function setValue(path: string, value: unknown, isOwnStep = false): void {
+  const change = ({ description }: Draft) => {
+    const [parent, last] = parentOf(path, description);
+    if (parent) parent[last] = value;
+  };
+  editDraft(change, isOwnStep ? "" : path);
+}
+
 /** End an undo step: a field lost the focus, a drag ended. */
 export function endUndoStep(): void {
   undoGroup = "";

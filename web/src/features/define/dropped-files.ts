@@ -8,9 +8,10 @@ import type { Draft, Identity } from "./draft";
 import { draft, editDraft, identity, isOpen, openDraft } from "./draft";
 import { insertJoint, nameFromFile, unusedName } from "./edits";
 import { cacheFile } from "./file-cache";
-import { baseName, missingFiles, readShape, resolvePath, setShape } from "./mesh-files";
+import { missingFiles, readShape, setShape } from "./mesh-files";
 import type { PartOrder } from "./part-order";
 import { guessOrder, stemOf } from "./part-order";
+import { baseName, fileName, resolvePath } from "./paths";
 import { choosePart, resetSelection } from "./selection";
 import type { MeshInfo } from "./server-requests";
 import { importRobot, mesh, unzip, upload } from "./server-requests";
@@ -175,8 +176,8 @@ async function takeShapes(sent: Map<string, string>): Promise<void> {
   const changed: string[] = [];
   const newPaths: string[] = [];
   for (const [path, sha] of sent) {
-    const name = path.split("/").at(-1) ?? path;
-    const wanted = missing.filter((each) => baseName(each.path) === baseName(name));
+    const name = fileName(path);
+    const wanted = missing.filter((each) => baseName(each.path) === baseName(path));
     const own = `${MESH_FOLDER}/${path}`;
     for (const each of wanted) {
       added[each.path] = sha;

@@ -1,15 +1,15 @@
 // Form fields: numbers with units, texts, choices; each has its path in the description.
 
 import type { ComponentChildren } from "preact";
-import { useId, useState } from "preact/hooks";
+import { useId } from "preact/hooks";
 import { d } from "../../i18n/define";
-import { numberText, readNumber } from "../../ui/number-text";
+import { NumberInput } from "../../ui/number-input";
 import { Select } from "../../ui/select";
 import { TextInput } from "../../ui/text-input";
 import { Warning } from "../../ui/warning";
 import { invalidNumbers, problemsAt, setInvalidNumber } from "./checks";
-import type { Pose, Triple } from "./description";
-import { endUndoStep } from "./draft";
+import { angleUnit } from "./description";
+import { draft, endUndoStep, setValue, valueAt } from "./draft";
 
 interface Place {
   /** Its path in the description, as in the server's problems: "joint/2/limits/0". */
@@ -19,156 +19,116 @@ interface Place {
   quiet?: boolean;
 }
 
-/** A number with its unit. Arrow keys step it; invalid text stays, marked, until it is corrected or Escape. */
-export function NumberField(
-  props: Place & {
-    value: number;
-    unit?: string;
-    step?: number;
-    /** Id of an element with the field's problems in words. */
-    describedBy?: string;
-    set: (value: number) => void;
-    onFocus?: () => void;
-  },
+function Labelled(
+  props: Place & { id: string; kind?: string; isWrong: boolean; hint?: string; children: ComponentChildren },
 ) {
-  const id = useId();
-  const [being, setBeing] = useState<string | null>(null);
-  const typed = invalidNumbers.value.get(props.path) ?? being;
-  const setTyped = (text: string | null) => {
-    setBeing(text);
-    setInvalidNumber(props.path, text !== null && readNumber(text) === null ? text : null);
-  };
-  const read = typed === null ? props.value : readNumber(typed);
-  // Keep the typed text while it has the value; an undo shows the value again.
-  const text = typed !== null && (read === null || read === props.value) ? typed : numberText(props.value);
-  const problems = problemsAt(props.path);
-  const wrong = problems[0]?.text ?? "";
-  const onKey = (event: KeyboardEvent) => {
-    const direction = { ArrowUp: 1, ArrowDown: -1 }[event.key];
-    if (direction) {
-      event.preventDefault();
-      setTyped(null);
-      const by = (props.step ?? 1) * (event.shiftKey ? 10 : 1) * direction;
-      props.set(Math.round((props.value + by) * 1e6) / 1e6);
-    } else if (event.key === "Escape" || (event.key === "Enter" && read !== null)) {
-      setTyped(null);
-      endUndoStep();
-    }
-  };
   return (
-    <span class={`field number ${props.quiet ? "quiet-label" : ""}`}>
-      <label for={id}>{props.label}</label>
-      <span class={`entry ${wrong ? "wrong" : ""}`}>
-        <TextInput
-          id={id}
-          inputMode="decimal"
-          data-path={props.path}
-          value={text}
-          aria-invalid={wrong !== ""}
-          aria-describedby={wrong ? props.describedBy : undefined}
-          title={wrong}
-          onFocus={() => props.onFocus?.()}
-          set={(text) => {
-            const value = readNumber(text);
-            setTyped(text);
-            if (value !== null) props.set(value);
-          }}
-          onBlur={() => {
-            if (read !== null) setTyped(null);
-            endUndoStep();
-          }}
-          onKeyDown={onKey}
-        />
-        {props.unit && <span class="entry-unit">{props.unit}</span>}
-      </span>
-    </span>
-  );
-}
-
-export function TextField(
-  props: Place & { value: string; set: (value: string) => void; hint?: string; placeholder?: string },
-) {
-  const id = useId();
-  const problems = problemsAt(props.path);
-  return (
-    <span class={`field ${props.quiet ? "quiet-label" : ""}`}>
-      <label for={id}>{props.label}</label>
-      <span class={`entry ${problems.length ? "wrong" : ""}`}>
-        <TextInput
-          id={id}
-          data-path={props.path}
-          value={props.value}
-          placeholder={props.placeholder ?? ""}
-          aria-invalid={problems.length > 0}
-          title={problems[0]?.text ?? ""}
-          set={props.set}
-          onBlur={endUndoStep}
-          onKeyDown={(event) => event.key === "Enter" && endUndoStep()}
-        />
-      </span>
+    <span class={`field ${props.kind ?? ""} ${props.quiet ? "quiet-label" : ""}`}>
+      <label for={props.id}>{props.label}</label>
+      <span class={`entry ${props.isWrong ? "wrong" : ""}`}>{props.children}</span>
       {props.hint && <span class="hint">{props.hint}</span>}
     </span>
   );
 }
 
-export function SelectField<Value extends string>(
+/** A number of the description with its unit, or one that `value` and `set` give. */
+export function NumberField(
   props: Place & {
-    value: Value;
-    values: readonly Value[];
-    text: (value: Value) => string;
-    set: (value: Value) => void;
+    unit?: string;
+    step?: number;
+    /** Id of an element with the field's problems in words. */
+    describedBy?: string;
+    value?: number;
+    set?: (value: number) => void;
+    onFocus?: () => void;
   },
 ) {
+  const { path } = props;
   const id = useId();
-  const wrong = problemsAt(props.path).length > 0;
+  const wrong = problemsAt(path)[0]?.text ?? "";
   return (
-    <span class={`field ${props.quiet ? "quiet-label" : ""}`}>
-      <label for={id}>{props.label}</label>
-      <span class={`entry ${wrong ? "wrong" : ""}`}>
-        <Select
-          id={id}
-          data-path={props.path}
-          value={props.value}
-          values={props.values}
-          text={props.text}
-          aria-invalid={wrong}
-          choose={props.set}
-        />
-      </span>
-    </span>
+    <Labelled {...props} id={id} kind="number" isWrong={wrong !== ""}>
+      <NumberInput
+        id={id}
+        data-path={path}
+        aria-invalid={wrong !== ""}
+        aria-describedby={wrong ? props.describedBy : undefined}
+        title={wrong}
+        step={props.step ?? 1}
+        value={props.value ?? Number(valueAt(path) ?? 0)}
+        set={props.set ?? ((value) => setValue(path, value))}
+        invalid={invalidNumbers.value.get(path)}
+        setInvalid={(text) => setInvalidNumber(path, text)}
+        end={endUndoStep}
+        onFocus={() => props.onFocus?.()}
+      />
+      {props.unit && <span class="entry-unit">{props.unit}</span>}
+    </Labelled>
   );
 }
 
-/** A pose: x, y, z and roll, pitch, yaw, each with its unit. */
-export function PoseFields(props: {
-  path: string;
-  of: string;
-  pose: Pose;
-  length: string;
-  angle: string;
-  set: (change: (pose: Pose) => void, field: string) => void;
-}) {
+/** A text of the description, or one that `value` and `set` give. */
+export function TextField(
+  props: Place & { value?: string; set?: (value: string) => void; hint?: string; placeholder?: string },
+) {
+  const { path } = props;
+  const id = useId();
+  const [problem] = problemsAt(path);
+  return (
+    <Labelled {...props} id={id} isWrong={problem !== undefined}>
+      <TextInput
+        id={id}
+        data-path={path}
+        value={props.value ?? String(valueAt(path) ?? "")}
+        placeholder={props.placeholder ?? ""}
+        aria-invalid={problem !== undefined}
+        title={problem?.text ?? ""}
+        set={props.set ?? ((value) => setValue(path, value))}
+        onBlur={endUndoStep}
+        onKeyDown={(event) => event.key === "Enter" && endUndoStep()}
+      />
+    </Labelled>
+  );
+}
+
+/** A choice; without `set`, of the description's value. */
+export function SelectField<Value extends string>(
+  props: Place & {
+    values: readonly Value[];
+    text: (value: Value) => string;
+    set?: (value: Value) => void;
+  },
+) {
+  const { path, values, text } = props;
+  const id = useId();
+  const isWrong = problemsAt(path).length > 0;
+  return (
+    <Labelled {...props} id={id} isWrong={isWrong}>
+      <Select
+        id={id}
+        data-path={path}
+        value={valueAt(path) as Value}
+        values={values}
+        text={text}
+        aria-invalid={isWrong}
+        choose={props.set ?? ((value) => setValue(path, value))}
+      />
+    </Labelled>
+  );
+}
+
+/** A pose of the description: x, y, z and roll, pitch, yaw, each with its unit. */
+export function PoseFields({ path, of }: { path: string; of: string }) {
+  const units = draft.value?.description.units;
+  if (!units) return null;
   const row = (key: "xyz" | "rpy", labels: readonly string[], unit: string) =>
     labels.map((label, index) => (
-      <NumberField
-        key={label}
-        path={`${props.path}/${key}/${index}`}
-        label={label}
-        value={props.pose[key][index] ?? 0}
-        unit={unit}
-        set={(value) =>
-          props.set((pose) => {
-            const values: Triple = [...pose[key]];
-            values[index] = value;
-            pose[key] = values;
-          }, `${key}/${index}`)
-        }
-      />
+      <NumberField key={label} path={`${path}/${key}/${index}`} label={label} unit={unit} />
     ));
   return (
-    <div class="pose" role="group" aria-label={props.of}>
-      {row("xyz", ["x", "y", "z"], props.length)}
-      {row("rpy", [d("roll"), d("pitch"), d("yaw")], props.angle)}
+    <div class="pose" role="group" aria-label={of}>
+      {row("xyz", ["x", "y", "z"], units.length)}
+      {row("rpy", [d("roll"), d("pitch"), d("yaw")], angleUnit(units))}
     </div>
   );
 }

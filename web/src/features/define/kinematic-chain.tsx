@@ -7,8 +7,9 @@ import { Button } from "../../ui/button";
 import { problemsAt } from "./checks";
 import type { Description, Joint } from "./description";
 import { linkName } from "./description";
-import { draft, editDraft, endUndoStep } from "./draft";
+import { draft, editDraft } from "./draft";
 import { insertJoint, makeBase, moveJoint, removeJoint } from "./edits";
+import { fileName } from "./paths";
 import type { Part } from "./selection";
 import { choosePart, chosenPart, sliderPositions } from "./selection";
 
@@ -24,7 +25,6 @@ function arrange(change: (description: Description) => void, order: (list: unkno
   const before = draft.value?.description.joint ?? [];
   const sliders: unknown[] = before.map(({ name }) => sliderPositions.value.get(name));
   order(sliders);
-  endUndoStep();
   editDraft((now) => change(now.description));
   const after = draft.value?.description.joint ?? [];
   const kept = after.flatMap(({ name }, index): [string, number][] => {
@@ -70,7 +70,6 @@ function remove(at: number, count: number): void {
 
 /** Make a link the base, in place of the present one. */
 function rebase(at: number): void {
-  endUndoStep();
   editDraft((now) => makeBase(now.description, at));
   choosePart("base");
   announced.value = d("is_base", { name: fileName(draft.value?.description.base.mesh ?? "") });
@@ -312,8 +311,4 @@ function JointSign({ joint }: { joint: Joint }) {
 function factsOf(joint: Joint): string {
   const file = joint.link.mesh ? fileName(joint.link.mesh) : d("no_shape");
   return linkName(joint) === joint.name ? file : `${linkName(joint)} · ${file}`;
-}
-
-export function fileName(path: string): string {
-  return path.split("/").at(-1) ?? path;
 }

@@ -3,6 +3,7 @@
 import { effect, signal } from "@preact/signals";
 import { bodies } from "./description";
 import { draft } from "./draft";
+import { resolvePath } from "./paths";
 import type { MeshInfo } from "./server-requests";
 import { mesh } from "./server-requests";
 
@@ -72,19 +73,4 @@ export function missingFiles(): MissingFile[] {
     }
   }
   return [...found.values()];
-}
-
-/** Resolve a name in a file to a path. */
-export function resolvePath(file: string, name: string): string {
-  const steps = file.split("/").slice(0, -1);
-  for (const step of name.replaceAll("\\", "/").split("/")) {
-    if (step === "..") steps.pop();
-    else if (step && step !== ".") steps.push(step);
-  }
-  return steps.join("/");
-}
-
-/** Return a path's last step in lower case: drives differ in whether they keep the case. */
-export function baseName(path: string): string {
-  return (path.split("/").at(-1) ?? path).toLowerCase();
 }

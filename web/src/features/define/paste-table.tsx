@@ -10,7 +10,7 @@ import { Select } from "../../ui/select";
 import { Warning } from "../../ui/warning";
 import type { Description } from "./description";
 import { COLUMN, type COLUMNS, columnUnit } from "./dh-columns";
-import { draft, editDraft, endUndoStep } from "./draft";
+import { draft, editDraft } from "./draft";
 import { outcome } from "./save-and-start";
 import { choosePart } from "./selection";
 import { CONVENTIONS, type Convention, fillJoints, typesFrom } from "./table-fill";
@@ -80,9 +80,7 @@ function PasteDialog({ description, text: given, start }: { description: Descrip
   const values = read?.rows.reduce((sum, { values: each }) => sum + Object.keys(each).length, 0) ?? 0;
   const fill = () => {
     if (!read || values === 0) return;
-    endUndoStep();
     editDraft((own) => fillJoints(own.description, read, first, chosen));
-    endUndoStep();
     choosePart(first);
     const rows = d(read.rows.length === 1 ? "paste_filled_one" : "paste_filled", { count: read.rows.length });
     const left = read.problems.length ? ` ${d("paste_left", { count: read.problems.length })}` : "";

@@ -1,55 +1,44 @@
 // Values of the whole robot: name, source of its dimensions, units.
 
+import { Fragment } from "preact";
 import { d } from "../../i18n/define";
 import type { Units } from "./description";
-import { draft, editDraft, endUndoStep } from "./draft";
+import { editDraft } from "./draft";
 import { setUnits } from "./edits";
 import { ProblemWords, Section, SelectField, TextField } from "./fields";
 
+const TEXTS = ["name", "title", "title_zh", "provenance", "provenance_zh"] as const;
+
 export function RobotTab() {
-  const now = draft.value;
-  if (!now) return null;
-  const { name, title, title_zh, provenance, provenance_zh, units } = now.description;
-  const text = (key: "name" | "title" | "title_zh" | "provenance" | "provenance_zh", value: string, hint = "") => (
-    <>
-      <TextField
-        path={key}
-        label={d(key)}
-        value={value}
-        hint={hint}
-        set={(typed) => editDraft(({ description }) => void (description[key] = typed), key)}
-      />
-      <ProblemWords path={key} />
-    </>
-  );
-  const inUnits = (changed: Partial<Units>) => {
-    endUndoStep();
+  const inUnits = (changed: Partial<Units>) =>
     editDraft(({ description }) => setUnits(description, { ...description.units, ...changed }));
-  };
   return (
     <>
       <Section title={d("robot")}>
-        {text("name", name, d("name_hint"))}
-        {text("title", title)}
-        {text("title_zh", title_zh)}
-        {text("provenance", provenance, d("provenance_hint"))}
-        {text("provenance_zh", provenance_zh)}
+        {TEXTS.map((key) => (
+          <Fragment key={key}>
+            <TextField
+              path={key}
+              label={d(key)}
+              hint={key === "name" || key === "provenance" ? d(`${key}_hint`) : ""}
+            />
+            <ProblemWords path={key} />
+          </Fragment>
+        ))}
       </Section>
       <Section title={d("units")}>
         <div class="grid-2">
           <SelectField
             path="units/length"
             label={d("unit_length")}
-            value={units.length}
-            values={["mm", "m"]}
-            text={(unit) => unit}
+            values={["mm", "m"] as const}
+            text={String}
             set={(length) => inUnits({ length })}
           />
           <SelectField
             path="units/angle"
             label={d("unit_angle")}
-            value={units.angle}
-            values={["deg", "rad"]}
+            values={["deg", "rad"] as const}
             text={(unit) => (unit === "deg" ? "°" : unit)}
             set={(angle) => inUnits({ angle })}
           />

@@ -32,10 +32,12 @@ export function chosenJoint(of: Description): Joint | undefined {
   return typeof chosenPart.value === "number" ? of.joint[chosenPart.value] : undefined;
 }
 
-/** The chosen link's appearance; undefined: the tool is chosen. */
-export function chosenBody(of: Description): Body | undefined {
-  return chosenPart.value === "base" ? of.base : chosenJoint(of)?.link;
+/** Return a link's appearance; undefined: the tool has none. */
+export function bodyOf(of: Description, part: Part): Body | undefined {
+  return part === "base" ? of.base : typeof part === "number" ? of.joint[part]?.link : undefined;
 }
+
+export const chosenBody = (of: Description): Body | undefined => bodyOf(of, chosenPart.value);
 
 export function chosenLinkName(of: Description): string {
   const joint = chosenJoint(of);

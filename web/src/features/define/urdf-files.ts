@@ -1,6 +1,6 @@
 // Which of the dropped files a URDF's addresses mean: "package://arm/meshes/visual/link_1.stl".
 
-import { baseName, resolvePath } from "./mesh-files";
+import { baseName, folderOf, resolvePath } from "./paths";
 
 /** A dropped file: its path, and its size in bytes if it is known. */
 export interface Candidate {
@@ -61,9 +61,4 @@ function decoded(address: string): string {
   } catch {
     return address;
   }
-}
-
-/** Return the folder of a path with its "/"; "" at the top. */
-function folderOf(path: string): string {
-  return path.replace(/\/$/, "").replace(/[^/]*$/, "");
 }

@@ -5,14 +5,13 @@ import { d } from "../../i18n/define";
 import { viewText } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import type { View } from "./description";
-import { draft, editDraft, endUndoStep } from "./draft";
+import { draft, editDraft, setValue } from "./draft";
 import { ProblemWords, SelectField, TextField } from "./fields";
 import { currentCamera, requestedView } from "./scene-panel";
 import { USUAL_VIEWS, viewOf } from "./views";
 
 function setFromCamera(name: string): void {
   const look = currentCamera.value?.();
-  endUndoStep();
   if (look) editDraft(({ description }) => void (description.view[name] = viewOf(look, description)));
 }
 
@@ -52,25 +51,17 @@ export function ViewsTab() {
                   quiet
                   path={`view/${name}/projection`}
                   label={`${d("projection")}: ${viewText(name)}`}
-                  value={given[name].projection}
                   values={["orthographic", "perspective"] as const}
                   text={(projection: View["projection"]) => d(projection)}
                   set={(projection) => {
-                    endUndoStep();
-                    editDraft(({ description }) => {
-                      const view = description.view[name];
-                      if (view) view.projection = projection;
-                    });
+                    setValue(`view/${name}/projection`, projection, true);
                     requestedView.value = { name };
                   }}
                 />
                 <Button
                   quiet
                   text={d((USUAL_VIEWS as readonly string[]).includes(name) ? "view_reset" : "remove")}
-                  onClick={() => {
-                    endUndoStep();
-                    editDraft(({ description }) => void delete description.view[name]);
-                  }}
+                  onClick={() => editDraft(({ description }) => void delete description.view[name])}
                 />
               </span>
             )}
