@@ -43,6 +43,11 @@ class Key(NamedTuple):
     def __str__(self) -> str:
         return f"{ROOT}/{self.site}/{self.robot}/{self.topic}"
 
+    @property
+    def last_chunk(self) -> str:
+        """The caller's name, of a request that has one; a view's, a process's."""
+        return self.topic.rpartition("/")[2]
+
 
 class PresenceKey(NamedTuple):
     """A parsed key of a liveliness token."""
@@ -101,19 +106,10 @@ def parse_key(key: str) -> Key:
         KeyNameError: If it is not a key of the mesh, or a chunk is invalid.
     """
     parsed = parse_expression(key)
-    check_key(parsed)
-    return parsed
-
-
-def check_key(key: Key) -> None:
-    """Check the chunks of a parsed key.
-
-    Raises:
-        KeyNameError: If one is invalid, or is a wildcard.
-    """
-    robot_key(*key)
-    for chunk in key.topic.split("/"):
+    robot_key(*parsed)
+    for chunk in parsed.topic.split("/"):
         check_chunk(chunk, "chunk")
+    return parsed
 
 
 def parse_expression(key_expr: str | Key) -> Key:

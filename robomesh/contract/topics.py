@@ -5,6 +5,7 @@ documentation and tests read it.
 """
 
 from collections.abc import Mapping
+from functools import lru_cache
 from types import MappingProxyType
 
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
@@ -573,6 +574,7 @@ def _row_name(name: str, rows: Mapping[str, object]) -> str | None:
     return None
 
 
+@lru_cache(4096)  # each message's
 def topic(name: str) -> Topic:
     """Return the row of a topic: `joints`, `video/top`.
 
@@ -605,6 +607,7 @@ def stale_after_s(name: str, description: schema.Description | None) -> float | 
     return row.stale_after_s
 
 
+@lru_cache(4096)
 def request(name: str) -> Request:
     """Return the row of a request: `stop`, `command/li`.
 

@@ -49,6 +49,7 @@ class Sample:
     """A received message.
 
     Attributes:
+        parsed: Site, robot and topic of the key.
         live: Received as a publication; False: the reply to a query for the last value, of unknown age, in
             the topic's history schema if there is one. A value that is published during the query may
             arrive twice: first as the reply, then live.
@@ -57,16 +58,12 @@ class Sample:
     """
 
     key: str
+    parsed: keys.Key
     payload: bytes
     header: Header
     live: bool
     received: float
     late_s: float = 0.0
-
-    @property
-    def parsed(self) -> keys.Key:
-        """Site, robot and topic."""
-        return keys.parse_key(self.key)
 
     def message(self) -> Message:
         """Decode the message by the topic table.
@@ -80,9 +77,14 @@ class Sample:
 
 
 @dataclass(slots=True)
-class _Seen:
-    """State of one key."""
+class _KeyState:
+    """State of one key.
 
+    Attributes:
+        header: Of the newest sample.
+    """
+
+    key: keys.Key
     header: Header
     is_replay: bool = False
     is_reply: bool = False  # of the newest sample
@@ -119,8 +121,8 @@ class Subscription:
         self._ready = asyncio.Event()
         self._awaited = False
         self._ring: deque[Sample] = deque(maxlen=newest)
-        self._seen: dict[str, _Seen] = {}
-        self._forgotten = _Seen(Header(0, 0, 0))  # counters of forgotten keys
+        self._seen: dict[str, _KeyState] = {}
+        self._forgotten = _KeyState(keys.Key("", "", ""), Header(0, 0, 0))  # counters of forgotten keys
         self._forgot_at = time.monotonic()
         self._lock = threading.Lock()
         self._malformed = 0
@@ -224,6 +226,12 @@ class Subscription:
         seen = self._seen.get(key)
         return None if seen is None or seen.live_at is None else time.monotonic() - seen.live_at
 
+    def ages_s(self) -> dict[keys.Key, float]:
+        """Return the age of the newest live sample of each key that has one [s]; see `age_s`."""
+        now = time.monotonic()
+        seen = [(each.key, each.live_at) for each in tuple(self._seen.values())]
+        return {key: now - live_at for key, live_at in seen if live_at is not None}
+
     def lost(self, key: str) -> int:
         """Return the number of the key's samples that never arrived: gaps in the publisher's numbers."""
         seen = self._seen.get(key)
@@ -233,11 +241,6 @@ class Subscription:
         """Return the number of the key's samples that were lost, or dropped for a slow consumer."""
         seen = self._seen.get(key)
         return 0 if seen is None else seen.lost + seen.skipped
-
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """The keys with samples."""
-        return tuple(self._seen)
 
     @property
     def skipped(self) -> int:
@@ -402,8 +405,8 @@ class Subscription:
         attachment = sample.attachment
         kind = PUBLICATION if queried_at is None else REPLY
         seen = self._seen.get(key)
-        parsed = self._ignored.key(kind, key) if seen is None else None
-        if seen is None and parsed is None:
+        parsed = self._ignored.key(kind, key) if seen is None else seen.key
+        if parsed is None:
             return
         if attachment is None or sample.kind != zenoh.SampleKind.PUT:
             self._malformed += 1
@@ -417,7 +420,7 @@ class Subscription:
         payload = sample.payload.to_bytes()
         if seen is None:
             self._forget(now)
-            self._seen[key] = seen = _Seen(header, parsed is not None and keys.is_replay(parsed.robot))
+            self._seen[key] = seen = _KeyState(parsed, header, keys.is_replay(parsed.robot))
         elif header.publisher != seen.header.publisher:
             if queried_at is not None and seen.live_at is not None and seen.live_at > queried_at:
                 return  # a live sample overtook the reply
@@ -449,7 +452,7 @@ class Subscription:
             seen.live_at = now - self.topic.heartbeat_s
         if len(self._ring) == self._ring.maxlen:
             self._seen.get(self._ring[0].key, self._forgotten).skipped += 1
-        self._ring.append(Sample(key, payload, header, queried_at is None, now, late_s))
+        self._ring.append(Sample(key, parsed, payload, header, queried_at is None, now, late_s))
 
     def _forget(self, now: float) -> None:
         """Forget the keys of processes and views that have ended, except for their counters."""

@@ -41,7 +41,7 @@ class Answer:
 
 async def ask_all(
     session: zenoh.Session,
-    key: keys.Key | str,
+    key: keys.Key,
     payload: bytes,
     *,
     timeout_s: float,
@@ -53,7 +53,7 @@ async def ask_all(
         timeout_s: Time for the owners to answer [s].
         silent_s: Longest gap between the pieces of a long answer [s]; None: `timeout_s`.
     """
-    row, asked = topics.request(keys.parse_expression(key).topic), str(key)
+    row, asked = topics.request(key.topic), str(key)
     if row.priority in ON_THE_SECOND_LINK:
         # A thread does not keep the order of requests. No command has such a priority.
         await asyncio.to_thread(wait_until_declared, session, row.priority)
@@ -129,9 +129,7 @@ def _refused(words: bytes, encoding: str) -> RefusedError:
     return RefusedError(reason, text=text)
 
 
-async def ask_bytes(
-    session: zenoh.Session, key: keys.Key | str, payload: bytes, *, timeout_s: float
-) -> bytes:
+async def ask_bytes(session: zenoh.Session, key: keys.Key, payload: bytes, *, timeout_s: float) -> bytes:
     """Send a request to its one owner and return the answer as bytes.
 
     Repeats the request while the owner is starting or busy, if it dropped a long answer before the transfer
@@ -145,7 +143,6 @@ async def ask_bytes(
         NoAnswerError: If no answer arrived in time.
         BrokenAnswerError: If a long answer began and no further piece arrived for `timeout_s`.
     """
-    key = keys.parse_expression(key)
     loop = asyncio.get_running_loop()
     deadline = loop.time() + timeout_s
     again: BusyError | QuotaError | BrokenAnswerError | None = None
@@ -168,23 +165,23 @@ async def ask_bytes(
     raise NoAnswerError(codes.NO_ANSWER(key=key, seconds=timeout_s))
 
 
-def answer_of(owner: str, answer: bytes | None, refused: RobomeshError | None) -> Answer:
+def answer_of(owner: keys.Key, answer: bytes | None, refused: RobomeshError | None) -> Answer:
     """Return one owner's decoded answer, or its error; bytes that cannot be decoded are an error too."""
     if answer is None:
-        return Answer(owner, None, None if refused is None else str(refused))
+        return Answer(str(owner), None, None if refused is None else str(refused))
     try:
-        return Answer(owner, decode_answer(owner, answer), None)
+        return Answer(str(owner), decode_answer(owner, answer), None)
     except RobomeshError as error:  # one invalid answer must not hide the others
-        return Answer(owner, None, str(error))
+        return Answer(str(owner), None, str(error))
 
 
-def decode_answer(key: keys.Key | str, payload: bytes) -> Message:
+def decode_answer(key: keys.Key, payload: bytes) -> Message:
     """Decode an answer by the request table.
 
     Raises:
         MessageError: If the bytes are not the table's message.
     """
-    schema = topics.request(keys.parse_expression(key).topic).answer
+    schema = topics.request(key.topic).answer
     if schema is None:
         raise MessageError(f"{key} answers with plain bytes")
     return decode(schema, payload)

@@ -6,7 +6,7 @@ import math
 import threading
 import time
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from threading import Lock
 from typing import Any
@@ -46,7 +46,6 @@ _MOST_OF_ONE = 16
 # Limits of the "too many requests" answers: burst, and rate [1/s].
 _BUSY_BURST = 1024
 _BUSY_PER_S = 250.0
-_ANY_CALLER = "*"
 _OCTETS = "application/octet-stream"
 
 
@@ -70,7 +69,26 @@ class Request:
     @property
     def asker(self) -> str:
         """Name of the caller, for a request whose row is `in_name`."""
-        return self.key.topic.rpartition("/")[2]
+        return self.key.last_chunk
+
+
+@dataclass(frozen=True, slots=True)
+class _Arrived:
+    """A request as it arrives, with its key parsed.
+
+    Attributes:
+        key: The key at this owner, also of a request with a wildcard.
+        chunk: As in `Request`.
+        caller: The last chunk, by which requests are limited; `*` for any key with a wildcard.
+        refused: Why the key is not that of a request; None: it is.
+    """
+
+    query: zenoh.Query
+    key: keys.Key
+    chunk: str
+    caller: str
+    refused: Reason | None = None
+    received_s: float = field(default_factory=time.monotonic)
 
 
 Handler = Callable[[Request], Awaitable[Message | bytes]]
@@ -116,6 +134,8 @@ class Answerer:
         self._ignored = ignored
         self._row = topics.request(name)
         self._own = keys.Key(site, robot, name)
+        # Place of the chunk that the row leaves open, in a whole key.
+        self._chunk_at = [*str(self._own).split("/"), "*"].index("*")
         self._handler = handler
         self._on_refused = on_refused
         self._loop = asyncio.get_running_loop()
@@ -182,7 +202,7 @@ class Answerer:
         While one waits for the loop, the next ones are answered from memory or queue, so that a flood delays
         no other robot's stop. The second copy of a request gets the answer to the first one.
         """
-        if self._loop.is_closed():
+        if self._loop.is_closed() or (arrived := self._parse(query)) is None:
             return
         mark = self._mark(query)
         with self._counting:
@@ -190,26 +210,50 @@ class Answerer:
             if mark and not is_copy:
                 self._remember(mark, None)
         if not first and not is_copy and (answer := self._recall()) is not None:
-            self._answer_repeated(query, mark, answer)
+            self._answer_repeated(arrived, mark, answer)
         elif self._waiting >= _MOST:
             self._turn_away(query)
         else:
-            begin = partial(self._start, query, _ANY_CALLER, time.monotonic())
-            self._count(_ANY_CALLER, 1)
+            begin = partial(self._start, arrived)
+            self._count(arrived.caller, 1)
             if first:
                 self._loop.call_soon_threadsafe(begin)
             else:
                 self._scheduler.add(self._queue, begin)
 
-    def _answer_repeated(self, query: zenoh.Query, mark: bytes, answer: Message) -> None:
+    def _parse(self, query: zenoh.Query) -> _Arrived | None:
+        """Parse the key of a request; drop a wildcard that does not end like the row, and return None.
+
+        `robomesh/**` queries all last values; it must not stop a robot.
+        """
+        text = str(query.key_expr)
+        if keys.has_wildcard(text):
+            if not self._row.wildcard:
+                refused = codes.WILDCARD(key=text, request=self._row.name)
+                return _Arrived(query, self._own, "*", "*", refused)
+            if text.rpartition("/")[2] == self._own.last_chunk:
+                return _Arrived(query, self._own, "", "*")
+            query.drop()
+            return None
+        # Zenoh passes on only keys with as many chunks as the row's.
+        chunk = "".join(text.split("/")[self._chunk_at : self._chunk_at + 1])
+        try:
+            key = keys.parse_key(text)
+        except KeyNameError as error:
+            self._ignored.note(REQUEST, text)
+            refused = codes.INVALID(error.reason)
+            return _Arrived(query, self._own, chunk, text.rpartition("/")[2], refused)
+        return _Arrived(query, key, chunk, key.last_chunk)
+
+    def _answer_repeated(self, arrived: _Arrived, mark: bytes, answer: Message) -> None:
+        query = arrived.query
         with query:
-            if (key := self._own_key(str(query.key_expr))) is not None:
-                self._reply(query, key, answer)
-                with self._counting:
-                    if mark:
-                        self._remember(mark, answer)
-                    self._repeated += 1
-                    self._newest_repeated = query.payload, _encoding(query), answer
+            self._reply(query, arrived.key, answer)
+            with self._counting:
+                if mark:
+                    self._remember(mark, answer)
+                self._repeated += 1
+                self._newest_repeated = query.payload, _encoding(query), answer
 
     def take_repeated(self) -> tuple[int, Message, Message] | None:
         """Return how many stops were answered from memory since the last call, the newest one, its answer."""
@@ -223,15 +267,13 @@ class Answerer:
 
     def _hand_over(self, query: zenoh.Query) -> None:
         """Queue a request for the event loop, or refuse it if too many are waiting."""
-        if self._long.reply_piece(query):
+        if self._long.reply_piece(query) or (arrived := self._parse(query)) is None:
             return
-        received_s = time.monotonic()
-        asker = _last_chunk(str(query.key_expr))
-        if self._waiting >= _MOST or self._unanswered.get(asker, 0) >= self._most_of_one:
+        if self._waiting >= _MOST or self._unanswered.get(arrived.caller, 0) >= self._most_of_one:
             self._turn_away(query)
         else:
-            self._count(asker, 1)
-            self._scheduler.add(self._queue, partial(self._start, query, asker, received_s))
+            self._count(arrived.caller, 1)
+            self._scheduler.add(self._queue, partial(self._start, arrived))
 
     def _turn_away(self, query: zenoh.Query) -> None:
         self.turned_away += 1
@@ -240,56 +282,47 @@ class Answerer:
             if self._busy_answers.take(time.monotonic()):
                 _refuse(query, BusyError(codes.BUSY()))
 
-    def _count(self, asker: str, more: int) -> None:
+    def _count(self, caller: str, more: int) -> None:
         with self._counting:
             self._waiting += more
-            count = self._unanswered.get(asker, 0) + more
+            count = self._unanswered.get(caller, 0) + more
             if count:
-                self._unanswered[asker] = count
+                self._unanswered[caller] = count
             else:
-                del self._unanswered[asker]
+                del self._unanswered[caller]
 
-    def _start(self, query: zenoh.Query, asker: str, received_s: float) -> None:
+    def _start(self, arrived: _Arrived) -> None:
         if self._closed:  # arrived during `close`
-            query.drop()
+            arrived.query.drop()
             return
-        work = self._answer(query, received_s)
+        work = self._answer(arrived)
         task = begin_now(self._loop, work) if self._row.unread else self._loop.create_task(work)
         if task is None:
-            self._end(asker, received_s)
+            self._end(arrived)
             return
         self._tasks.add(task)
-        task.add_done_callback(lambda task: self._done(task, asker, received_s))
+        task.add_done_callback(lambda task: self._end(arrived, task))
 
-    def _done(self, task: asyncio.Task[None], asker: str, received_s: float) -> None:
-        self._tasks.discard(task)
-        self._end(asker, received_s)
+    def _end(self, arrived: _Arrived, task: asyncio.Task[None] | None = None) -> None:
+        if task is not None:
+            self._tasks.discard(task)
+        self.latencies.add(time.monotonic() - arrived.received_s)
+        self._count(arrived.caller, -1)
 
-    def _end(self, asker: str, received_s: float) -> None:
-        self.latencies.add(time.monotonic() - received_s)
-        self._count(asker, -1)
-
-    async def _answer(self, query: zenoh.Query, received_s: float) -> None:
-        asked = str(query.key_expr)
-        with query:
-            key = self._own_key(asked)
-            if key is None:
-                return
+    async def _answer(self, arrived: _Arrived) -> None:
+        with arrived.query as query:
             try:
-                request = self._read(key, asked, query, received_s)
-                answer = await self._handled(request, query)
+                answer = await self._handled(self._read(arrived), query)
             except RefusedError as error:
                 self.over_quota += isinstance(error, QuotaError)
                 _refuse(query, error)
-                return
             except (MessageError, KeyNameError) as error:
                 _refuse(query, RefusedError(codes.INVALID(error.reason)))
-                return
             except Exception:
-                log.exception("%s: a request failed", key)
+                log.exception("%s: a request failed", arrived.key)
                 _refuse(query, RefusedError(codes.FAILED(request=self._row.name)))
-                return
-            self._reply(query, key, answer)
+            else:
+                self._reply(query, arrived.key, answer)
 
     def _reply(self, query: zenoh.Query, key: keys.Key, answer: Message | bytes) -> None:
         """Reply in the form of the request."""
@@ -337,31 +370,18 @@ class Answerer:
         if len(self._begun) > _MOST_MARKS:
             del self._begun[next(iter(self._begun))]
 
-    def _read(self, key: keys.Key, asked: str, query: zenoh.Query, received_s: float) -> Request:
-        chunk = _chunk(self._row.name, key.topic)
+    def _read(self, arrived: _Arrived) -> Request:
+        query = arrived.query
         try:
-            if keys.has_wildcard(asked):
-                if not self._row.wildcard:
-                    raise RefusedError(codes.WILDCARD(key=asked, request=self._row.name))
-            else:
-                self._check_key(key, asked)
+            if arrived.refused is not None:
+                raise RefusedError(arrived.refused)
             payload = query.payload.to_bytes() if query.payload is not None else b""
             message = self._message(payload, _encoding(query))
-            return Request(key, message, chunk, received_s, _within_s(query))
-        except (MessageError, KeyNameError) as error:
-            reason = codes.INVALID(error.reason)
-            self._on_refused(chunk, reason)
+        except (MessageError, RefusedError) as error:
+            reason = codes.INVALID(error.reason) if isinstance(error, MessageError) else error.reason
+            self._on_refused(arrived.chunk, reason)
             raise RefusedError(reason) from None
-        except RefusedError as error:
-            self._on_refused(chunk, error.reason)
-            raise
-
-    def _check_key(self, key: keys.Key, asked: str) -> None:
-        try:
-            keys.check_key(key)
-        except KeyNameError:
-            self._ignored.note(REQUEST, asked)
-            raise
+        return Request(arrived.key, message, arrived.chunk, arrived.received_s, _within_s(query))
 
     def _message(self, payload: bytes, encoding: str) -> Message | None:
         schema = self._row.request
@@ -378,16 +398,6 @@ class Answerer:
             if self._row.unread:
                 return schema()
             raise
-
-    def _own_key(self, asked: str) -> keys.Key | None:
-        """Return the key of a request at this owner; None: a wildcard that does not end in `stop`.
-
-        `robomesh/**` queries all last values; it must not stop a robot.
-        """
-        if not keys.has_wildcard(asked):
-            return keys.parse_expression(asked)
-        last = self._own.topic.rsplit("/", 1)[-1]
-        return self._own if not self._row.wildcard or asked.rsplit("/", 1)[-1] == last else None
 
 
 def _refuse(query: zenoh.Query, error: RefusedError) -> None:
@@ -416,15 +426,3 @@ def _within_s(query: zenoh.Query) -> float | None:
     except ValueError:
         return None
     return within_s if math.isfinite(within_s) and within_s > 0 else None
-
-
-def _last_chunk(asked: str) -> str:
-    """Return the last chunk of a key, by which requests are limited; `*` for any key with a wildcard."""
-    return "*" if keys.has_wildcard(asked) else asked.rpartition("/")[2]
-
-
-def _chunk(row: str, name: str) -> str:
-    for pattern, chunk in zip(row.split("/"), name.split("/"), strict=True):
-        if pattern == "*":
-            return chunk
-    return ""

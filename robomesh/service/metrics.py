@@ -18,7 +18,6 @@ from prometheus_client.core import (
 from prometheus_client.process_collector import ProcessCollector
 from prometheus_client.registry import Collector
 
-from robomesh.contract.keys import parse_key
 from robomesh.requests.latencies import STEPS_S, Latencies
 from robomesh.wire.counters import Measure
 from robomesh.wire.session import Session
@@ -104,11 +103,10 @@ class SessionMetrics(Collector):
         for subscription in self._session.subscriptions:
             if subscription.topic.stale_after_s is None:
                 continue
-            for key in subscription.keys:
-                age_s, parsed = subscription.age_s(key), parse_key(key)
+            for key, age_s in subscription.ages_s().items():
                 # The row's name, because a full name would leave a series for each former process.
-                labels = parsed.site, parsed.robot, subscription.topic.name
-                if age_s is not None and age_s < min(newest.get(labels, _LONGEST_AGE_S), _LONGEST_AGE_S):
+                labels = key.site, key.robot, subscription.topic.name
+                if age_s < min(newest.get(labels, _LONGEST_AGE_S), _LONGEST_AGE_S):
                     newest[labels] = age_s
         for labels, age_s in sorted(newest.items()):
             ages.add_metric(labels, age_s)

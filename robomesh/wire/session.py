@@ -168,7 +168,8 @@ class Session:
 
     async def ask_bytes(self, key: keys.Key | str, payload: bytes = b"", *, timeout_s: float = 2.0) -> bytes:
         """Send a request as bytes and return the answer's bytes; see `ask`."""
-        self._check("query", str(key))
+        key = keys.parse_expression(key)
+        self._check("query", key)
         try:
             return await requests.ask_bytes(self.zenoh_session, key, payload, timeout_s=timeout_s)
         except NoAnswerError as error:
@@ -182,12 +183,17 @@ class Session:
         self, key: str, request: Message | None = None, *, timeout_s: float = 2.0
     ) -> list[requests.Answer]:
         """Send a request on a key with a wildcard and return every owner's answer."""
-        self._check("query", key)
+        asked = keys.parse_expression(key)
+        self._check("query", asked)
         payload = b"" if request is None else request.SerializeToString()
-        answers = await requests.ask_all(self.zenoh_session, key, payload, timeout_s=timeout_s)
+        answers = await requests.ask_all(self.zenoh_session, asked, payload, timeout_s=timeout_s)
         # A refusal has the request's key instead of its owner's.
-        fits = (each for each in answers if each[0] == key or self.ignored.key(REPLY, each[0]) is not None)
-        return [requests.answer_of(*each) for each in fits]
+        owners = (asked if each[0] == key else self.ignored.key(REPLY, each[0]) for each in answers)
+        return [
+            requests.answer_of(owner, answer, refused)
+            for owner, (_, answer, refused) in zip(owners, answers, strict=True)
+            if owner is not None
+        ]
 
     async def last(self, key: str, *, timeout_s: float = 2.0) -> Message | None:
         """Return the last value of a topic, or its history message; None: no publisher has one."""
@@ -289,11 +295,11 @@ class Session:
         except SessionError as error:
             raise NoAnswerError(str(error)) from None
 
-    def _check(self, act: access_rights.Act, key: str) -> None:
+    def _check(self, act: access_rights.Act, key: keys.Key | str) -> None:
         """Raise an error with the reason if the router would silently reject the act."""
         who = self.principal
-        if who is not None and not access_rights.may(who, who.site, act, key):
-            raise NoRightError(codes.NO_RIGHT(access_rights.refusal(who, act, key)))
+        if who is not None and not access_rights.may(who, who.site, act, str(key)):
+            raise NoRightError(codes.NO_RIGHT(access_rights.refusal(who, act, str(key))))
 
     def measure(
         self,

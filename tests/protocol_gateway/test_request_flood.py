@@ -3,6 +3,7 @@
 import asyncio
 
 from protocol_gateway.audit.log import read_entries
+from robomesh.contract.keys import Key
 from robomesh.requests.requests import ask_all
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
@@ -28,7 +29,7 @@ def test_in_a_flood_of_requests_a_stop_works_and_all_are_counted(mesh, tmp_path)
                 asyncio.create_task(
                     ask_all(
                         stranger.zenoh_session,
-                        site.key("command/eve"),
+                        Key("hall", "arm", "command/eve"),
                         guess.SerializeToString(),
                         timeout_s=30.0,
                     )

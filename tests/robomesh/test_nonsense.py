@@ -7,6 +7,7 @@ import pytest
 import zenoh
 
 from robomesh.contract.endpoints import client_config
+from robomesh.contract.keys import Key
 from robomesh.contract.messages import TEXT
 from robomesh.errors import RefusedError
 from robomesh.requests.requests import ask_all
@@ -79,7 +80,7 @@ def test_request_that_arrives_during_close_is_not_handled(mesh, plain):
     async def main():
         async with open_session(mesh) as gateway:
             answerer = gateway.answer("site", "arm", "stop", stop)
-            while not await ask_all(plain, STOP.format("arm"), b"", timeout_s=20.0):
+            while not await ask_all(plain, Key("site", "arm", "stop"), b"", timeout_s=20.0):
                 pass
             done.clear()
             plain.get(STOP.format("arm"), lambda reply: None)
@@ -112,7 +113,7 @@ def test_request_longer_than_its_row_permits_is_not_decoded_but_a_stop_stops(mes
         async with open_session(mesh) as gateway:
             gateway.answer("site", "arm", "stop", stop)
             gateway.answer("site", "arm", "command/*", move)
-            while not await ask_all(plain, STOP.format("arm"), b"", timeout_s=20.0):
+            while not await ask_all(plain, Key("site", "arm", "stop"), b"", timeout_s=20.0):
                 pass
             for longest, why in ((4 << 20, "at most 524288 are permitted"), (500_000, "at most 10000")):
                 payload = b'{"joint_positions":[' + b"0," * (longest // 2) + b"0]}"

@@ -6,6 +6,7 @@ import time
 
 import pytest
 
+from robomesh.contract.keys import Key
 from robomesh.contract.messages import PROTOBUF
 from robomesh.errors import BusyError
 from robomesh.requests.request_queue import RateLimit, begin_now, paced
@@ -63,7 +64,7 @@ async def site(mesh):
 
 def once(session, name, what="command"):
     """Send a request without repeating it, like a flooding client."""
-    key = f"robomesh/site/arm/{what}/{name}"
+    key = Key("site", "arm", f"{what}/{name}")
     payload = HOME.SerializeToString() if what == "command" else b""
     return asyncio.create_task(ask_all(session.zenoh_session, key, payload, timeout_s=60.0))
 

@@ -2,6 +2,7 @@
 
 import asyncio
 
+from robomesh.contract.keys import parse_key
 from robomesh.errors import RefusedError
 from robomesh.requests.requests import ask_all
 from robomesh.schemas.robomesh_pb2 import LeaseAnswer, LeaseRequest, ReplayState
@@ -105,7 +106,7 @@ def test_a_busy_gateway_is_to_the_page_one_that_does_not_answer_and_may_be_asked
             other.answer("s", "r", "lease/request/*", lease)
             payload = asked(ACTION.RENEW)
             waiting = [
-                asyncio.create_task(ask_all(other.zenoh_session, KEY, payload, timeout_s=20.0))
+                asyncio.create_task(ask_all(other.zenoh_session, parse_key(KEY), payload, timeout_s=20.0))
                 for _ in range(16)
             ]
             async with asyncio.timeout(40):

@@ -14,6 +14,7 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from robomesh import reason_codes as codes
 from robomesh.contract.header import Header
+from robomesh.contract.keys import Key
 from robomesh.errors import QuotaError, RefusedError
 from robomesh.publications.subscription import Sample
 from robomesh.schemas.robomesh_pb2 import KeyFrameAnswer, ViewAnswer, ViewRequest
@@ -334,7 +335,8 @@ def test_a_slow_reader_gets_the_newest_picture_next():
         feeds = SharedSubscriptions()
         watch = pictures.Watch(feeds, "robomesh/s/r/image/front", NewestQueue())
         for number in range(100):
-            sample = Sample("robomesh/s/r/image/front", b"", Header(1, number, 0), True, 0.0)
+            key = Key("s", "r", "image/front")
+            sample = Sample(str(key), key, b"", Header(1, number, 0), True, 0.0)
             feeds.sink(SampleBatch([sample]))
         assert (await watch.next(1.0)).header.sequence == 99
         assert await watch.next(0.01) is None

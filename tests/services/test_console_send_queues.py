@@ -7,6 +7,7 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from robomesh.contract import topics
 from robomesh.contract.header import Header
+from robomesh.contract.keys import Key
 from robomesh.publications.subscription import Sample
 from services.console.websocket.send_queues import drop_outdated, queue_for
 
@@ -16,7 +17,7 @@ DELTA = b"\0\0\0\1\x41\x9a\x01"
 
 def sample(number, data=b"", *, topic="joints", live=True):
     payload = CompressedVideo(data=data).SerializeToString() if topic.startswith("video") else data
-    return Sample(f"robomesh/s/r/{topic}", payload, Header(1, number, 0), live, 0.0)
+    return Sample(f"robomesh/s/r/{topic}", Key("s", "r", topic), payload, Header(1, number, 0), live, 0.0)
 
 
 def frame(number, data, *, live=True):

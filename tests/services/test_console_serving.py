@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from robomesh.contract.header import Header
+from robomesh.contract.keys import parse_key
 from robomesh.publications.subscription import Sample
 from robomesh.schemas.robomesh_pb2 import FromPage, ToPage
 from services.console.websocket.framing import SampleBatch, batches, frame, state_frame
@@ -20,7 +21,7 @@ DELTA = b"\0\0\0\1\x41\x9a\x01"
 
 def sample(number, *, key=KEY, payload=b"state", received=None):
     received = time.monotonic() if received is None else received
-    return Sample(key, payload, Header(1, number, 0), True, received)
+    return Sample(key, parse_key(key), payload, Header(1, number, 0), True, received)
 
 
 def numbers(frames):

@@ -7,6 +7,7 @@ import pytest
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from robomesh.contract.header import Header
+from robomesh.contract.keys import parse_key
 from robomesh.errors import RefusedError
 from robomesh.publications.subscription import Sample
 from robomesh.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
@@ -24,7 +25,8 @@ WHOLE = ViewAnswer(topic="video/free-0", image="image/free-0", width=1280, heigh
 
 
 def sample(number, data, key=KEY):
-    return Sample(key, CompressedVideo(data=data).SerializeToString(), Header(1, number, 0), True, 0.0)
+    payload = CompressedVideo(data=data).SerializeToString()
+    return Sample(key, parse_key(key), payload, Header(1, number, 0), True, 0.0)
 
 
 @pytest.mark.parametrize("step", range(1, LOWEST_STEP + 1))

@@ -12,6 +12,7 @@ import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from prometheus_client.parser import text_string_to_metric_families
 
+from robomesh.contract.keys import Key
 from robomesh.errors import NoAnswerError
 from robomesh.publications import subscription as subscription_module
 from robomesh.requests.latencies import Latencies
@@ -133,7 +134,7 @@ def test_processes_that_come_and_go_leave_neither_series_nor_keys(mesh, monkeypa
                 publisher.put(ServiceHealth(service="gateway"))
                 while healths.received <= n:
                     await asyncio.sleep(0.01)
-            assert healths.keys == ("robomesh/s/-/health/gateway.2",)
+            assert [*healths.ages_s()] == [Key("s", "-", "health/gateway.2")]
             assert (healths.received, healths.skipped) == (3, 2)
             ages = next(
                 each for each in SessionMetrics(monitor, {}).collect() if each.name == "robomesh_age_seconds"

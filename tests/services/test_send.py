@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from robomesh import reason_codes as codes
+from robomesh.contract.keys import parse_key
 from robomesh.errors import MessageError, RefusedError
 from robomesh.requests.requests import ask_all
 from robomesh.schemas import robomesh_pb2 as schema
@@ -89,7 +90,7 @@ def test_a_busy_renewal_is_repeated_and_a_refused_one_ends_control(mesh):
             asks, asked = schema.LeaseRequest(action=A.ASK).SerializeToString(), []
             async with asyncio.timeout(40):
                 while gateway.waiting < 16:
-                    one = ask_all(eve.zenoh_session, KEY, asks, timeout_s=20.0)
+                    one = ask_all(eve.zenoh_session, parse_key(KEY), asks, timeout_s=20.0)
                     asked.append(asyncio.create_task(one))
                     await asyncio.sleep(0.01)
             before = gateway.renewed

@@ -36,7 +36,7 @@ def parse_request(text: str) -> tuple[keys.Key, topics.Request]:
         key = keys.parse_key(text)
         row = topics.request(key.topic)
         if row.in_name:
-            topics.check_operator(_last_chunk(key))
+            topics.check_operator(key.last_chunk)
     except (KeyNameError, UnknownTopicError) as error:
         raise RefusedError(codes.INVALID(error.reason)) from None
     if Role.CONSOLE not in row.askers:
@@ -70,7 +70,7 @@ def check_own_name(row: topics.Request, key: keys.Key, own: str, *, user: str = 
     Raises:
         RefusedError: If it uses another name.
     """
-    chunk = _last_chunk(key)
+    chunk = key.last_chunk
     if row.in_name and chunk != own:
         raise RefusedError(codes.OWN_NAME_ONLY(who=user, own=own, name=chunk))
 
@@ -85,7 +85,3 @@ def in_own_name(row: topics.Request, payload: bytes, operator: str) -> bytes:
         return payload  # the gateway accepts a stop with an invalid payload
     stop.by = operator
     return stop.SerializeToString()
-
-
-def _last_chunk(key: keys.Key) -> str:
-    return key.topic.rpartition("/")[2]

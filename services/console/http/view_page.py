@@ -21,7 +21,7 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
 from robomesh import reason_codes as codes
-from robomesh.contract import keys, topics
+from robomesh.contract import topics
 from robomesh.contract.header import pack
 from robomesh.errors import KeyNameError
 from robomesh.publications.subscription import Sample
@@ -124,7 +124,7 @@ def _shown(sample: Sample | None) -> ToPage.Sample | None:
 
 def _shown_payload(sample: Sample) -> bytes:
     """Return a payload without what the page does not show: names of operators, texts, the robot's model."""
-    topic = keys.parse_key(sample.key).topic
+    topic = sample.parsed.topic
     if topic == "description":
         described = Description.FromString(sample.payload)
         kept: Message = Description(simulated=described.simulated)
