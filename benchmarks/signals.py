@@ -22,7 +22,7 @@ from controllers.universal_robots import rtde_messages as rtde
 from controllers.universal_robots.driver import RTDE, RtdeDriver
 from controllers.universal_robots.simulated.controller import UrController
 from controllers.universal_robots.state import OUTPUTS
-from protocol_gateway.link.timestamping import Received, Timestamper
+from protocol_gateway.link.timestamping import EventTime, Timestamper
 from protocol_gateway.seam import Report, SignalsReceived
 from protocol_gateway.telemetry.journal import Journal
 from protocol_gateway.telemetry.signals import Signals
@@ -104,7 +104,7 @@ def measure(rate_hz: int, seconds: float, *, signals: bool) -> dict[str, Any]:
     count = 0
     begun_s = time.process_time()
     for number, data in enumerate(packages):
-        now = Received(number / rate_hz + 100.0, round((number / rate_hz + 100.0) * 1e9))
+        now = EventTime(number / rate_hz + 100.0, round((number / rate_hz + 100.0) * 1e9))
         for effect in driver.received(RTDE, data, now.monotonic_s):
             if isinstance(effect, Report):
                 for event, date in zip(effect.events, stamper.timestamps(effect.events, now), strict=True):

@@ -434,13 +434,13 @@ class RtdeMotionDriver(RtdeDriver):
 
     def _give_up(self, why: Reason) -> Effects:
         """End the permission and the beats of the motion, and have a stop latched."""
-        self._may_move_yet()
+        self._await_rest()
         effects: list[Effect] = []
         if self._inputs.ready:
             effects.append(self._written(_NO_MOTION))
         return (*effects, FateUnknown(why))
 
-    def _may_move_yet(self) -> None:
+    def _await_rest(self) -> None:
         """Note that the arm may still move after the end of a motion, until it was seen at rest."""
         self._rest.prove_again(moved=self._motion.sent is not None)
         self._motion.leave()
@@ -479,7 +479,7 @@ class RtdeMotionDriver(RtdeDriver):
 
     def _stop(self) -> Effects:
         """End permission and beats, and the program itself, by the connections that are there."""
-        self._may_move_yet()
+        self._await_rest()
         effects: list[Effect] = []
         if self._inputs.ready:
             effects.append(self._written(_NO_MOTION, alternative=True))

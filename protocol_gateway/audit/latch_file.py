@@ -24,7 +24,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from protocol_gateway.authority.lease_rules import Stop
+from protocol_gateway.authority.lease_rules import LatchedStop
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.texts import one_line
@@ -48,7 +48,7 @@ class LatchState:
         reserved: Highest number that may have been given out.
     """
 
-    stop: Stop | None = None
+    stop: LatchedStop | None = None
     last_stop_id: int = 0
     reserved: int = 0
 
@@ -90,7 +90,7 @@ class LatchFile:
             return codes.LATCH_SLOW(name=self.path.name, seconds=LONGEST_WRITE_S)
         return None
 
-    def begin(self, stop: Stop | None, last_stop_id: int, *, given_out: int) -> None:
+    def begin(self, stop: LatchedStop | None, last_stop_id: int, *, given_out: int) -> None:
         """Allocate the file and write both slots; a failure is in `problem`.
 
         Args:
@@ -109,7 +109,7 @@ class LatchFile:
         reserved = 0 if self._written is None else self._written.reserved
         return number if number <= reserved else max(number, wall_ns // 1000)
 
-    def keep(self, stop: Stop | None, last_stop_id: int) -> None:
+    def keep(self, stop: LatchedStop | None, last_stop_id: int) -> None:
         """Write the latch soon, in the file's thread, without waiting."""
         reserved = last_stop_id + RESERVED
         self._write_soon(LatchState(stop=stop, last_stop_id=last_stop_id, reserved=reserved))
@@ -283,7 +283,7 @@ def _parsed(part: bytes) -> _Slot | None:
         digest = row.pop(_DIGEST)
         if len(part) != SLOT_BYTES or digest != sha256(_json(row)).hexdigest():
             return None
-        stop = None if row["stop"] is None else Stop(**row["stop"])
+        stop = None if row["stop"] is None else LatchedStop(**row["stop"])
         state = LatchState(stop=stop, last_stop_id=row["last_stop_id"], reserved=row["reserved"])
         # Files that were written before 2026-11-23 name no robot.
         return _Slot(int(row["sequence"]), str(row.get("of", "")), state)

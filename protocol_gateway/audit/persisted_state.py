@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from protocol_gateway.audit.latch_file import LatchState
 from protocol_gateway.authority.entry import Entry, Outcome
-from protocol_gateway.authority.lease_rules import Authority, Stop
+from protocol_gateway.authority.lease_rules import Authority, LatchedStop
 
 ROTATE = "ROTATE"
 UNKNOWN = "audit log damaged: whether a stop was latched is not known"
@@ -33,8 +33,8 @@ class PersistedState:
             was killed.
     """
 
-    stop: Stop | None = None
-    cleared: Stop | None = None
+    stop: LatchedStop | None = None
+    cleared: LatchedStop | None = None
     last_stop_id: int = 0
     mover: str = ""
 
@@ -68,7 +68,7 @@ def apply_entry(state: PersistedState, entry: Entry) -> PersistedState:
     # Counted stops of a flood are written after newer ones, so an older number changes nothing.
     if entry.request == "STOP" and number > state.last_stop_id:
         reason = entry.values.get("reason", "")
-        latched = Stop(id=number, by=entry.operator, reason=reason, since_ns=entry.time_ns)
+        latched = LatchedStop(id=number, by=entry.operator, reason=reason, since_ns=entry.time_ns)
         return replace(state, stop=latched, last_stop_id=number, mover="")
     if entry.request in _MOTIONS and entry.outcome is Outcome.ACCEPTED:
         return replace(state, mover=entry.operator)
@@ -88,9 +88,9 @@ def apply_entry(state: PersistedState, entry: Entry) -> PersistedState:
 
 def with_latched_stop(
     state: PersistedState, *, number: int, by: str, since_ns: int, reason: str = UNKNOWN
-) -> tuple[PersistedState, Stop]:
+) -> tuple[PersistedState, LatchedStop]:
     """Return the state with a new latched stop, for a damaged log that may have lost one."""
-    stop = Stop(id=number, by=by, reason=reason, since_ns=since_ns)
+    stop = LatchedStop(id=number, by=by, reason=reason, since_ns=since_ns)
     return replace(state, stop=stop, last_stop_id=stop.id), stop
 
 
@@ -104,8 +104,8 @@ class MergedState(NamedTuple):
     """
 
     state: PersistedState
-    unwritten: Stop | None = None
-    unsent: Stop | None = None
+    unwritten: LatchedStop | None = None
+    unsent: LatchedStop | None = None
 
 
 def merge(state: PersistedState, latch: LatchState | None) -> MergedState:
@@ -149,16 +149,16 @@ def _number(text: str) -> int:
     return int(text) if text.isdecimal() and len(text) < 19 else 0
 
 
-def _text(stop: Stop | None) -> str:
+def _text(stop: LatchedStop | None) -> str:
     # The time of sending is on a monotonic clock, which a restart of the machine resets.
     return "" if stop is None else json.dumps(stop.kept(), ensure_ascii=False)
 
 
-def _stop(text: str) -> Stop | None:
+def _stop(text: str) -> LatchedStop | None:
     if not text:
         return None
     try:
         row: dict[str, Any] = json.loads(text)
-        return Stop(**row)
+        return LatchedStop(**row)
     except (ValueError, TypeError, RecursionError):
         return None  # a changed line: `verify` reports it

@@ -10,11 +10,11 @@ from protocol_gateway.authority.admission import (
     stop_refusal,
     wait_refusal,
 )
-from protocol_gateway.authority.effects import Program, Seen
+from protocol_gateway.authority.decisions import PlannedProgram, Snapshot
 from protocol_gateway.authority.entries import MESH
 from protocol_gateway.authority.events import CommandsRequested
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, Authority, Now, holds, not_sent
-from protocol_gateway.authority.preconditions import Controller, obstacle, predicted
+from protocol_gateway.authority.preconditions import ControllerState, obstacle, predicted
 from protocol_gateway.seam import Activity
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
@@ -38,7 +38,7 @@ class RunningProgram:
         ending: Why a jog ends: nothing more of it is sent; None: it goes on.
     """
 
-    program: Program
+    program: PlannedProgram
     done: int = 0
     held: bool = False
     given_up: bool = False
@@ -49,7 +49,7 @@ class RunningProgram:
         """Targets after the current motion [rad] or [m]."""
         return self.program.targets[self.done :]
 
-    def after(self, request: CommandRequest, controller: Controller) -> "RunningProgram":
+    def after(self, request: CommandRequest, controller: ControllerState) -> "RunningProgram":
         """Return the program after a command was sent, before which the controller was in a state."""
         match request.command:
             case _C.HOLD | _C.RESUME:
@@ -72,7 +72,7 @@ def refusal_of(
     command: CommandsRequested,
     authority: Authority,
     program: RunningProgram | None,
-    seen: Seen,
+    seen: Snapshot,
     joints: Joints,
 ) -> Answer | None:
     """Return the refusal of commands, each evaluated after the previous ones; None: allowed.
@@ -110,7 +110,7 @@ def refusal_of(
 
 
 def controller_refusal(
-    request: CommandRequest, authority: Authority, controller: Controller, seen: Seen, joints: Joints
+    request: CommandRequest, authority: Authority, controller: ControllerState, seen: Snapshot, joints: Joints
 ) -> Answer | None:
     """Return the refusal of a command by the controller's state; None: allowed."""
     status, reset_s = controller.status, authority.reset_s
@@ -125,7 +125,7 @@ def refusal_meanwhile(
     command: CommandsRequested,
     authority: Authority,
     program: RunningProgram | None,
-    seen: Seen,
+    seen: Snapshot,
     joints: Joints,
 ) -> Answer | None:
     """Return the refusal of commands after their audit entry was written; None: send them."""
@@ -147,13 +147,13 @@ def _overtaken_by_hold(
     return not_sent(codes.COMMAND_HELD()) if held else None
 
 
-def _latch_refusal(request: CommandRequest, seen: Seen) -> Answer | None:
+def _latch_refusal(request: CommandRequest, seen: Snapshot) -> Answer | None:
     if seen.latch_problem is None or request.command not in MOTION_COMMANDS:
         return None
     return not_sent(codes.COMMAND_NOT_LATCHED(seen.latch_problem))
 
 
-def _closed_refusal(request: CommandRequest, seen: Seen) -> Answer | None:
+def _closed_refusal(request: CommandRequest, seen: Snapshot) -> Answer | None:
     if seen.closed is None or request.command not in MOTION_COMMANDS | {_C.RECOVER}:
         return None
     return not_sent(seen.closed)

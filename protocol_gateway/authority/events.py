@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from math import degrees
 from typing import NamedTuple, TypeAlias
 
-from protocol_gateway.authority.effects import Finding, Program
+from protocol_gateway.authority.decisions import CheckResult, PlannedProgram
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, Lease, Now
 from protocol_gateway.seam import Activity
 from robomesh import reason_codes as codes
@@ -85,7 +85,7 @@ class CommandsRequested:
     operator: str
     source: str
     arrived: Now
-    program: Program | None = None
+    program: PlannedProgram | None = None
     refused: Answer | None = None
     step: bool = False
     held_up: bool = False
@@ -119,7 +119,7 @@ class JogPartReady:
     secret: str
     target: tuple[float, ...]
     percent: float
-    finding: Finding
+    check_result: CheckResult
 
 
 @dataclass(frozen=True)

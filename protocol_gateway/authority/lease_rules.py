@@ -193,7 +193,7 @@ class Lease:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stop:
+class LatchedStop:
     """A latched stop.
 
     Attributes:
@@ -251,7 +251,7 @@ class Authority:
     lease: Lease | None = None
     ended: Reason | None = None
     asked_by: tuple[Asker, ...] = ()
-    stop: Stop | None = None
+    stop: LatchedStop | None = None
     last_stop_id: int = 0
     stopping_s: float | None = None
     speed_percent: float | None = None

@@ -73,7 +73,7 @@ _EVERYTHING = Capabilities(commands=COMMANDS, jogs=True)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Controller:
+class ControllerState:
     """Current state of a controller.
 
     Attributes:
@@ -114,7 +114,7 @@ class Controller:
     recover: frozenset[Recovery] = frozenset()
 
 
-def obstacle(request: CommandRequest, controller: Controller, joints: Joints) -> Answer | None:
+def obstacle(request: CommandRequest, controller: ControllerState, joints: Joints) -> Answer | None:
     """Return the refusal of a command that cannot be sent now; None: it can."""
     found = (
         _link_obstacle(controller)
@@ -127,7 +127,7 @@ def obstacle(request: CommandRequest, controller: Controller, joints: Joints) ->
     return None if found is None else not_sent(found)
 
 
-def _link_obstacle(controller: Controller) -> Reason | None:
+def _link_obstacle(controller: ControllerState) -> Reason | None:
     if controller.read_only is not None:
         return codes.ROBOT_READ_ONLY(controller.read_only)
     match controller.link.state:
@@ -139,7 +139,7 @@ def _link_obstacle(controller: Controller) -> Reason | None:
             return None
 
 
-def _ability_obstacle(request: CommandRequest, controller: Controller) -> Reason | None:
+def _ability_obstacle(request: CommandRequest, controller: ControllerState) -> Reason | None:
     capabilities = controller.capabilities
     if request.command == _C.RECOVER:
         return _recovery_obstacle(request, controller)
@@ -150,7 +150,7 @@ def _ability_obstacle(request: CommandRequest, controller: Controller) -> Reason
     return codes.COMMAND_NOT_THERE(command=enum_name(_C, request.command))
 
 
-def _recovery_obstacle(request: CommandRequest, controller: Controller) -> Reason | None:
+def _recovery_obstacle(request: CommandRequest, controller: ControllerState) -> Reason | None:
     if request.recover.recovery == RecoverMessage.CONFIRM_TOOL:
         return None if controller.set_up is not None else codes.RECOVER_UNCHANGED()
     recovery = _RECOVERIES.get(request.recover.recovery)
@@ -163,7 +163,7 @@ def _recovery_obstacle(request: CommandRequest, controller: Controller) -> Reaso
     return None
 
 
-def recoveries_of(controller: Controller) -> list[RecoverMessage.Recovery]:
+def recoveries_of(controller: ControllerState) -> list[RecoverMessage.Recovery]:
     """Return the recoveries that the controller has and the site file allows, and what can be confirmed."""
     allowed = controller.capabilities.recoveries & controller.recover
     found = [number for number, recovery in _RECOVERIES.items() if recovery in allowed]
@@ -177,12 +177,12 @@ def _kind(command: CommandRequest.Command, capabilities: Capabilities) -> type[C
     return _KINDS.get(command)
 
 
-def _stop_obstacle(request: CommandRequest, controller: Controller) -> Reason | None:
+def _stop_obstacle(request: CommandRequest, controller: ControllerState) -> Reason | None:
     moves = request.command in MOTION_COMMANDS
     return codes.STOP_WOULD_NOT_ARRIVE() if moves and not controller.stop_arrives else None
 
 
-def commands_of(controller: Controller) -> Sequence[CommandRequest.Command]:
+def commands_of(controller: ControllerState) -> Sequence[CommandRequest.Command]:
     """Return the commands of the mesh that can be executed with a controller."""
     capabilities = controller.capabilities
     found = [
@@ -193,7 +193,7 @@ def commands_of(controller: Controller) -> Sequence[CommandRequest.Command]:
     return [*found, _C.RECOVER] if recoveries_of(controller) else found
 
 
-def _mode_obstacle(request: CommandRequest, controller: Controller) -> Reason | None:
+def _mode_obstacle(request: CommandRequest, controller: ControllerState) -> Reason | None:
     match controller.status.mode:
         case Mode.LOCAL:
             return codes.CONTROLLER_LOCAL()
@@ -202,7 +202,7 @@ def _mode_obstacle(request: CommandRequest, controller: Controller) -> Reason | 
     return None
 
 
-def _state_obstacle(request: CommandRequest, controller: Controller) -> Reason | None:
+def _state_obstacle(request: CommandRequest, controller: ControllerState) -> Reason | None:
     if request.command == _C.RECOVER:
         match controller.status.activity:
             case Activity.HOLDING:
@@ -240,7 +240,7 @@ def _state_obstacle(request: CommandRequest, controller: Controller) -> Reason |
     return None if "homed" in controller.accept_unknown else codes.ROBOT_HOMED_UNKNOWN()
 
 
-def _value_obstacle(request: CommandRequest, controller: Controller, joints: Joints) -> Reason | None:
+def _value_obstacle(request: CommandRequest, controller: ControllerState, joints: Joints) -> Reason | None:
     if request.command == _C.SPEED:
         if not request.HasField("speed_percent"):
             return codes.SPEED_MISSING()
@@ -261,7 +261,9 @@ def _value_obstacle(request: CommandRequest, controller: Controller, joints: Joi
     return codes.JOINTS_OUTSIDE(*found) if found else None
 
 
-def target_of(request: CommandRequest, controller: Controller, joints: Joints) -> tuple[float, ...] | None:
+def target_of(
+    request: CommandRequest, controller: ControllerState, joints: Joints
+) -> tuple[float, ...] | None:
     """Return the joint positions after a command [rad] or [m]; None: no motion, or unknown."""
     match request.command:
         case _C.HOME:
@@ -274,7 +276,7 @@ def target_of(request: CommandRequest, controller: Controller, joints: Joints) -
     return None
 
 
-def predicted(request: CommandRequest, controller: Controller, joints: Joints) -> Controller:
+def predicted(request: CommandRequest, controller: ControllerState, joints: Joints) -> ControllerState:
     """Return the controller's expected state after a command, for the next command of the same unit."""
     status = controller.status
     match request.command:
@@ -291,7 +293,7 @@ def predicted(request: CommandRequest, controller: Controller, joints: Joints) -
 
 
 def controller_commands(
-    requests: Sequence[CommandRequest], controller: Controller, joints: Joints
+    requests: Sequence[CommandRequest], controller: ControllerState, joints: Joints
 ) -> list[ControllerCommand]:
     """Convert commands of one unit for the driver; one without `MoveRelative` gets targets.
 

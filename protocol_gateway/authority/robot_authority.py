@@ -1,8 +1,8 @@
 """Authority over one robot: the one owner of its lease, its latched stop, its commands, its program or jog.
 
-`handle(event, seen)` yields effects in the order in which they must be performed. No I/O, no clock.
+`handle(event, seen)` yields decisions in the order in which they must be performed. No I/O, no clock.
 
-    event            effects, in this order
+    event            decisions, in this order
     ---------------  -----------------------------------------------------------------------------------
     stop             wire -> latch -> latch file -> programs cancelled -> published -> audit later
     jog part         evaluated -> wire: checked before, and its command is in the audit log
@@ -16,7 +16,7 @@
     link restored    the latched stop on the wire -> audit later
     fate unknown     as a stop
 
-`control` performs the effects: it hands over one command after the other, so that they reach the controller
+`control` performs the decisions: it hands over one command after the other, so that they reach the controller
 in the order of the audit log. Stops, HOLD, renewals and releases do not wait.
 """
 
@@ -25,23 +25,23 @@ from dataclasses import replace
 from typing import Any, assert_never
 
 from protocol_gateway.authority import (
-    effects,
+    decisions,
     entries,
     evaluation,
     events,
     lease_rules,
     motion_owner,
-    reports,
+    published_events,
     stop_rules,
 )
 from protocol_gateway.authority.admission import Verdict, keep_answer
-from protocol_gateway.authority.effects import Effects, Finding, Seen
+from protocol_gateway.authority.decisions import CheckResult, Decisions, Snapshot
 from protocol_gateway.authority.entry import GATEWAY, Outcome
 from protocol_gateway.authority.evaluation import RunningProgram
 from protocol_gateway.authority.events import LeaseResult, StopResult
 from protocol_gateway.authority.lease_rules import Answer, Authority, LeaseEnd, Now, not_sent, refused
 from protocol_gateway.authority.preconditions import (
-    Controller,
+    ControllerState,
     controller_command,
     controller_commands,
     predicted,
@@ -99,8 +99,8 @@ class RobotAuthority:
         """Program that runs; None: none runs."""
         return self._program
 
-    def handle(self, event: events.Event, seen: Seen) -> Effects[Any]:
-        """Return the effects of an event, to be performed one after the other, each with its result.
+    def handle(self, event: events.Event, seen: Snapshot) -> Decisions[Any]:
+        """Return the decisions on an event, to be performed one after the other, each with its result.
 
         The generator returns the result of a request.
         """
@@ -119,14 +119,14 @@ class RobotAuthority:
                 yield from self._give_jog_up(event.percent, seen)
             case events.JogEnded():
                 self._program = None
-                yield reports.jog_ended(event)
-                yield effects.AppendLater(entries.jog_end_entry(event, seen.now))
-                yield effects.Publish()
+                yield published_events.jog_ended(event)
+                yield decisions.AppendLater(entries.jog_end_entry(event, seen.now))
+                yield decisions.PublishState()
             case events.ProgramEnded():
                 self._program = None
-                yield reports.program_ended(event)
-                yield effects.AppendLater(entries.program_end_entry(event, seen.now))
-                yield effects.Publish()
+                yield published_events.program_ended(event)
+                yield decisions.AppendLater(entries.program_end_entry(event, seen.now))
+                yield decisions.PublishState()
             case events.TimePassed():
                 yield from self._expire(seen)
                 yield from self._stop_in_local_control(seen)
@@ -152,7 +152,7 @@ class RobotAuthority:
                 before = replace(self._authority, speed_percent=None)
                 self._authority = motion_owner.refused(before)
                 if before is not self._authority:
-                    yield effects.Publish()
+                    yield decisions.PublishState()
             case events.MotionObserved():
                 yield from self._motion_observed(event.moving, seen)
             case _:
@@ -166,13 +166,13 @@ class RobotAuthority:
             return None
         return None if stop_rules.in_transit_since(authority, now) is None else last[2]
 
-    def obstacle(self, request: CommandRequest, seen: Seen) -> Answer | None:
+    def obstacle(self, request: CommandRequest, seen: Snapshot) -> Answer | None:
         """Return the refusal of a command by the controller's present state; None: allowed."""
         return evaluation.controller_refusal(request, self._authority, seen.controller, seen, self._joints)
 
     # ------------------------------------------------------------------ stops
 
-    def _stop(self, stop: events.StopRequested, seen: Seen) -> Effects[StopResult]:
+    def _stop(self, stop: events.StopRequested, seen: Snapshot) -> Decisions[StopResult]:
         """Send the stop unit and latch the stop.
 
         While one is latched, a repeated request of its sender is the same stop; so is any other request
@@ -183,7 +183,7 @@ class RobotAuthority:
         if read_only is not None:
             # No operator could reset the latch, and the gateway never sends motion to this robot.
             result = StopResult(codes.STOP_READ_ONLY(read_only))
-            yield reports.stop_not_sent(stop, result)
+            yield published_events.stop_not_sent(stop, result)
         elif (problem := (yield from self._send_stop_unit()) if sent_s is None else None) is None and (
             repeated := self._repeated(stop, seen)
         ):
@@ -191,7 +191,7 @@ class RobotAuthority:
             if sent_s is None:
                 self._authority = stop_rules.stop_sent(self._authority, result.id, seen.now.monotonic_s)
         else:
-            number = yield effects.NumberStop(self._authority.last_stop_id)
+            number = yield decisions.NumberStop(self._authority.last_stop_id)
             self._authority, latched = stop_rules.stop(
                 self._authority, by=stop.by, reason=stop.reason, now=seen.now, number=number
             )
@@ -204,14 +204,14 @@ class RobotAuthority:
                 result = StopResult(codes.STOP_NOT_SENT(problem, id=latched.id), latched.id)
             self._last_stop = (stop.by, stop.source, result) if result.sent else None
             stop = replace(stop, reason=latched.reason)
-            yield effects.KeepLatch(latched, latched.id)
-            yield effects.CancelPrograms(codes.PROGRAM_STOPPED(by=stop.by, reason=stop.reason))
-            yield effects.Publish()
-            yield reports.stop_latched(stop, result)
-        yield effects.AppendLater(entries.stop_entry(stop, result, seen.now))
+            yield decisions.KeepLatch(latched, latched.id)
+            yield decisions.CancelPrograms(codes.PROGRAM_STOPPED(by=stop.by, reason=stop.reason))
+            yield decisions.PublishState()
+            yield published_events.stop_latched(stop, result)
+        yield decisions.AppendLater(entries.stop_entry(stop, result, seen.now))
         return result
 
-    def _repeated(self, stop: events.StopRequested, seen: Seen) -> StopResult | None:
+    def _repeated(self, stop: events.StopRequested, seen: Snapshot) -> StopResult | None:
         """Return the result of the latched stop if a request repeats it; None: it is a new stop."""
         if self._authority.stop is None or self._last_stop is None:
             return None
@@ -219,21 +219,21 @@ class RobotAuthority:
         same = (by, source) == (stop.by, stop.source)
         return result if same or not self._new_stops.take(seen.now.monotonic_s) else None
 
-    def _stop_by_gateway(self, reason: Reason, seen: Seen) -> Effects[None]:
+    def _stop_by_gateway(self, reason: Reason, seen: Snapshot) -> Decisions[None]:
         yield from self._stop(events.StopRequested(by=GATEWAY, reason=reason, source=GATEWAY), seen)
 
-    def _send_latched_stop(self, seen: Seen) -> Effects[None]:
+    def _send_latched_stop(self, seen: Snapshot) -> Decisions[None]:
         """Send the latched stop, if there is one, again: the controller may have missed it."""
         latched = self._authority.stop
         if latched is None or seen.controller.read_only or (yield from self._send_stop_unit()) is not None:
             return
         self._authority = stop_rules.stop_sent(self._authority, latched.id, seen.now.monotonic_s, first=True)
-        yield effects.Publish()
+        yield decisions.PublishState()
         result = StopResult(codes.STOP_SENT_AGAIN(id=latched.id), latched.id, sent=True)
-        yield reports.stop_sent(result)
-        yield effects.AppendLater(entries.repeated_stop_entry(result, seen.now))
+        yield published_events.stop_sent(result)
+        yield decisions.AppendLater(entries.repeated_stop_entry(result, seen.now))
 
-    def _check_heeded(self, moving: bool, seen: Seen) -> Effects[None]:
+    def _check_heeded(self, moving: bool, seen: Snapshot) -> Decisions[None]:
         """Report a robot that still moves after its stop, and send the stop again."""
         latched, first_s = self._authority.stop, self._authority.stopping_s
         if not moving or latched is None or first_s is None or seen.controller.read_only is not None:
@@ -244,40 +244,42 @@ class RobotAuthority:
         problem = yield from self._send_stop_unit()
         why = codes.STOP_DISOBEYED(problem or codes.STOP_UNIT_REPEATED(), id=latched.id)
         result = StopResult(why, latched.id, sent=problem is None)
-        yield reports.stop_disobeyed(result)
-        yield effects.AppendLater(entries.repeated_stop_entry(result, seen.now))
+        yield published_events.stop_disobeyed(result)
+        yield decisions.AppendLater(entries.repeated_stop_entry(result, seen.now))
 
-    def _send_stop_unit(self) -> Effects[Reason | None]:
+    def _send_stop_unit(self) -> Decisions[Reason | None]:
         """Send the stop unit; return the reason of a failure."""
         try:
             unit = self._prepare(Stop())
         except CommandError as error:
             return codes.STOP_SENT_LATER(error.reason)
-        problem = yield effects.Send(unit, urgent=True)
+        problem = yield decisions.Send(unit, urgent=True)
         return None if problem is None else codes.STOP_SENT_LATER(problem)
 
     # ----------------------------------------------------------------- leases
 
-    def _lease_requested(self, event: events.LeaseRequested, seen: Seen) -> Effects[LeaseResult]:
+    def _lease_requested(self, event: events.LeaseRequested, seen: Snapshot) -> Decisions[LeaseResult]:
         asked_before = any(each.operator == event.operator for each in self._authority.asked_by)
         unrecorded = event.request.action == _A.RENEW or (event.request.action == _A.ASK and asked_before)
         outcome = yield from self._evaluate_lease(event, seen)
         if outcome.answer.accepted and not unrecorded:
             entry = entries.lease_entry(event, Outcome.ACCEPTED, outcome.answer, seen.now)
             if event.is_immediate:
-                yield effects.AppendLater(entry)
+                yield decisions.AppendLater(entry)
             else:
-                problem, seen = yield effects.Append((entry,))
+                problem, seen = yield decisions.Append((entry,))
                 if problem is not None:
                     return LeaseResult(refused(codes.LEASE_NOT_WRITTEN(problem)))
                 outcome = yield from self._evaluate_lease(event, seen)
         if not outcome.answer.accepted:
-            yield effects.AppendLater(entries.lease_entry(event, Outcome.REFUSED, outcome.answer, seen.now))
+            yield decisions.AppendLater(entries.lease_entry(event, Outcome.REFUSED, outcome.answer, seen.now))
             return LeaseResult(outcome.answer)
         yield from self._set_authority(outcome.authority, outcome.ended, seen)
         return LeaseResult(outcome.answer, outcome.granted)
 
-    def _evaluate_lease(self, event: events.LeaseRequested, seen: Seen) -> Effects[lease_rules.LeaseOutcome]:
+    def _evaluate_lease(
+        self, event: events.LeaseRequested, seen: Snapshot
+    ) -> Decisions[lease_rules.LeaseOutcome]:
         yield from self._expire(seen)
         read_only = seen.controller.read_only
         if read_only is not None and event.request.action in (_A.ACQUIRE, _A.TAKE):
@@ -288,21 +290,21 @@ class RobotAuthority:
             self._authority, event.request, operator=event.operator, now=seen.now, secret=event.secret
         )
 
-    def _expire(self, seen: Seen) -> Effects[None]:
+    def _expire(self, seen: Snapshot) -> Decisions[None]:
         """End the lease if it has expired."""
         yield from self._end_lease(lease_rules.expire(self._authority, seen.now), seen, "EXPIRE")
 
     def _end_lease(
-        self, outcome: tuple[Authority, LeaseEnd | None], seen: Seen, request: str = "REVOKE"
-    ) -> Effects[None]:
+        self, outcome: tuple[Authority, LeaseEnd | None], seen: Snapshot, request: str = "REVOKE"
+    ) -> Decisions[None]:
         """Apply a change of the lease that no operator has requested, if there is one."""
         authority, ended = outcome
         if authority is not self._authority:
             yield from self._set_authority(authority, ended, seen)
         if ended is not None:
-            yield effects.AppendLater(entries.lease_end_entry(request, ended, seen.now))
+            yield decisions.AppendLater(entries.lease_end_entry(request, ended, seen.now))
 
-    def _set_authority(self, authority: Authority, ended: LeaseEnd | None, seen: Seen) -> Effects[None]:
+    def _set_authority(self, authority: Authority, ended: LeaseEnd | None, seen: Snapshot) -> Decisions[None]:
         """Set the state; stop the motion of a lease that has ended, before anything else."""
         changed = _secret(authority) != _secret(self._authority)
         first_percent = seen.controller.capabilities.first_speed_percent
@@ -312,16 +314,16 @@ class RobotAuthority:
         self._authority = authority
         if ended is not None and ended.stop:
             yield from self._stop_by_gateway(codes.STOP_CONTROL_ENDED(ended.why), seen)
-        yield effects.SetTimer(None if authority.lease is None else authority.lease.until_s)
+        yield decisions.SetTimer(None if authority.lease is None else authority.lease.until_s)
         if changed:
-            yield effects.Controlled(authority.lease is not None)
-        yield effects.Publish()
+            yield decisions.Controlled(authority.lease is not None)
+        yield decisions.PublishState()
         if ended is not None:
-            yield reports.lease_ended(ended)
+            yield published_events.lease_ended(ended)
 
     # --------------------------------------------------------------- commands
 
-    def _commands_requested(self, command: events.CommandsRequested, seen: Seen) -> Effects[Answer]:
+    def _commands_requested(self, command: events.CommandsRequested, seen: Snapshot) -> Decisions[Answer]:
         yield from self._expire(seen)
         verdict = evaluation.admission(command, self._authority, seen.now)
         if verdict.repeat:
@@ -331,26 +333,29 @@ class RobotAuthority:
             yield from self._end_jog(codes.JOG_COMMANDED(names=command.names), seen)
         sends = command.program is None and not _confirms(command)
         if problem is None and command.is_immediate:
-            cancelled = yield effects.CancelPrograms(codes.PROGRAM_HOLD())
+            cancelled = yield decisions.CancelPrograms(codes.PROGRAM_HOLD())
             rests = self._authority.moving is False and self._authority.motion is None
             # A HOLD sent to an arm at rest would make the controller refuse every motion.
             sends = not (cancelled and rests and self._program is None)
         if problem is None:
-            seen = yield effects.EnterCell(command.requests)
+            seen = yield decisions.EnterCell(command.requests)
             problem = evaluation.refusal_of(command, self._authority, self._program, seen, self._joints)
-        unit, finding = None, Finding(start=None if command.program is None else command.program.start)
+        unit, check_result = (
+            None,
+            CheckResult(start=None if command.program is None else command.program.start),
+        )
         if problem is None and sends:
             try:
                 unit = self._prepare(*controller_commands(command.requests, seen.controller, self._joints))
             except CommandError as error:
                 problem = not_sent(error.reason)
         if problem is None and command.program is None:
-            finding = yield effects.CheckMotion(command.requests)
-            problem = finding.refusal
+            check_result = yield decisions.CheckMotion(command.requests)
+            problem = check_result.refusal
         if problem is None:
             # The id is used before anything is sent, so that a repeat never executes the command again.
             self._keep_answer(command, not_sent(codes.COMMAND_BROKEN_OFF()), verdict)
-            answer: Answer = yield from self._write_and_send(command, unit, finding)
+            answer: Answer = yield from self._write_and_send(command, unit, check_result)
         else:
             answer = problem
             yield from _record(command, Outcome.REFUSED, answer)
@@ -358,22 +363,22 @@ class RobotAuthority:
         return answer
 
     def _write_and_send(
-        self, command: events.CommandsRequested, unit: object, finding: Finding
-    ) -> Effects[Answer]:
-        warning = finding.warning
+        self, command: events.CommandsRequested, unit: object, check_result: CheckResult
+    ) -> Decisions[Answer]:
+        warning = check_result.warning
         if any(request.command == _C.RESET for request in command.requests):
             self._last_stop = None  # a stop from now on is a new one, and the RESET does not clear it
         accepted = Answer(True, "" if warning is None else warning.text, warning)
-        unwritten, seen = yield effects.Append(entries.command_entries(command, Outcome.ACCEPTED, accepted))
+        unwritten, seen = yield decisions.Append(entries.command_entries(command, Outcome.ACCEPTED, accepted))
         if unwritten is not None:
             return not_sent(codes.COMMAND_NOT_WRITTEN(unwritten))
         yield from self._expire(seen)
         problem = evaluation.refusal_meanwhile(command, self._authority, self._program, seen, self._joints)
-        if problem is None and (changed := (yield effects.Recheck(finding))) is not None:
+        if problem is None and (changed := (yield decisions.Recheck(check_result))) is not None:
             runs = command.program is not None and not command.program.is_jog
             problem = not_sent(codes.PROGRAM_MOVED() if runs else codes.COMMAND_CHANGED(changed))
         if problem is None and unit is not None:
-            failure = yield effects.Send(unit)
+            failure = yield decisions.Send(unit)
             problem = None if failure is None else not_sent(failure)
         if problem is not None:
             yield from _record(command, Outcome.FAILED, problem)
@@ -381,11 +386,11 @@ class RobotAuthority:
         text = yield from self._book(command, unit, seen)
         if warning is None:
             return Answer(True, text)
-        if finding.is_violation or not command.step:
-            yield reports.check_warning(command.names, finding)
+        if check_result.is_violation or not command.step:
+            yield published_events.check_warning(command.names, check_result)
         return Answer(True, f"{text}; mind: {warning}", warning)
 
-    def _book(self, command: events.CommandsRequested, unit: object, seen: Seen) -> Effects[str]:
+    def _book(self, command: events.CommandsRequested, unit: object, seen: Snapshot) -> Decisions[str]:
         """Apply commands after their unit was sent; return the answer's text."""
         now_s, controller = seen.now.monotonic_s, seen.controller
         isolated = now_s - self._last_unit_s >= motion_owner.ANSWERED_WITHIN_S
@@ -396,9 +401,9 @@ class RobotAuthority:
         if _confirms(command):
             changes = "" if controller.set_up is None else controller.set_up.values["changes"]
             (request,) = command.requests
-            yield effects.ConfirmSetUp()
-            yield reports.tool_confirmed(changes, command.operator, request.recover.reason)
-            yield effects.Publish()
+            yield decisions.ConfirmSetUp()
+            yield published_events.tool_confirmed(changes, command.operator, request.recover.reason)
+            yield decisions.PublishState()
             return f"{changes}: confirmed"
         if unit is None:
             return f"{command.names}: the program was not started, and nothing is on hold"
@@ -414,13 +419,13 @@ class RobotAuthority:
             )
             self._program = self._program and self._program.after(request, controller)
             if request.command == _C.RESET and latched is not None:
-                yield effects.KeepLatch(self._authority.stop, self._authority.last_stop_id)
-                yield reports.stop_reset(latched.id)
+                yield decisions.KeepLatch(self._authority.stop, self._authority.last_stop_id)
+                yield published_events.stop_reset(latched.id)
             if request.command == _C.RECOVER:
                 recovery = entries.recovery_name(request)
-                yield reports.recovery_sent(recovery, command.operator, request.recover.reason)
+                yield published_events.recovery_sent(recovery, command.operator, request.recover.reason)
                 return f"{recovery} is on the controller's socket; the robot's state shows what becomes of it"
-            yield effects.Publish()
+            yield decisions.PublishState()
             # Each command starts from the state after the previous one.
             controller = predicted(request, controller, self._joints)
         if command.step and command.moves and self._program is not None:
@@ -430,7 +435,7 @@ class RobotAuthority:
 
     # ------------------------------------------------------------------- jogs
 
-    def _jog_part(self, part: events.JogPartReady, seen: Seen) -> Effects[Reason | None]:
+    def _jog_part(self, part: events.JogPartReady, seen: Snapshot) -> Decisions[Reason | None]:
         """Send the next part of the jog that runs; return why it was not sent."""
         yield from self._expire(seen)
         program = self._program
@@ -448,11 +453,11 @@ class RobotAuthority:
         refusal = evaluation.refusal_of(command, self._authority, program, seen, self._joints)
         if refusal is not None:
             return refusal.reason
-        if (changed := (yield effects.Recheck(part.finding))) is not None:
+        if (changed := (yield decisions.Recheck(part.check_result))) is not None:
             return codes.COMMAND_CHANGED(changed)
         return (yield from self._send_for_jog(requests, seen))
 
-    def _end_jog(self, why: Reason, seen: Seen, *, hold: bool = True) -> Effects[None]:
+    def _end_jog(self, why: Reason, seen: Snapshot, *, hold: bool = True) -> Decisions[None]:
         """End a jog that runs and does not end already; stop the robot if its hold cannot be sent."""
         program = self._program
         if program is None or not program.program.is_jog or program.ending is not None:
@@ -465,7 +470,7 @@ class RobotAuthority:
         if problem is not None:
             yield from self._stop_by_gateway(problem, seen)
 
-    def _give_jog_up(self, percent: float | None, seen: Seen) -> Effects[None]:
+    def _give_jog_up(self, percent: float | None, seen: Snapshot) -> Decisions[None]:
         """Discard the rest of a jog that is on hold, and set the operator's speed again."""
         requests = []
         # RESET would also clear a stop.
@@ -478,13 +483,13 @@ class RobotAuthority:
         if requests[0].command == _C.RESET:
             self._authority = motion_owner.given_up(self._authority)
 
-    def _send_for_jog(self, requests: Sequence[CommandRequest], seen: Seen) -> Effects[Reason | None]:
+    def _send_for_jog(self, requests: Sequence[CommandRequest], seen: Snapshot) -> Decisions[Reason | None]:
         """Send commands of a jog as one unit, and apply them; return why they were not sent."""
         try:
             unit = self._prepare(*map(controller_command, requests))
         except CommandError as error:
             return error.reason
-        problem: Reason | None = yield effects.Send(unit)
+        problem: Reason | None = yield decisions.Send(unit)
         if problem is not None:
             return problem
         self._last_unit_s = seen.now.monotonic_s
@@ -507,7 +512,7 @@ class RobotAuthority:
 
     # ------------------------------------------------------------- controller
 
-    def _link_lost(self, why: str, seen: Seen) -> Effects[None]:
+    def _link_lost(self, why: str, seen: Snapshot) -> Decisions[None]:
         """Stop the robot if motion of the holder runs: its position is unknown now."""
         # The next connection may reach another controller.
         first_percent = seen.controller.capabilities.first_speed_percent
@@ -517,7 +522,7 @@ class RobotAuthority:
         if lease is not None and lease.motion is not None:
             yield from self._stop_by_gateway(codes.STOP_LINK_LOST(holder=lease.holder, detail=why), seen)
 
-    def _stop_in_local_control(self, seen: Seen) -> Effects[None]:
+    def _stop_in_local_control(self, seen: Snapshot) -> Decisions[None]:
         """Stop a motion of the holder after the controller changed to local control.
 
         Drivers that follow their motions have ended it by then. A person at the robot expects none of ours.
@@ -526,7 +531,7 @@ class RobotAuthority:
         if seen.controller.status.mode is Mode.LOCAL and lease is not None and lease.motion is not None:
             yield from self._stop_by_gateway(codes.STOP_WENT_LOCAL(holder=lease.holder), seen)
 
-    def _motion_observed(self, moving: bool, seen: Seen) -> Effects[None]:
+    def _motion_observed(self, moving: bool, seen: Snapshot) -> Decisions[None]:
         orphaned_by, self._orphan = self._orphan, ""
         if orphaned_by and moving and self._authority.lease is None:
             yield from self._stop_by_gateway(codes.STOP_GATEWAY_KILLED(holder=orphaned_by), seen)
@@ -540,15 +545,15 @@ class RobotAuthority:
         )
         lease = self._authority.lease
         if uncommanded and not lease_rules.moved_recently(before, seen.now):
-            yield reports.uncommanded_motion(lease is not None)
+            yield published_events.uncommanded_motion(lease is not None)
         if uncommanded and lease is not None and not lease.tolerates_motion:
             why = codes.ENDED_FOREIGN_MOTION()
             yield from self._end_lease(lease_rules.end_lease(self._authority, why, uncommanded=True), seen)
         if (before.motion is None) != (lease is None or lease.motion is None):
-            yield effects.Publish()
+            yield decisions.PublishState()
         yield from self._check_heeded(moving, seen)
 
-    def _has_arrived(self, controller: Controller) -> bool:
+    def _has_arrived(self, controller: ControllerState) -> bool:
         motion = self._authority.motion
         if motion is None or controller.status.homed is False:
             return False  # at its home position, but not homed yet
@@ -567,6 +572,6 @@ def _confirms(command: events.CommandsRequested) -> bool:
     )
 
 
-def _record(command: events.CommandsRequested, outcome: Outcome, answer: Answer) -> Effects[None]:
+def _record(command: events.CommandsRequested, outcome: Outcome, answer: Answer) -> Decisions[None]:
     for entry in entries.command_entries(command, outcome, answer):
-        yield effects.AppendLater(entry)
+        yield decisions.AppendLater(entry)

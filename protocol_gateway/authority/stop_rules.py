@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from protocol_gateway.authority.lease_rules import Authority, Now, Stop
+from protocol_gateway.authority.lease_rules import Authority, LatchedStop, Now
 from robomesh.reasons import Reason
 
 # A burst of dozens of units would fill the send buffer, which closes the connection.
@@ -11,14 +11,14 @@ IN_TRANSIT_S = 0.1
 
 def stop(
     authority: Authority, *, by: str, reason: str | Reason, now: Now, number: int | None = None
-) -> tuple[Authority, Stop]:
+) -> tuple[Authority, LatchedStop]:
     """Latch a stop under a new number, and drop the motion that it ends.
 
     Args:
         number: Number above all previous ones; None: the next one.
     """
     number = authority.last_stop_id + 1 if number is None else number
-    latched = Stop(
+    latched = LatchedStop(
         id=number,
         by=by,
         reason=str(reason) or "no reason given",

@@ -1,4 +1,4 @@
-"""Control of one robot: hands events to its authority, and performs the effects.
+"""Control of one robot: hands events to its authority, and performs the decisions.
 
 One command after the other is handed over, so that commands reach the controller in the order of the audit
 log. A stop, and what the controller sends, is performed in the caller's callback. HOLD, RENEW, RELEASE and
@@ -15,18 +15,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from protocol_gateway.audit.latch_file import LatchFile
-from protocol_gateway.authority import effects, entries, events
+from protocol_gateway.authority import decisions, entries, events
 from protocol_gateway.authority.admission import Verdict, admit_all, wait_refusal
-from protocol_gateway.authority.effects import Finding, Program, Seen
+from protocol_gateway.authority.decisions import CheckResult, PlannedProgram, Snapshot
 from protocol_gateway.authority.entries import PROGRAM, page_values
 from protocol_gateway.authority.evaluation import RunningProgram
 from protocol_gateway.authority.lease_rules import Answer, Authority
-from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.authority.robot_authority import RobotAuthority
 from protocol_gateway.control.audit_trail import AuditTrail
-from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.clocks import read_clocks
-from protocol_gateway.control.deadlines import Arrivals
+from protocol_gateway.control.deadlines import CommandArrivals
+from protocol_gateway.control.motion_checks import MotionChecks
 from protocol_gateway.seam.errors import AuditError, LinkError
 from protocol_gateway.telemetry.journal import Journal
 from protocol_gateway.telemetry.state_messages import lease_answer
@@ -40,8 +40,8 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(kw_only=True)
-class Ports:
-    """Targets of the effects of one robot's authority.
+class Performers:
+    """Targets of the decisions of one robot's authority.
 
     Attributes:
         latch: File that keeps the latched stop and its number across a restart.
@@ -57,7 +57,7 @@ class Ports:
     latch: LatchFile
     journal: Journal
     send: Callable[[object], None]
-    controller: Callable[[], Controller]
+    controller: Callable[[], ControllerState]
     publish: Callable[[], None]
     confirm_set_up: Callable[[], None] = lambda: None
     controlled: Callable[[bool], None] = lambda taken: None
@@ -74,14 +74,16 @@ class Control:
         arrivals: Times of arrival of commands, which learns here that the gateway runs.
     """
 
-    def __init__(self, robot_authority: RobotAuthority, ports: Ports, checks: Checks | None = None) -> None:
+    def __init__(
+        self, robot_authority: RobotAuthority, performers: Performers, checks: MotionChecks | None = None
+    ) -> None:
         self._robot_authority = robot_authority
-        self._ports = ports
+        self._performers = performers
         self._checks = checks
         self._command_lock = asyncio.Lock()
         self._preparing: set[asyncio.Future[Reason]] = set()
         self._timer: asyncio.TimerHandle | None = None
-        self.arrivals = Arrivals()
+        self.arrivals = CommandArrivals()
 
     @property
     def authority(self) -> Authority:
@@ -117,7 +119,7 @@ class Control:
         result = events.StopResult(codes.STOP_SENT(id=stop_id), stop_id, sent=True)
         event = events.StopRequested(by=by, reason=reason, source=source)
         entry = entries.stop_entry(event, result, read_clocks())
-        self._ports.audit_trail.write_later(replace(entry, repeated=count - 1))
+        self._performers.audit_trail.write_later(replace(entry, repeated=count - 1))
 
     async def lease(self, request: schema.LeaseRequest, *, operator: str, source: str) -> schema.LeaseAnswer:
         """Answer a lease request.
@@ -153,7 +155,7 @@ class Control:
         *,
         operator: str,
         source: str,
-        program: Program | None = None,
+        program: PlannedProgram | None = None,
         refused: Answer | None = None,
     ) -> Answer:
         """Execute commands like `commands`, but return a refusal as the answer.
@@ -204,25 +206,25 @@ class Control:
 
     def obstacle(self, request: schema.CommandRequest) -> Answer | None:
         """Return the refusal of a command by the controller's present state; None: allowed."""
-        return self._robot_authority.obstacle(request, self._seen())
+        return self._robot_authority.obstacle(request, self._snapshot())
 
     async def close(self) -> None:
         """End the lease, if there is one, and write pending audit entries."""
         self.handle(events.LeaseEnded(codes.ENDED_GATEWAY()))
         self._set_timer(None)
-        await self._ports.audit_trail.settle()
+        await self._performers.audit_trail.settle()
 
-    # ---------------------------------------------------------------- effects
+    # ---------------------------------------------------------------- decisions
 
     def handle(self, event: events.Event) -> Any:
-        """Hand over an event, and perform its effects, which wait for nothing; return its result."""
-        handled, result = self._robot_authority.handle(event, self._seen()), None
+        """Hand over an event, and perform its decisions, which wait for nothing; return its result."""
+        handled, result = self._robot_authority.handle(event, self._snapshot()), None
         while True:
             try:
-                effect = handled.send(result)
+                decision = handled.send(result)
             except StopIteration as done:
                 return done.value
-            result = self._perform(effect)
+            result = self._perform(decision)
 
     async def _handle_in_turn(self, event: events.LeaseRequested | events.CommandsRequested) -> Any:
         """Hand over a request after the earlier ones, unless it is immediate; return its result."""
@@ -230,89 +232,89 @@ class Control:
             contextlib.nullcontext() if event.is_immediate else self._command_lock,
             contextlib.AsyncExitStack() as cell,
         ):
-            handled = self._robot_authority.handle(event, self._seen())
+            handled = self._robot_authority.handle(event, self._snapshot())
             result: Any = None
             while True:
                 try:
-                    effect = handled.send(result)
+                    decision = handled.send(result)
                 except StopIteration as done:
                     return done.value
-                match effect:
-                    case effects.EnterCell():
+                match decision:
+                    case decisions.EnterCell():
                         if self._checks is not None:
-                            await cell.enter_async_context(self._checks.motion_lock(effect.requests))
-                        result = self._seen()
-                    case effects.CheckMotion():
+                            await cell.enter_async_context(self._checks.motion_lock(decision.requests))
+                        result = self._snapshot()
+                    case decisions.CheckMotion():
                         if self._checks is None:
-                            result = Finding()
+                            result = CheckResult()
                         else:
-                            result = await self._checks.check(effect.requests)
-                    case effects.Append():
-                        result = await self._append(effect), self._seen()
+                            result = await self._checks.check(decision.requests)
+                    case decisions.Append():
+                        result = await self._append(decision), self._snapshot()
                     case _:
-                        result = self._perform(effect)
+                        result = self._perform(decision)
 
-    def _perform(self, effect: effects.Effect) -> Any:
-        """Perform an effect that waits for nothing, and return its result.
+    def _perform(self, decision: decisions.Decision) -> Any:
+        """Perform an decision that waits for nothing, and return its result.
 
         Raises:
-            TypeError: If the effect must be awaited.
+            TypeError: If the decision must be awaited.
         """
-        match effect:
-            case effects.Send():
-                return self._send(effect)
-            case effects.Recheck():
-                return None if self._checks is None else self._checks.changed(effect.finding)
-            case effects.EnterCell() | effects.CheckMotion() | effects.Append():
-                raise TypeError(f"{type(effect).__name__} cannot be performed without waiting")
+        match decision:
+            case decisions.Send():
+                return self._send(decision)
+            case decisions.Recheck():
+                return None if self._checks is None else self._checks.changed(decision.check_result)
+            case decisions.EnterCell() | decisions.CheckMotion() | decisions.Append():
+                raise TypeError(f"{type(decision).__name__} cannot be performed without waiting")
         try:
-            return self._perform_rest(effect)
+            return self._perform_rest(decision)
         except Exception:
             # A stop must be latched and audited, and a motion booked, whatever fails beside it.
-            log.exception("%s failed", type(effect).__name__)
+            log.exception("%s failed", type(decision).__name__)
             return None
 
-    def _perform_rest(self, effect: effects.Effect) -> Any:
-        ports = self._ports
-        match effect:
-            case effects.NumberStop():
-                return ports.latch.next_number(effect.last, read_clocks().wall_ns)
-            case effects.CancelPrograms():
-                return self._cancel_programs(effect.why)
-            case effects.AppendLater():
-                ports.audit_trail.write_later(effect.entry)
-            case effects.KeepLatch():
-                ports.latch.keep(effect.stop, effect.last_stop_id)
-            case effects.Publish():
-                ports.publish()
-            case effects.ConfirmSetUp():
-                ports.confirm_set_up()
-            case effects.Report():
-                ports.journal.report(
-                    effect.severity, effect.code, effect.text, why=effect.why, **effect.values
+    def _perform_rest(self, decision: decisions.Decision) -> Any:
+        performers = self._performers
+        match decision:
+            case decisions.NumberStop():
+                return performers.latch.next_number(decision.last, read_clocks().wall_ns)
+            case decisions.CancelPrograms():
+                return self._cancel_programs(decision.why)
+            case decisions.AppendLater():
+                performers.audit_trail.write_later(decision.entry)
+            case decisions.KeepLatch():
+                performers.latch.keep(decision.stop, decision.last_stop_id)
+            case decisions.PublishState():
+                performers.publish()
+            case decisions.ConfirmSetUp():
+                performers.confirm_set_up()
+            case decisions.PublishEvent():
+                performers.journal.report(
+                    decision.severity, decision.code, decision.text, why=decision.why, **decision.values
                 )
-            case effects.SetTimer():
-                self._set_timer(effect.at_s)
-            case effects.Controlled():
-                ports.controlled(effect.taken)
+            case decisions.SetTimer():
+                self._set_timer(decision.at_s)
+            case decisions.Controlled():
+                performers.controlled(decision.taken)
         return None
 
-    def _seen(self) -> Seen:
-        return Seen(
+    def _snapshot(self) -> Snapshot:
+        return Snapshot(
             now=read_clocks(),
-            controller=self._ports.controller(),
-            latch_problem=self._ports.latch.problem,
-            closed=self._ports.other_gateway()
+            controller=self._performers.controller(),
+            latch_problem=self._performers.latch.problem,
+            closed=self._performers.other_gateway()
             or (None if self._checks is None else self._checks.cell_closed),
         )
 
-    def _send(self, effect: effects.Send) -> Reason | None:
+    def _send(self, decision: decisions.Send) -> Reason | None:
         try:
-            self._ports.send(effect.unit)
+            self._performers.send(decision.unit)
         except LinkError as error:
             return error.reason
         except Exception as error:
-            if not effect.urgent:
+            if not decision.urgent:
                 raise
             log.exception("the stop unit was not sent")
             return codes.OTHER(detail=f"{type(error).__name__}: see the gateway's log")
@@ -324,9 +326,9 @@ class Control:
                 each.set_result(why)
         return bool(self._preparing)
 
-    async def _append(self, effect: effects.Append) -> Reason | None:
+    async def _append(self, decision: decisions.Append) -> Reason | None:
         try:
-            await self._ports.audit_trail.write_before(*effect.entries)
+            await self._performers.audit_trail.write_before(*decision.entries)
         except AuditError as error:
             return error.reason
         return None

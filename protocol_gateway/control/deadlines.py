@@ -22,7 +22,7 @@ DEFAULT_TIMEOUT_S = 2.0
 _DELIVERED_S = 1.0
 
 
-class Arrivals:
+class CommandArrivals:
     """Times of arrival of commands (monotonic)."""
 
     def __init__(self) -> None:

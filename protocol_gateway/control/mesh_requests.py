@@ -12,8 +12,8 @@ from protocol_gateway.authority.entry import Entry, Outcome
 from protocol_gateway.control.clocks import read_clocks
 from protocol_gateway.control.control import Control
 from protocol_gateway.control.deadlines import set_deadline
-from protocol_gateway.control.jog import Jogs
-from protocol_gateway.control.program import Programs
+from protocol_gateway.control.jog_runner import JogRunner
+from protocol_gateway.control.program_runner import ProgramRunner
 from protocol_gateway.seam.text_limits import LONGEST_SENTENCE, LONGEST_TEXT
 from robomesh import reason_codes as codes
 from robomesh.contract.topics import check_operator
@@ -42,8 +42,8 @@ class MeshRequests:
         robot: str,
         *,
         control: Control,
-        programs: Programs,
-        jogs: Jogs,
+        programs: ProgramRunner,
+        jogs: JogRunner,
         audit: Callable[[Entry], None],
     ) -> None:
         self._control, self._programs, self._jogs, self._audit = control, programs, jogs, audit

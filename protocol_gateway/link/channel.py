@@ -11,7 +11,7 @@ import random
 from typing import Protocol
 
 from protocol_gateway.link.connection import Connection, Datagrams, reason_of
-from protocol_gateway.link.program import ProgramError, ProgramOutput
+from protocol_gateway.link.reader_process import ReaderProcess, ReaderProcessError
 from protocol_gateway.seam import Channel
 from protocol_gateway.seam.errors import LinkDownError
 from robomesh import reason_codes as codes
@@ -68,7 +68,7 @@ class KeptChannel:
         self.channel = channel
         self.where = f"{host}:{port}"
         self.reason: Reason = codes.LINK_CONNECTING(where=self.where)
-        self.connection: Connection | Datagrams | ProgramOutput | None = None
+        self.connection: Connection | Datagrams | ReaderProcess | None = None
         self._settings = settings
         self._host, self._port, self._timeout_s = host, port, timeout_s
         self._listener = listener
@@ -126,14 +126,14 @@ class KeptChannel:
         try:
             async with asyncio.timeout(self._timeout_s):
                 connection = await self._connect()
-            if isinstance(connection, ProgramOutput):
+            if isinstance(connection, ReaderProcess):
                 self._began = True
                 await connection.connected()
         except TimeoutError:
             return self._attempt_failed(codes.LINK_NO_ANSWER(where=self.where))
         except OSError as error:
             return self._attempt_failed(codes.LINK_FAILED(where=self.where, detail=reason_of(error)))
-        except ProgramError as error:
+        except ReaderProcessError as error:
             return self._attempt_failed(codes.LINK_FAILED(where=self.where, detail=error))
         of_use = False
         try:
@@ -153,13 +153,13 @@ class KeptChannel:
         self._listener.on_ended(self)
         return False
 
-    async def _connect(self) -> Connection | Datagrams | ProgramOutput:
+    async def _connect(self) -> Connection | Datagrams | ReaderProcess:
         loop = asyncio.get_running_loop()
         if self.channel.program:
             # A controller that is off costs no process.
             probe, _ = await loop.create_connection(asyncio.Protocol, self._host, self._port)
             probe.close()
-            return await ProgramOutput.started(
+            return await ReaderProcess.started(
                 self.channel.program,
                 (self._host, str(self._port), self._settings),
                 self._on_connected,
@@ -176,7 +176,7 @@ class KeptChannel:
         )
         return connection
 
-    async def _serve(self, connection: Connection | Datagrams | ProgramOutput) -> Reason:
+    async def _serve(self, connection: Connection | Datagrams | ReaderProcess) -> Reason:
         """Wait for the connection's end; return its reason."""
         while not connection.lost.done():
             wait_s = self._listener.patience(self)
@@ -185,7 +185,7 @@ class KeptChannel:
             await asyncio.wait([connection.lost], timeout=None if wait_s == math.inf else wait_s)
         return codes.LINK_LOST(connection.lost.result(), where=self.where)
 
-    def _on_connected(self, connection: Connection | Datagrams | ProgramOutput) -> None:
+    def _on_connected(self, connection: Connection | Datagrams | ReaderProcess) -> None:
         self.connection = connection
         self.reason = codes.LINK_CLOSED()
         self._listener.on_opened(self)

@@ -11,7 +11,7 @@ import asyncio
 from collections.abc import Callable, Hashable, Sequence
 from functools import partial
 
-from protocol_gateway.link.timestamping import Received
+from protocol_gateway.link.timestamping import EventTime
 from protocol_gateway.seam import (
     AlarmReceived,
     ControllerEvent,
@@ -78,7 +78,7 @@ class EventDispatcher:
 
     def __init__(
         self,
-        on_event: Callable[[ControllerEvent, Received], None],
+        on_event: Callable[[ControllerEvent, EventTime], None],
         later: Callable[[float, Callable[[], None]], asyncio.TimerHandle],
     ) -> None:
         self.flood = FloodDetector()
@@ -88,7 +88,7 @@ class EventDispatcher:
         self._deferred: dict[Hashable, Callable[[], None]] = {}
         self._timer: asyncio.TimerHandle | None = None
 
-    def dispatch(self, events: Sequence[ControllerEvent], dates: Sequence[Received], *, burst: bool) -> None:
+    def dispatch(self, events: Sequence[ControllerEvent], dates: Sequence[EventTime], *, burst: bool) -> None:
         """Dispatch the events of one read; `burst`: they may have been delayed on the way."""
         if burst:
             self._restart_timer()

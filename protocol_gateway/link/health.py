@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from statistics import median
 
-from protocol_gateway.link.timestamping import Received
+from protocol_gateway.link.timestamping import EventTime
 from protocol_gateway.seam import ControllerEvent, Refused, StatusReceived
 
 _WINDOW_S = 5.0
@@ -70,11 +70,11 @@ class Questions:
     def __init__(self) -> None:
         self._halves_s: deque[tuple[float, float]] = deque(maxlen=_MOST_ARRIVALS)
 
-    def answered(self, asked_s: float, now: Received) -> Received:
+    def answered(self, asked_s: float, now: EventTime) -> EventTime:
         """Return the time stamp of an answer that was received now."""
         half_s = max(0.0, now.monotonic_s - asked_s) / 2
         self._halves_s.append((now.monotonic_s, half_s))
-        return Received(now.monotonic_s - half_s, now.wall_ns - round(half_s * 1e9), now.clock)
+        return EventTime(now.monotonic_s - half_s, now.wall_ns - round(half_s * 1e9), now.clock)
 
     def stamp_uncertainty_s(self, now_s: float) -> float | None:
         """Return the greatest uncertainty of stamps within the last 5 s; None: nothing was asked."""

@@ -29,7 +29,7 @@ from protocol_gateway.link.health import Arrivals, LinkHealth, LossCounter, Ques
 from protocol_gateway.link.plausibility import Plausibility
 from protocol_gateway.link.status import LinkState, LinkStatus
 from protocol_gateway.link.timers import Timers
-from protocol_gateway.link.timestamping import Received, Timestamper
+from protocol_gateway.link.timestamping import EventTime, Timestamper
 from protocol_gateway.seam import (
     Carries,
     Channel,
@@ -61,11 +61,11 @@ from robots.kinematics.joints import Joints
 
 __all__ = [
     "ControllerLink",
+    "EventTime",
     "LinkCounters",
     "LinkSettings",
     "LinkState",
     "LinkStatus",
-    "Received",
 ]
 
 logger = logging.getLogger(__name__)
@@ -129,7 +129,7 @@ class ControllerLink:
         driver: Driver,
         joints: Joints,
         *,
-        on_event: Callable[[ControllerEvent, Received], None],
+        on_event: Callable[[ControllerEvent, EventTime], None],
         on_status: Callable[[LinkStatus], None] = lambda status: None,
         on_channel: Callable[[Channel, Reason | None], None] = lambda channel, why: None,
         on_fate_unknown: Callable[[Reason], None] = lambda why: None,
@@ -160,7 +160,7 @@ class ControllerLink:
         self._connected_s = self._units_at_connect = 0.0
         self._status = LinkStatus(LinkState.DOWN, codes.LINK_CONNECTING(where=self._where))
         self._counts: Counter[str] = Counter()
-        self._last_received: Received | None = None
+        self._last_received: EventTime | None = None
         self._refusal = ""
         self._unusable: tuple[float, Reason, str] | None = (
             None  # time of the last unusable data, reason, and the event's code
@@ -190,7 +190,7 @@ class ControllerLink:
         )
 
     @property
-    def last_received(self) -> Received | None:
+    def last_received(self) -> EventTime | None:
         """Time of the last well-formed unit; None: none yet."""
         return self._last_received
 
@@ -286,7 +286,7 @@ class ControllerLink:
 
     # --------------------------------------------------------- effects of the driver
 
-    def _tell(self, effects: Effects, now: Received | None = None) -> None:
+    def _tell(self, effects: Effects, now: EventTime | None = None) -> None:
         """Perform what the driver returns when something happened, now unless a time is given."""
         now = now or self._now()
         # The end of a motion that the driver gives up is always sent.
@@ -297,7 +297,7 @@ class ControllerLink:
         for effect in effects:
             self._perform(effect, now, counted=not gives_up)
 
-    def _perform(self, effect: Effect, now: Received, *, counted: bool = True) -> None:
+    def _perform(self, effect: Effect, now: EventTime, *, counted: bool = True) -> None:
         match effect:
             case Report():
                 self._report(effect, now)
@@ -482,7 +482,7 @@ class ControllerLink:
         self._tell(self._driver.received(kept.channel, data, now.monotonic_s), now)
         self._ran(self, now.monotonic_s)
 
-    def _report(self, report: Report, now: Received) -> None:
+    def _report(self, report: Report, now: EventTime) -> None:
         events, units = report.events, report.units
         self._unanswered += report.lost
         if units:
@@ -540,11 +540,11 @@ class ControllerLink:
             _, reason, code = self._unusable
             self._set_status(LinkState.SILENT, reason, code)
 
-    def _now(self) -> Received:
+    def _now(self) -> EventTime:
         if self._wall_clock.was_set():
             self._timestamper.wall_clock_was_set()
         now_s = self._monotonic_s()
-        return Received(now_s, self._wall_clock.earliest_ns(round(now_s * 1e9)))
+        return EventTime(now_s, self._wall_clock.earliest_ns(round(now_s * 1e9)))
 
     def _note_losses(self, event: ControllerEvent) -> None:
         if isinstance(event, JointsReceived | StatusReceived):
@@ -556,7 +556,7 @@ class ControllerLink:
                 # Such as a repetition while nothing changes: the gap before the next TIME is no loss.
                 self._losses.forget()
 
-    def _unit_received(self, newest: Received, now: Received) -> None:
+    def _unit_received(self, newest: EventTime, now: EventTime) -> None:
         self._last_received = newest
         old = now.monotonic_s - newest.monotonic_s >= self._settings.stale_after_s
         if not old and self._status.state is not LinkState.UP:

@@ -11,7 +11,7 @@ the measured rate.
 
 A controller's clock may drift, or be set. The offset follows a drift slowly. If it cannot be followed (TIME
 goes back, a unit is early by more than 1 ms, all units stay late), a new clock number begins
-(`Received.clock`), and with it a new publisher identity. Within one number, stamps strictly increase and are
+(`EventTime.clock`), and with it a new publisher identity. Within one number, stamps strictly increase and are
 spaced like TIME. Units that stay late for a second are taken as on time, so that no clock can make live data
 look old for longer.
 """
@@ -50,7 +50,7 @@ _UNKNOWN_PERIOD_NS = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class Received:
+class EventTime:
     """Time stamp of an event.
 
     Attributes:
@@ -92,7 +92,7 @@ class Timestamper:
         """Begin a new clock number, because the gateway's wall clock was set."""
         self._clock += 1
 
-    def timestamps(self, events: Sequence[ControllerEvent], now: Received) -> list[Received]:
+    def timestamps(self, events: Sequence[ControllerEvent], now: EventTime) -> list[EventTime]:
         """Return the time stamp of each event of a read: now, or earlier.
 
         Args:
@@ -112,12 +112,12 @@ class Timestamper:
         dates = [
             now
             if stamp_ns == now_ns and clock == now.clock
-            else Received(stamp_ns * 1e-9, now.wall_ns - (now_ns - stamp_ns), clock)
+            else EventTime(stamp_ns * 1e-9, now.wall_ns - (now_ns - stamp_ns), clock)
             for stamp_ns, clock in stamps
         ]
         return [dates[moment] for moment in moment_of]
 
-    def _is_of_now(self, event: ControllerEvent, now: Received, now_ns: int) -> bool:
+    def _is_of_now(self, event: ControllerEvent, now: EventTime, now_ns: int) -> bool:
         """Note the only event of a read, and return whether its stamp is simply its receipt.
 
         This is a shortcut for controllers without TIME: the general way gives the same stamp.

@@ -4,7 +4,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 
 from protocol_gateway.audit.log import AuditLog
-from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.authority.robot_authority import RobotAuthority
 from protocol_gateway.checking.cell_occupancy import CellOccupancy
 from protocol_gateway.checking.checker import Checker
@@ -12,7 +12,7 @@ from protocol_gateway.checking.policy import Policy
 from protocol_gateway.configuration.controller_proofs import ControllerProofs
 from protocol_gateway.configuration.kinds import driver_maker
 from protocol_gateway.configuration.settings import RobotSettings
-from protocol_gateway.control.checks import Checks
+from protocol_gateway.control.motion_checks import MotionChecks
 from protocol_gateway.link.link import LinkSettings
 from protocol_gateway.seam import Driver
 from protocol_gateway.seam.errors import GatewaySettingsError
@@ -116,10 +116,10 @@ def make_checks(
     cell_check: CellCheck,
     joints: Joints,
     robot_authority: RobotAuthority,
-    controller: Callable[[], Controller],
-) -> Checks:
+    controller: Callable[[], ControllerState],
+) -> MotionChecks:
     """Return the check of the robot's motions before they start."""
-    return Checks(
+    return MotionChecks(
         settings.name,
         Policy(settings.check),
         cell=[robot.name for robot in settings.surroundings.robots],

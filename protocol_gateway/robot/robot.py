@@ -13,15 +13,15 @@ from protocol_gateway.audit.persisted_state import ROTATE
 from protocol_gateway.audit.search import Query, SearchServer, find
 from protocol_gateway.authority import events
 from protocol_gateway.authority.entry import audit_entry
-from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.authority.robot_authority import HEED_TIMEOUT_S
 from protocol_gateway.configuration.settings import RobotSettings
 from protocol_gateway.control.audit_trail import AuditTrail
 from protocol_gateway.control.clocks import read_clocks
-from protocol_gateway.control.control import Control, Ports
-from protocol_gateway.control.jog import Jogs
+from protocol_gateway.control.control import Control, Performers
+from protocol_gateway.control.jog_runner import JogRunner
 from protocol_gateway.control.mesh_requests import MeshRequests
-from protocol_gateway.control.program import Programs
+from protocol_gateway.control.program_runner import ProgramRunner
 from protocol_gateway.legacy.clients import LegacyClients
 from protocol_gateway.link.link import (
     JOINT_COUNT,
@@ -111,7 +111,7 @@ class Robot:
         self._audit_trail = AuditTrail(self._audit, self._journal)
         authority = make_authority(self._audit, joints, driver, read_only=self._read_only is not None)
         self._checks = make_checks(settings, cell_check, joints, authority, self._controller)
-        self._control = Control(authority, self._ports(), self._checks)
+        self._control = Control(authority, self._performers(), self._checks)
         self._programs = self._make_programs()
         self._jogs = self._make_jogs(joints)
         self._legacy = self._make_legacy_clients(joints)
@@ -156,8 +156,8 @@ class Robot:
             tolerates=self._tolerates,
         )
 
-    def _ports(self) -> Ports:
-        return Ports(
+    def _performers(self) -> Performers:
+        return Performers(
             audit_trail=self._audit_trail,
             latch=self._audit.latch,
             journal=self._journal,
@@ -169,8 +169,8 @@ class Robot:
             other_gateway=self._other_gateway,
         )
 
-    def _make_programs(self) -> Programs:
-        return Programs(
+    def _make_programs(self) -> ProgramRunner:
+        return ProgramRunner(
             self._control,
             self._checks,
             journal=self._journal,
@@ -179,8 +179,8 @@ class Robot:
             publish_source=self._publisher("program/source").put,
         )
 
-    def _make_jogs(self, joints: Joints) -> Jogs:
-        return Jogs(
+    def _make_jogs(self, joints: Joints) -> JogRunner:
+        return JogRunner(
             self._control,
             self._checks,
             joints=joints,
@@ -465,11 +465,11 @@ class Robot:
         if moving is not None:
             self._control.handle(events.MotionObserved(moving))
 
-    def _controller(self) -> Controller:
+    def _controller(self) -> ControllerState:
         now_s, software = time.monotonic(), self._telemetry.software
         unproven = self._joints_unproven()
         changes = self._signals.unconfirmed
-        return Controller(
+        return ControllerState(
             link=self._link.status,
             status=self._telemetry.status(now_s),
             fault=self._telemetry.fault(now_s),

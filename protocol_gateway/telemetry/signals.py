@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from protocol_gateway.link.timestamping import Received
+from protocol_gateway.link.timestamping import EventTime
 from protocol_gateway.seam import Signal, SignalsReceived, SignalValue
 from protocol_gateway.seam.text_limits import LONGEST_TEXT
 from protocol_gateway.telemetry.journal import Journal
@@ -49,7 +49,7 @@ class _Entry:
     event: str = ""  # code of the event that reports a change
     raw: SignalValue | None = None
     value: SignalValue | None = None
-    received: Received = field(default_factory=lambda: Received(0.0, 0))
+    received: EventTime = field(default_factory=lambda: EventTime(0.0, 0))
     valid_until_s: float = 0.0
 
     def take(self, raw: SignalValue | None) -> None:
@@ -122,13 +122,13 @@ class Signals:
         self._by_signal: dict[Signal, _Entry] = {}
         self._message = schema.Signals()
         self._shown: list[_Entry] = []  # the entries of its rows
-        self._newest: Received | None = None
+        self._newest: EventTime | None = None
         self._numbers_changed = self._states_changed = self._unpublished = False
         self._next_s = self._next_change_s = self._next_same_s = float("-inf")
         self._next_removal_s = float("-inf")
         self._said_too_many = False
 
-    def take(self, report: SignalsReceived, received: Received) -> None:
+    def take(self, report: SignalsReceived, received: EventTime) -> None:
         """Take a report's values, and publish if it is time."""
         valid_until_s = received.monotonic_s + report.valid_for_s
         changes: dict[str, list[str]] = {}

@@ -6,8 +6,8 @@ from foxglove_schemas_protobuf.JointState_pb2 import JointState
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from protocol_gateway.authority.lease_rules import Authority, Lease, Now, Stop
-from protocol_gateway.authority.preconditions import Controller, commands_of, recoveries_of
+from protocol_gateway.authority.lease_rules import Authority, LatchedStop, Lease, Now
+from protocol_gateway.authority.preconditions import ControllerState, commands_of, recoveries_of
 from protocol_gateway.checking.policy import Policy
 from protocol_gateway.link.health import LinkHealth
 from protocol_gateway.link.link import LinkCounters, LinkState
@@ -76,8 +76,8 @@ def raw_record(record: UnknownReceived, wall_ns: int) -> schema.RawRecord:
 
 
 def controller_state(
-    controller: Controller,
-    stop: Stop | None,
+    controller: ControllerState,
+    stop: LatchedStop | None,
     *,
     counters: LinkCounters,
     health: LinkHealth,
@@ -155,7 +155,7 @@ def controller_state(
     return state
 
 
-def _capabilities(controller: Controller) -> schema.Capabilities:
+def _capabilities(controller: ControllerState) -> schema.Capabilities:
     capabilities = controller.capabilities
     if controller.read_only is not None:
         return schema.Capabilities(
@@ -181,7 +181,7 @@ def _health(health: LinkHealth, *, flooding: bool) -> schema.LinkHealth:
     )
 
 
-def _link_reasons(controller: Controller) -> list[Reason]:
+def _link_reasons(controller: ControllerState) -> list[Reason]:
     reasons = [controller.link.reason]
     # While the link is not up, its own reason already covers missing positions.
     if controller.positions_stale is not None and controller.link.state is LinkState.UP:

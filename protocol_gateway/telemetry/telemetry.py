@@ -5,7 +5,7 @@
 
 from collections.abc import Callable
 
-from protocol_gateway.link.link import Received
+from protocol_gateway.link.link import EventTime
 from protocol_gateway.link.motion import MotionDetector, is_moving
 from protocol_gateway.seam import (
     Activity,
@@ -215,7 +215,7 @@ class Telemetry:
         if self._lost != before:
             self._on_status()
 
-    def on_event(self, event: ControllerEvent, received: Received) -> None:
+    def on_event(self, event: ControllerEvent, received: EventTime) -> None:
         """Publish a driver's event and keep its values."""
         match event:
             case JointsReceived():
@@ -311,7 +311,7 @@ class Telemetry:
             why = codes.CONTROLLER_STOPPED_ITSELF()
             self._journal.report(_S.WARNING, "controller.stopped", why.text, why=why)
 
-    def _on_joints(self, joints: JointsReceived, received: Received) -> None:
+    def _on_joints(self, joints: JointsReceived, received: EventTime) -> None:
         self._positions = joints.positions, received.monotonic_s
         if joints.controller_time_s is not None:
             self.controller_time_s = joints.controller_time_s

@@ -24,7 +24,7 @@ from protocol_gateway.core.codes import TYPES, code_table
 from protocol_gateway.core.records import Error
 from protocol_gateway.core.stream import Unit, UnitStream
 from protocol_gateway.legacy.requests import asks_for_more, asks_to_stop, requests_of
-from protocol_gateway.link.timestamping import Received, Timestamper
+from protocol_gateway.link.timestamping import EventTime, Timestamper
 from protocol_gateway.seam import JointsReceived
 from protocol_gateway.telemetry.journal import Journal
 from protocol_gateway.telemetry.signals import Signals
@@ -133,7 +133,7 @@ class Gateway:
         """Return the problem on the link's side; empty: none."""
         self._now_s += 0.01
         events = [event for piece in pieces for event in self._driver.read(piece).events]
-        now = Received(self._now_s, int(self._now_s * 1e9))
+        now = EventTime(self._now_s, int(self._now_s * 1e9))
         for event, received in zip(events, self._timestamper.timestamps(events, now), strict=True):
             if received.wall_ns > now.wall_ns:
                 return f"{event} is stamped {received.wall_ns - now.wall_ns} ns after its receipt"

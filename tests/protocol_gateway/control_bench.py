@@ -5,10 +5,10 @@ from contextlib import asynccontextmanager
 from controllers.unit.driver import UnitDriver
 from protocol_gateway.audit.log import AuditLog, read_entries
 from protocol_gateway.authority.lease_rules import Authority
-from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.authority.robot_authority import RobotAuthority
 from protocol_gateway.control.audit_trail import AuditTrail
-from protocol_gateway.control.control import Control, Ports
+from protocol_gateway.control.control import Control, Performers
 from protocol_gateway.link.link import LinkState, LinkStatus
 from protocol_gateway.seam import Activity, Mode, StatusReceived
 from protocol_gateway.seam.errors import LinkDownError
@@ -35,7 +35,7 @@ class ControlBench:
         self.driver = UnitDriver(self.joints.types)
         self.log = AuditLog(folder / "arm.jsonl", on_written=lambda entry: None)
         journal = Journal(self, "arm")
-        self.ports = Ports(
+        self.ports = Performers(
             audit_trail=AuditTrail(self.log, journal),
             latch=self.log.latch,
             journal=journal,
@@ -62,7 +62,7 @@ class ControlBench:
         self.socket.append(unit)
 
     def controller(self):
-        return self.known or Controller(
+        return self.known or ControllerState(
             link=LinkStatus(LinkState.UP, codes.LINK_CONNECTED(where="there")),
             status=self.status,
             positions=self.positions,

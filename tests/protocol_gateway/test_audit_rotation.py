@@ -17,7 +17,7 @@ from protocol_gateway.audit.files import older_parts, part_name
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome, read_entries, verify
 from protocol_gateway.audit.persisted_state import authority_after
 from protocol_gateway.audit.search import Query, find, matches, query_of
-from protocol_gateway.authority.lease_rules import Stop
+from protocol_gateway.authority.lease_rules import LatchedStop
 from robomesh import reason_codes as codes
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
@@ -161,7 +161,7 @@ def test_every_file_holds_the_state_for_a_restart(tmp_path, asked, latched, afte
     assert memory.last_stop_id == 7
     assert (memory.stop.id if memory.stop else None) == latched
     if latched:
-        assert memory.stop == Stop(id=7, by="li", reason="dog", since_ns=1_001)
+        assert memory.stop == LatchedStop(id=7, by="li", reason="dog", since_ns=1_001)
 
 
 def test_a_late_count_of_older_stops_does_not_replace_the_newest():

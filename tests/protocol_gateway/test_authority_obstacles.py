@@ -6,7 +6,7 @@ from math import radians
 import pytest
 
 from protocol_gateway.authority.preconditions import (
-    Controller,
+    ControllerState,
     commands_of,
     controller_command,
     controller_commands,
@@ -38,7 +38,7 @@ C = CommandRequest.Command
 JOINTS = joints_of(load("pt600"))
 HOME = tuple(JOINTS.home.tolist())
 TYPES = (JointType.ROTARY, JointType.PRISMATIC)
-READY = Controller(
+READY = ControllerState(
     link=LinkStatus(LinkState.UP, codes.LINK_CONNECTED(where="there")),
     status=StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=True, trace=False),
     positions=HOME,

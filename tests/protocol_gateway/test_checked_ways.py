@@ -9,7 +9,7 @@ import pytest
 
 from protocol_gateway.checking.cell_occupancy import CellOccupancy
 from protocol_gateway.checking.policy import Policy
-from protocol_gateway.control.checks import Checks
+from protocol_gateway.control.motion_checks import MotionChecks
 from protocol_gateway.seam import Activity, Mode, StatusReceived
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
@@ -31,7 +31,7 @@ HERE, FAR, NEAR = (0.0,) * 5, (1.0, 0.0, 0.0, 0.0, 0.0), (0.1, 0.0, 0.0, 0.0, 0.
 def occupied_path(bench):
     """Return the path that the cell's other robots are checked against."""
     cell_occupancy = CellOccupancy()
-    Checks(
+    MotionChecks(
         "arm",
         Policy.OFF,
         cell=("arm", "arm-2"),

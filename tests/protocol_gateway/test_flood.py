@@ -8,7 +8,7 @@ import time
 import pytest
 
 from protocol_gateway.link.flood import EventDispatcher, FloodDetector
-from protocol_gateway.link.timestamping import Received
+from protocol_gateway.link.timestamping import EventTime
 from protocol_gateway.seam import Activity, JointsReceived, Mode, Refused, StatusReceived
 from robomesh.contract.keys import robot_key
 from tests.conftest import run
@@ -80,7 +80,7 @@ class Timers:
 
 def handed_over(*reads, burst):
     """Return the events dispatched immediately, and those dispatched later."""
-    seen, timers, now = [], Timers(), Received(1.0, 10**9)
+    seen, timers, now = [], Timers(), EventTime(1.0, 10**9)
     dispatcher = EventDispatcher(lambda event, date: seen.append(event), timers.later)
     for events in reads:
         dispatcher.dispatch(events, [now] * len(events), burst=burst)

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from protocol_gateway.authority.effects import Finding, Program
+from protocol_gateway.authority.decisions import CheckResult, PlannedProgram
 from protocol_gateway.authority.events import JogEnding, JogHeld, JogPartReady
 from protocol_gateway.seam import Activity
 from robomesh import reason_codes as codes
@@ -11,7 +11,7 @@ from tests.conftest import run
 from tests.protocol_gateway.control_bench import control_bench
 
 A, C = schema.LeaseRequest.Action, schema.CommandRequest.Command
-JOG = Program(name="base x +", targets=(), is_jog=True)
+JOG = PlannedProgram(name="base x +", targets=(), is_jog=True)
 
 
 async def begun(bench, program=JOG, first_id=1):
@@ -33,7 +33,7 @@ def part(bench, percent=10.0, operator="li", secret=None):
             secret=bench.secret if secret is None else secret,
             target=(0.01, 0.0, 0.0, 0.0, 0.0),
             percent=percent,
-            finding=Finding(),
+            check_result=CheckResult(),
         )
     )
 
@@ -92,7 +92,7 @@ def test_the_end_holds_once_and_gives_the_rest_up_only_on_hold_without_a_stop(tm
 def test_no_jog_begins_beside_a_program_or_another_jog(tmp_path):
     async def main():
         async with control_bench(tmp_path) as bench:
-            program = Program(name="weld", targets=())
+            program = PlannedProgram(name="weld", targets=())
             assert (await begun(bench, program)).accepted
             assert (await attempt(bench, JOG, 2)).reason.code == "command.program_runs"
 

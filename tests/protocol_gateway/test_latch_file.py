@@ -14,7 +14,7 @@ import pytest
 from protocol_gateway.audit.latch_file import RESERVED, SLOT_BYTES, LatchFile
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome, read_entries
 from protocol_gateway.audit.persisted_state import LATCH_UNKNOWN
-from protocol_gateway.authority.lease_rules import Stop
+from protocol_gateway.authority.lease_rules import LatchedStop
 from protocol_gateway.seam.errors import AuditError
 from robomesh import reason_codes as codes
 from tests.conftest import run
@@ -26,7 +26,7 @@ NOW_NS = 1_800_000_000_000_000_000
 
 
 def stop(number, reason="fire"):
-    return Stop(id=number, by="wang", reason=reason, since_ns=NOW_NS)
+    return LatchedStop(id=number, by="wang", reason=reason, since_ns=NOW_NS)
 
 
 @pytest.fixture
@@ -159,7 +159,7 @@ def test_any_file_is_read_or_reported_as_damaged(path, data):
 
 
 def test_the_longest_texts_fit_into_a_slot(path):
-    killed(path, (Stop(id=2**62, by="\U0010ffff" * 900, reason='"\\' * 900, since_ns=NOW_NS), 2**62))
+    killed(path, (LatchedStop(id=2**62, by="\U0010ffff" * 900, reason='"\\' * 900, since_ns=NOW_NS), 2**62))
     assert LatchFile(path).found.stop.id == 2**62
 
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol_gateway.authority.events import LeaseEnded, MotionObserved
-from protocol_gateway.authority.lease_rules import Authority, Stop
-from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.authority.lease_rules import Authority, LatchedStop
+from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.core.records import Error, read_records, write_unit
 from protocol_gateway.core.stream import Unit, UnitStream
 from protocol_gateway.legacy.requests import (
@@ -40,7 +40,7 @@ from tests.protocol_gateway.control_bench import control_bench
 JOINTS = joints_of(load("pt600"))
 A = LeaseRequest.Action
 C = CommandRequest.Command
-READY = Controller(
+READY = ControllerState(
     link=LinkStatus(LinkState.UP, codes.LINK_CONNECTED(where="there")),
     status=StatusReceived(Activity.IDLE, Mode.REMOTE, True, False),
     positions=(0.0,) * 5,
@@ -178,7 +178,7 @@ def test_motion_under_a_latched_stop_and_a_reset_while_the_robot_moves_are_refus
 
 def test_reset_means_a_stop_that_its_sender_can_have_seen():
     assert stop_to_reset(Authority(), 100.0) == 0
-    stop = Stop(id=3, by="wang", reason="smoke", since_ns=0, sent_s=10.0)
+    stop = LatchedStop(id=3, by="wang", reason="smoke", since_ns=0, sent_s=10.0)
     assert stop_to_reset(Authority(stop=stop), 11.5) == 3
     fresh = stop_to_reset(Authority(stop=stop), 10.5)
     assert isinstance(fresh, Error)

@@ -1,4 +1,4 @@
-"""Order of the effects of a robot's authority, without sockets or disk."""
+"""Order of the decisions of a robot's authority, without sockets or disk."""
 
 import asyncio
 from dataclasses import replace
@@ -6,12 +6,12 @@ from dataclasses import replace
 import pytest
 
 from controllers.unit.driver import UnitDriver
-from protocol_gateway.authority import effects, events
-from protocol_gateway.authority.effects import Finding, Program, Seen
+from protocol_gateway.authority import decisions, events
+from protocol_gateway.authority.decisions import CheckResult, PlannedProgram, Snapshot
 from protocol_gateway.authority.lease_rules import Authority, Now
-from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.authority.robot_authority import RobotAuthority
-from protocol_gateway.control.control import Control, Ports
+from protocol_gateway.control.control import Control, Performers
 from protocol_gateway.link.link import LinkState, LinkStatus
 from protocol_gateway.seam import Activity, Mode, StatusReceived
 from robomesh import reason_codes as codes
@@ -26,24 +26,24 @@ JOINTS = joints_of(load("pt600"))
 THERE = (0.4, 0.1, 0.0, 0.0, 0.0)
 BROKEN = codes.OTHER(detail="the cable is cut")
 NOW = Now(100.0, 1_700_000_000_000_000_000, 1_600_000_000_000_000_000)
-SEEN = Seen(
+SEEN = Snapshot(
     now=NOW,
-    controller=Controller(
+    controller=ControllerState(
         link=LinkStatus(LinkState.UP, codes.LINK_CONNECTED(where="there")),
         status=StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=True),
         positions=(0.0,) * 5,
     ),
 )
-STOP_UNIT = effects.Send(b"1#COMMAND*stop@", urgent=True)
+STOP_UNIT = decisions.Send(b"1#COMMAND*stop@", urgent=True)
 STOP = events.StopRequested(by="li", reason="smoke", source="test")
 
 
 class Bench:
-    """A robot's authority whose effects are recorded and not performed.
+    """A robot's authority whose decisions are recorded and not performed.
 
     Attributes:
-        performed: Names of the effects since the last `clear`; "Stop" is the stop unit on the wire.
-        during: Events that are handed over while the effect of a name is performed.
+        performed: Names of the decisions since the last `clear`; "Stop" is the stop unit on the wire.
+        during: Events that are handed over while the decision of a name is performed.
     """
 
     def __init__(self):
@@ -51,19 +51,19 @@ class Bench:
         self.seen = SEEN
         self.performed = []
         self.during = {}
-        self.finding = Finding()
+        self.check_result = CheckResult()
         self.link = self.disk = self.changed = None
         self.cancelled = False
 
     def give(self, event):
-        """Hand over an event and perform its effects; return its result."""
+        """Hand over an event and perform its decisions; return its result."""
         handled, result = self.robot_authority.handle(event, self.seen), None
         while True:
             try:
-                effect = handled.send(result)
+                decision = handled.send(result)
             except StopIteration as done:
                 return done.value
-            name = "Stop" if effect == STOP_UNIT else type(effect).__name__
+            name = "Stop" if decision == STOP_UNIT else type(decision).__name__
             self.performed.append(name)
             if name in self.during:
                 self.give(self.during.pop(name))
@@ -71,7 +71,7 @@ class Bench:
                 "Stop": self.link,
                 "Send": self.link,
                 "Append": (self.disk, self.seen),
-                "CheckMotion": self.finding,
+                "CheckMotion": self.check_result,
                 "Recheck": self.changed,
                 "EnterCell": self.seen,
                 "NumberStop": self.robot_authority.authority.last_stop_id + 1,
@@ -103,8 +103,8 @@ class Bench:
         return self
 
 
-STOPPED = ["Stop", "NumberStop", "KeepLatch", "CancelPrograms", "Publish", "Report", "AppendLater"]
-APPLIED = ["SetTimer", "Controlled", "Publish"]
+STOPPED = ["Stop", "NumberStop", "KeepLatch", "CancelPrograms", "PublishState", "PublishEvent", "AppendLater"]
+APPLIED = ["SetTimer", "Controlled", "PublishState"]
 CHECKED = ["EnterCell", "CheckMotion", "Append", "Recheck"]
 
 
@@ -112,21 +112,25 @@ CHECKED = ["EnterCell", "CheckMotion", "Append", "Recheck"]
     ("begin", "event", "order"),
     [
         ("in_control", STOP, STOPPED),
-        ("in_control", events.LeaseEnded(codes.ENDED_GATEWAY()), [*APPLIED, "Report", "AppendLater"]),
+        ("in_control", events.LeaseEnded(codes.ENDED_GATEWAY()), [*APPLIED, "PublishEvent", "AppendLater"]),
         (
             "moving",
             events.LeaseEnded(codes.ENDED_GATEWAY()),
-            [*STOPPED, *APPLIED, "Report", "AppendLater"],
+            [*STOPPED, *APPLIED, "PublishEvent", "AppendLater"],
         ),
         ("moving", events.LinkLost("the cable is cut"), STOPPED),
         ("in_control", events.LinkLost("the cable is cut"), []),
         ("in_control", events.LinkRestored(), []),
         ("in_control", events.SessionEnded("another"), []),
-        ("moving", events.UnitRefused(), ["Publish"]),
-        ("in_control", events.MotionObserved(True), ["Report", *APPLIED, "Report", "AppendLater"]),
+        ("moving", events.UnitRefused(), ["PublishState"]),
+        (
+            "in_control",
+            events.MotionObserved(True),
+            ["PublishEvent", *APPLIED, "PublishEvent", "AppendLater"],
+        ),
     ],
 )
-def test_order_of_effects_that_wait_for_nothing(begin, event, order):
+def test_order_of_decisions_that_wait_for_nothing(begin, event, order):
     bench = getattr(Bench(), begin)()
     bench.give(event)
     assert bench.performed == order
@@ -135,15 +139,15 @@ def test_order_of_effects_that_wait_for_nothing(begin, event, order):
 @pytest.mark.parametrize(
     ("command", "fields", "order"),
     [
-        (C.MOVE_ABSOLUTE, {"joint_positions": THERE}, [*CHECKED, "Send", "Publish"]),
-        (C.SPEED, {"speed_percent": 50.0}, [*CHECKED, "Send", "Publish"]),
-        (C.HOLD, {}, ["CancelPrograms", *CHECKED, "Send", "Publish"]),
+        (C.MOVE_ABSOLUTE, {"joint_positions": THERE}, [*CHECKED, "Send", "PublishState"]),
+        (C.SPEED, {"speed_percent": 50.0}, [*CHECKED, "Send", "PublishState"]),
+        (C.HOLD, {}, ["CancelPrograms", *CHECKED, "Send", "PublishState"]),
         (C.RUN_PROGRAM, {"program": "home"}, ["EnterCell", "Append", "Recheck"]),
     ],
 )
 def test_a_command_reaches_the_wire_only_after_its_audit_entry(command, fields, order):
     bench = Bench().in_control()
-    checked = Program(name="p", targets=(THERE,)) if command == C.RUN_PROGRAM else None
+    checked = PlannedProgram(name="p", targets=(THERE,)) if command == C.RUN_PROGRAM else None
     assert bench.command(command, checked=checked, **fields).accepted
     assert bench.performed == order
 
@@ -161,7 +165,7 @@ def test_a_command_reaches_the_wire_only_after_its_audit_entry(command, fields, 
         ),
         (
             {"during": {"Append": events.LeaseEnded(codes.ENDED_GATEWAY())}},
-            ["EnterCell", "CheckMotion", "Append", *APPLIED, "Report", "AppendLater", "AppendLater"],
+            ["EnterCell", "CheckMotion", "Append", *APPLIED, "PublishEvent", "AppendLater", "AppendLater"],
             "command.control_ended_meanwhile",
         ),
     ],
@@ -177,7 +181,7 @@ def test_nothing_is_sent_if_something_comes_between(fault, order, code):
 
 
 def test_a_stop_never_waits():
-    """Check that a stop at any point of a command yields no effect that must be awaited."""
+    """Check that a stop at any point of a command yields no decision that must be awaited."""
     for name in ("EnterCell", "CheckMotion", "Append", "Recheck", "Send"):
         bench = Bench().in_control()
         bench.during = {name: STOP}
@@ -195,15 +199,15 @@ def test_a_failed_stop_unit_is_latched_and_sent_when_the_link_is_back():
     bench.performed.clear()
     bench.link = None
     bench.give(events.LinkRestored())
-    assert bench.performed == ["Stop", "Publish", "Report", "AppendLater"]
+    assert bench.performed == ["Stop", "PublishState", "PublishEvent", "AppendLater"]
 
 
-def test_an_awaited_effect_of_an_event_that_must_not_wait_is_an_error():
+def test_an_awaited_decision_of_an_event_that_must_not_wait_is_an_error():
     class Waits:
         def handle(self, event, seen):
-            yield effects.Append(())
+            yield decisions.Append(())
 
-    ports = Ports(
+    ports = Performers(
         audit_trail=None,
         latch=type("Latch", (), {"problem": None}),
         journal=None,
@@ -231,7 +235,7 @@ def test_a_publication_that_fails_hides_no_stop(tmp_path, caplog):
         assert [name for name, _ in bench.entries()][-2:] == ["STOP", "REVOKE"]
 
     asyncio.run(main())
-    assert "Publish failed" in caplog.text
+    assert "PublishState failed" in caplog.text
 
 
 def test_a_lease_that_cannot_be_recorded_is_not_granted():
@@ -245,7 +249,7 @@ def test_a_lease_that_cannot_be_recorded_is_not_granted():
 def test_a_release_waits_for_no_disk_and_stops_motion():
     bench = Bench().moving()
     assert bench.lease(A.RELEASE).answer.accepted
-    assert bench.performed == ["AppendLater", *STOPPED, *APPLIED, "Report"]
+    assert bench.performed == ["AppendLater", *STOPPED, *APPLIED, "PublishEvent"]
 
 
 def test_expired_control_ends_before_a_command_is_evaluated():
@@ -262,7 +266,7 @@ def test_a_request_for_control_expires_after_the_lease():
     bench.performed.clear()
     bench.seen = replace(SEEN, now=later(NOW, 31.0))
     bench.give(events.TimePassed())
-    assert bench.performed == ["SetTimer", "Publish"]
+    assert bench.performed == ["SetTimer", "PublishState"]
     assert bench.robot_authority.authority.asked_by == ()
 
 
@@ -280,7 +284,7 @@ def test_the_speed_of_one_operator_is_not_that_of_the_next():
     bench.performed.clear()
     bench.lease(A.RENEW)
     # The driver is not told again of the same control.
-    assert (speed(), bench.performed) == (80.0, ["SetTimer", "Publish"])
+    assert (speed(), bench.performed) == (80.0, ["SetTimer", "PublishState"])
     bench.lease(A.TAKE, "wang", secret="another", reason="shift")
     assert speed() == 25.0
     assert "Controlled" in bench.performed
@@ -298,7 +302,7 @@ def test_hold_at_rest_is_sent_only_if_a_program_runs(runs):
     bench = Bench().in_control()
     bench.give(events.MotionObserved(False))
     if runs:
-        bench.command(C.RUN_PROGRAM, program="home", checked=Program(name="p", targets=(THERE,)))
+        bench.command(C.RUN_PROGRAM, program="home", checked=PlannedProgram(name="p", targets=(THERE,)))
     bench.cancelled = True
     bench.performed.clear()
     assert bench.command(C.HOLD, 2).accepted

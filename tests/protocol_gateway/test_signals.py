@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from protocol_gateway.driver_parts.signal_names import SHARED, numbered, of_axes, of_joints
-from protocol_gateway.link.timestamping import Received
+from protocol_gateway.link.timestamping import EventTime
 from protocol_gateway.seam import Signal, SignalsReceived
 from protocol_gateway.telemetry import set_up_file
 from protocol_gateway.telemetry.journal import Journal
@@ -46,7 +46,7 @@ class Robot:
 
     def reports(self, *values, after_s=0.0, **more):
         self.now_s += after_s
-        self.signals.take(SignalsReceived(values, **more), Received(self.now_s, round(self.now_s * 1e9)))
+        self.signals.take(SignalsReceived(values, **more), EventTime(self.now_s, round(self.now_s * 1e9)))
 
     def waits(self, seconds):
         self.now_s += seconds

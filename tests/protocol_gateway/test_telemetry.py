@@ -2,7 +2,7 @@
 
 from types import SimpleNamespace
 
-from protocol_gateway.link.link import Received
+from protocol_gateway.link.link import EventTime
 from protocol_gateway.seam import Activity, JointsReceived, Mode, StatusReceived
 from protocol_gateway.telemetry.journal import Journal
 from protocol_gateway.telemetry.signals import Signals
@@ -40,7 +40,7 @@ class Desk:
         for _ in range(round(seconds * 10)):
             self.now_s += 0.1
             if positions:
-                self.telemetry.on_event(JointsReceived((0.0,) * 5), Received(self.now_s, 0))
+                self.telemetry.on_event(JointsReceived((0.0,) * 5), EventTime(self.now_s, 0))
             self.telemetry.check_timeouts(self.now_s)
 
 
@@ -70,7 +70,7 @@ def test_controller_that_stops_by_itself_is_an_event_and_its_end_another():
     def does(activity, seconds=0.3):
         for _ in range(round(seconds * 10)):
             desk.now_s += 0.1
-            desk.telemetry.on_event(StatusReceived(activity, Mode.REMOTE), Received(desk.now_s, 0))
+            desk.telemetry.on_event(StatusReceived(activity, Mode.REMOTE), EventTime(desk.now_s, 0))
             desk.telemetry.check_timeouts(desk.now_s)
         found, desk.codes = desk.codes, []
         return [code for code in found if code.startswith("controller.")]

@@ -3,7 +3,7 @@ from itertools import pairwise
 
 import pytest
 
-from protocol_gateway.link.timestamping import Received, Timestamper
+from protocol_gateway.link.timestamping import EventTime, Timestamper
 from protocol_gateway.seam import (
     Activity,
     JointsReceived,
@@ -16,7 +16,7 @@ MS = 1_000_000
 
 
 def at(seconds):
-    return Received(seconds, round(seconds * 1e9))
+    return EventTime(seconds, round(seconds * 1e9))
 
 
 def joints(time_s=None):
@@ -125,7 +125,7 @@ def test_setting_the_gateways_clock_begins_a_new_number():
     timestamper = Timestamper()
     end_s = fresh(timestamper)
     timestamper.wall_clock_was_set()
-    received = date(timestamper, 1.01, Received(end_s + 0.03, round((end_s + 500.0) * 1e9)))
+    received = date(timestamper, 1.01, EventTime(end_s + 0.03, round((end_s + 500.0) * 1e9)))
     assert (received.monotonic_s, received.clock) == (near(end_s + 0.01), 1)
 
 
@@ -133,7 +133,7 @@ def test_a_new_connection_discards_the_previous_clock():
     timestamper = Timestamper()
     end_s = fresh(timestamper)
     timestamper.connected()
-    assert date(timestamper, 1.0 + 0.5, at(end_s + 2.0)) == Received(
+    assert date(timestamper, 1.0 + 0.5, at(end_s + 2.0)) == EventTime(
         end_s + 2.0, round((end_s + 2.0) * 1e9), 1
     )
 

@@ -1,4 +1,4 @@
-"""Each effect of an event fails in turn: what a stop and a command promise must still hold."""
+"""Each decision on an event fails in turn: what a stop and a command promise must still hold."""
 
 import asyncio
 import contextlib
@@ -7,12 +7,12 @@ import errno
 import pytest
 
 from controllers.unit.driver import UnitDriver
-from protocol_gateway.authority.effects import Finding, Program
+from protocol_gateway.authority.decisions import CheckResult, PlannedProgram
 from protocol_gateway.authority.events import LeaseEnded, LinkLost, LinkRestored, MotionObserved
 from protocol_gateway.authority.lease_rules import Authority
-from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.authority.robot_authority import RobotAuthority
-from protocol_gateway.control.control import Control, Ports
+from protocol_gateway.control.control import Control, Performers
 from protocol_gateway.link.link import LinkState, LinkStatus
 from protocol_gateway.seam import Activity, Mode, StatusReceived
 from protocol_gateway.seam.errors import AuditError, LinkDownError
@@ -31,8 +31,8 @@ CUT = LinkDownError(codes.OTHER(detail="the cable is cut"))
 FAULT = RuntimeError("a fault of the gateway")
 
 
-class FailingPorts:
-    """Ports of a Control, also its checks; one of their calls fails.
+class FailingPerformers:
+    """Performers of a Control, also its checks; one of their calls fails.
 
     Attributes:
         calls: Name of each call, its text, and whether it succeeded.
@@ -85,13 +85,13 @@ class FailingPorts:
 
     async def check(self, requests):
         self.call("check", FAULT)
-        return Finding()
+        return CheckResult()
 
-    def changed(self, finding):
+    def changed(self, check_result):
         self.call("recheck", FAULT)
 
     def controller(self):
-        return Controller(
+        return ControllerState(
             link=LinkStatus(LinkState.UP, codes.LINK_CONNECTED(where="there")),
             status=StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=True),
             positions=(0.0,) * 5,
@@ -119,9 +119,9 @@ class Bench:
 
     def __init__(self, clock, send_error):
         self.clock = clock
-        self.ports = FailingPorts(send_error)
+        self.ports = FailingPerformers(send_error)
         encode = UnitDriver(JOINTS.types).prepare
-        ports = Ports(
+        ports = Performers(
             audit_trail=self.ports,
             latch=self.ports,
             journal=self.ports,
@@ -145,7 +145,7 @@ class Bench:
     async def command(self, command, **fields):
         self.last_id += 1
         request = CommandRequest(command=command, id=self.last_id, lease=self.secret, **fields)
-        checked = Program(name="p", targets=(THERE,)) if command == C.RUN_PROGRAM else None
+        checked = PlannedProgram(name="p", targets=(THERE,)) if command == C.RUN_PROGRAM else None
         return await self.control.attempt([request], operator="li", source="test", program=checked)
 
     async def free(self):
@@ -284,7 +284,7 @@ TABLE = [
 
 @pytest.mark.parametrize(("begin", "happens", "promise"), TABLE)
 @pytest.mark.parametrize("send_error", [CUT, FAULT], ids=["link", "fault"])
-def test_an_effect_that_fails_breaks_no_promise(clock, begin, happens, promise, send_error):
+def test_a_decision_that_fails_breaks_no_promise(clock, begin, happens, promise, send_error):
     async def one(failing):
         bench = Bench(clock, send_error)
         await getattr(bench, begin)()

@@ -20,14 +20,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from protocol_gateway.authority import lease_rules
-from protocol_gateway.authority.effects import Finding, Program
+from protocol_gateway.authority.decisions import CheckResult, PlannedProgram
 from protocol_gateway.authority.events import JogEnded, JogEnding, JogHeld, JogPartReady, StopRequested
 from protocol_gateway.authority.lease_rules import not_sent, why_not_holder
-from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.checking.worker_messages import Extended, Positions
 from protocol_gateway.control.abort import abort_reason
-from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.control import Control, command_answer, refusal
+from protocol_gateway.control.motion_checks import MotionChecks
 from protocol_gateway.seam import Activity
 from protocol_gateway.seam.errors import CheckError
 from protocol_gateway.telemetry.journal import Journal
@@ -87,7 +87,7 @@ class _Run:
     rotary: bool
     begin_s: float
     deadline_s: float
-    first: tuple[Extended, Finding] | None
+    first: tuple[Extended, CheckResult] | None
     keep_alives: int = 0
     sequence: int = 0
     last: Positions | None = None
@@ -99,7 +99,7 @@ class _Run:
     warned: bool = False
 
 
-class Jogs:
+class JogRunner:
     """Runner of one robot's jogs, one at a time.
 
     Args:
@@ -111,11 +111,11 @@ class Jogs:
     def __init__(
         self,
         control: Control,
-        checks: Checks,
+        checks: MotionChecks,
         *,
         joints: Joints,
         journal: Journal,
-        controller: Callable[[], Controller],
+        controller: Callable[[], ControllerState],
         can_jog: bool,
         tool_speed: float,
     ) -> None:
@@ -160,7 +160,7 @@ class Jogs:
                 start = run.origin
             except CheckError as error:
                 refused = not_sent(error.reason)
-        program = None if run is None else Program(name=run.name, targets=(), start=start, is_jog=True)
+        program = None if run is None else PlannedProgram(name=run.name, targets=(), start=start, is_jog=True)
         answer = await self._control.attempt(
             [request], operator=operator, source=source, program=program, refused=refused
         )
@@ -243,7 +243,7 @@ class Jogs:
                 await asyncio.wait((part, cancelled), return_when=asyncio.FIRST_COMPLETED)
                 if cancelled.done():
                     raise CheckError(cancelled.result())
-                start, extended, finding = part.result()
+                start, extended, check_result = part.result()
             finally:
                 self._preparing = None
                 part.cancel()
@@ -263,7 +263,7 @@ class Jogs:
             rotary=jog.turns(self._joints),
             begin_s=0.0,
             deadline_s=0.0,
-            first=(extended, finding),
+            first=(extended, check_result),
         )
 
     def _direction(self, request: schema.CommandRequest) -> Jog:
@@ -384,7 +384,7 @@ class Jogs:
         requests = (schema.CommandRequest(command=_C.JOG),)
         async with self._checks.motion_lock(requests):
             try:
-                extended, finding = await self._part(run)
+                extended, check_result = await self._part(run)
             except CheckError as error:
                 self._end(run, error.reason)
                 return
@@ -398,39 +398,39 @@ class Jogs:
                 secret=run.secret,
                 target=extended.target,
                 percent=extended.percent,
-                finding=finding,
+                check_result=check_result,
             )
             problem: Reason | None = self._control.handle(part)
         if problem is not None:
             self._end(run, self._why_not(run) or problem)
             return
         run.last, run.commanded = extended.target, extended.commanded
-        self._warn(run, finding)
+        self._warn(run, check_result)
 
-    async def _part(self, run: _Run) -> tuple[Extended, Finding]:
+    async def _part(self, run: _Run) -> tuple[Extended, CheckResult]:
         """Return the next part; the first one was checked before the start, and must still hold."""
         if run.first is not None:
-            (extended, finding), run.first = run.first, None
-            return extended, replace(finding, start=run.origin)
-        _, extended, finding = await self._checks.jog_part(
+            (extended, check_result), run.first = run.first, None
+            return extended, replace(check_result, start=run.origin)
+        _, extended, check_result = await self._checks.jog_part(
             run.jog, origin=run.origin, last=run.last, commanded=run.commanded
         )
-        return extended, finding
+        return extended, check_result
 
     def _follow(self, run: _Run, extended: Extended) -> None:
         if abs(extended.moved - run.moved) > 1e-4 or extended.target is not None:
             run.progress_s = time.monotonic()
         run.moved = extended.moved
 
-    def _warn(self, run: _Run, finding: Finding) -> None:
-        if finding.warning is None or run.warned:
+    def _warn(self, run: _Run, check_result: CheckResult) -> None:
+        if check_result.warning is None or run.warned:
             return
         run.warned = True
         self._journal.report(
             schema.Event.Severity.WARNING,
-            finding.code,
-            f"jog {run.name}: {finding.warning}",
-            why=finding.warning,
+            check_result.code,
+            f"jog {run.name}: {check_result.warning}",
+            why=check_result.warning,
         )
 
     def _rests_at_last(self, run: _Run) -> bool:

@@ -17,15 +17,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from protocol_gateway.authority.admission import time_left_s
-from protocol_gateway.authority.effects import Program
+from protocol_gateway.authority.decisions import PlannedProgram
 from protocol_gateway.authority.events import ProgramEnded
 from protocol_gateway.authority.lease_rules import Answer, refused
-from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.checking.worker_messages import Checked
 from protocol_gateway.control.abort import abort_reason
-from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.clocks import read_clocks
 from protocol_gateway.control.control import Control, command_answer, refusal
+from protocol_gateway.control.motion_checks import MotionChecks
 from protocol_gateway.seam import Activity
 from protocol_gateway.seam.errors import CheckError
 from protocol_gateway.seam.text_limits import LONGEST_TEXT
@@ -67,7 +67,7 @@ class _Run:
         last_stop_id: Number of the newest stop at its check.
     """
 
-    program: Program
+    program: PlannedProgram
     operator: str
     secret: str
     last_stop_id: int
@@ -107,7 +107,7 @@ class _Prepared:
     run: _Run | None = None
 
 
-class Programs:
+class ProgramRunner:
     """Runner of one robot's programs, one at a time.
 
     Args:
@@ -122,10 +122,10 @@ class Programs:
     def __init__(
         self,
         control: Control,
-        checks: Checks,
+        checks: MotionChecks,
         *,
         journal: Journal,
-        controller: Callable[[], Controller],
+        controller: Callable[[], ControllerState],
         publish: Callable[[], None],
         publish_source: Callable[[schema.ProgramSource], object],
     ) -> None:
@@ -212,28 +212,28 @@ class Programs:
         """Check a program."""
         if len(request.program.encode()) > MOST_BYTES:
             raise CheckError(codes.PROGRAM_TOO_LONG(kib=MOST_BYTES // 1024))
-        checked, finding = await self._checks.program(request.program)
+        checked, check_result = await self._checks.program(request.program)
         newest_stop = self._control.authority.last_stop_id
-        if finding.refusal is not None:
-            return _Prepared(finding.refusal)
+        if check_result.refusal is not None:
+            return _Prepared(check_result.refusal)
         first = next((step for step in checked.steps if step.target is not None), None)
         # Refuse now if the present state (not homed, on hold) would refuse the first step.
         if first is not None and (problem := self._control.obstacle(_request(first, ""))) is not None:
             return _Prepared(problem)
         name = one_line(request.program_name, LONGEST_TEXT).strip() or "unnamed"
-        if finding.warning is not None:
+        if check_result.warning is not None:
             self._journal.report(
                 _S.WARNING,
-                finding.code,
-                f"program {name}: {finding.warning}",
-                why=finding.warning,
+                check_result.code,
+                f"program {name}: {check_result.warning}",
+                why=check_result.warning,
                 program=name,
             )
         targets = tuple(tuple(each.target.tolist()) for each in checked.steps if each.target is not None)
-        program = Program(name=name, targets=targets, start=finding.start)
+        program = PlannedProgram(name=name, targets=targets, start=check_result.start)
         lines = tuple(request.program.split("\n"))
         run = _Run(program, operator, request.lease, newest_stop, lines, checked)
-        return _Prepared(None, finding.warning, run)
+        return _Prepared(None, check_result.warning, run)
 
     def _start(self, run: _Run) -> None:
         self._wait_s = None

@@ -1,6 +1,6 @@
 """Events that a robot's authority publishes. Pure functions."""
 
-from protocol_gateway.authority.effects import Finding, Report
+from protocol_gateway.authority.decisions import CheckResult, PublishEvent
 from protocol_gateway.authority.events import JogEnded, ProgramEnded, StopRequested, StopResult
 from protocol_gateway.authority.lease_rules import LeaseEnd
 from robomesh import reason_codes as codes
@@ -10,9 +10,9 @@ from robomesh.schemas.robomesh_pb2 import Event
 _S = Event.Severity
 
 
-def stop_latched(stop: StopRequested, result: StopResult) -> Report:
+def stop_latched(stop: StopRequested, result: StopResult) -> PublishEvent:
     """Report a new stop; an error if its unit is not on the wire."""
-    return Report(
+    return PublishEvent(
         _S.WARNING if result.sent else _S.ERROR,
         "stop.latched",
         f"{result.reason} ({stop.by}: {stop.reason})",
@@ -21,47 +21,51 @@ def stop_latched(stop: StopRequested, result: StopResult) -> Report:
     )
 
 
-def stop_not_sent(stop: StopRequested, result: StopResult) -> Report:
+def stop_not_sent(stop: StopRequested, result: StopResult) -> PublishEvent:
     """Report a stop of a read-only robot."""
     text = f"{result.reason} ({stop.by}: {stop.reason})"
-    return Report(_S.WARNING, "stop.not_sent", text, why=result.reason, values={"by": stop.by})
+    return PublishEvent(_S.WARNING, "stop.not_sent", text, why=result.reason, values={"by": stop.by})
 
 
-def stop_sent(result: StopResult) -> Report:
+def stop_sent(result: StopResult) -> PublishEvent:
     """Report a latched stop that was sent on a new connection."""
     return _stop(_S.WARNING, "stop.sent", result.reason, result.id)
 
 
-def stop_disobeyed(result: StopResult) -> Report:
+def stop_disobeyed(result: StopResult) -> PublishEvent:
     """Report a robot that still moves after its stop."""
     return _stop(_S.CRITICAL, "stop.disobeyed", result.reason, result.id)
 
 
-def stop_reset(stop_id: int) -> Report:
+def stop_reset(stop_id: int) -> PublishEvent:
     """Report the RESET of a stop."""
     text = f"stop request {stop_id} was reset"
-    return Report(_S.INFO, "stop.reset", text, values={"stop_id": stop_id})
+    return PublishEvent(_S.INFO, "stop.reset", text, values={"stop_id": stop_id})
 
 
-def recovery_sent(recovery: str, by: str, reason: str) -> Report:
+def recovery_sent(recovery: str, by: str, reason: str) -> PublishEvent:
     """Report a recovery that was sent to the controller."""
     why = codes.RECOVER_SENT(recovery=recovery, by=by, reason=reason)
-    return Report(_S.WARNING, "recover.sent", why.text, why=why, values={"recovery": recovery, "by": by})
+    return PublishEvent(
+        _S.WARNING, "recover.sent", why.text, why=why, values={"recovery": recovery, "by": by}
+    )
 
 
-def tool_confirmed(changes: str, by: str, reason: str) -> Report:
+def tool_confirmed(changes: str, by: str, reason: str) -> PublishEvent:
     """Report that an operator has confirmed the tool, payload or frame."""
     why = codes.RECOVER_CONFIRMED(changes=changes, by=by, reason=reason)
-    return Report(_S.INFO, "recover.confirmed", why.text, why=why, values={"changes": changes, "by": by})
+    return PublishEvent(
+        _S.INFO, "recover.confirmed", why.text, why=why, values={"changes": changes, "by": by}
+    )
 
 
-def _stop(severity: Event.Severity, code: str, why: Reason, stop_id: int) -> Report:
-    return Report(severity, code, why.text, why=why, values={"stop_id": stop_id})
+def _stop(severity: Event.Severity, code: str, why: Reason, stop_id: int) -> PublishEvent:
+    return PublishEvent(severity, code, why.text, why=why, values={"stop_id": stop_id})
 
 
-def lease_ended(ended: LeaseEnd) -> Report:
+def lease_ended(ended: LeaseEnd) -> PublishEvent:
     """Report the end of a lease."""
-    return Report(
+    return PublishEvent(
         _S.WARNING if ended.stop else _S.INFO,
         "lease.ended",
         f"control ended: {ended.why}{', its motion was stopped' if ended.stop else ''}",
@@ -70,24 +74,26 @@ def lease_ended(ended: LeaseEnd) -> Report:
     )
 
 
-def uncommanded_motion(leased: bool) -> Report:
+def uncommanded_motion(leased: bool) -> PublishEvent:
     """Report a robot that moves without a command; a warning if an operator has control."""
-    return Report(
+    return PublishEvent(
         _S.WARNING if leased else _S.INFO,
         "motion.foreign",
         "the robot began to move without a command of the gateway",
     )
 
 
-def check_warning(names: str, finding: Finding) -> Report:
+def check_warning(names: str, check_result: CheckResult) -> PublishEvent:
     """Report the warning of a check: of commands, or of a program."""
-    text = f"{names}: {finding.warning}"
-    return Report(_S.WARNING, finding.code, text, why=finding.warning, values={"command": names})
+    text = f"{names}: {check_result.warning}"
+    return PublishEvent(
+        _S.WARNING, check_result.code, text, why=check_result.warning, values={"command": names}
+    )
 
 
-def jog_ended(event: JogEnded) -> Report:
+def jog_ended(event: JogEnded) -> PublishEvent:
     """Report the end of a jog."""
-    return Report(
+    return PublishEvent(
         _S.WARNING if event.failed else _S.INFO,
         event.outcome.code,
         event.outcome.text,
@@ -96,10 +102,10 @@ def jog_ended(event: JogEnded) -> Report:
     )
 
 
-def program_ended(event: ProgramEnded) -> Report:
+def program_ended(event: ProgramEnded) -> PublishEvent:
     """Report the end of a program."""
     severity = _S.INFO if event.problem is None else _S.WARNING
-    return Report(
+    return PublishEvent(
         severity,
         event.outcome.code,
         event.outcome.text,

@@ -27,17 +27,17 @@ _LONGEST_REASON = 400
 _OUTPUT, _ERRORS = 1, 2
 
 
-class ProgramError(Exception):
+class ReaderProcessError(Exception):
     """The program ended before it was connected; the text is its own reason."""
 
 
-class ProgramOutput(asyncio.SubprocessProtocol):
+class ReaderProcess(asyncio.SubprocessProtocol):
     """A running program; the future `lost` gets the reason when it has ended."""
 
     round_trip_s = None
 
     def __init__(
-        self, on_connected: Callable[["ProgramOutput"], None], receive: Callable[[bytes], None], name: str
+        self, on_connected: Callable[["ReaderProcess"], None], receive: Callable[[bytes], None], name: str
     ) -> None:
         self._on_connected = on_connected
         self._receive = receive
@@ -54,7 +54,7 @@ class ProgramOutput(asyncio.SubprocessProtocol):
         cls,
         module: str,
         arguments: Sequence[str],
-        on_connected: Callable[["ProgramOutput"], None],
+        on_connected: Callable[["ReaderProcess"], None],
         receive: Callable[[bytes], None],
     ) -> Self:
         """Start the program `python -m module PARENT arguments...`.
@@ -75,7 +75,7 @@ class ProgramOutput(asyncio.SubprocessProtocol):
         """Wait until the program is connected.
 
         Raises:
-            ProgramError: If the program ended before.
+            ReaderProcessError: If the program ended before.
             TimeoutError: If it does not connect in time; the program is ended.
         """
         try:
@@ -88,7 +88,7 @@ class ProgramOutput(asyncio.SubprocessProtocol):
         if not self._first.done():
             reason = self.lost.result()
             await self.end()
-            raise ProgramError(str(reason))
+            raise ReaderProcessError(str(reason))
 
     # ------------------------------------------------------------------ called by asyncio
 

@@ -1,17 +1,18 @@
-"""Effects of a robot's authority, performed by `control`.
+"""Decisions of a robot's authority, performed by `control`.
 
-    effect                                result
+    decision                              result
     ------------------------------------  ---------------------------------------------------
     Send                                  reason of a failure, or None
     Recheck                               reason for a change, or None
-    EnterCell, CheckMotion, Append        awaited: Seen; Finding; (reason or None, Seen)
+    EnterCell, CheckMotion, Append        awaited: Snapshot; CheckResult; (reason or None, Snapshot)
     NumberStop                            number of the stop; None: the next one
     CancelPrograms                        whether a program was cancelled
-    AppendLater, KeepLatch, Publish,      none
-      Report, SetTimer, Controlled
+    AppendLater, KeepLatch,               none
+      PublishState, PublishEvent,
+      SetTimer, Controlled
 
-If an effect of the last three rows fails, that is logged, and the next effect is performed.
-Only commands and lease requests may yield an awaited effect. A stop yields none.
+If a decision of the last three rows fails, that is logged, and the next one is performed.
+Only commands and lease requests may yield an awaited decision. A stop yields none.
 """
 
 from collections.abc import Generator, Mapping, Sequence
@@ -19,15 +20,15 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias, TypeVar
 
 from protocol_gateway.authority.entry import Entry
-from protocol_gateway.authority.lease_rules import Answer, Now, Stop
-from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.authority.lease_rules import Answer, LatchedStop, Now
+from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.checking.worker_messages import Positions
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest, Event
 
 
 @dataclass(frozen=True, kw_only=True)
-class Seen:
+class Snapshot:
     """Present time and state of the controller.
 
     Attributes:
@@ -36,13 +37,13 @@ class Seen:
     """
 
     now: Now
-    controller: Controller
+    controller: ControllerState
     latch_problem: Reason | None = None
     closed: Reason | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finding:
+class CheckResult:
     """Result of the check of commands.
 
     Attributes:
@@ -67,7 +68,7 @@ class Finding:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Program:
+class PlannedProgram:
     """A planned and checked program, or a jog, ready to run.
 
     Attributes:
@@ -119,12 +120,12 @@ class NumberStop:
 class KeepLatch:
     """Write the latched stop and the newest number to the latch file soon."""
 
-    stop: Stop | None
+    stop: LatchedStop | None
     last_stop_id: int
 
 
 @dataclass(frozen=True)
-class Publish:
+class PublishState:
     """Publish the state of lease, stop and program."""
 
 
@@ -134,7 +135,7 @@ class ConfirmSetUp:
 
 
 @dataclass(frozen=True)
-class Report:
+class PublishEvent:
     """Publish an event."""
 
     severity: Event.Severity
@@ -176,7 +177,7 @@ class CheckMotion:
 class Recheck:
     """Return the reason if the robot or its cell has changed since a check; None: unchanged."""
 
-    finding: Finding
+    check_result: CheckResult
 
 
 @dataclass(frozen=True)
@@ -186,15 +187,15 @@ class CancelPrograms:
     why: Reason
 
 
-Effect: TypeAlias = (
+Decision: TypeAlias = (
     Send
     | Append
     | AppendLater
     | NumberStop
     | KeepLatch
-    | Publish
+    | PublishState
     | ConfirmSetUp
-    | Report
+    | PublishEvent
     | SetTimer
     | Controlled
     | EnterCell
@@ -204,4 +205,4 @@ Effect: TypeAlias = (
 )
 
 R = TypeVar("R")
-Effects: TypeAlias = Generator[Effect, Any, R]
+Decisions: TypeAlias = Generator[Decision, Any, R]
