@@ -22,13 +22,13 @@ if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[1])
 
 from benchmarks.renderer import mesh_of
-from renderer.cameras import Camera, fitted
-from renderer.drawing import Drawing
-from renderer.encoder import jpeg, open_encoder
+from renderer.drawing.drawing import Drawing
+from renderer.drawing.opengl import open_context
+from renderer.encoding.encoder import jpeg, open_encoder
 from renderer.errors import RendererError
-from renderer.opengl import open_context
-from renderer.overlay import Overlay, Row, write_over
-from renderer.scene import Part, Scene
+from renderer.pictures.overlay import Overlay, Row, write_over
+from renderer.scene.cameras import Camera, fitted
+from renderer.scene.scene import Part, Scene
 from robots.descriptions.description import load
 from robots.descriptions.glb import link_meshes
 from robots.kinematics.model import build_model, link_placements

@@ -54,10 +54,10 @@ def pictures() -> Iterator[bytes]:
     from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
     from benchmarks.drawing import view
-    from renderer.drawing import Drawing
-    from renderer.encoder import open_encoder
-    from renderer.mesh import prepared as prepared_mesh
-    from renderer.opengl import open_context
+    from renderer.drawing.drawing import Drawing
+    from renderer.drawing.opengl import open_context
+    from renderer.encoding.encoder import open_encoder
+    from renderer.shapes.prepare import prepared as prepared_mesh
     from robots.descriptions.description import load
     from robots.descriptions.glb import link_meshes
     from robots.kinematics.model import build_model, link_placements

@@ -37,11 +37,11 @@ if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[1])
 
 from benchmarks.renderer_peers import drawn, reason
-from renderer.cameras import Camera
-from renderer.drawing import Drawing
-from renderer.mesh import MOST_TRIANGLES, Mesh, prepared_surfaces
-from renderer.opengl import open_context
-from renderer.scene import Part, Scene
+from renderer.drawing.drawing import Drawing
+from renderer.drawing.opengl import open_context
+from renderer.scene.cameras import Camera
+from renderer.scene.scene import Part, Scene
+from renderer.shapes.prepare import MOST_TRIANGLES, Mesh, prepared_surfaces
 from robots.descriptions.description import load
 from robots.descriptions.glb import link_meshes
 from robots.kinematics.model import build_model, link_placements

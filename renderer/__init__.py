@@ -1,4 +1,4 @@
-"""Off-screen rendering of the mesh's robots: scene, cameras, OpenGL, overlay, encoders, and the service.
+"""Off-screen rendering of a site's robots, as video and pictures.
 
 Robots are known only from the mesh, and only views with subscribers are drawn.
 """

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from renderer.appearance import floor_of
+from renderer.scene.appearance import floor_of
 from robomesh.schemas.robomesh_pb2 import Description
 from robots.descriptions.urdf.viewers import Fixture, Viewed
 

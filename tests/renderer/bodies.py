@@ -6,8 +6,8 @@ import struct
 import numpy as np
 import pytest
 
+from renderer.drawing.opengl import open_context
 from renderer.errors import NoOpenGLError
-from renderer.opengl import open_context
 
 _FACES = np.array([[0, 2, 6, 4], [1, 5, 7, 3], [0, 4, 5, 1], [2, 3, 7, 6], [0, 1, 3, 2], [4, 6, 7, 5]])
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from renderer.appearance import Appearance, appearance_of, mesh_name
-from renderer.cache import prepared_once
-from renderer.drawing import Drawing
-from renderer.mesh import Mesh
-from renderer.opengl import open_context
+from renderer.drawing.drawing import Drawing
+from renderer.drawing.opengl import open_context
+from renderer.scene.appearance import Appearance, appearance_of, mesh_name
+from renderer.shapes.cache import prepared_once
+from renderer.shapes.prepare import Mesh
 from robots.descriptions.cells import CellDescription, CellRobot
 from robots.descriptions.description import load
 from robots.descriptions.glb import link_meshes

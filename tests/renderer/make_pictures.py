@@ -15,12 +15,12 @@ import numpy as np
 if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[2])
 
-from renderer.appearance import frame_placements, placements_at
-from renderer.cache import cache_folder
-from renderer.cameras import fitted
-from renderer.overlay import Overlay, Row, _write_badge, write_over
-from renderer.scene_assembly import Placed, scene_of
-from renderer.views import camera_from, camera_of
+from renderer.pictures.overlay import Overlay, Row, _write_badge, write_over
+from renderer.scene.appearance import frame_placements, placements_at
+from renderer.scene.assembly import Placed, scene_of
+from renderer.scene.cameras import fitted
+from renderer.scene.views import camera_from, camera_of
+from renderer.shapes.cache import cache_folder
 from robomesh.schemas.robomesh_pb2 import Vector3, View
 from tests.renderer.library_scenes import cell, drawing_of, posed, robot
 

@@ -11,7 +11,7 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from renderer import service
-from renderer.overlay import AMBER
+from renderer.pictures.overlay import AMBER
 from renderer.service import Settings
 from robomesh.wire.session import open_session
 from services import kinematics

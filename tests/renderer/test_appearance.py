@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from renderer.appearance import appearance_of, home_placements
-from renderer.cameras import pixels
-from renderer.chain import placements, reach, read_chain
 from renderer.errors import ChainError, UnknownViewError
-from renderer.views import camera_of
+from renderer.scene.appearance import appearance_of, home_placements
+from renderer.scene.cameras import pixels
+from renderer.scene.chain import placements, reach, read_chain
+from renderer.scene.views import camera_of
 from robomesh.schemas.robomesh_pb2 import Description, Vector3, View
 from robots.descriptions.description import load
 from robots.descriptions.urdf.write import to_urdf

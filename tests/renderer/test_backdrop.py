@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from renderer import backdrop
-from renderer.cameras import Camera
-from renderer.drawing import Drawing
-from renderer.scene import Scene
+from renderer.drawing import backdrop
+from renderer.drawing.drawing import Drawing
+from renderer.scene.cameras import Camera
+from renderer.scene.scene import Scene
 from tests.renderer.bodies import context_or_skip
 
 SIZE = (64, 36)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from renderer.cameras import Camera, close_up, fitted, pixels, site_to_camera
+from renderer.scene.cameras import Camera, close_up, fitted, pixels, site_to_camera
 
 SIZE = (640, 360)
 TOP = Camera(np.array([0, 0, 3.0]), np.zeros(3), np.array([0, 1.0, 0]), half_height=0.9)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from renderer.cameras import Camera, pixels
-from renderer.clearance_line import RED, ClearanceLine, draw_clearance_line, line_of, same_line
-from renderer.overlay import AMBER, FAINT
-from renderer.robot_state import Ages, RobotState, current_clearance_line
+from renderer.pictures.clearance_line import RED, ClearanceLine, draw_clearance_line, line_of, same_line
+from renderer.pictures.overlay import AMBER, FAINT
+from renderer.pictures.robot_state import Ages, RobotState, current_clearance_line
+from renderer.scene.cameras import Camera, pixels
 from robomesh.schemas.robomesh_pb2 import Clearance, Description, KinematicState, Vector3
 
 DESCRIPTION = Description(warning_distance=0.05, stop_distance=0.01)

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer import opengl
-from renderer.cameras import Camera, pixels
-from renderer.drawing import Drawing
+from renderer.drawing import opengl
+from renderer.drawing.drawing import Drawing
+from renderer.drawing.opengl import open_context
 from renderer.errors import NoOpenGLError
-from renderer.mesh import prepared
-from renderer.opengl import open_context
-from renderer.scene import Finish, Line, Part, Scene
+from renderer.scene.cameras import Camera, pixels
+from renderer.scene.scene import Finish, Line, Part, Scene
+from renderer.shapes.prepare import prepared
 from tests.renderer.bodies import ball, context_or_skip, cube
 
 SIZE = (320, 180)

@@ -5,10 +5,10 @@ import cv2
 import numpy as np
 import pytest
 
-from renderer import encoder as encoders
-from renderer.encoder import H264Encoder, jpeg, open_encoder
+from renderer.encoding import encoder as encoders
+from renderer.encoding.encoder import H264Encoder, jpeg, open_encoder
 from renderer.errors import NoEncoderError
-from renderer.key_frames import KeyFrameClock
+from renderer.service.key_frames import KeyFrameClock
 
 SIZE = (320, 180)
 IDR, SPS, PPS = 5, 7, 8

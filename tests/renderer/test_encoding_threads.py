@@ -4,7 +4,7 @@ import asyncio
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
-from renderer.encoding_threads import EncodingThread, EncodingThreads, thread_count
+from renderer.service.encoding_threads import EncodingThread, EncodingThreads, thread_count
 from tests.conftest import run
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from renderer.frame_scheduler import FrameScheduler, due_with_placements, next_due, next_view
+from renderer.service.frame_scheduler import FrameScheduler, due_with_placements, next_due, next_view
 
 
 @dataclass

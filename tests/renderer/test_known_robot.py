@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 
-from renderer.appearance import appearance_of
-from renderer.composition import RobotSnapshot, compose
-from renderer.requested_views import ViewSpec, standard_view
-from renderer.robot_state import Ages, RobotState, current_contacts, is_stale
-from renderer.scene import Finish
+from renderer.pictures.composition import RobotSnapshot, compose
+from renderer.pictures.requested_views import ViewSpec, standard_view
+from renderer.pictures.robot_state import Ages, RobotState, current_contacts, is_stale
+from renderer.scene.appearance import appearance_of
+from renderer.scene.scene import Finish
 from robomesh.schemas.robomesh_pb2 import KinematicState, ViewRequest
 from tests.renderer.test_appearance import described
 

@@ -8,9 +8,9 @@ import struct
 import numpy as np
 import pytest
 
-from renderer import cache
 from renderer.errors import GlbError
-from renderer.mesh import prepared
+from renderer.shapes import cache
+from renderer.shapes.prepare import prepared
 from robots.schema.errors import MeshError
 from robots.shapes.files.gltf import glb_to_z_up, read_glb
 from tests.renderer.bodies import ball, cube

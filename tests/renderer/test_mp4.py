@@ -6,10 +6,10 @@ import av
 import numpy as np
 import pytest
 
-from renderer.encoder import H264Encoder
+from renderer.encoding.encoder import H264Encoder
+from renderer.encoding.h264_sps import picture_size
+from renderer.encoding.mp4 import FragmentedMp4
 from renderer.errors import Mp4Error
-from renderer.h264_sps import picture_size
-from renderer.mp4 import FragmentedMp4
 from robomesh.recordings.h264 import is_key_frame
 
 # Not a multiple of 16: the parameter set has a cropping rectangle.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from renderer.overlay import AMBER, Overlay, Row, inside, text_width, write_over
+from renderer.pictures.overlay import AMBER, Overlay, Row, inside, text_width, write_over
 
 ROWS = (Row("waist", "−12.34", "°", 0.4), Row("lift", "1204.5", "mm", 1.0))
 LIVE = Overlay(title="pt600", view="free", time="14:02:11.3 UTC", state="moving", rows=ROWS)

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
-from renderer import drawing
-from renderer.scene import Finish
-from renderer.shadow import FloorShadow
+from renderer.drawing import drawing
+from renderer.drawing.shadow import FloorShadow
+from renderer.scene.scene import Finish
 from tests.renderer.bodies import context_or_skip
 from tests.renderer.make_pictures import PICTURES, STORED, free
 

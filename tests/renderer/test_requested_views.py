@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from renderer.appearance import appearance_of
 from renderer.errors import RendererError
-from renderer.requested_views import low_rate_view, requested_view
+from renderer.pictures.requested_views import low_rate_view, requested_view
+from renderer.scene.appearance import appearance_of
 from robomesh.schemas.robomesh_pb2 import Vector3, View, ViewRequest
 from tests.renderer.test_appearance import described
 

@@ -6,8 +6,8 @@ import pytest
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from renderer.appearance import appearance_of
-from renderer.robot_state import Ages, RobotState, age_s, overlay_of
+from renderer.pictures.robot_state import Ages, RobotState, age_s, overlay_of
+from renderer.scene.appearance import appearance_of
 from robomesh.schemas.robomesh_pb2 import ControllerState
 from tests.renderer.test_appearance import described
 

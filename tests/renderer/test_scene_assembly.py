@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from renderer.appearance import appearance_of, placements_at
-from renderer.cameras import Camera, site_to_clip
-from renderer.mesh import prepared
-from renderer.obstruction import contains, hides
-from renderer.occlusion import open_sky
-from renderer.ribbons import ribbons
-from renderer.scene import Finish, Line, square_m
-from renderer.scene_assembly import Placed, scene_of
+from renderer.drawing.obstruction import contains, hides
+from renderer.drawing.ribbons import ribbons
+from renderer.scene.appearance import appearance_of, placements_at
+from renderer.scene.assembly import Placed, scene_of
+from renderer.scene.cameras import Camera, site_to_clip
+from renderer.scene.scene import Finish, Line, square_m
+from renderer.shapes.occlusion import open_sky
+from renderer.shapes.prepare import prepared
 from tests.renderer.bodies import ball, cube
 from tests.renderer.test_appearance import described
 

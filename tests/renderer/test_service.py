@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from renderer import frame_scheduler, post_processing, robots, service, stream
-from renderer.composition import compose
-from renderer.encoder import H264Encoder
+from renderer.drawing.studio import Studio
+from renderer.encoding.encoder import H264Encoder
 from renderer.errors import NoEncoderError, RendererError
-from renderer.robot_state import RobotState
-from renderer.service import Settings
-from renderer.studio import Studio
+from renderer.pictures import post_processing
+from renderer.pictures.composition import compose
+from renderer.pictures.robot_state import RobotState
+from renderer.service import Settings, frame_scheduler, renderer, robots, stream
 from robomesh import reason_codes as codes
 from robomesh.errors import NoAnswerError
 from robomesh.schemas.robomesh_pb2 import ControllerState, Event, KeyFrameRequest, VideoFrames
@@ -197,7 +197,7 @@ def test_a_picture_of_an_unwatched_robot_shows_its_newest_state(mesh, tmp_path, 
 
 def test_an_unwatched_renderer_unsubscribes_and_its_next_picture_is_live(mesh, tmp_path, monkeypatch):
     monkeypatch.setattr(robots, "_REST_AFTER_S", 0.5)
-    monkeypatch.setattr(service, "_TIDY_EACH_S", 0.1)
+    monkeypatch.setattr(renderer, "_TIDY_EACH_S", 0.1)
     monkeypatch.setattr(robots, "_LIVE_WITHIN_S", 20.0)  # on a busy machine too
     decoded, ages, update = [], [], RobotState.update_frames
 
@@ -371,7 +371,7 @@ def test_a_renderer_started_late_shows_the_last_state_as_stale(mesh, tmp_path):
             while await monitor.last("robomesh/hall/arm/frames") is None:
                 pass
             second = Settings(site="hall", size=SIZE, folder=tmp_path, views=("left", "behind"))
-            task = asyncio.create_task(service.serve(late, second))
+            task = asyncio.create_task(renderer.serve(late, second))
             image = await picture(monitor, "left")
             task.cancel()
             await asyncio.wait([task])
@@ -389,7 +389,7 @@ def test_a_renderer_started_late_shows_the_last_state_as_stale(mesh, tmp_path):
 def test_invalid_settings_are_rejected(mesh, tmp_path, settings, says):
     async def main():
         async with open_session(mesh) as session:
-            await service.serve(session, Settings(site="hall", folder=tmp_path, **settings))
+            await renderer.serve(session, Settings(site="hall", folder=tmp_path, **settings))
 
     with pytest.raises(RendererError, match=says):
         run(main())
@@ -399,13 +399,13 @@ def test_a_slow_machine_draws_without_anti_aliasing_and_reports_it_once(mesh, tm
     """Slow down drawing, as on a busy machine."""
     sizes = []
 
-    class Slow(service.Studio):
+    class Slow(renderer.Studio):
         def draw(self, *args, coarse, **options):
             sizes.append(coarse)
             time.sleep(0.1)
             return super().draw(*args, coarse=coarse, **options)
 
-    monkeypatch.setattr(service, "Studio", Slow)
+    monkeypatch.setattr(renderer, "Studio", Slow)
     monkeypatch.setattr(frame_scheduler, "_REPORT_AFTER_S", 0.8)
     monkeypatch.setattr(frame_scheduler, "_COARSE_AFTER_S", 0.3)
 
@@ -438,13 +438,13 @@ def test_a_slow_machine_draws_without_anti_aliasing_and_reports_it_once(mesh, tm
 def test_no_old_picture_is_sent_after_drawing_has_failed(mesh, tmp_path, monkeypatch):
     broken = threading.Event()
 
-    class Breaking(service.Studio):
+    class Breaking(renderer.Studio):
         def draw(self, *args, **options):
             if broken.is_set():
                 raise RuntimeError("the test took the GPU away")
             return super().draw(*args, **options)
 
-    monkeypatch.setattr(service, "Studio", Breaking)
+    monkeypatch.setattr(renderer, "Studio", Breaking)
 
     async def main():
         async with renderer_site(mesh, tmp_path) as (_, monitor):
@@ -480,19 +480,19 @@ def test_a_robot_removed_while_it_is_drawn_leaves_no_encoder(mesh, tmp_path, mon
     made, may_draw, draws = [], threading.Event(), threading.Event()
     may_draw.set()
 
-    class Held(service.Studio):
+    class Held(renderer.Studio):
         def draw(self, *args, **options):
             draws.set()
             may_draw.wait(40)
             return super().draw(*args, **options)
 
-    class PostProcessor(service.PostProcessor):
+    class PostProcessor(renderer.PostProcessor):
         def __init__(self, *args):
             super().__init__(*args)
             made.append(self)
 
-    monkeypatch.setattr(service, "Studio", Held)
-    monkeypatch.setattr(service, "PostProcessor", PostProcessor)
+    monkeypatch.setattr(renderer, "Studio", Held)
+    monkeypatch.setattr(renderer, "PostProcessor", PostProcessor)
 
     async def main():
         async with renderer_site(mesh, tmp_path) as (_, monitor), open_session(mesh) as player:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from renderer import service
-from renderer.mp4 import FragmentedMp4
+from renderer.encoding.mp4 import FragmentedMp4
+from renderer.service import renderer
 from robomesh import reason_codes as codes
 from robomesh.contract.quotas import Quotas
 from robomesh.errors import QuotaError, RefusedError
@@ -43,8 +43,8 @@ async def packets(subscription, count):
 
 
 def test_a_requested_view_is_drawn_shared_and_ends_without_subscribers(mesh, tmp_path, monkeypatch):
-    monkeypatch.setattr(service, "_NEXT_WATCHER_WITHIN_S", 0.3)
-    monkeypatch.setattr(service, "_FIRST_WATCHER_WITHIN_S", 8.0)
+    monkeypatch.setattr(renderer, "_NEXT_WATCHER_WITHIN_S", 0.3)
+    monkeypatch.setattr(renderer, "_FIRST_WATCHER_WITHIN_S", 8.0)
 
     async def main():
         async with renderer_site(mesh, tmp_path, most_views=1) as (robot, monitor), moving(robot):

@@ -5,12 +5,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from renderer import level_of_detail
-from renderer import mesh as mesh_module
-from renderer.creases import crease_normals
-from renderer.level_of_detail import next_level
-from renderer.mesh import prepared
-from renderer.simplification import simplified
+from renderer.drawing import level_of_detail
+from renderer.drawing.level_of_detail import next_level
+from renderer.shapes import prepare
+from renderer.shapes.creases import crease_normals
+from renderer.shapes.prepare import prepared
+from renderer.shapes.simplification import simplified
 from tests.renderer.bodies import ball, context_or_skip, cube, glb
 from tests.renderer.make_pictures import program
 
@@ -85,7 +85,7 @@ def test_a_large_scan_is_reduced_before_its_errors_are_bounded(monkeypatch):
     positions[:, 2] = np.random.default_rng(0).normal(0.0, 0.3, len(positions))
     scan = glb(positions, triangles)
     assert len(prepared(scan).finest) == len(triangles)
-    monkeypatch.setattr(mesh_module, "_MOST_BOUNDED", 500)
+    monkeypatch.setattr(prepare, "_MOST_BOUNDED", 500)
     assert 0 < len(prepared(scan).finest) < len(triangles) / 2
 
 

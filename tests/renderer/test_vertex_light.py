@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from renderer import drawing
-from renderer.mesh import prepared
-from renderer.vertex_light import SCALES, counts_at, ordered
+from renderer.drawing import drawing
+from renderer.shapes.prepare import prepared
+from renderer.shapes.vertex_light import SCALES, counts_at, ordered
 from tests.renderer.bodies import ball, context_or_skip, cube
 from tests.renderer.make_pictures import free, front
 

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import pytest
 
 from renderer.errors import NoRoomError, ViewRequestError
-from renderer.requested_views import ViewSpec
+from renderer.pictures.requested_views import ViewSpec
 from renderer.service import Settings
-from renderer.view_budget import ViewBudget
+from renderer.service.view_budget import ViewBudget
 from robomesh.errors import QuotaError
 
 

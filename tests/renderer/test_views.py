@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from renderer.appearance import appearance_of, frame_placements, placements_at
-from renderer.cameras import pixels
 from renderer.errors import CameraError, UnknownViewError
-from renderer.views import camera_from, camera_of, view_names
+from renderer.scene.appearance import appearance_of, frame_placements, placements_at
+from renderer.scene.cameras import pixels
+from renderer.scene.views import camera_from, camera_of, view_names
 from robomesh.schemas.robomesh_pb2 import Vector3, View
 from tests.renderer.test_appearance import described
 

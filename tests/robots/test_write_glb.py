@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from renderer.mesh import prepared
+from renderer.shapes.prepare import prepared
 from robots.shapes.files.gltf import read_glb
 from robots.shapes.files.read import read_mesh
 from robots.shapes.files.write_glb import glb_of

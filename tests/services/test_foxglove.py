@@ -12,7 +12,7 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from foxglove_schemas_protobuf.Log_pb2 import Log
 
-from renderer.encoder import H264Encoder
+from renderer.encoding.encoder import H264Encoder
 from robomesh.contract.endpoints import router_config
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import SessionSettings, open_session

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from renderer.appearance import floor_of
+from renderer.scene.appearance import floor_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.collision import build_cell
 from robots.descriptions.cells import CellDescription, CellRobot, Floor

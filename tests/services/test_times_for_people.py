@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from renderer.robot_state import _time
+from renderer.pictures.robot_state import _time
 from services.command_line.live.listing_text import since
 from services.command_line.terminal.local_time import time_text
 

@@ -117,8 +117,8 @@ def _drivers(site: "Site") -> Iterator[Finding]:
 def _open_gl() -> list[Finding]:
     fix = "apt-get install libegl1 libgl1; everything but the renderer runs without it"
     try:
+        from renderer.drawing.opengl import device_name, device_names, open_context
         from renderer.errors import RendererError
-        from renderer.opengl import device_name, device_names, open_context
     except ImportError as error:
         return [Finding("OpenGL", False, f"its packages are missing: {error}", fix)]
     try:

@@ -10,8 +10,8 @@ from typing import BinaryIO
 
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
+from renderer.encoding.mp4 import FragmentedMp4
 from renderer.errors import Mp4Error
-from renderer.mp4 import FragmentedMp4
 from robomesh.errors import MessageError
 from robomesh.publications.subscription import Subscription
 from robomesh.recordings.h264 import is_key_frame

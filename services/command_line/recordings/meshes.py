@@ -1,6 +1,6 @@
 """Meshes of a recording's bodies."""
 
-from renderer.cache import cache_folder, stored_glb
+from renderer.shapes.cache import cache_folder, stored_glb
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.reading import RecordingFile
 from robomesh.schemas import robomesh_pb2 as schema

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from renderer.mp4 import FragmentedMp4
+from renderer.encoding.mp4 import FragmentedMp4
 from robomesh.recordings.h264 import holds_key_frame
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.series.publisher_time import PublisherTimes

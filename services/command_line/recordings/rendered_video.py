@@ -7,16 +7,16 @@ from pathlib import Path
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from renderer.appearance import appearance_of, mesh_name, placements_at
-from renderer.cache import cache_folder
-from renderer.clearance_line import draw_clearance_line
-from renderer.composition import RobotSnapshot, compose
-from renderer.encoder import open_encoder
-from renderer.mp4 import FragmentedMp4
-from renderer.overlay import write_over
-from renderer.requested_views import ViewSpec
-from renderer.robot_state import Ages, RobotState
-from renderer.studio import Studio
+from renderer.drawing.studio import Studio
+from renderer.encoding.encoder import open_encoder
+from renderer.encoding.mp4 import FragmentedMp4
+from renderer.pictures.clearance_line import draw_clearance_line
+from renderer.pictures.composition import RobotSnapshot, compose
+from renderer.pictures.overlay import write_over
+from renderer.pictures.requested_views import ViewSpec
+from renderer.pictures.robot_state import Ages, RobotState
+from renderer.scene.appearance import appearance_of, mesh_name, placements_at
+from renderer.shapes.cache import cache_folder
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.series.publisher_time import PublisherTimes
 from robomesh.schemas import robomesh_pb2 as schema

@@ -15,8 +15,8 @@ import numpy as np
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from renderer.appearance import Appearance, appearance_of, frame_placements, placements_at
-from renderer.views import camera_of
+from renderer.scene.appearance import Appearance, appearance_of, frame_placements, placements_at
+from renderer.scene.views import camera_of
 from robomesh.contract.keys import FREE, parse_key
 from robomesh.extras import missing
 from robomesh.recordings.h264 import is_key_frame

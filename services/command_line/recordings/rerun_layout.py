@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from renderer.cameras import Camera
+from renderer.scene.cameras import Camera
 from services.command_line.recordings.plots import Panel
 
 if TYPE_CHECKING:

@@ -24,14 +24,14 @@ def draw_four_views(description: RobotDescription, out: Path) -> None:
         RobotError: If a mesh cannot be read, or the picture cannot be written.
         RendererError: If OpenGL is missing.
     """
-    from renderer.appearance import appearance_of, home_placements, mesh_name
-    from renderer.cache import cache_folder, prepared_once
-    from renderer.cameras import fitted
-    from renderer.drawing import Drawing
-    from renderer.opengl import open_context
-    from renderer.overlay import Overlay, write_over
-    from renderer.scene_assembly import Placed, scene_of
-    from renderer.views import camera_of
+    from renderer.drawing.drawing import Drawing
+    from renderer.drawing.opengl import open_context
+    from renderer.pictures.overlay import Overlay, write_over
+    from renderer.scene.appearance import appearance_of, home_placements, mesh_name
+    from renderer.scene.assembly import Placed, scene_of
+    from renderer.scene.cameras import fitted
+    from renderer.scene.views import camera_of
+    from renderer.shapes.cache import cache_folder, prepared_once
     from robots.descriptions.glb import link_meshes
     from robots.descriptions.urdf.write import to_urdf
     from services.kinematics.descriptions import describe

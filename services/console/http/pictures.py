@@ -29,8 +29,8 @@ from starlette.responses import Response
 from starlette.routing import Route
 from starlette.types import Scope
 
+from renderer.encoding.mp4 import FragmentedMp4
 from renderer.errors import Mp4Error
-from renderer.mp4 import FragmentedMp4
 from robomesh import reason_codes as codes
 from robomesh.contract import keys
 from robomesh.errors import BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError, RobomeshError
