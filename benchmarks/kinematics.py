@@ -38,8 +38,8 @@ from robots.kinematics.singularity import reach_of
 from robots.schema.poses import inverse
 from services.kinematics.cell_state import CellState
 from services.kinematics.states import FramesMessage, add_proximity, kinematic_state
-from services.site_file.fixtures import Fixture as FixtureSettings
-from services.site_file.fixtures import fixture_shape
+from services.site_file.tables.fixtures import Fixture as FixtureSettings
+from services.site_file.tables.fixtures import fixture_shape
 
 ARMS = {
     "ur5": Task.POSE_6D,

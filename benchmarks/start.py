@@ -34,7 +34,7 @@ import zenoh
 from latency import free_port
 
 from robomesh.contract.endpoints import client_config
-from services.command_line.site.services import SERVICES
+from services.command_line.services.table import SERVICES
 
 SITE = """site = "bench"
 [router]

@@ -8,8 +8,8 @@ import sys
 from dataclasses import replace
 
 from services.command_line.main import main
+from services.command_line.services.table import SERVICES
 from services.command_line.site import up
-from services.command_line.site.services import SERVICES
 
 
 def leave_out(needed: set[str]) -> None:

@@ -20,14 +20,14 @@ from pydantic_core import PydanticUndefined
 
 from robomesh.contract import quotas
 from robots.schema.robot_toml import Pose
-from services.site_file.quotas import Quotas
 from services.site_file.site import Site
+from services.site_file.tables.quotas import Quotas
 
 FILE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "site-file.md"
 
 _HEAD = """# Site file
 
-Generated from the models in `services/site_file/` and `controllers/*/table.py` by
+Generated from the models in `services/site_file/tables/` and `controllers/*/table.py` by
 `tests/make_site_file.py`; do not edit.
 
 `robomesh up site.toml` starts the services of a site file. Without a file it starts the site `demo`. An

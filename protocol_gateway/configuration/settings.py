@@ -89,7 +89,7 @@ class RobotSettings:
 class CellFile(Protocol):
     """The place where the content of cells is kept. Its methods may block.
 
-    `CellFile` in `services/site_file/cell_file.py` describes each.
+    `CellFile` in `services/cells/file.py` describes each.
     """
 
     @property

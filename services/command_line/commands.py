@@ -45,43 +45,47 @@ COMMANDS = {
         "site.bridges", "Serve Foxglove and Lichtblick on a Foxglove WebSocket, ws://127.0.0.1:8765."
     ),
     "ros2": Row("site.bridges", "Publish the robots to ROS 2 nodes with rmw_zenoh."),
-    "list": Row("live.app", "List sites, robots and services, with monitors, control, ages and round trips."),
-    "monitor": Row("live.app", "Watch a robot in the terminal."),
+    "list": Row(
+        "watch.listing", "List sites, robots and services, with monitors, control, ages and round trips."
+    ),
+    "monitor": Row("watch.monitor", "Watch a robot in the terminal."),
     "signals": Row(
-        "live.app",
+        "watch.signals",
         "Print what a robot's controller reports in addition to joints: I/O, currents, program, modes.",
     ),
-    "send": Row("live.app", "Send a command to a robot and wait until it ends; Ctrl-C stops the robot."),
-    "fault": Row("live.app", "Make a simulated controller misbehave: freeze, flood, jump, ..."),
-    "snapshot": Row("live.app", "Save a rendered picture of a robot."),
-    "video": Row("live.app", "Save rendered video of a robot, playable while it is written."),
-    "record": Row("live.app", "Record a robot until Ctrl-C."),
-    "alive": Row("live.app", "Check that a service answers: exit status 0 or 1, for health checks."),
+    "send": Row("control.send", "Send a command to a robot and wait until it ends; Ctrl-C stops the robot."),
+    "fault": Row("control.fault", "Make a simulated controller misbehave: freeze, flood, jump, ..."),
+    "snapshot": Row("watch.snapshot", "Save a rendered picture of a robot."),
+    "video": Row("watch.video", "Save rendered video of a robot, playable while it is written."),
+    "record": Row("record.record", "Record a robot until Ctrl-C."),
+    "alive": Row("watch.alive", "Check that a service answers: exit status 0 or 1, for health checks."),
     "doctor": Row("doctor.app", "Check this machine, and say how to fix what is missing."),
-    "version": Row("version", "Print the version of robomesh; --all: all that a report of a fault needs."),
+    "version": Row(
+        "doctor.version", "Print the version of robomesh; --all: all that a report of a fault needs."
+    ),
     "fk": Row(
-        "robot.kinematics", 'Forward kinematics: {"joints": [..]} a line in, {"tool", "links"} a line out.'
+        "robots.kinematics", 'Forward kinematics: {"joints": [..]} a line in, {"tool", "links"} a line out.'
     ),
     "ik": Row(
-        "robot.kinematics",
+        "robots.kinematics",
         'Inverse kinematics of a pose; JSON: {"pose", "task", "near", "all", "seed"} a line in.',
     ),
-    "robot": Row("robot.commands", "Robot descriptions: check, show, import, export, verify."),
-    "mesh": Row("robot.mesh", "Mesh files: inspect, convert."),
-    "program": Row("teach.program", "Teach programs: check, plan, from CAD."),
+    "robot": Row("robots.commands", "Robot descriptions: check, show, import, export, verify."),
+    "mesh": Row("robots.mesh", "Mesh files: inspect, convert."),
+    "program": Row("program.commands", "Teach programs: check, plan, from CAD."),
     "programs": Row(
-        "teach.programs", "Programs stored at a site: list, show, save, restore, diff, export, import."
+        "program.stored", "Programs stored at a site: list, show, save, restore, diff, export, import."
     ),
-    "probe": Row("site.probe", "Show which protocol a controller's port speaks."),
-    "note": Row("log.note", "Write a note on a robot's time, list its notes, or withdraw one."),
-    "cell": Row("site.cell", "Fixtures and the floor of a robot's cell: show, set, move, undo."),
+    "probe": Row("doctor.probe", "Show which protocol a controller's port speaks."),
+    "note": Row("record.note", "Write a note on a robot's time, list its notes, or withdraw one."),
+    "cell": Row("control.cell", "Fixtures and the floor of a robot's cell: show, set, move, undo."),
     "recordings": Row(
-        "recordings.app", "Recordings: list, inspect, play, export, fetch, rename, note, tag, delete."
+        "record.app", "Recordings: list, inspect, play, export, fetch, rename, note, tag, delete."
     ),
-    "audit": Row("log.audit", "The gateway's audit log."),
-    "alarms": Row("log.alarms", "Alarms: list, acknowledge, shelve."),
-    "keys": Row("site.keys", "A site's certificates: who may take part, in which role."),
-    "accounts": Row("account.accounts", "Accounts that may sign in to a console."),
+    "audit": Row("record.audit", "The gateway's audit log."),
+    "alarms": Row("watch.alarms", "Alarms: list, acknowledge, shelve."),
+    "keys": Row("keys.certificates", "A site's certificates: who may take part, in which role."),
+    "accounts": Row("keys.accounts", "Accounts that may sign in to a console."),
 }
 
 

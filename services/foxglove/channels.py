@@ -14,7 +14,7 @@ from robomesh.wire.session import Session
 from robots.descriptions.urdf.viewers import together
 from services.foxglove.channel_subscriptions import LatchedChannel, TopicChannel
 from services.foxglove.messages import TEXT_SCHEMA, log_of, protobuf_schema, text_message
-from services.viewer_robots import meshes_of, viewer_robot
+from services.viewers.robots import meshes_of, viewer_robot
 
 log = logging.getLogger(__name__)
 

@@ -19,7 +19,7 @@ from robots.kinematics.model import RobotModel
 from robots.schema.errors import RobotError, reason_of
 from services.kinematics.cell_state import CellState
 from services.kinematics.states import forward_answer
-from services.kinematics.worker_messages import CheckQuestion, InverseQuestion, Question, ReplaceCells
+from services.kinematics.worker.messages import CheckQuestion, InverseQuestion, Question, ReplaceCells
 
 _INVERSE_S = 5.0
 _CHECK_S = 30.0

@@ -24,7 +24,7 @@ from services.kinematics.shown_cell import ShownCell, first_content, follow_gate
 
 log = logging.getLogger(__name__)
 
-_WORKER = "services.kinematics.worker"
+_WORKER = "services.kinematics.worker.worker"
 # Live states have priority over requests on a busy machine.
 _NICE = 5
 

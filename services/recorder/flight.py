@@ -25,11 +25,11 @@ from services.recorder.captures import Files, check_name
 from services.recorder.disk import error_text
 from services.recorder.file_writer import STATES, Part
 from services.recorder.finishing import Finisher, Job
+from services.recorder.reading.robot_series import FLIGHT_FOLDER
 from services.recorder.settings import MIB, Flight
 
 log = logging.getLogger(__name__)
 
-FOLDER = ".flight"
 SOURCE = "recorder"
 _S = schema.Event.Severity
 _SEGMENTS = 10
@@ -86,7 +86,7 @@ class FlightRecorder:
         report: Callable[[schema.Event.Severity, str, str], None],
     ) -> None:
         self._files, self._finisher, self._flight = files, finisher, flight
-        self._folder = files.settings.folder / FOLDER / files.robot
+        self._folder = files.settings.folder / FLIGHT_FOLDER / files.robot
         self._target = files.settings.folder / files.robot
         self._loop = asyncio.get_running_loop()
         self._lock = asyncio.Lock()

@@ -30,10 +30,10 @@ from services.recorder.file_writer import Part
 from services.recorder.finishing import Finisher, Job
 from services.recorder.flight import FlightRecorder
 from services.recorder.orphans import left_state, lock_folder
-from services.recorder.serving import RecordingServer
+from services.recorder.reading.serving import RecordingServer
+from services.recorder.reading.uses import Uses
 from services.recorder.settings import Settings
 from services.recorder.subscriptions import Subscriptions
-from services.recorder.uses import Uses
 
 log = logging.getLogger(__name__)
 

@@ -20,7 +20,7 @@ from robots.descriptions.urdf.viewers import WORLD, Viewed, together
 from services.ros2.meshes import Meshes
 from services.ros2.settings import Settings
 from services.ros2.wire import Node, Topic, message
-from services.viewer_robots import viewer_robot
+from services.viewers.robots import viewer_robot
 
 log = logging.getLogger(__name__)
 

@@ -10,7 +10,7 @@ from robomesh.errors import RobomeshError
 from robomesh.files.atomic_write import write_atomically
 from robomesh.schemas.robomesh_pb2 import Description
 from robomesh.wire.session import Session
-from services.viewer_robots import meshes_of
+from services.viewers.robots import meshes_of
 
 log = logging.getLogger(__name__)
 

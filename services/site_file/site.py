@@ -33,13 +33,13 @@ from robots.schema.bounded_toml import read_toml
 from robots.schema.errors import DescriptionError, VerificationRecordError
 from robots.schema.robot_toml import Pose, UrdfDescription
 from services.errors import SiteFileError
-from services.site_file.console import Console
-from services.site_file.console import resolve_paths as resolve_console_paths
-from services.site_file.fixtures import Fixture, fixture_problem, name_problem
-from services.site_file.quotas import Quotas
-from services.site_file.renderer_and_recorder import ALWAYS_RENDERED, Recorder, Renderer
-from services.site_file.robot import Robot
-from services.site_file.router import RoutedSite, resolve_paths
+from services.site_file.tables.console import Console
+from services.site_file.tables.console import resolve_paths as resolve_console_paths
+from services.site_file.tables.fixtures import Fixture, fixture_problem, name_problem
+from services.site_file.tables.quotas import Quotas
+from services.site_file.tables.renderer_and_recorder import ALWAYS_RENDERED, Recorder, Renderer
+from services.site_file.tables.robot import Robot
+from services.site_file.tables.router import RoutedSite, resolve_paths
 from services.site_file.validation_errors import sentence
 
 # Maximum number of problems that an error lists.

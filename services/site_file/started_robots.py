@@ -13,8 +13,8 @@ from robomesh.files.atomic_write import write_atomically
 from robots.descriptions.description import DESCRIPTION_FILE, library_names
 from robots.schema.bounded_toml import read_toml
 from services.errors import SiteFileError
-from services.site_file.robot import Robot
 from services.site_file.site import Site
+from services.site_file.tables.robot import Robot
 
 STARTED_FILE = "started.toml"
 

@@ -24,7 +24,7 @@ from robots.descriptions.description import load
 from robots.descriptions.glb import link_mesh
 from robots.kinematics.kinematic_tree import tree_of
 from robots.kinematics.model import build_model, link_placements
-from services.viewer_layout import viewer_layout
+from services.viewers.layout import viewer_layout
 from tests.browser.conftest import ARGUMENTS, CHROMIUM, LAUNCH_MS
 from tests.compatibility.earlier import unpack
 from tests.conftest import free_port

@@ -12,8 +12,8 @@ from playwright.sync_api import expect
 
 from robots.descriptions.cells import Fixture
 from robots.schema.robot_toml import Pose
-from services.site_file.fixtures import Fixture as FixtureRow
-from services.site_file.fixtures import fixture_shape, fixture_to_site
+from services.site_file.tables.fixtures import Fixture as FixtureRow
+from services.site_file.tables.fixtures import fixture_shape, fixture_to_site
 from tests.browser.crowd import crowd
 from tests.browser.rendering import rendering
 from tests.browser.robot_page import (

@@ -18,7 +18,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robots.descriptions.cells import CellDescription, CellRobot, Fixture
 from robots.schema.poses import pose_matrix
 from robots.schema.robot_toml import Pose, Units
-from services.site_file import fixtures
+from services.site_file.tables import fixtures
 from services.watch.rules import RULES
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, kept_control, refusal, simulator, until

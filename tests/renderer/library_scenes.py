@@ -14,9 +14,9 @@ from robots.descriptions.cells import CellDescription, CellRobot
 from robots.descriptions.description import load
 from robots.descriptions.glb import link_meshes
 from robots.descriptions.urdf.write import to_urdf
+from services.cells.descriptions import cells_of
 from services.kinematics.descriptions import add_surroundings, describe, fixture_meshes
 from services.site_file import site as site_file
-from services.site_file.cells import cells_of
 
 
 @cache

@@ -22,8 +22,8 @@ from robomesh.errors import NoAnswerError
 from robomesh.schemas.robomesh_pb2 import ControllerState, Event, KeyFrameRequest, VideoFrames
 from robomesh.wire.session import open_session
 from robots.descriptions.cells import Fixture
-from services.site_file.fixtures import Fixture as FixtureRow
-from services.site_file.fixtures import fixture_shape
+from services.site_file.tables.fixtures import Fixture as FixtureRow
+from services.site_file.tables.fixtures import fixture_shape
 from tests.cells import single_arm
 from tests.conftest import last_value, run
 from tests.refusals import refused

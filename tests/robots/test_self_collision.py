@@ -23,8 +23,8 @@ from robots.descriptions.importing import import_robot
 from robots.descriptions.save_description import write_folder
 from robots.shapes.solids import ball
 from services.command_line.main import run
-from services.kinematics.worker import begin
-from services.kinematics.worker_messages import CheckQuestion
+from services.kinematics.worker.messages import CheckQuestion
+from services.kinematics.worker.worker import begin
 
 REAL = Path(__file__).parents[3] / "shared" / "testdata" / "urdf" / "abb_irb2400_support"
 # Studies run in separate processes.

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
-from services.command_line.site.services import SERVICES, Options
+from services.cells.content import version_of
+from services.cells.file import CellFile
+from services.command_line.services.table import SERVICES, Options
 from services.kinematics import serve as serve_kinematics
-from services.site_file.cell_content import version_of
-from services.site_file.cell_file import CellFile
 from services.site_file.site import load
 from tests.conftest import last_value
 from tests.protocol_gateway.gateway_site import simulator, until

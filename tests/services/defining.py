@@ -14,8 +14,8 @@ from typing import Any
 from robomesh.wire.session import SessionSettings, open_session
 from services.console.app import Settings, serve
 from services.console.define.settings import DefineSettings
-from services.site_file.robot import Robot
 from services.site_file.site import Define, Site
+from services.site_file.tables.robot import Robot
 from tests.services.http_refusals import read_refusal
 
 

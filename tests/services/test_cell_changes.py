@@ -20,8 +20,8 @@ from robomesh import reason_codes as codes
 from robomesh.errors import RobomeshError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
+from services.cells.file import CellFile
 from services.kinematics.shown_cell import ShownCell
-from services.site_file.cell_file import CellFile
 from tests.conftest import free_port, last_value, run
 from tests.protocol_gateway.gateway_site import A, C, GatewaySite, kept_control, until
 from tests.refusals import refused
@@ -238,11 +238,11 @@ sys.argv[0] = "robomesh"
 main()
 """
 BEFORE_SAVE = """
-from services.site_file.cell_file import CellFile
+from services.cells.file import CellFile
 CellFile.save = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
 """
 AFTER_SAVE = """
-from services.site_file.cell_file import CellFile
+from services.cells.file import CellFile
 save = CellFile.save
 CellFile.save = lambda *given: (save(*given), os.kill(os.getpid(), signal.SIGKILL))
 """

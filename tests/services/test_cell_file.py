@@ -11,8 +11,8 @@ from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.files.atomic_write import write_atomically
 from robomesh.schemas import robomesh_pb2 as schema
-from services.site_file.cell_content import MOST_FIXTURES, changes, summary, version_of
-from services.site_file.cell_file import CellFile
+from services.cells.content import MOST_FIXTURES, changes, summary, version_of
+from services.cells.file import CellFile
 from services.site_file.site import load
 from tests.refusals import refused
 
@@ -206,7 +206,7 @@ def test_a_full_disk_leaves_the_file(tmp_path, monkeypatch, written):
         written -= 1
         write_atomically(target, data, **options)
 
-    monkeypatch.setattr("services.site_file.cell_file.write_atomically", full)
+    monkeypatch.setattr("services.cells.file.write_atomically", full)
     with refused(codes.CELL_DISK):
         save(file, content)
     assert path.read_text() == EXAMPLE

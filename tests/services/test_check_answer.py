@@ -5,7 +5,7 @@ import numpy as np
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.collision import Cell, build_cell
 from robots.descriptions.cells import CellDescription, CellRobot
-from services.kinematics.check import check_answer
+from services.kinematics.worker.check import check_answer
 from tests.robots.boxes import block, placed
 
 ARM = CellRobot(name="arm", model="pt600", base_to_site=np.eye(4))

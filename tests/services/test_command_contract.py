@@ -15,10 +15,10 @@ import pytest
 from services.command_line import main
 from services.command_line.commands import COMMANDS, load
 from services.command_line.main import run
-from services.command_line.site.services import SERVICES
-from services.site_file.console import Console
-from services.site_file.router import Router
+from services.command_line.services.table import SERVICES
 from services.site_file.site import Site
+from services.site_file.tables.console import Console
+from services.site_file.tables.router import Router
 from tests.conftest import SHARED, free_port
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -9,8 +9,8 @@ import pytest
 from typer import Context
 
 from services.command_line.commands import COMMANDS, root
-from services.site_file.console import Console
 from services.site_file.site import Site
+from services.site_file.tables.console import Console
 
 ROBOMESH = (sys.executable, "-m", "services.command_line.main")
 

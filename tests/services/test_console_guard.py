@@ -9,7 +9,7 @@ from services.console.accounts.rights import parse_request
 from services.console.common.errors import WatchError
 from services.console.common.guard import Guard, refused_host, refused_origin
 from services.console.websocket.shared_subscriptions import check_expression
-from services.site_file.console import Console
+from services.site_file.tables.console import Console
 from tests.conftest import run
 
 

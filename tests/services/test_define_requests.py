@@ -17,8 +17,8 @@ from robomesh.contract.endpoints import router_config
 from robomesh.wire.session import SessionSettings
 from robots.descriptions.description import LIBRARY, load
 from robots.descriptions.save_description import read_robot, write_folder
+from services.command_line.services.table import Options
 from services.command_line.site import launch
-from services.command_line.site.services import Options
 from services.console.common.errors import RefusedRequest
 from services.console.define import routes, store
 from services.console.define.routes import Define

@@ -12,7 +12,7 @@ from controllers.unit.simulated.service import Settings, serve
 from controllers.universal_robots.simulated.server import UR_FAULTS
 from controllers.universal_robots.simulated.service import UrSettings, serve_rtde
 from robomesh.schemas import robomesh_pb2 as schema
-from services.command_line.live.monitor import link_words
+from services.command_line.watch.monitor import link_words
 from tests.conftest import run
 from tests.site import robomesh
 

@@ -14,7 +14,7 @@ from robots.descriptions.description import load
 from robots.kinematics.inverse import build_solver
 from robots.kinematics.model import build_model, tool_placement
 from services.command_line.main import run
-from services.kinematics.inverse import inverse_answer
+from services.kinematics.worker.inverse import inverse_answer
 from tests.refusals import refused
 
 MODEL = build_model(load("pt600"))

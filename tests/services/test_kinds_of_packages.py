@@ -11,9 +11,8 @@ from controllers import probing
 from protocol_gateway.configuration.kinds import kind_with, part_of
 from protocol_gateway.seam.errors import GatewaySettingsError
 from protocol_gateway.seam.simulated import Simulated
-from services.command_line.doctor import machine
+from services.command_line.doctor import machine, probe
 from services.command_line.main import run
-from services.command_line.site import probe
 from services.command_line.site.up import programs
 from services.errors import SiteFileError
 from services.site_file.site import load
@@ -255,7 +254,7 @@ def test_a_site_starts_the_simulated_controller_of_a_package(lines, tmp_path):
     assert "--protocol lines --table {" in words
     assert '"rate_hz":7.0' in words
     assert gateway.arguments[-1].endswith(",second=7")
-    assert site.robot[0].simulated_options(()) == {"joints": 0}
+    assert site.robot[0].driver_options == {"joints": 5}
     assert site.robot[0].kind.key == "driver"
 
 

@@ -18,8 +18,8 @@ from robots.kinematics.model import tool_placement
 from services import kinematics
 from services.kinematics import answers
 from services.kinematics.cell_state import CellState
-from services.site_file.fixtures import Fixture as FixtureRow
-from services.site_file.fixtures import fixture_shape
+from services.site_file.tables.fixtures import Fixture as FixtureRow
+from services.site_file.tables.fixtures import fixture_shape
 from tests.conftest import last_value, run
 from tests.refusals import refused
 from tests.site import alive

@@ -4,8 +4,8 @@ import pytest
 
 from robomesh.contract.endpoints import DEFAULT_ROUTER
 from services.command_line.site.launch import session_settings
-from services.site_file.router import Router
 from services.site_file.site import Site
+from services.site_file.tables.router import Router
 
 
 @pytest.mark.parametrize(

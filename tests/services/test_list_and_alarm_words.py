@@ -9,10 +9,9 @@ from robomesh.client.mesh import RobotNotFoundError
 from robomesh.contract.keys import PresenceKey
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
-from services.command_line.live import listing, listing_text
-from services.command_line.log import alarms
 from services.command_line.terminal import discovery
 from services.command_line.terminal.alarm_lists import gone_sites, lists
+from services.command_line.watch import alarms, listing, listing_text
 from tests.conftest import run
 
 Alarm = schema.Alarm
@@ -76,8 +75,8 @@ def test_a_robots_row_has_what_its_driver_can_do(mesh):
 
 
 def test_a_gateway_that_answers_late_is_not_called_missing(mesh, monkeypatch):
-    monkeypatch.setattr("services.command_line.live.listing._LATE_S", 4.0)
-    monkeypatch.setattr("services.command_line.live.listing._ANSWER_S", 0.2)
+    monkeypatch.setattr("services.command_line.watch.listing._LATE_S", 4.0)
+    monkeypatch.setattr("services.command_line.watch.listing._ANSWER_S", 0.2)
 
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:

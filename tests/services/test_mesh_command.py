@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from services.command_line.robot import mesh
+from services.command_line.robots import mesh
 
 BOX = "#VRML V2.0 utf8\nShape { geometry Box { } }\n"
 

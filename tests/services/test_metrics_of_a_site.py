@@ -7,18 +7,18 @@ import pytest
 
 from robomesh.errors import ListenError
 from services.command_line.main import run
-from services.command_line.site.metrics_ports import (
+from services.command_line.services.metrics_ports import (
     extra_with_metrics,
     first_address,
     own_address,
     scrape_config,
     with_metrics,
 )
-from services.command_line.site.services import SERVICES
+from services.command_line.services.table import SERVICES
 from services.command_line.site.up import programs
 from services.errors import SiteFileError
 from services.site_file import site as site_file
-from services.site_file.router import Metrics
+from services.site_file.tables.router import Metrics
 from services.supervisor import Program
 from tests.site import robomesh
 

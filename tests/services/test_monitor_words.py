@@ -14,8 +14,8 @@ from robomesh.schemas.robomesh_pb2 import (
     ProgramState,
 )
 from robomesh.wire.session import open_session
-from services.command_line.live import monitor
-from services.command_line.live.monitor_text import (
+from services.command_line.watch import monitor
+from services.command_line.watch.monitor_text import (
     check_words,
     clearance_record,
     near_words,

@@ -26,7 +26,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.service.health import Served, present
 from robomesh.wire.session import SessionSettings, open_session
 from services import foxglove, kinematics, player, recorder, ros2, watch
-from services.command_line.live.listing import _Clocks, _collect
+from services.command_line.watch.listing import _Clocks, _collect
 from services.console import app
 from services.pki import Folder, authority
 from services.recorder.settings import Settings as RecorderSettings

@@ -16,7 +16,7 @@ from robomesh.errors import NoAnswerError, RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
 from services import player, recorder
-from services.command_line.live import listing, monitor
+from services.command_line.watch import listing, monitor
 from tests.conftest import last_value, run
 from tests.recordings import START_NS, Written, joints, write_recording
 from tests.refusals import refused

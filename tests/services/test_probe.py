@@ -11,8 +11,8 @@ import pytest
 
 from controllers import probing
 from controllers.probing import ProbeError
-from services.command_line.site import probe
-from services.command_line.site.probe import examine, probes
+from services.command_line.doctor import probe
+from services.command_line.doctor.probe import examine, probes
 from tests.conftest import free_port, run
 from tests.controllers.fanuc.ftp_site import controller as fanuc_by_ftp
 from tests.controllers.fanuc.test_snpx_driver import controller as fanuc

@@ -14,8 +14,8 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from robomesh.contract.topics import Role
-from services.command_line.site.metrics_ports import ports, scrape_config
-from services.command_line.site.services import SERVICES
+from services.command_line.services.metrics_ports import ports, scrape_config
+from services.command_line.services.table import SERVICES
 from services.pki import Folder, authority
 from services.site_file import site as site_file
 from tests.conftest import free_port

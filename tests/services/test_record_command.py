@@ -11,8 +11,8 @@ import zenoh
 from robomesh.contract.endpoints import router_config
 from robomesh.errors import RefusedError
 from robomesh.wire.session import SessionSettings
-from services.command_line.live.send import joined
-from services.command_line.recordings.record import _interrupted, _record, _stop
+from services.command_line.control.send import joined
+from services.command_line.record.record import _interrupted, _record, _stop
 from services.command_line.terminal.discovery import Robot
 from tests.conftest import free_port, run
 from tests.services.recording import put_states, recording_site, trace_off
@@ -90,8 +90,8 @@ def test_a_recording_ended_by_another_client_is_reported(mesh, router, tmp_path,
 def test_a_recording_whose_site_has_gone_ends_after_a_while_and_says_where_to_look(
     tmp_path, capsys, monkeypatch
 ):
-    monkeypatch.setattr("services.command_line.recordings.record._SILENCE_S", 0.5)
-    monkeypatch.setattr("services.command_line.recordings.record._SITE_GONE_S", 2.0)
+    monkeypatch.setattr("services.command_line.record.record._SILENCE_S", 0.5)
+    monkeypatch.setattr("services.command_line.record.record._SITE_GONE_S", 2.0)
     endpoint = f"tcp/127.0.0.1:{free_port()}"
 
     async def main():

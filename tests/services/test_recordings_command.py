@@ -18,9 +18,9 @@ from robomesh.recordings.writing.capture import Capture
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
 from services.command_line.main import run
-from services.command_line.recordings import plots
-from services.command_line.recordings.output import atomic_file
-from services.recorder.serving import RecordingServer
+from services.command_line.record.export import plots
+from services.command_line.record.export.output import atomic_file
+from services.recorder.reading.serving import RecordingServer
 from tests.conftest import run as run_async
 from tests.recordings import START_NS, Written, joints, write_recording, write_swinging_arm
 

@@ -28,8 +28,8 @@ from robomesh.recordings.files import describe_file
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
 from services.console.http.recordings import Recordings
-from services.recorder.answers import Answers
-from services.recorder.serving import RecordingServer
+from services.recorder.reading.answers import Answers
+from services.recorder.reading.serving import RecordingServer
 from tests.conftest import run
 from tests.recordings import START_NS, Written, joints, merge, write_capture, write_recording
 from tests.refusals import refused

@@ -8,7 +8,7 @@ from mcap.reader import make_reader
 
 from robomesh.recordings.errors import RecordingError
 from robomesh.schemas import robomesh_pb2 as schema
-from services.recorder.answers import Answers
+from services.recorder.reading.answers import Answers
 from tests.recordings import START_NS, Written, joints
 
 S_NS = 1_000_000_000
@@ -88,7 +88,7 @@ def test_a_closer_view_of_a_long_recording_has_all_its_points(tmp_path):
 def test_a_second_request_reads_only_files_that_have_changed(folder, monkeypatch):
     answers = Answers(folder)
     first = ask(folder, WAIST, start_s=0, end_s=200, answers=answers)
-    monkeypatch.setattr("services.recorder.robot_series.cut", lambda *_: pytest.fail("read again"))
+    monkeypatch.setattr("services.recorder.reading.robot_series.cut", lambda *_: pytest.fail("read again"))
     assert ask(folder, WAIST, start_s=0, end_s=200, answers=answers) == first
 
 

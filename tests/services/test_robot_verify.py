@@ -15,7 +15,7 @@ from robots.kinematics.model import build_model, tool_placement
 from robots.kinematics.verification_record import VerificationRecord, read_record
 from robots.schema.errors import VerificationRecordError
 from robots.schema.poses import rotation_vector
-from services.command_line.robot import verify
+from services.command_line.robots import verify
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import until
 

@@ -13,7 +13,7 @@ from robomesh.errors import MessageError, RefusedError
 from robomesh.requests.requests import ask_all
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
-from services.command_line.live import send
+from services.command_line.control import send
 from services.command_line.terminal import discovery
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import A, until
@@ -215,7 +215,7 @@ def test_the_advice_of_a_refusal_is_a_command():
 )
 def test_a_recovery_needs_a_name_a_reason_and_a_look(words, options, text):
     with pytest.raises(send.WordsError, match=text):
-        send.run("hall/arm", words, "", "li", False, **options)
+        send.send("hall/arm", words, operator="li", **options)
 
 
 def test_a_recovery_is_sent_with_its_reason(mesh):

@@ -17,7 +17,7 @@ from robomesh.service.metrics import SessionMetrics
 from robomesh.wire.session import open_session
 from services import recorder
 from services.command_line.main import run as robomesh_run
-from services.recorder.answers import Answers
+from services.recorder.reading.answers import Answers
 from services.recorder.settings import Settings
 from tests.conftest import run
 from tests.controllers.universal_robots.test_rtde_driver import UR, controller

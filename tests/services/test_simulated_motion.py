@@ -17,7 +17,7 @@ from robots.descriptions.example_robots import example_folder
 from robots.kinematics.joints import joints_of, violations
 from robots.kinematics.model import build_model, tool_placement
 from robots.kinematics.motion import Motion
-from services.site_file.cells import cells_of
+from services.cells.descriptions import cells_of
 from services.site_file.site import DEMO
 
 PT600 = load("pt600")

@@ -11,11 +11,11 @@ from robots.descriptions import description
 from robots.descriptions.cells import CellDescription, Floor
 from robots.descriptions.glb import link_mesh
 from robots.shapes.mesh import bounds
+from services.cells.descriptions import cells_of
 from services.errors import SiteFileError
 from services.site_file import site
-from services.site_file.cells import cells_of
-from services.site_file.fixtures import Fixture, fixture_shape
 from services.site_file.started_robots import read_started
+from services.site_file.tables.fixtures import Fixture, fixture_shape
 from tests.robots.boxes import bar_arm
 
 ROBOT = '[[robot]]\nname = "arm"\nmodel = "pt600"\n'

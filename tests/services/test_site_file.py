@@ -9,11 +9,11 @@ from robomesh.errors import ListenError
 from robomesh.listen_address import check_reach, split_address
 from robots.descriptions import description
 from robots.kinematics.joints import joints_of
+from services.cells.descriptions import cells_of
 from services.errors import SiteFileError
 from services.site_file import site
-from services.site_file.cells import cells_of
-from services.site_file.router import OTHER_PARTS, RoutedSite, read_routed
 from services.site_file.started_robots import read_started, robot_to_start, write_started
+from services.site_file.tables.router import OTHER_PARTS, RoutedSite, read_routed
 from services.site_file.validation_errors import problem_text
 from tests.robots.boxes import one_joint_arm
 

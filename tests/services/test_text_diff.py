@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from services.command_line.teach.text_diff import unified_diff
+from services.command_line.program.text_diff import unified_diff
 
 WORDS = ("home", "wait 1", "move_joints a", "move_line b", "end", "repeat 2", "")
 

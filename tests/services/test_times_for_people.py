@@ -5,8 +5,8 @@ import time
 import pytest
 
 from renderer.pictures.robot_state import _time
-from services.command_line.live.listing_text import since
 from services.command_line.terminal.local_time import time_text
+from services.command_line.watch.listing_text import since
 
 AT_S = 1_795_912_378.083
 

@@ -15,8 +15,8 @@ from robomesh.listen_address import own_addresses
 from robomesh.wire.session import SessionSettings, open_session
 from services.command_line.site import up
 from services.router.router import Settings, check_ports_free, serve
-from services.site_file.console import Console
 from services.site_file.site import Site
+from services.site_file.tables.console import Console
 from services.used_ports import check_free
 from tests.conftest import free_port, run
 

@@ -1,1 +1,1 @@
-"""`robomesh doctor`: checks of this machine, and with `--security` of every role's rights."""
+"""Commands that check: this machine, every role's rights, a controller's port, the versions."""

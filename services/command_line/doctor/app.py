@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from services.command_line.site.keys import KeysFolder, keys_folder
+from services.command_line.keys.certificates import KeysFolder, keys_folder
 from services.command_line.terminal.options import Json, SiteFile, command_group
 
 app = command_group()

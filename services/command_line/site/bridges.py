@@ -79,7 +79,7 @@ def _write_layout(path: Path, robots: list[str], router: str) -> None:
 
     from robomesh.client.robot.robot import AsyncRobot
     from services.command_line.terminal import discovery
-    from services.viewer_layout import viewer_layout
+    from services.viewers.layout import viewer_layout
 
     if len(robots) != 1:
         raise typer.BadParameter("a layout shows one robot: add --robot ROBOT", param_hint="--layout")

@@ -20,17 +20,17 @@ from robomesh.listen_address import own_addresses, split_address
 from robomesh.service import service
 from robomesh.wire.session import SessionSettings, open_session
 from services.command_line import main
-from services.command_line.site.metrics_ports import extra_with_metrics, first_address, with_metrics
-from services.command_line.site.services import SERVICES
+from services.command_line.services.metrics_ports import extra_with_metrics, first_address, with_metrics
+from services.command_line.services.table import SERVICES
 from services.command_line.terminal.output import print_line
 from services.errors import SiteFileError
 from services.pki import Folder
 from services.pki.errors import KeysError
 from services.router.router import check_ports_free
 from services.site_file import site as site_file
-from services.site_file.robot import Robot
 from services.site_file.site import Site
 from services.site_file.started_robots import may_start, read_started
+from services.site_file.tables.robot import Robot
 from services.supervisor import ENDS_WITHIN_S, Program, fork, supervise
 from services.used_ports import check_free, is_used_by_child
 

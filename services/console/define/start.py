@@ -3,9 +3,9 @@
 from robomesh import reason_codes as codes
 from services.console.common.errors import RefusedRequest
 from services.errors import SiteFileError
-from services.site_file.robot import Robot
 from services.site_file.site import Site
 from services.site_file.started_robots import read_started, robot_to_start, write_started
+from services.site_file.tables.robot import Robot
 
 
 def started_names(site: Site) -> tuple[str, ...]:

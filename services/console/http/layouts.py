@@ -9,7 +9,7 @@ from robomesh.client.robot.robot import AsyncRobot
 from robomesh.errors import RobomeshError
 from robomesh.wire.session import Session
 from services.console.common.error_responses import as_text, refused_on_the_mesh
-from services.viewer_layout import viewer_layout
+from services.viewers.layout import viewer_layout
 
 
 async def layout_response(request: Request, session: Session) -> Response:

@@ -12,8 +12,8 @@ from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.series.downsampling import SeriesReader
 from robomesh.recordings.series.publisher_time import PublisherTimes
 from robomesh.schemas import robomesh_pb2 as schema
-from services.command_line.recordings.export import Wanted
-from services.command_line.recordings.export import run as export
+from services.command_line.record.export.export import Wanted
+from services.command_line.record.export.export import run as export
 from services.player.recording_source import RecordingSource
 from tests.recordings import START_NS, joints
 

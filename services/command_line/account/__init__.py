@@ -1,1 +1,0 @@
-"""Commands for the console's accounts: people, passwords, tokens of views."""

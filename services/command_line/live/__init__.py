@@ -1,1 +1,0 @@
-"""The commands that attach to a running mesh: list, monitor, send, fault, snapshot, video, alive."""

@@ -1,1 +1,0 @@
-"""Commands for what happened: alarms, audit entries, notes."""

@@ -1,0 +1,1 @@
+"""Commands for what is kept: recordings, audit entries, notes."""

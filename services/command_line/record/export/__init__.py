@@ -1,0 +1,1 @@
+"""A recording as a table, plots, video or a file for Rerun."""

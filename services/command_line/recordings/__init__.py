@@ -1,1 +1,0 @@
-"""`robomesh record` and `robomesh recordings`: record, list, play, export and fetch."""

@@ -1,1 +1,0 @@
-"""`robomesh robot`, `fk` and `ik`: descriptions and kinematics, without a running mesh."""

@@ -1,0 +1,1 @@
+"""`robomesh robot`, `mesh`, `fk` and `ik`: descriptions and kinematics, without a running mesh."""

@@ -1,7 +1,0 @@
-"""Worker process that reads recordings for `serving`: `python -m services.recorder.reader`."""
-
-from robomesh.files.worker import answer_all
-from services.recorder.answers import Answers
-
-if __name__ == "__main__":
-    answer_all(lambda folder: Answers(folder).answer)
