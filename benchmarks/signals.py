@@ -18,10 +18,10 @@ from typing import Any
 from google.protobuf.message import Message
 
 from controllers.simulated.demo import demo_tour
-from controllers.universal_robots import rtde_messages as rtde
 from controllers.universal_robots.driver import RTDE, RtdeDriver
+from controllers.universal_robots.interfaces import rtde_messages as rtde
+from controllers.universal_robots.interfaces.state import OUTPUTS
 from controllers.universal_robots.simulated.controller import UrController
-from controllers.universal_robots.state import OUTPUTS
 from protocol_gateway.link.timestamping import EventTime, Timestamper
 from protocol_gateway.seam import Report, SignalsReceived
 from protocol_gateway.telemetry.journal import Journal

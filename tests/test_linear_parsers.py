@@ -20,10 +20,13 @@ from typing import Any, Protocol
 import pytest
 
 from controllers.fanuc import data as fanuc_data
-from controllers.fanuc import files, ftp, rmi, srtp
+from controllers.fanuc import srtp
+from controllers.fanuc.ftp import files
+from controllers.fanuc.ftp import protocol as ftp
+from controllers.fanuc.rmi import messages as rmi
 from controllers.opcua import facts
 from controllers.opcua.driver import OPCUA, OpcUaDriver
-from controllers.universal_robots import dashboard, packages, primary, rtde_messages
+from controllers.universal_robots.interfaces import dashboard, packages, primary, rtde_messages
 from controllers.yaskawa import hses
 from protocol_gateway.authority.entry import chain_link, parse_line
 from protocol_gateway.core.grammar import type_code

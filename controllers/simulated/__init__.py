@@ -1,1 +1,4 @@
-"""What simulated controllers share: faults, their schedule and requests, and the demo."""
+"""What simulated controllers share: faults, their schedule and requests, and the demo.
+
+The protocol of a simulated controller belongs to its kind.
+"""

@@ -1,4 +1,4 @@
-"""Protocols of Universal Robots' controllers: RTDE and the primary interface, read only, without I/O."""
+"""Kind of Universal Robots controllers: drivers that read and move, signals, settings; without I/O."""
 
 from protocol_gateway.seam.kind import Kind
 

@@ -7,15 +7,15 @@ a seat of another client.
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from types import MappingProxyType
 
-from controllers.universal_robots.modes import (
+from controllers.universal_robots.interfaces.modes import (
     ReportLevel,
     RobotMode,
     RuntimeState,
     SafetyMode,
     TextLevel,
 )
-from controllers.universal_robots.packages import Malformed
-from controllers.universal_robots.primary import (
+from controllers.universal_robots.interfaces.packages import Malformed
+from controllers.universal_robots.interfaces.primary import (
     Alarm,
     KeyMessage,
     Popup,
@@ -23,11 +23,11 @@ from controllers.universal_robots.primary import (
     PrimaryStream,
     RuntimeFault,
 )
-from controllers.universal_robots.rtde_messages import TextReceived
-from controllers.universal_robots.rtde_reader import Failed, Ready, RtdeReader
+from controllers.universal_robots.interfaces.rtde_messages import TextReceived
+from controllers.universal_robots.interfaces.rtde_reader import Failed, Ready, RtdeReader
+from controllers.universal_robots.interfaces.state import OUTPUTS, ControllerState
 from controllers.universal_robots.settings import UniversalRobotsSettings
 from controllers.universal_robots.signals import SignalReports
-from controllers.universal_robots.state import OUTPUTS, ControllerState
 from protocol_gateway.driver_parts.only_reads import OnlyReads, check_no_type_codes
 from protocol_gateway.seam import (
     NOTHING,

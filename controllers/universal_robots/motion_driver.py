@@ -29,7 +29,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from controllers.universal_robots import codes as ur_codes
-from controllers.universal_robots.dashboard import RECOVERIES, Dashboard
 from controllers.universal_robots.driver import (
     JOINTS,
     OUTPUT_FIELDS,
@@ -37,18 +36,19 @@ from controllers.universal_robots.driver import (
     RtdeDriver,
     status_of,
 )
-from controllers.universal_robots.inputs import InputsWriter
-from controllers.universal_robots.modes import (
+from controllers.universal_robots.interfaces.dashboard import RECOVERIES, Dashboard
+from controllers.universal_robots.interfaces.inputs import InputsWriter
+from controllers.universal_robots.interfaces.modes import (
     RobotMode,
     RuntimeState,
     SafetyMode,
     name_of,
 )
+from controllers.universal_robots.interfaces.rtde_messages import ControllerVersion
+from controllers.universal_robots.interfaces.rtde_reader import RtdeReader
+from controllers.universal_robots.interfaces.state import ControllerState
 from controllers.universal_robots.motion_script import Progress, Registers, motion_script
-from controllers.universal_robots.rtde_messages import ControllerVersion
-from controllers.universal_robots.rtde_reader import RtdeReader
 from controllers.universal_robots.settings import UniversalRobotsSettings
-from controllers.universal_robots.state import ControllerState
 from protocol_gateway.driver_parts.one_motion import FIRST_PERCENT, OneMotion, Phase, prepared
 from protocol_gateway.driver_parts.rest import Rest
 from protocol_gateway.seam import (

@@ -1,12 +1,16 @@
-"""The program that makes one motion: built from numbers only, it never contains a text from outside.
+"""URScript program that makes one motion. The gateway builds it from numbers only, never from texts.
 
-    it moves only while    the input register `go` holds the motion's number, which the gateway writes;
-                           the input register `beat` is written at least WATCHDOG_HZ times a second
-    it waits               at most PERMISSION_S for that number, which comes by another connection
-    it reports             its number, how far it is, and the beat that it has read last
+The gateway sends the program to the controller, and permits its motion by another connection, in registers:
 
-So a program that arrives late does nothing once the gateway has given the motion up, and the arm stops when
-the gateway is gone. It ends with the motion: nothing of robomesh stays in the controller.
+    register   written by   content
+    --------   ----------   --------------------------------------------------------------------------
+    go         gateway      number of the permitted motion: a program with another number moves nothing
+    beat       gateway      a new number at least WATCHDOG_HZ times a second; without it the arm stops
+    outputs    program      its number, its `Progress`, and the newest beat that it has read
+
+The program waits at most PERMISSION_S for its permission. So a program that arrives after the gateway has
+given up its motion moves nothing, and the arm stops if the gateway ends. After the motion nothing of the
+program remains in the controller.
 """
 
 import math

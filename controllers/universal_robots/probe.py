@@ -1,8 +1,8 @@
 """How `robomesh probe` knows a controller of Universal Robots."""
 
 from controllers.probing import MOST_BYTES, Asked, Found, Probe, nothing_known
-from controllers.universal_robots.packages import Package
-from controllers.universal_robots.rtde_messages import (
+from controllers.universal_robots.interfaces.packages import Package
+from controllers.universal_robots.interfaces.rtde_messages import (
     ProtocolVersionAnswered,
     RtdeStream,
     request_protocol_version,

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from enum import IntEnum
 
-from controllers.universal_robots.modes import (
+from controllers.universal_robots.interfaces.modes import (
     JointMode,
     RobotMode,
     RobotStatus,
@@ -12,7 +12,7 @@ from controllers.universal_robots.modes import (
     SafetyStatus,
     name_of,
 )
-from controllers.universal_robots.state import ControllerState
+from controllers.universal_robots.interfaces.state import ControllerState
 from protocol_gateway.driver_parts.signal_names import numbered, of_axes, of_joints, of_placement
 from protocol_gateway.seam import Signal, SignalsReceived, SignalValue
 

@@ -1,1 +1,4 @@
-"""Handling of requests to move or control one robot: evaluated, audited, executed, answered."""
+"""Requests to move or control one robot: received, evaluated by `authority`, audited, executed, answered.
+
+Requests of old client programs come from `legacy`.
+"""

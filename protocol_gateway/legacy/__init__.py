@@ -1,1 +1,1 @@
-"""Support of old client programs, which connect to the gateway as if it were the controller."""
+"""Server for old client programs, which connect to the gateway as if it were the controller."""

@@ -1,1 +1,4 @@
-"""Link to one controller: its connection, its health, and the time stamps of its data."""
+"""Link to one controller: performs a driver's effects, and stamps, checks and counts what it reports.
+
+What bytes mean belongs to the driver.
+"""

@@ -1,1 +1,4 @@
-"""TCP clients of a server of units (a simulated controller or the gateway), and their limits."""
+"""TCP clients of a server of units, and their limits.
+
+Used by `legacy` and by the simulated controller of the unit protocol.
+"""

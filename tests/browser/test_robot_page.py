@@ -8,7 +8,7 @@ import time
 import pytest
 from playwright.sync_api import expect
 
-from controllers.universal_robots.modes import RobotMode
+from controllers.universal_robots.interfaces.modes import RobotMode
 from controllers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
 from protocol_gateway import gateway
 from protocol_gateway.configuration.settings import RobotSettings

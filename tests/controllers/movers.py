@@ -17,7 +17,7 @@ import pytest
 
 from controllers.unit.simulated import service as unit_service
 from controllers.universal_robots import motion_script
-from controllers.universal_robots.modes import RuntimeState
+from controllers.universal_robots.interfaces.modes import RuntimeState
 from controllers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
 from controllers.yaskawa.data import Status1
 from controllers.yaskawa.motion_driver import HsesMotionDriver
@@ -597,8 +597,8 @@ class RmiMover(Mover):
 
     @staticmethod
     def controller(monkeypatch):
-        monkeypatch.setattr("controllers.fanuc.motion_driver.SILENT_S", 1.0)
-        monkeypatch.setattr("controllers.fanuc.motion_driver.ANSWER_S", 2.0)
+        monkeypatch.setattr("controllers.fanuc.rmi.motion_driver.SILENT_S", 1.0)
+        monkeypatch.setattr("controllers.fanuc.rmi.motion_driver.ANSWER_S", 2.0)
         return fanuc_site.controller(monkeypatch)
 
     def moves(self):

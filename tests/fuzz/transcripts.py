@@ -37,8 +37,8 @@ DRIVERS = {
     "HsesDriver": "controllers.yaskawa.driver",
     "HsesMotionDriver": "controllers.yaskawa.motion_driver",
     "SnpxDriver": "controllers.fanuc.driver",
-    "FanucMotionDriver": "controllers.fanuc.motion_driver",
-    "FtpDriver": "controllers.fanuc.ftp_driver",
+    "FanucMotionDriver": "controllers.fanuc.rmi.motion_driver",
+    "FtpDriver": "controllers.fanuc.ftp.driver",
     "OpcUaDriver": "controllers.opcua.driver",
     "UnitDriver": "controllers.unit.driver",
 }

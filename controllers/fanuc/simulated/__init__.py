@@ -1,1 +1,1 @@
-"""Simulated controller of FANUC's kind with SNPX, for reading."""
+"""Simulated FANUC controller: servers of SNPX, FTP and RMI, and the arm behind them."""

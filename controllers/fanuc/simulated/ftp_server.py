@@ -10,7 +10,7 @@ import logging
 import time
 from collections.abc import Iterable
 
-from controllers.fanuc.ftp import FOLDER, File
+from controllers.fanuc.ftp.protocol import FOLDER, File
 from controllers.fanuc.simulated.controller import SOFTWARE
 from controllers.fanuc.simulated.server import SnpxServer
 from controllers.fanuc.simulated.state_files import content

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from controllers.fanuc.axes import Axes, FanucSettings, with_defaults
 from controllers.fanuc.data import AXES
-from controllers.fanuc.rmi import PORT
+from controllers.fanuc.rmi.messages import PORT
 from controllers.fanuc.simulated.controller import SnpxController
 from controllers.fanuc.simulated.ftp_server import FTP_FAULTS, FtpServer
 from controllers.fanuc.simulated.memory import Entry

@@ -7,8 +7,8 @@ from datetime import datetime
 from controllers.fanuc import data
 from controllers.fanuc.axes import SignalBits
 from controllers.fanuc.data import Cartesian
-from controllers.fanuc.files import KINDS
-from controllers.fanuc.ftp import File
+from controllers.fanuc.ftp.files import KINDS
+from controllers.fanuc.ftp.protocol import File
 from controllers.fanuc.signals import Operator
 from controllers.fanuc.simulated import memory
 from controllers.fanuc.simulated.controller import SOFTWARE, SnpxController

@@ -1,1 +1,1 @@
-"""Simulated controller with an OPC UA server in the form of OPC 40010-1, for reading."""
+"""Simulated controller with an OPC UA server in the form of OPC 40010-1. It cannot be commanded."""

@@ -1,1 +1,1 @@
-"""Simulated controller with the paper's protocol: a TCP server that moves any described arm."""
+"""Simulated controller with the unit protocol: a TCP server that moves any described arm."""

@@ -1,1 +1,4 @@
-"""Simulated controller of Universal Robots' kind: RTDE and the primary interface, for reading."""
+"""Simulated Universal Robots controller: RTDE, primary, dashboard, and the scripts that move its arm.
+
+The language of scripts belongs to `script`.
+"""

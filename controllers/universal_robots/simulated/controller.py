@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from controllers.simulated.errors import SimulatorError
-from controllers.universal_robots.modes import (
+from controllers.universal_robots.interfaces.modes import (
     JointMode,
     ReportLevel,
     RobotMode,
@@ -22,7 +22,7 @@ from controllers.universal_robots.modes import (
     SafetyMode,
     SafetyStatus,
 )
-from controllers.universal_robots.primary import (
+from controllers.universal_robots.interfaces.primary import (
     Alarm,
     KeyMessage,
     Origin,
@@ -32,7 +32,7 @@ from controllers.universal_robots.primary import (
     RuntimeFault,
     SafetyModeChanged,
 )
-from controllers.universal_robots.rtde_messages import Value
+from controllers.universal_robots.interfaces.rtde_messages import Value
 from controllers.universal_robots.simulated.fields import OFFERED
 from controllers.universal_robots.simulated.motion_functions import pose_of
 from controllers.universal_robots.simulated.programs import Programs

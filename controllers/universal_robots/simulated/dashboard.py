@@ -6,8 +6,8 @@ local control stays restricted until it is opened again.
 
 from collections.abc import Callable, Mapping
 
-from controllers.universal_robots.modes import RobotMode, RuntimeState, SafetyMode, name_of
-from controllers.universal_robots.rtde_messages import ControllerVersion
+from controllers.universal_robots.interfaces.modes import RobotMode, RuntimeState, SafetyMode, name_of
+from controllers.universal_robots.interfaces.rtde_messages import ControllerVersion
 from controllers.universal_robots.simulated.controller import UrController
 
 GREETING = "Connected: Universal Robots Dashboard Server"

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from controllers.universal_robots.state import OUTPUTS
+from controllers.universal_robots.interfaces.state import OUTPUTS
 
 _MORE = {
     "target_qd": "VECTOR6D",

@@ -2,8 +2,8 @@
 
 import struct
 
-from controllers.universal_robots.modes import RuntimeState, SafetyMode, TextLevel
-from controllers.universal_robots.primary import (
+from controllers.universal_robots.interfaces.modes import RuntimeState, SafetyMode, TextLevel
+from controllers.universal_robots.interfaces.primary import (
     HEADER,
     ROBOT_MESSAGE,
     Alarm,
@@ -16,7 +16,7 @@ from controllers.universal_robots.primary import (
     RuntimeFault,
     SafetyModeChanged,
 )
-from controllers.universal_robots.rtde_messages import (
+from controllers.universal_robots.interfaces.rtde_messages import (
     ControllerVersion,
     PackageType,
     package,

@@ -7,7 +7,7 @@ import logging
 from collections.abc import Callable, Iterator
 
 from controllers.simulated.demo import DemoProgram
-from controllers.universal_robots.modes import RuntimeState
+from controllers.universal_robots.interfaces.modes import RuntimeState
 from controllers.universal_robots.simulated.line_motion import JointLine, Path, PathMotion
 from controllers.universal_robots.simulated.registers import Registers
 from controllers.universal_robots.simulated.script.code import Program

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from controllers.universal_robots.rtde_messages import Value
+from controllers.universal_robots.interfaces.rtde_messages import Value
 from controllers.universal_robots.simulated.fields import INPUTS, OFFERED
 from controllers.universal_robots.simulated.script.errors import ScriptError
 

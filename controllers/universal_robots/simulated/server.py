@@ -16,11 +16,11 @@ from collections.abc import Callable, Mapping
 from controllers.simulated import faults as effects
 from controllers.simulated.fault_table import displacement
 from controllers.simulated.faults import Faults
-from controllers.universal_robots import rtde_messages as rtde
-from controllers.universal_robots.modes import TextLevel
-from controllers.universal_robots.packages import Malformed, Package, PackageStream
-from controllers.universal_robots.primary import PrimaryMessage
-from controllers.universal_robots.rtde_messages import (
+from controllers.universal_robots.interfaces import rtde_messages as rtde
+from controllers.universal_robots.interfaces.modes import TextLevel
+from controllers.universal_robots.interfaces.packages import Malformed, Package, PackageStream
+from controllers.universal_robots.interfaces.primary import PrimaryMessage
+from controllers.universal_robots.interfaces.rtde_messages import (
     IN_USE,
     LONGEST_PACKAGE_BYTES,
     NOT_FOUND,

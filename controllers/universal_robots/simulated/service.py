@@ -9,8 +9,8 @@ from controllers.simulated.demo import demo_tour
 from controllers.simulated.errors import SimulatorError
 from controllers.simulated.faults import Faults
 from controllers.simulated.serving import SimulatorSettings, listen, run, warn_beyond_loopback
-from controllers.universal_robots.primary import PrimaryMessage
-from controllers.universal_robots.rtde_messages import ControllerVersion
+from controllers.universal_robots.interfaces.primary import PrimaryMessage
+from controllers.universal_robots.interfaces.rtde_messages import ControllerVersion
 from controllers.universal_robots.simulated.controller import UrController
 from controllers.universal_robots.simulated.fields import INPUTS
 from controllers.universal_robots.simulated.server import UR_FAULTS, UrServer

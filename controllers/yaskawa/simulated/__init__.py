@@ -1,1 +1,1 @@
-"""Simulated controller of Yaskawa's kind with the High-Speed Ethernet Server."""
+"""Simulated Yaskawa controller with the High-Speed Ethernet Server, and the arm behind it."""

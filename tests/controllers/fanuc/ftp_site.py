@@ -4,7 +4,7 @@ import contextlib
 from dataclasses import replace
 
 from controllers.fanuc.axes import FanucSettings
-from controllers.fanuc.files import Reading
+from controllers.fanuc.ftp.files import Reading
 from controllers.fanuc.simulated.service import FtpSettings, serve_ftp
 from tests.controllers.simulated_site import running
 

@@ -21,7 +21,7 @@ if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.fanuc.axes import FanucSettings
-from controllers.fanuc.ftp_driver import FILE, FTP, FtpDriver
+from controllers.fanuc.ftp.driver import FILE, FTP, FtpDriver
 from protocol_gateway.seam import (
     AlarmReceived,
     Close,

@@ -20,7 +20,7 @@ if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.fanuc.axes import FanucSettings
-from controllers.fanuc.motion_driver import RMI, SESSION, FanucMotionDriver
+from controllers.fanuc.rmi.motion_driver import RMI, SESSION, FanucMotionDriver
 from protocol_gateway.link.timers import Timers
 from protocol_gateway.seam import (
     Activity,

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from controllers.fanuc import file_signals, files
 from controllers.fanuc.axes import signal_bits
-from controllers.fanuc.files import ListedAlarm
-from controllers.fanuc.ftp import Reply, ReplyStream, password, user
+from controllers.fanuc.ftp import file_signals, files
+from controllers.fanuc.ftp.files import ListedAlarm
+from controllers.fanuc.ftp.protocol import Reply, ReplyStream, password, user
 from protocol_gateway.seam import Activity, Mode
 from tests.controllers.fanuc.ftp_site import (
     alarm,

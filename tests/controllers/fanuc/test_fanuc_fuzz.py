@@ -4,11 +4,14 @@ import re
 
 import pytest
 
-from controllers.fanuc import data, files, ftp, rmi
+from controllers.fanuc import data
 from controllers.fanuc.assignments import Block
 from controllers.fanuc.data import Position
-from controllers.fanuc.ftp_driver import FtpDriver
-from controllers.fanuc.rmi import Answer
+from controllers.fanuc.ftp import files
+from controllers.fanuc.ftp import protocol as ftp
+from controllers.fanuc.ftp.driver import FtpDriver
+from controllers.fanuc.rmi import messages as rmi
+from controllers.fanuc.rmi.messages import Answer
 from tests.controllers.fanuc import fuzz_ftp, fuzz_rmi, fuzz_snpx
 from tests.fuzz.fuzzing import assert_found, assert_strict, broken
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controllers.fanuc import rmi
 from controllers.fanuc.axes import Axes, FanucSettings
-from controllers.fanuc.motion_driver import (
+from controllers.fanuc.rmi import messages as rmi
+from controllers.fanuc.rmi.motion_driver import (
     RMI,
     SESSION,
     FanucMotionDriver,

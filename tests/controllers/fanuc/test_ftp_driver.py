@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from controllers.fanuc.axes import FanucSettings
-from controllers.fanuc.ftp_driver import FILE, FTP, TIMEOUT_S, FtpDriver, fanuc_ftp_driver
+from controllers.fanuc.ftp.driver import FILE, FTP, TIMEOUT_S, FtpDriver, fanuc_ftp_driver
 from protocol_gateway.link.link import UnaskedSends
 from protocol_gateway.seam import (
     Activity,

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from controllers.fanuc.axes import FanucSettings
-from controllers.fanuc.ftp import File
-from controllers.fanuc.ftp_driver import fanuc_ftp_driver
+from controllers.fanuc.ftp.driver import fanuc_ftp_driver
+from controllers.fanuc.ftp.protocol import File
 from protocol_gateway.link.link import ControllerLink, LinkSettings
 from protocol_gateway.seam import AlarmReceived, JointsReceived, MalformedReceived, SignalsReceived
 from robots.kinematics.joints import JointType

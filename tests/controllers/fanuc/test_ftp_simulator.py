@@ -8,8 +8,8 @@ import subprocess
 
 import pytest
 
-from controllers.fanuc import files
-from controllers.fanuc.ftp import File
+from controllers.fanuc.ftp import files
+from controllers.fanuc.ftp.protocol import File
 from controllers.fanuc.simulated.service import FtpSettings, serve_ftp
 from controllers.simulated.errors import FaultError
 from robomesh.errors import ListenError

@@ -18,9 +18,9 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[3])
 
-from controllers.universal_robots.primary import Alarm, PrimaryStream, SafetyModeChanged
-from controllers.universal_robots.rtde_reader import RtdeReader
-from controllers.universal_robots.state import OUTPUTS, ControllerState
+from controllers.universal_robots.interfaces.primary import Alarm, PrimaryStream, SafetyModeChanged
+from controllers.universal_robots.interfaces.rtde_reader import RtdeReader
+from controllers.universal_robots.interfaces.state import OUTPUTS, ControllerState
 from tests.fuzz.fuzzing import Finding, campaign, changed, cut
 
 LONGEST = 4096

@@ -27,6 +27,7 @@ if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.universal_robots.driver import PRIMARY, RTDE
+from controllers.universal_robots.interfaces.state import OUTPUTS
 from controllers.universal_robots.motion_driver import (
     DASHBOARD,
     INPUTS,
@@ -34,7 +35,6 @@ from controllers.universal_robots.motion_driver import (
     RtdeMotionDriver,
 )
 from controllers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
-from controllers.universal_robots.state import OUTPUTS
 from protocol_gateway.link.link import UnaskedSends
 from protocol_gateway.link.timers import Timers
 from protocol_gateway.seam import (

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controllers.universal_robots import rtde_messages as rtde
-from controllers.universal_robots.modes import RobotMode, RobotStatus, SafetyStatus, name_of
-from controllers.universal_robots.packages import Malformed
-from controllers.universal_robots.rtde_messages import (
+from controllers.universal_robots.interfaces import rtde_messages as rtde
+from controllers.universal_robots.interfaces.modes import RobotMode, RobotStatus, SafetyStatus, name_of
+from controllers.universal_robots.interfaces.packages import Malformed
+from controllers.universal_robots.interfaces.rtde_messages import (
     LONGEST_PACKAGE_BYTES,
     ControllerVersion,
     DataReceived,
@@ -23,8 +23,8 @@ from controllers.universal_robots.rtde_messages import (
     StartAnswered,
     TextReceived,
 )
-from controllers.universal_robots.rtde_reader import Failed, Ready, RtdeReader
-from controllers.universal_robots.state import OUTPUTS, ControllerState
+from controllers.universal_robots.interfaces.rtde_reader import Failed, Ready, RtdeReader
+from controllers.universal_robots.interfaces.state import OUTPUTS, ControllerState
 
 FEW = {"timestamp": "DOUBLE", "actual_q": "VECTOR6D", "robot_mode": "INT32"}
 Q = (0.1, -1.5, 1.2, -0.4, 1.57, 3.0)

@@ -7,16 +7,16 @@ import struct
 import pytest
 
 from controllers.universal_robots.driver import PRIMARY, RTDE, RtdeDriver, activity_of
-from controllers.universal_robots.modes import (
+from controllers.universal_robots.interfaces.modes import (
     RobotMode,
     RobotStatus,
     RuntimeState,
     SafetyMode,
     SafetyStatus,
 )
+from controllers.universal_robots.interfaces.state import OUTPUTS, ControllerState
 from controllers.universal_robots.signals import signals_of
 from controllers.universal_robots.simulated.service import UrSettings, serve_rtde
-from controllers.universal_robots.state import OUTPUTS, ControllerState
 from protocol_gateway.driver_parts.signal_names import BOOLEAN, SHARED, TEXT
 from protocol_gateway.seam import (
     Activity,

@@ -4,9 +4,10 @@ import struct
 
 import pytest
 
-from controllers.universal_robots import motion_driver, primary
-from controllers.universal_robots.dashboard import Dashboard
-from controllers.universal_robots.rtde_messages import Recipe
+from controllers.universal_robots import motion_driver
+from controllers.universal_robots.interfaces import primary
+from controllers.universal_robots.interfaces.dashboard import Dashboard
+from controllers.universal_robots.interfaces.rtde_messages import Recipe
 from tests.controllers.universal_robots import fuzz_ur, fuzz_ur_motion
 from tests.fuzz.fuzzing import assert_found, assert_strict, broken, no_problem
 

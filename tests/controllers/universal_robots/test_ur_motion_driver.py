@@ -5,8 +5,9 @@ import struct
 
 import pytest
 
-from controllers.universal_robots import rtde_messages as rtde
 from controllers.universal_robots.driver import PRIMARY, RTDE, RtdeDriver
+from controllers.universal_robots.interfaces import rtde_messages as rtde
+from controllers.universal_robots.interfaces.rtde_messages import PackageType, Recipe, package
 from controllers.universal_robots.motion_driver import (
     DASHBOARD,
     INPUTS,
@@ -15,7 +16,6 @@ from controllers.universal_robots.motion_driver import (
     RtdeMotionDriver,
 )
 from controllers.universal_robots.motion_script import Progress, Registers, motion_script
-from controllers.universal_robots.rtde_messages import PackageType, Recipe, package
 from controllers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
 from controllers.universal_robots.simulated.fields import INPUTS as INPUT_TYPES
 from controllers.universal_robots.simulated.fields import OFFERED

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controllers.universal_robots.modes import ReportLevel, SafetyMode
-from controllers.universal_robots.packages import Malformed
-from controllers.universal_robots.primary import (
+from controllers.universal_robots.interfaces.modes import ReportLevel, SafetyMode
+from controllers.universal_robots.interfaces.packages import Malformed
+from controllers.universal_robots.interfaces.primary import (
     LONGEST_MESSAGE_BYTES,
     LONGEST_SKIPPED_BYTES,
     LONGEST_TEXT,

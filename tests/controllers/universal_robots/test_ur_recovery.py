@@ -6,7 +6,7 @@ from contextlib import asynccontextmanager
 import pytest
 
 from controllers.universal_robots import motion_driver
-from controllers.universal_robots.modes import RobotMode, RuntimeState, SafetyMode
+from controllers.universal_robots.interfaces.modes import RobotMode, RuntimeState, SafetyMode
 from controllers.universal_robots.simulated import controller as simulated
 from protocol_gateway.audit.log import read_entries
 from protocol_gateway.authority.entry import Outcome

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from controllers.simulated.demo import demo_tour
-from controllers.universal_robots.modes import RuntimeState
-from controllers.universal_robots.primary import KeyMessage, Popup, PrimaryText, RuntimeFault
-from controllers.universal_robots.rtde_messages import ControllerVersion
+from controllers.universal_robots.interfaces.modes import RuntimeState
+from controllers.universal_robots.interfaces.primary import KeyMessage, Popup, PrimaryText, RuntimeFault
+from controllers.universal_robots.interfaces.rtde_messages import ControllerVersion
 from controllers.universal_robots.simulated import dashboard
 from controllers.universal_robots.simulated.controller import UrController
 from controllers.universal_robots.simulated.script.code import LONGEST_SOURCE, compile_script

@@ -16,8 +16,8 @@ import pytest
 from controllers.simulated.errors import FaultError, SimulatorError
 from controllers.simulated.fault_table import LEAP
 from controllers.simulated.faults import Faults
-from controllers.universal_robots import rtde_messages as rtde
-from controllers.universal_robots.modes import (
+from controllers.universal_robots.interfaces import rtde_messages as rtde
+from controllers.universal_robots.interfaces.modes import (
     JointMode,
     ReportLevel,
     RobotMode,
@@ -27,15 +27,15 @@ from controllers.universal_robots.modes import (
     SafetyStatus,
     TextLevel,
 )
-from controllers.universal_robots.packages import Malformed
-from controllers.universal_robots.primary import (
+from controllers.universal_robots.interfaces.packages import Malformed
+from controllers.universal_robots.interfaces.primary import (
     Alarm,
     KeyMessage,
     PrimaryStream,
     PrimaryVersion,
     SafetyModeChanged,
 )
-from controllers.universal_robots.rtde_messages import (
+from controllers.universal_robots.interfaces.rtde_messages import (
     ControllerVersion,
     DataReceived,
     InputsSetUp,
@@ -47,12 +47,12 @@ from controllers.universal_robots.rtde_messages import (
     StartAnswered,
     TextReceived,
 )
-from controllers.universal_robots.rtde_reader import Ready, RtdeReader
+from controllers.universal_robots.interfaces.rtde_reader import Ready, RtdeReader
+from controllers.universal_robots.interfaces.state import OUTPUTS, ControllerState
 from controllers.universal_robots.simulated import service
 from controllers.universal_robots.simulated.controller import UrController
 from controllers.universal_robots.simulated.service import UrSettings, serve_rtde
 from controllers.universal_robots.simulated.start import RTDE
-from controllers.universal_robots.state import OUTPUTS, ControllerState
 from robomesh.errors import ListenError
 from robots.descriptions.description import load
 from robots.kinematics.joints import joints_of

@@ -2,7 +2,7 @@
 
 import contextlib
 
-from controllers.universal_robots.modes import RuntimeState
+from controllers.universal_robots.interfaces.modes import RuntimeState
 from controllers.universal_robots.settings import MotionSettings, UniversalRobotsSettings
 from controllers.universal_robots.simulated import service
 from controllers.universal_robots.simulated.service import UrSettings, serve_rtde

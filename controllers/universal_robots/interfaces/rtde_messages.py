@@ -23,7 +23,7 @@ from itertools import accumulate
 from types import MappingProxyType
 from typing import TypeAlias
 
-from controllers.universal_robots.packages import (
+from controllers.universal_robots.interfaces.packages import (
     Malformed,
     Package,
     PackageStream,

@@ -14,9 +14,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from controllers.universal_robots import rtde_messages as rtde
-from controllers.universal_robots.packages import Malformed, Package
-from controllers.universal_robots.rtde_messages import (
+from controllers.universal_robots.interfaces import rtde_messages as rtde
+from controllers.universal_robots.interfaces.packages import Malformed, Package
+from controllers.universal_robots.interfaces.rtde_messages import (
     NOT_FOUND,
     ControllerVersion,
     DataReceived,
@@ -29,7 +29,7 @@ from controllers.universal_robots.rtde_messages import (
     StartAnswered,
     TextReceived,
 )
-from controllers.universal_robots.state import (
+from controllers.universal_robots.interfaces.state import (
     OUTPUTS,
     REQUIRED,
     ControllerState,

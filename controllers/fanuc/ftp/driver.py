@@ -5,7 +5,7 @@ It is the slow way, for controllers without SNPX. The controller writes a file w
     PASV -> port -> the gateway connects there -> RETR -> the file's bytes, and 226
 
 Each file is reported separately, with the time from its RETR to its end: contents of different files are
-never combined. `controllers.fanuc.ftp` has all commands that can be sent.
+never combined. `controllers.fanuc.ftp.protocol` has all commands that can be sent.
 """
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
@@ -13,12 +13,14 @@ from enum import Enum, auto
 from pathlib import Path
 
 from controllers.fanuc import codes as fanuc_codes
-from controllers.fanuc import file_signals, files, ftp, signals
+from controllers.fanuc import signals
 from controllers.fanuc.axes import Axes, FanucSettings, signal_bits
 from controllers.fanuc.data import Alarm
 from controllers.fanuc.driver import alarm_of
-from controllers.fanuc.files import FilePosition, ListedAlarm, Reading, Steps
-from controllers.fanuc.ftp import File, Reply, ReplyStream
+from controllers.fanuc.ftp import file_signals, files
+from controllers.fanuc.ftp import protocol as ftp
+from controllers.fanuc.ftp.files import FilePosition, ListedAlarm, Reading, Steps
+from controllers.fanuc.ftp.protocol import File, Reply, ReplyStream
 from protocol_gateway.driver_parts.only_reads import OnlyReads, check_no_type_codes
 from protocol_gateway.driver_parts.polling import Polling, Regular
 from protocol_gateway.seam import (

@@ -28,10 +28,10 @@ from typing import Any
 import numpy as np
 
 from controllers.fanuc import codes as fanuc_codes
-from controllers.fanuc import rmi
 from controllers.fanuc.axes import FanucSettings
 from controllers.fanuc.driver import SNPX, SnpxDriver
-from controllers.fanuc.rmi import Answer, LineStream
+from controllers.fanuc.rmi import messages as rmi
+from controllers.fanuc.rmi.messages import Answer, LineStream
 from controllers.fanuc.srtp import Answer as Packet
 from controllers.fanuc.srtp import Question
 from protocol_gateway.driver_parts.hexadecimal import hexadecimal

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TypeAlias
 
-from controllers.universal_robots.packages import (
+from controllers.universal_robots.interfaces.packages import (
     Malformed,
     Package,
     PackageStream,

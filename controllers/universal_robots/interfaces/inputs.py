@@ -10,9 +10,9 @@ start                        accepted; from now on inputs are written
 
 from collections.abc import Sequence
 
-from controllers.universal_robots import rtde_messages as rtde
-from controllers.universal_robots.packages import Malformed
-from controllers.universal_robots.rtde_messages import (
+from controllers.universal_robots.interfaces import rtde_messages as rtde
+from controllers.universal_robots.interfaces.packages import Malformed
+from controllers.universal_robots.interfaces.rtde_messages import (
     IN_USE,
     InputsSetUp,
     OutputsSetUp,

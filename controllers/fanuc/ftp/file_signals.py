@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from controllers.fanuc.axes import SignalBits
 from controllers.fanuc.driver import activity_of, mode_of
-from controllers.fanuc.files import FilePosition, Tools, values_of
+from controllers.fanuc.ftp.files import FilePosition, Tools, values_of
 from controllers.fanuc.signals import FRAME, OFFSET, POSE, TOOL, Operator, of_frame, register
 from protocol_gateway.seam import (
     Activity,

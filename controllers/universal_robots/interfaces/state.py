@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from controllers.universal_robots.modes import RobotStatus, SafetyStatus
-from controllers.universal_robots.rtde_messages import Value
+from controllers.universal_robots.interfaces.modes import RobotStatus, SafetyStatus
+from controllers.universal_robots.interfaces.rtde_messages import Value
 
 REQUIRED = ("timestamp", "actual_q")
 """Fields that every controller has and without which there is nothing to show."""
