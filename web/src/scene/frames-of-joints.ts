@@ -7,35 +7,33 @@ import { JointStatesSchema } from "../gen/foxglove/JointStates_pb";
 import type { Description } from "../gen/robomesh_pb";
 import type { Forward } from "./forward-kinematics";
 
-/** Convert JointStates to FrameTransforms payloads. */
-export function framesOf(
+/** Convert a payload of JointStates to one of FrameTransforms. */
+export function framesOfJoints(
   prefix: string,
-  description: Description,
+  { joints, frames, baseToSite }: Description,
   forward: Forward,
-): (joints: Uint8Array) => Uint8Array {
-  const base = matrixOf(description.baseToSite);
-  const { joints, frames } = description;
-  return (payload) => {
-    const positionsByName = new Map(
-      fromBinary(JointStatesSchema, payload).joints.map(({ name, position }) => [name, position]),
-    );
-    const placements = forward(joints.map(({ name, home }) => positionsByName.get(name) ?? home));
-    const named = frames.flatMap(({ name, link, frameToLink }): [string, THREE.Matrix4][] => {
-      const placement = placements.get(link);
-      return placement ? [[name, placement.clone().multiply(matrixOf(frameToLink))]] : [];
-    });
-    const transforms = [...placements, ...named].map(([name, placement]) => {
-      const [translation, rotation] = [new THREE.Vector3(), new THREE.Quaternion()];
-      base.clone().multiply(placement).decompose(translation, rotation, new THREE.Vector3());
-      const { x, y, z, w } = rotation;
-      return {
-        childFrameId: `${prefix}/${name}`,
-        translation: { x: translation.x, y: translation.y, z: translation.z },
-        rotation: { x, y, z, w },
-      };
-    });
-    return toBinary(FrameTransformsSchema, create(FrameTransformsSchema, { transforms }));
-  };
+  payload: Uint8Array,
+): Uint8Array {
+  const base = matrixOf(baseToSite);
+  const positionsByName = new Map(
+    fromBinary(JointStatesSchema, payload).joints.map(({ name, position }) => [name, position]),
+  );
+  const placements = forward(joints.map(({ name, home }) => positionsByName.get(name) ?? home));
+  const named = frames.flatMap(({ name, link, frameToLink }): [string, THREE.Matrix4][] => {
+    const placement = placements.get(link);
+    return placement ? [[name, placement.clone().multiply(matrixOf(frameToLink))]] : [];
+  });
+  const transforms = [...placements, ...named].map(([name, placement]) => {
+    const [translation, rotation] = [new THREE.Vector3(), new THREE.Quaternion()];
+    base.clone().multiply(placement).decompose(translation, rotation, new THREE.Vector3());
+    const { x, y, z, w } = rotation;
+    return {
+      childFrameId: `${prefix}/${name}`,
+      translation: { x: translation.x, y: translation.y, z: translation.z },
+      rotation: { x, y, z, w },
+    };
+  });
+  return toBinary(FrameTransformsSchema, create(FrameTransformsSchema, { transforms }));
 }
 
 /** Read 16 doubles by rows; anything else is the identity. */

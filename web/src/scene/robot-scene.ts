@@ -1,20 +1,26 @@
 // The live 3-D picture of one robot, drawn only after a change.
 
-import { create } from "@bufbuild/protobuf";
 import * as THREE from "three";
 import type { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Description, View } from "../gen/robomesh_pb";
-import { View_Projection, ViewSchema } from "../gen/robomesh_pb";
 import { floorOf } from "../mesh/clearance";
+import type { Sample } from "../mesh/connection";
+import { watch } from "../mesh/connection";
+import type { Picture } from "../mesh/sight";
+import type { Camera } from "../ui/layout";
+import type { Theme } from "../ui/theme";
 import type { Failed } from "./arm";
 import { Arm, loadOrReport, meshUrl } from "./arm";
 import { DrawBudget, qualities } from "./draw-budget";
 import { DrawLoop } from "./draw-loop";
+import type { Forward } from "./forward-kinematics";
+import { forwardOf } from "./forward-kinematics";
+import { framesOfJoints } from "./frames-of-joints";
 import type { Nearest } from "./lines";
 import { Gap, Path, Trail } from "./lines";
 import { colourEdges, paint, withEdges } from "./models";
+import { SceneCamera } from "./scene-camera";
 import { KEY_LIGHT, lights, palette, surround } from "./surroundings";
-import { Viewpoint } from "./viewpoint";
 import { countFrame, disposeScene, drawsInSoftware, makeRenderer, observeSize, parentSize, toneMap } from "./webgl";
 
 /** Interface for parts that other components add: see Program's gizmo. */
@@ -31,14 +37,45 @@ export interface Stage {
   changed: () => void;
 }
 
+/** What the scene shows of its robot, and how. */
+export interface SceneState {
+  description: Description;
+  /** The topic that places the links: "frames", or joints from which the scene computes them. */
+  topic: "frames" | "joints/slow";
+  /** Draw the robot grey and translucent, because its data is stale. */
+  stale: boolean;
+  /** Of a replay; see `FramePlayer`. */
+  rate: number;
+  theme: Theme;
+  trail: boolean;
+  frames: boolean;
+  /** Joint positions of the ghost [rad] or [m]; null: none. */
+  ghost: readonly number[] | null;
+  /** Red links (`<robot>/<link>`) and fixtures. */
+  red: ReadonlySet<string>;
+  /** A path of the tool in the base frame [m]; null: none. */
+  path: readonly (readonly [number, number, number])[] | null;
+  /** The two nearest points, shown together with the arm at their source time [ms]; null: not known. */
+  nearest: { nearest: Nearest; sourceTime: number } | null;
+  view: View;
+  /** Where a person put the camera; null: where the view has it. */
+  pose: readonly number[] | null;
+  /** Called when a person has moved the camera; undefined: nothing follows it. */
+  moved: ((camera: Camera) => void) | undefined;
+  /** Called with each picture that is ready. */
+  drew: (picture: Picture) => void;
+}
+
 // After the last motion; then a coarse picture is drawn once more, in full.
 const REST_MS = 700;
+const KEPT_SAMPLES = 16; // more than the drawing lags behind
 
-/** A scene on a canvas. `placeFrames` supplies placements; `dispose` frees the GPU. */
+/** A scene on a canvas. `update` says what it shows; `dispose` frees the GPU. */
 export class RobotScene {
   private readonly renderer: THREE.WebGLRenderer;
   private readonly scene = new THREE.Scene();
-  private readonly viewpoint: Viewpoint;
+  private readonly camera: SceneCamera;
+  private readonly prefix: string; // `<site>/<robot>`
   private readonly arm: Arm;
   private readonly neighbours = new Set<Arm>();
   private readonly fixtures = new Map<string, THREE.Group>();
@@ -46,12 +83,14 @@ export class RobotScene {
   private readonly trail = new Trail();
   private readonly path = new Path();
   private readonly gap: Gap;
-  private base = new THREE.Matrix4();
+  private readonly base = new THREE.Matrix4();
   private floorAt: number | null = null; // in the site's frame [m]
   private colours = palette();
-  private red: ReadonlySet<string> = new Set();
+  private state: SceneState | undefined;
+  private forward: Forward = () => new Map();
+  private received: Sample[] = []; // oldest first
+  private unfollow: () => void = () => undefined;
   private dirty = true;
-  private framesShown = false;
   private readonly loop: DrawLoop;
   private readonly budget: DrawBudget;
   private fitted = false;
@@ -61,38 +100,63 @@ export class RobotScene {
   private disposed = false;
   private readonly observer: ResizeObserver;
 
-  /** Called when a picture is ready. */
-  onDrawn: () => void = () => undefined;
-
   /** @throws Error if the browser has no WebGL. */
   constructor(
     private readonly canvas: HTMLCanvasElement,
-    private readonly prefix: string,
+    private readonly robotKey: string,
     label: HTMLElement,
   ) {
     const software = drawsInSoftware();
+    this.prefix = robotKey.split("/").slice(1).join("/");
     this.renderer = makeRenderer(software, canvas);
     this.loop = new DrawLoop(this.renderer, this.draw, this.drawn);
     this.budget = new DrawBudget(qualities(software));
     this.renderer.shadowMap.enabled = !software;
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
     toneMap(this.renderer);
-    this.arm = new Arm(this.scene, prefix, "arm", this.changed);
+    this.arm = new Arm(this.scene, this.prefix, "arm", this.changed);
     this.gap = new Gap(label);
     this.scene.add(...lights(), this.trail.line, this.path.line, this.gap.group);
     this.setColours();
-    this.viewpoint = new Viewpoint(
-      canvas,
-      { clip: [0.02, 60], distance: [0.2, 12], damping: true, turnsFlat: false, polarMargin: 0.05 },
-      this.changed,
-    );
+    this.camera = new SceneCamera(canvas, this.base, this.changed);
     this.observer = observeSize(canvas, this.resize);
     canvas.addEventListener("webglcontextrestored", this.resize);
     this.resize();
   }
 
+  /** Show a state; what equals the last one stays as it is. */
+  update(state: SceneState): void {
+    const before = this.state;
+    this.state = state;
+    const changed = (name: keyof SceneState) => before?.[name] !== state[name];
+    if (changed("description"))
+      this.forward = forwardOf(
+        state.description.urdf,
+        state.description.joints.map(({ name }) => name),
+      );
+    if (changed("topic")) this.follow(state.topic);
+    if (changed("stale")) {
+      this.arm.setStale(state.stale);
+      this.loop.hurry();
+    }
+    this.arm.player.setRate(state.rate);
+    if (before && changed("theme")) this.setColours();
+    if (changed("trail")) this.trail.show(state.trail);
+    if (changed("frames")) this.arm.player.touch();
+    if (changed("ghost") || changed("description")) this.showGhost();
+    if (changed("red")) this.paintRed();
+    if (changed("path")) {
+      this.path.show(state.path);
+      this.canvas.dataset.path = String(state.path?.length ?? 0);
+    }
+    if (changed("nearest")) this.showNearest(state.nearest);
+    if (changed("trail") || changed("frames") || changed("path")) this.changed();
+    this.camera.moved = state.moved;
+    this.camera.show(state.view, state.pose);
+  }
+
   /** Set background, floor and lines to the page's theme. */
-  setColours(): void {
+  private setColours(): void {
     const colours = (this.colours = palette());
     // Level in the site's frame, whatever the robot's base is tilted by.
     const floor = surround(this.scene, colours, this.floorAt !== null);
@@ -100,7 +164,7 @@ export class RobotScene {
     this.canvas.dataset.floor = String(this.floorAt);
     this.trail.line.material.color.set(colours.accent);
     this.path.line.material.color.set(colours.accent);
-    this.setRed(this.red);
+    this.paintRed();
   }
 
   private readonly changed = (): void => {
@@ -114,9 +178,9 @@ export class RobotScene {
       scene,
       canvas,
       base: () => this.base,
-      camera: () => this.viewpoint.camera,
-      controls: () => this.viewpoint.controls,
-      view: () => this.view(),
+      camera: () => this.camera.viewpoint.camera,
+      controls: () => this.camera.viewpoint.controls,
+      view: () => this.camera.now(),
       changed,
     };
   }
@@ -134,8 +198,9 @@ export class RobotScene {
       this.scene.add(axes);
     }
     // Compile the ghosts' shaders now: during the first drag they would block the page, and its lease would expire.
-    const compiled = (ghost: THREE.Group) => this.renderer.compile(ghost, this.viewpoint.camera, this.scene);
+    const compiled = (ghost: THREE.Group) => this.renderer.compile(ghost, this.camera.viewpoint.camera, this.scene);
     await Promise.all([this.arm.load(description, failed, compiled), this.loadFixtures(description, failed)]);
+    this.showGhost();
   }
 
   private async loadFixtures({ fixtures }: Description, failed: Failed): Promise<void> {
@@ -153,32 +218,35 @@ export class RobotScene {
         this.fixtures.set(name, group);
         this.scene.add(group);
         this.canvas.dataset.fixtures = String(this.fixtures.size);
-        this.setRed(this.red);
+        this.paintRed();
       }),
     );
   }
 
-  /** Add a FrameTransforms payload. */
-  placeFrames(payload: Uint8Array, sourceTimeMs: number, arrivedMs: number): void {
-    this.arm.placeFrames(payload, sourceTimeMs, arrivedMs);
-    if (this.gap.waits) this.loop.wake();
+  /** Take placements from another topic. */
+  private follow(topic: SceneState["topic"]): void {
+    this.unfollow();
+    this.received = [];
+    this.unfollow = watch(`${this.robotKey}/${topic}`, (sample) => {
+      this.received.push(sample);
+      if (this.received.length > KEPT_SAMPLES) this.received.shift();
+      const frames = topic === "frames" ? sample.payload : this.framesFrom(sample.payload);
+      this.arm.placeFrames(frames, sample.sourceTime, sample.arrived);
+      if (this.gap.waits) this.loop.wake();
+      this.reportPicture();
+    });
   }
 
-  /** Source time [ms] of the frames that are drawn; infinite if they equal the newest. */
-  get drawnTime(): number {
+  private framesFrom(joints: Uint8Array): Uint8Array {
+    return this.state ? framesOfJoints(this.prefix, this.state.description, this.forward, joints) : new Uint8Array();
+  }
+
+  /** Report the publication that is drawn. */
+  private reportPicture(): void {
     const { moving, shown } = this.arm.player;
-    return moving ? shown : Number.POSITIVE_INFINITY;
-  }
-
-  /** Set a replay's rate; see `FramePlayer`. */
-  setRate(rate: number): void {
-    this.arm.player.setRate(rate);
-  }
-
-  /** Draw the robot grey and translucent when its data is stale. */
-  setStale(stale: boolean): void {
-    this.arm.setStale(stale);
-    this.loop.hurry();
+    const newest = moving ? this.received.findLast(({ sourceTime }) => sourceTime <= shown) : this.received.at(-1);
+    // After the loss of its WebGL context, as with a GPU's reset, the canvas shows an old picture.
+    if (newest) this.state?.drew(this.renderer.getContext().isContextLost() ? null : newest);
   }
 
   /** Add another robot of the cell, dimmed; it receives its own placements. */
@@ -197,88 +265,36 @@ export class RobotScene {
     neighbour.remove();
   }
 
-  /** Draw links (`<robot>/<link>`) and fixtures red. */
-  setRed(names: ReadonlySet<string>): void {
-    this.red = names;
-    for (const arm of [this.arm, ...this.neighbours]) arm.setRed(names);
+  private get red(): ReadonlySet<string> {
+    return this.state?.red ?? new Set();
+  }
+
+  private paintRed(): void {
+    const { red } = this;
+    for (const arm of [this.arm, ...this.neighbours]) arm.setRed(red);
     const { alarm, dim } = this.colours;
     for (const [name, group] of this.fixtures) {
-      paint(group, { stale: false, red: names.has(name), kind: "fixture" }, alarm);
-      colourEdges(group, names.has(name) ? alarm : dim);
+      paint(group, { stale: false, red: red.has(name), kind: "fixture" }, alarm);
+      colourEdges(group, red.has(name) ? alarm : dim);
     }
-    this.canvas.dataset.red = [...names].sort().join(" ");
+    this.canvas.dataset.red = [...red].sort().join(" ");
     this.changed();
   }
 
-  /** Show the ghost at placements in the base frame; null hides it. */
-  showGhost(placements: ReadonlyMap<string, THREE.Matrix4> | null): void {
-    this.canvas.dataset.ghost = String(this.arm.showGhost(placements));
+  private showGhost(): void {
+    const positions = this.state?.ghost;
+    this.canvas.dataset.ghost = String(this.arm.showGhost(positions ? this.forward(positions) : null));
   }
 
-  /** Show a path of the tool in the base frame [m]; null: none. */
-  showPath(points: readonly (readonly [number, number, number])[] | null): void {
-    this.path.show(points);
-    this.canvas.dataset.path = String(points?.length ?? 0);
-    this.changed();
-  }
-
-  /** Show the two nearest points together with the arm at their source time [ms]; null: none. */
-  showGap(nearest: Nearest | null, sourceTimeMs = 0): void {
-    if (nearest) this.gap.add(nearest, sourceTimeMs);
+  private showNearest(found: SceneState["nearest"]): void {
+    if (found) this.gap.add(found.nearest, found.sourceTime);
     else if (this.gap.hide()) this.changed();
     if (this.gap.waits) this.loop.wake();
   }
 
-  showTrail(shown: boolean): void {
-    this.trail.show(shown);
-    this.changed();
-  }
-
-  showFrames(shown: boolean): void {
-    this.framesShown = shown;
-    this.arm.player.touch();
-    this.changed();
-  }
-
-  /** Set the camera to a view of the description; its points are in the robot's base frame. */
-  look(view: View): void {
-    const point = (v: { x: number; y: number; z: number } | undefined) =>
-      new THREE.Vector3(v?.x ?? 0, v?.y ?? 0, v?.z ?? 0);
-    const up = point(view.up);
-    this.viewpoint.look({
-      eye: point(view.eye).applyMatrix4(this.base),
-      target: point(view.target).applyMatrix4(this.base),
-      up: up.lengthSq() ? up.transformDirection(this.base) : new THREE.Vector3(0, 0, 1),
-      flat: view.projection === View_Projection.ORTHOGRAPHIC,
-    });
-  }
-
-  /** Return the current camera as a view in the base frame, for the renderer. */
-  view(): View {
-    const { camera, controls, isFlat, fieldOfView, flatHeight } = this.viewpoint;
-    const toBase = this.base.clone().invert();
-    const { x, y, z } = controls.target.clone().applyMatrix4(toBase);
-    const eye = camera.position.clone().applyMatrix4(toBase);
-    const up = camera.up.clone().transformDirection(toBase);
-    const view = create(ViewSchema, {
-      name: "own",
-      eye: { x: eye.x, y: eye.y, z: eye.z },
-      target: { x, y, z },
-      up: { x: up.x, y: up.y, z: up.z },
-    });
-    if (isFlat) {
-      view.projection = View_Projection.ORTHOGRAPHIC;
-      view.height = flatHeight;
-    } else {
-      view.projection = View_Projection.PERSPECTIVE;
-      view.fieldOfView = THREE.MathUtils.degToRad(fieldOfView);
-    }
-    return view;
-  }
-
   /** Turn the free camera by angles [rad] about the vertical and the horizontal, for the keyboard. */
   turn(azimuth: number, polar: number): void {
-    this.viewpoint.turn(azimuth, polar);
+    this.camera.viewpoint.turn(azimuth, polar);
   }
 
   /** Take the size at the next frame: a resized canvas is empty until then. */
@@ -291,15 +307,15 @@ export class RobotScene {
     this.fitted = true;
     const { width, height } = parentSize(this.canvas);
     const { pixelRatio } = this.sharp ? this.budget.best : this.budget.quality;
-    this.viewpoint.resize(width / height);
+    this.camera.viewpoint.resize(width / height);
     this.canvas.dataset.pixelRatio = String(pixelRatio);
     this.renderer.setPixelRatio(pixelRatio);
     this.renderer.setSize(width, height, false);
   }
 
   private readonly drawn = (tookMs: number, at: number): void => {
-    this.onDrawn();
-    this.gap.placeLabel(this.viewpoint.camera, this.canvas.clientWidth, this.canvas.clientHeight);
+    this.reportPicture();
+    this.gap.placeLabel(this.camera.viewpoint.camera, this.canvas.clientWidth, this.canvas.clientHeight);
     countFrame(this.canvas);
     clearTimeout(this.restTimer);
     if (this.sharp) return; // a single frame says nothing about the machine's speed
@@ -323,7 +339,7 @@ export class RobotScene {
     if (this.gap.showAt(this.arm.player.shown, this.colours)) this.dirty = true;
     const arms = [this.arm, ...this.neighbours];
     for (const neighbour of this.neighbours) if (neighbour.placeAt(at)) this.dirty = true;
-    const { camera, controls } = this.viewpoint;
+    const { camera, controls } = this.camera.viewpoint;
     if (controls.enableDamping) controls.update(); // calls `changed` until the camera is at rest
     const dirty = this.dirty;
     this.dirty = false;
@@ -341,7 +357,7 @@ export class RobotScene {
     for (const [frame, axes] of this.axes) {
       const placement = placements.get(frame);
       if (!placement) continue;
-      axes.visible = this.framesShown;
+      axes.visible = this.state?.frames ?? false;
       placement.decompose(axes.position, axes.quaternion, axes.scale);
     }
     for (const at of this.arm.player.passed(`${this.prefix}/tool`)) this.trail.extend(at);
@@ -350,10 +366,11 @@ export class RobotScene {
 
   dispose(): void {
     this.disposed = true;
+    this.unfollow();
     clearTimeout(this.restTimer);
     this.loop.dispose();
     this.observer.disconnect();
-    this.viewpoint.dispose();
+    this.camera.dispose();
     for (const arm of [this.arm, ...this.neighbours]) arm.remove();
     disposeScene(this.scene, this.renderer);
   }

@@ -8,8 +8,6 @@ import { staleText, whenText } from "../i18n/format";
 import { r } from "../i18n/recordings";
 import { t, viewText } from "../i18n/texts";
 import { distanceText, useClearanceLevel } from "../mesh/clearance";
-import type { Sample } from "../mesh/connection";
-import { watch } from "../mesh/connection";
 import type { MomentState } from "../mesh/replay-moment";
 import { OWN_DRAWING, useShownView } from "../mesh/sight";
 import { ageOf, isStale, useTopic } from "../mesh/topics";
@@ -21,24 +19,21 @@ import { ghost, redLinks, toolPath } from "./ghost";
 import type { Nearest } from "./lines";
 import { Neighbours } from "./neighbours";
 import { Poster } from "./poster";
-import type { RobotScene, Stage } from "./robot-scene";
+import type { RobotScene, SceneState, Stage } from "./robot-scene";
 import { framesTopic } from "./topic-selection";
 
 // Eye of the free camera relative to its target, in multiples of the arm's reach.
 const FREE_EYE = { x: 1.2, y: -1.69, z: 0.72 };
 const NOMINAL_REACH = 1.1; // m, until the description arrives
-const CAMERA_LOOK_MS = 500;
-const KEPT_SAMPLES = 16; // more than the drawing lags behind
 
-type Drawing = typeof import("./drawing");
-let drawing: Drawing | null = null;
+let drawing: typeof import("./robot-scene") | null = null;
 
-/** Return what draws in 3-D, loaded once it is `wanted`; null until then. */
-function useDrawing(wanted: boolean, failed: (why: string) => void): Drawing | null {
+/** Return what draws in 3-D, loaded once it is `wanted`, because it is larger than the rest of the page. */
+function useDrawing(wanted: boolean, failed: (why: string) => void): typeof drawing {
   const [loaded, setLoaded] = useState(drawing);
   useEffect(() => {
     if (!wanted || loaded) return;
-    import("./drawing").then(
+    import("./robot-scene").then(
       (all) => setLoaded((drawing = all)),
       (error: unknown) => failed(error instanceof Error ? error.message : String(error)),
     );
@@ -94,7 +89,6 @@ export function SceneView(props: {
   const [trail, setTrail] = useState(false);
   const [frames, setFrames] = useState(false);
   const { robotKey, description } = props;
-  const prefix = robotKey.split("/").slice(1).join("/");
   const topic = framesTopic(robotKey);
   const framesAge = useFramesAge(robotKey, topic);
   const drawn = useShownView(robotKey, OWN_DRAWING, topic, () => canvas.current);
@@ -117,22 +111,13 @@ export function SceneView(props: {
   );
   // The joints are shown first.
   const code = useDrawing(description !== undefined, setProblem);
-  const forward = useMemo(
-    () =>
-      description &&
-      code?.forwardOf(
-        description.urdf,
-        description.joints.map((joint) => joint.name),
-      ),
-    [description, code],
-  );
   useEffect(() => {
     if (!canvas.current || !label.current || !description || !code) return;
     setProblem("");
     setLoaded(false);
     let made: RobotScene;
     try {
-      made = new code.RobotScene(canvas.current, prefix, label.current);
+      made = new code.RobotScene(canvas.current, robotKey, label.current);
     } catch {
       setProblem(t("no_webgl"));
       return;
@@ -153,39 +138,27 @@ export function SceneView(props: {
       scene.current = null;
     };
   }, [identity, code]);
-  useEffect(() => {
-    const made = scene.current;
-    if (!made || !description || !forward || !code) return;
-    const read = topic === "frames" ? (payload: Uint8Array) => payload : code.framesOf(prefix, description, forward);
-    const received: Sample[] = [];
-    const report = () => {
-      const newest = received.findLast(({ sourceTime }) => sourceTime <= made.drawnTime);
-      // After the loss of its WebGL context, as with a GPU's reset, the canvas shows an old picture.
-      const lost = canvas.current?.getContext("webgl2")?.isContextLost() !== false;
-      if (newest) drawn.picture = lost ? null : newest;
-    };
-    made.onDrawn = report;
-    return watch(`${robotKey}/${topic}`, (sample) => {
-      received.push(sample);
-      if (received.length > KEPT_SAMPLES) received.shift();
-      made.placeFrames(read(sample.payload), sample.sourceTime, sample.arrived);
-      report();
-    });
-  }, [identity, topic, code]);
-  useEffect(() => scene.current?.setStale(stale), [stale, identity, loaded, code]);
-  useEffect(() => scene.current?.setRate(rate), [rate, identity, code]);
-  useEffect(() => scene.current?.setColours(), [theme.value]);
-  useEffect(() => scene.current?.showTrail(trail), [trail, identity, code]);
-  useEffect(() => scene.current?.showFrames(frames), [frames, identity, code]);
-  const shown = ghost.value?.robotKey === robotKey ? ghost.value.positions : null;
-  useEffect(() => scene.current?.showGhost(shown && (forward?.(shown) ?? null)), [shown, forward, loaded]);
-  useEffect(() => scene.current?.setRed(redLinks.value), [redLinks.value, identity, code]);
-  useEffect(() => scene.current?.showPath(toolPath.value), [toolPath.value, identity, code]);
-  const near = useNearest(robotKey, description);
-  useEffect(() => scene.current?.showGap(near?.nearest ?? null, near?.sourceTime), [near, identity, code]);
   const views = viewsOf(description);
   const chosen = views.find((each) => each.name === view) ?? freeView([]);
-  useCamera(scene, chosen, props.camera?.pose ?? null, props.setCamera, [chosen.name, identity, code]);
+  const near = useNearest(robotKey, description);
+  const state: SceneState | undefined = description && {
+    description,
+    topic,
+    stale,
+    rate,
+    theme: theme.value,
+    trail,
+    frames,
+    ghost: ghost.value?.robotKey === robotKey ? ghost.value.positions : null,
+    red: redLinks.value,
+    path: toolPath.value,
+    nearest: near,
+    view: chosen,
+    pose: props.camera?.pose ?? null,
+    moved: props.setCamera,
+    drew: (picture) => (drawn.picture = picture),
+  };
+  useEffect(() => void (state && scene.current?.update(state)));
 
   const onKey = (event: KeyboardEvent) => {
     const step = 0.1;
@@ -261,61 +234,6 @@ export function SceneView(props: {
       )}
     </section>
   );
-}
-
-/** Set the camera to a view, or to where a person put it, and report where a person puts it. */
-function useCamera(
-  scene: { readonly current: RobotScene | null },
-  chosen: View,
-  pose: readonly number[] | null,
-  report: ((camera: Camera) => void) | undefined,
-  depends: readonly unknown[],
-): void {
-  const reported = useRef("");
-  const latest = useRef(report);
-  latest.current = report;
-  const wanted = pose?.join() ?? "";
-  const settled = useRef("");
-  useEffect(() => {
-    // The scene's own camera, which the address follows.
-    if (wanted && wanted === reported.current) return;
-    reported.current = "";
-    scene.current?.look(pose ? lookFrom(chosen, pose) : chosen);
-    settled.current = "";
-  }, [...depends, wanted]);
-  useEffect(() => {
-    const made = scene.current;
-    if (!made || !latest.current) return;
-    if (pose && wanted === reported.current) made.look(lookFrom(chosen, pose)); // a new scene
-    settled.current = "";
-    let before = "";
-    const timer = setInterval(() => {
-      const at = poseOf(made.view());
-      const now = at.join();
-      // At rest: each report changes the address. A flat view has a zoom, which a pose does not say.
-      if (settled.current && now !== settled.current && now === before) {
-        settled.current = now;
-        if (chosen.projection !== View_Projection.ORTHOGRAPHIC) {
-          reported.current = now;
-          latest.current?.({ view: chosen.name, pose: at });
-        }
-      }
-      settled.current ||= now;
-      before = now;
-    }, CAMERA_LOOK_MS);
-    return () => clearInterval(timer);
-  }, depends);
-}
-
-function poseOf({ eye, target }: View): number[] {
-  return [eye, target].flatMap((at) => [at?.x ?? 0, at?.y ?? 0, at?.z ?? 0].map((each) => Number(each.toFixed(3))));
-}
-
-function lookFrom(view: View, [x = 0, y = 0, z = 0, ...target]: readonly number[]): View {
-  const [tx = 0, ty = 0, tz = 0] = target;
-  const { name, projection } = view;
-  const up = view.up ?? { z: 1 };
-  return create(ViewSchema, { name, projection, up, eye: { x, y, z }, target: { x: tx, y: ty, z: tz } });
 }
 
 /** Return the two nearest points of the arm and its surroundings; null: not known. */
