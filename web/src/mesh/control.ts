@@ -7,7 +7,7 @@
 
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
 import { timestampMs } from "@bufbuild/protobuf/wkt";
-import { signal } from "@preact/signals";
+import { computed, signal } from "@preact/signals";
 import type { Lease, LeaseAnswer } from "../gen/robomesh_pb";
 import {
   LeaseRequest_Action as Action,
@@ -19,6 +19,7 @@ import { reasonText } from "../i18n/reasons";
 import type { TextName } from "../i18n/texts";
 import { t } from "../i18n/texts";
 import { AskError, ask, hello, lostAt } from "./connection";
+import { isSlow, measureStalls, wasStalled } from "./page-stalls";
 
 /** The outcome of an action, in words, shown next to the action. */
 export interface Notice {
@@ -50,8 +51,7 @@ const TTL_S = 2;
 const SLOW_TTL_S = 4; // a page that is blocked for 5 s has lost control
 const RENEW_INTERVAL_MS = 650;
 const RETRY_MS = 100;
-const SLOW_GAP_MS = 500;
-const SLOW_FOR_MS = 60_000; // after a long gap
+const LATE_MS = 500;
 /** Ends that another person caused, also if this page was slow at the time. */
 const TAKEN = ["lease.ended.taken", "lease.ended.handed_over", "lease.ended.no_right", "lease.ended.signed_out"];
 /** Refusals of a renewal after which somebody else, or another window, has control. */
@@ -61,21 +61,69 @@ const OPERATOR_NAME = /^[A-Za-z0-9][A-Za-z0-9_.-]*$/;
 
 /** The account's name, or without accounts the name that the operator gave. */
 export const operator = signal(localStorage.getItem(OPERATOR) ?? "");
-/** The lease that this tab holds; one robot at a time. */
-export const heldLease = signal<HeldLease | null>(null);
 export const controlNotice = signal<Notice | null>(null);
 
-let renewing: ReturnType<typeof setTimeout> | undefined;
-let slowUntil = 0;
-let timerRanAt = performance.now();
-/** Recent gaps in which this page's timers did not run, newest last. */
-let gaps: { ms: number; endedAt: number }[] = [];
-let beginning = false;
-let offeredTo = "";
-/** An ended lease, until the gateway has given the reason. */
-let ended: HeldLease | null = null;
-/** The lease that was lost last, and the lease that replaced it. */
-let lost: { mine: HeldLease; to: string } | null = null;
+type State =
+  | { phase: "none" }
+  /** `unwanted`: released before the answer came. */
+  | { phase: "asking"; unwanted: boolean }
+  | { phase: "held"; lease: HeldLease; offeredTo: string }
+  /** `explained`: the message gives the reason; `successor`: the lease that replaced this one. */
+  | { phase: "lost"; lease: HeldLease; offeredTo: string; explained: boolean; successor: string };
+
+/** Control by this tab, of one robot at a time.
+ *
+ *     phase    this tab                                             steps
+ *     ------   --------------------------------------------------   -----------------------------
+ *     none     has no lease                                         ask
+ *     asking   waits for the answer to its request                  grant; end: it was refused
+ *     held     has a lease, and renews it                           renew, lose; ask; end: it was released
+ *     lost     shows why its lease ended without a release, until   ask; end: another operator
+ *              another operator takes control                       took control
+ */
+class Control {
+  readonly state = signal<State>({ phase: "none" });
+  private renewal: ReturnType<typeof setTimeout> | undefined;
+
+  ask(): void {
+    this.become({ phase: "asking", unwanted: false });
+  }
+
+  grant(lease: HeldLease): void {
+    this.become({ phase: "held", lease, offeredTo: "" });
+    this.renewIn(RENEW_INTERVAL_MS);
+  }
+
+  renew(lease: HeldLease): void {
+    const state = this.state.peek();
+    if (state.phase !== "held") return;
+    this.become({ ...state, lease });
+    this.renewIn(RENEW_INTERVAL_MS);
+  }
+
+  renewIn(delayMs: number): void {
+    clearTimeout(this.renewal);
+    this.renewal = setTimeout(renew, delayMs);
+  }
+
+  lose(explained: boolean): void {
+    const state = this.state.peek();
+    if (state.phase === "held") this.become({ ...state, phase: "lost", explained, successor: "" });
+  }
+
+  end(): void {
+    this.become({ phase: "none" });
+  }
+
+  private become(state: State): void {
+    if (state.phase !== "held") clearTimeout(this.renewal);
+    this.state.value = state;
+  }
+}
+
+const control = new Control();
+/** The lease that this tab holds. */
+export const heldLease = computed(() => (control.state.value.phase === "held" ? control.state.value.lease : null));
 
 export function setOperator(name: string): void {
   operator.value = name;
@@ -119,7 +167,7 @@ function askLease(
 }
 
 function ttlS(): number {
-  return performance.now() < slowUntil ? SLOW_TTL_S : TTL_S;
+  return isSlow() ? SLOW_TTL_S : TTL_S;
 }
 
 /** Take control of a robot that no operator controls. */
@@ -131,22 +179,25 @@ export const accept = (robotKey: string) => begin(robotKey, Action.ACCEPT);
 
 async function begin(robotKey: string, action: Action, reason = ""): Promise<void> {
   const who = ownName();
-  if (!who || beginning) return;
-  beginning = true;
-  await release();
-  ended = null;
-  offeredTo = "";
+  if (!who || control.state.peek().phase === "asking") return;
+  const before = heldLease.peek();
+  control.ask();
+  if (before) await giveBack(before);
   controlNotice.value = { kind: "busy", text: t("taking") };
   const requestedAt = performance.now();
+  let unwanted = false;
   try {
     const answer = await askLease(robotKey, who, action, { reason });
-    hold(robotKey, who, answer, requestedAt);
+    const state = control.state.peek();
+    unwanted = state.phase === "asking" && state.unwanted;
+    control.grant(leaseFrom(robotKey, who, answer, requestedAt));
     controlNotice.value = null;
-    if (document.hidden) await releaseHidden();
   } catch (error) {
+    control.end();
     controlNotice.value = { kind: "refused", text: t("not_taken", { text: reasonOf(error) }) };
   }
-  beginning = false;
+  if (document.hidden) await releaseHidden();
+  else if (unwanted) await release();
 }
 
 /** Ask the operator in control for it; every page shows the request for half a minute. */
@@ -157,9 +208,10 @@ export async function requestControl(robotKey: string, holder: string, reason: s
 
 /** Offer control to another operator, or withdraw the offer. */
 export async function offer(to: string | null): Promise<void> {
-  const mine = heldLease.value;
-  if (!mine) return;
-  offeredTo = to ?? "";
+  const state = control.state.peek();
+  if (state.phase !== "held") return;
+  const mine = state.lease;
+  state.offeredTo = to ?? "";
   const values = { lease: mine.lease, to: to ?? mine.operator };
   const done = to ? t("offered", { name: to }) : t("withdrawn");
   await say(mine.robotKey, mine.operator, Action.OFFER, values, done, "not_offered");
@@ -181,9 +233,9 @@ async function say(
   }
 }
 
-function hold(robotKey: string, who: string, answer: LeaseAnswer, requestedAt: number): void {
+function leaseFrom(robotKey: string, who: string, answer: LeaseAnswer, requestedAt: number): HeldLease {
   const ttlMs = ms(answer.until) - ms(answer.now) || ttlS() * 1000;
-  heldLease.value = {
+  return {
     robotKey,
     operator: who,
     lease: answer.lease,
@@ -193,12 +245,6 @@ function hold(robotKey: string, who: string, answer: LeaseAnswer, requestedAt: n
     since: ms(answer.since),
     saidAt: ms(answer.now),
   };
-  renewIn(RENEW_INTERVAL_MS);
-}
-
-function renewIn(delayMs: number): void {
-  clearTimeout(renewing);
-  renewing = setTimeout(renew, delayMs);
 }
 
 async function renew(): Promise<void> {
@@ -208,14 +254,15 @@ async function renew(): Promise<void> {
   try {
     const answer = await askLease(mine.robotKey, mine.operator, Action.RENEW, { lease: mine.lease });
     if (heldLease.value?.lease !== mine.lease) return;
-    hold(mine.robotKey, mine.operator, { ...answer, lease: answer.lease || mine.lease }, requestedAt);
+    const renewed = { ...answer, lease: answer.lease || mine.lease };
+    control.renew(leaseFrom(mine.robotKey, mine.operator, renewed, requestedAt));
   } catch (error) {
     if (heldLease.value?.lease !== mine.lease) return;
     const silent = error instanceof AskError && error.noAnswer;
     const held = error instanceof AskError && HELD.includes(error.reason?.code ?? "");
-    const slow = !held && (requestedAt > mine.endsAt + SLOW_GAP_MS || wasInactive(mine.endsAt - mine.requestedAt));
+    const slow = !held && (requestedAt > mine.endsAt + LATE_MS || wasStalled(mine.endsAt - mine.requestedAt));
     // An attempt after the end would look like a slow browser's.
-    if (silent && performance.now() + RETRY_MS < mine.endsAt) renewIn(RETRY_MS);
+    if (silent && performance.now() + RETRY_MS < mine.endsAt) control.renewIn(RETRY_MS);
     else if (slow) lose(t("lost_slow"), true);
     else if (silent) lose(t("lost_no_answer", { seconds: Math.round((mine.endsAt - mine.requestedAt) / 1000) }));
     else lose(reasonOf(error));
@@ -224,10 +271,7 @@ async function renew(): Promise<void> {
 
 /** `known`: this page knows the reason and does not need the gateway's. */
 function lose(reason: string, known = false): void {
-  clearTimeout(renewing);
-  ended = known ? null : heldLease.value;
-  lost = heldLease.value && { mine: heldLease.value, to: "" };
-  heldLease.value = null;
+  control.lose(known);
   controlNotice.value = { kind: "lost", text: t("control_lost", { text: reason }) };
 }
 
@@ -236,10 +280,14 @@ const releaseHidden = () => release(t("released_hidden"), Cause.HIDDEN);
 
 /** Release control if this tab has it; every page shows the cause. */
 export async function release(text: string = t("released"), cause?: Cause): Promise<void> {
-  const mine = heldLease.value;
-  if (!mine) return;
-  clearTimeout(renewing);
-  heldLease.value = null;
+  const state = control.state.peek();
+  if (state.phase === "asking") state.unwanted = true;
+  if (state.phase !== "held") return;
+  control.end();
+  await giveBack(state.lease, text, cause);
+}
+
+async function giveBack(mine: HeldLease, text = t("released"), cause?: Cause): Promise<void> {
   controlNotice.value = { kind: "done", text };
   try {
     await askLease(mine.robotKey, mine.operator, Action.RELEASE, { lease: mine.lease, ...(cause && { cause }) });
@@ -250,39 +298,32 @@ export async function release(text: string = t("released"), cause?: Cause): Prom
 
 /** Compare the published lease with this tab's: a different one means that this tab's has ended. */
 export function handleLease(robotKey: string, lease: Lease): void {
-  handleLoss(robotKey, lease);
-  endLoss(robotKey, lease);
-}
-
-function handleLoss(robotKey: string, lease: Lease): void {
-  const mine = heldLease.value ?? ended;
+  const before = control.state.peek();
+  if (before.phase !== "held" && before.phase !== "lost") return;
+  const mine = before.lease;
   // Messages from before this lease began do not know it.
-  if (mine?.robotKey !== robotKey || ms(lease.timestamp) <= mine.saidAt) return;
-  if (isOf(mine, lease)) return;
-  if (heldLease.value) {
-    const slow = !TAKEN.includes(lease.endedReason?.code ?? "") && wasInactive(mine.endsAt - mine.requestedAt);
+  if (mine.robotKey !== robotKey || ms(lease.timestamp) <= mine.saidAt || isOf(mine, lease)) return;
+  if (before.phase === "held") {
+    const slow = !TAKEN.includes(lease.endedReason?.code ?? "") && wasStalled(mine.endsAt - mine.requestedAt);
     lose(slow ? t("lost_slow") : "", slow);
-    if (slow) return;
   }
-  ended = null;
-  if (controlNotice.value?.kind !== "lost") return;
-  controlNotice.value =
-    offeredTo && lease.holder === offeredTo
-      ? { kind: "done", text: t("handed_over", { name: offeredTo }) }
-      : {
-          kind: "lost",
-          text: t("control_lost", { text: reasonText(lease.endedReason, lease.ended) || t("lost_unknown") }),
-        };
+  const state = control.state.peek();
+  if (state.phase !== "lost") return;
+  if (!state.explained && controlNotice.value?.kind === "lost")
+    controlNotice.value = explanation(lease, state.offeredTo);
+  state.explained = true;
+  const now = `${lease.holder} ${ms(lease.since)}`;
+  state.successor ||= now;
+  if (state.successor === now) return;
+  control.end();
+  if (controlNotice.value?.kind === "lost") controlNotice.value = null;
 }
 
-/** Clear the message about a lost lease once another operator takes control. */
-function endLoss(robotKey: string, lease: Lease): void {
-  if (lost?.mine.robotKey !== robotKey || ms(lease.timestamp) <= lost.mine.saidAt || isOf(lost.mine, lease)) return;
-  const now = `${lease.holder} ${ms(lease.since)}`;
-  lost.to ||= now;
-  if (lost.to === now) return;
-  lost = null;
-  if (controlNotice.value?.kind === "lost") controlNotice.value = null;
+/** Return why this tab's lease ended, by the lease that the gateway published after it. */
+function explanation(lease: Lease, offeredTo: string): Notice {
+  if (offeredTo && lease.holder === offeredTo) return { kind: "done", text: t("handed_over", { name: offeredTo }) };
+  const text = reasonText(lease.endedReason, lease.ended) || t("lost_unknown");
+  return { kind: "lost", text: t("control_lost", { text }) };
 }
 
 function isOf(mine: HeldLease, lease: Lease): boolean {
@@ -302,19 +343,5 @@ export function followThisTab(): void {
   lostAt.subscribe((at) => {
     if (at && heldLease.value) lose(t("lost_connection"), true);
   });
-  setInterval(() => {
-    const now = performance.now();
-    if (now - timerRanAt > SLOW_GAP_MS) {
-      slowUntil = now + SLOW_FOR_MS;
-      gaps = [...gaps.filter((each) => now - each.endedAt < SLOW_TTL_S * 1000), { ms: now - timerRanAt, endedAt: now }];
-    }
-    timerRanAt = now;
-  }, 100);
-}
-
-/** Return whether this page was inactive for most of a lease's time just now, so that it caused the delay itself. */
-function wasInactive(leaseMs: number): boolean {
-  const now = performance.now();
-  const recent = gaps.filter((each) => now - each.endedAt < leaseMs);
-  return recent.reduce((total, each) => total + each.ms, now - timerRanAt) > leaseMs / 2;
+  measureStalls();
 }
