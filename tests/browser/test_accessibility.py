@@ -1,10 +1,13 @@
 """Every page, dark and light: axe finds nothing serious; in Chinese nothing of the page itself is English."""
 
+import re
+
 import pytest
 from playwright.sync_api import expect
 
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.browser.robot_page import alarms, keep_picture, serious, visit
+from tests.site import wait_until
 
 pytestmark = pytest.mark.browser
 
@@ -73,6 +76,19 @@ def test_axe_finds_nothing_serious_on_any_page_and_a_chinese_page_is_chinese(
         if language == "zh":
             found[path] += page.evaluate(ENGLISH)
     assert found == {path: [] for path in PICTURED}
+
+
+def test_nothing_is_shown_in_english_while_the_chinese_texts_are_loaded(contexts, plant):
+    context, kind = contexts.lend(locale="zh-CN")
+    page = context.new_page()
+    catalogue = []
+    page.route(re.compile("/assets/zh-"), catalogue.append)
+    page.goto(plant.address)
+    wait_until(lambda: page.title() and catalogue)  # a question to the page lets its requests come here
+    assert page.locator("#app").inner_text() == ""
+    catalogue[0].continue_()
+    expect(page.get_by_role("navigation", name="页面")).to_contain_text("机群")
+    contexts.give_back(context, kind, plant.address)
 
 
 def test_the_first_stop_of_the_tab_key_skips_the_bar(open_page):

@@ -11,12 +11,14 @@ from tests import page_modules
 pytestmark = pytest.mark.slow
 
 SCRIPT = """
-answer(asked.map(([language, reason, seconds]) => {
-  page.language.value = language;
+const shown = [];
+for (const [language, reason, seconds] of asked) {
+  await page.showLanguage(language);
   const given = { values: {}, causes: [], text: "", ...reason };
   given.causes = given.causes.map((cause) => ({ values: {}, causes: [], text: "", ...cause }));
-  return page.reasonText(seconds ? page.withValue(given, "seconds", seconds) : given);
-}));
+  shown.push(page.reasonText(seconds ? page.withValue(given, "seconds", seconds) : given));
+}
+answer(shown);
 """
 LIMIT = codes.JOINT_LIMIT(name="elbow", value="-131.0°", limit="-120.0°")
 HELD = codes.LEASE_HELD(holder="עלי")

@@ -1,7 +1,7 @@
 import "@preact/signals";
 import { render } from "preact";
 import { isolateForeignTexts } from "../i18n/foreign-text";
-import { declareLanguage } from "../i18n/texts";
+import { showLanguage } from "../i18n/texts";
 import { fetchAccount, reportActivity, signedOut } from "../mesh/account";
 import { keepConnected } from "../mesh/connection";
 import { followThisTab } from "../mesh/control";
@@ -12,13 +12,16 @@ import "./styles";
 
 isolateForeignTexts();
 applyTheme();
-declareLanguage();
-followThisTab();
-renewWhileBusy();
-const maySee = async () => {
-  const who = await fetchAccount();
-  return who && (!who.accounts || who.account !== "");
-};
-reportActivity(keepConnected(maySee, signedOut));
-const root = document.getElementById("app");
-if (root) render(<App />, root);
+void showLanguage().then(start);
+
+function start(): void {
+  followThisTab();
+  renewWhileBusy();
+  const maySee = async () => {
+    const who = await fetchAccount();
+    return who && (!who.accounts || who.account !== "");
+  };
+  reportActivity(keepConnected(maySee, signedOut));
+  const root = document.getElementById("app");
+  if (root) render(<App />, root);
+}

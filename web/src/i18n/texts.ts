@@ -1,15 +1,19 @@
 // The page's texts by key: one catalogue for each language, flat JSON with `{name}` placeholders, one line a message.
 
-import { signal } from "@preact/signals";
+import { computed, signal } from "@preact/signals";
 import en from "./en.json";
 import { isolated } from "./foreign-text";
 import { readStored } from "./stored";
-import zh from "./zh.json";
 
 type Key = keyof typeof en;
+type Catalogue = Readonly<Record<Key, string>>;
 
-/** English defines the keys; the others also translate what arrives in English. Add a language as a file and a name. */
-const CATALOGUES = { en, zh } satisfies Record<string, Readonly<Record<Key, string>>>;
+/** English defines the keys and is in the first bundle, the others are loaded when they are shown; they also
+ * translate what arrives in English. Add a language as a file and a row. */
+const CATALOGUES = {
+  en: { name: "English", load: async () => en },
+  zh: { name: "中文", load: async () => (await import("./zh.json")).default },
+} satisfies Record<string, { name: string; load: () => Promise<Catalogue> }>;
 
 export type Language = keyof typeof CATALOGUES;
 export const LANGUAGES = Object.keys(CATALOGUES) as Language[];
@@ -22,33 +26,44 @@ export type Values = Readonly<Record<string, string | number>>;
 
 const STORAGE_KEY = "robomesh.language";
 
+const shownLanguage = signal<{ name: Language; catalogue: Catalogue }>({ name: "en", catalogue: en });
+let wanted: Language = "en"; // while its catalogue is loaded
+/** The page's language. */
+export const language = computed(() => shownLanguage.value.name);
+
 export const isLanguage = (name: string | null): name is Language => name !== null && Object.hasOwn(CATALOGUES, name);
 
-function initialLanguage(): Language {
+function preferredLanguage(): Language {
   const stored = readStored(STORAGE_KEY);
   if (isLanguage(stored)) return stored;
   return LANGUAGES.find((each) => navigator.language.toLowerCase().startsWith(each)) ?? "en";
 }
 
-export const language = signal<Language>(initialLanguage());
-
-/** Show the page in a language; by default in the next one. */
-export function switchLanguage(to?: Language): void {
-  language.value = to ?? LANGUAGES[(LANGUAGES.indexOf(language.value) + 1) % LANGUAGES.length] ?? "en";
-  localStorage.setItem(STORAGE_KEY, language.value);
-  declareLanguage();
-}
-
-/** Tell the browser the page's language. */
-export function declareLanguage(): void {
+/** Show the page in a language, by default in the one that the person or the browser prefers; without its
+ * catalogue, as of an older console's page, it stays as it is. */
+export async function showLanguage(name = preferredLanguage()): Promise<void> {
+  wanted = name;
+  try {
+    const catalogue = await CATALOGUES[name].load();
+    if (wanted === name) shownLanguage.value = { name, catalogue };
+  } catch (error) {
+    console.error(error);
+  }
   document.documentElement.lang = t("language_tag");
 }
 
-export const languageName = (of: Language): string => CATALOGUES[of].language_name;
+/** Show the page in a language from now on; by default in the next one. */
+export function switchLanguage(to?: Language): void {
+  const next = to ?? LANGUAGES[(LANGUAGES.indexOf(language.value) + 1) % LANGUAGES.length] ?? "en";
+  localStorage.setItem(STORAGE_KEY, next);
+  void showLanguage(next);
+}
+
+export const languageName = (of: Language): string => CATALOGUES[of].name;
 
 /** Return a message of the language's catalogue, or undefined. */
 export function message(key: string): string | undefined {
-  const catalogue: Readonly<Partial<Record<string, string>>> = CATALOGUES[language.value];
+  const catalogue: Readonly<Partial<Record<string, string>>> = shownLanguage.value.catalogue;
   return catalogue[key];
 }
 
@@ -67,12 +82,12 @@ export function filled(template: string, values: Values, shown: (value: string) 
 
 /** Return a text in the page's language. */
 export function t(name: TextName, values: Values = {}): string {
-  return filled(CATALOGUES[language.value][name], values);
+  return filled(shownLanguage.value.catalogue[name], values);
 }
 
 /** Return a sentence made of sentences, which have their values `isolated` already. */
 export function compose(name: TextName, sentences: Values): string {
-  return filled(CATALOGUES[language.value][name], sentences, String);
+  return filled(shownLanguage.value.catalogue[name], sentences, String);
 }
 
 /** Return the function that returns the texts of a section. */
