@@ -3,8 +3,9 @@
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Recording } from "../gen/robomesh_pb";
 import { count, fixed } from "./format";
-import { r } from "./recordings";
+import { recordingsText as r, viewText } from "./texts";
 
+const RECORDED = "recorded-";
 const UNITS = ["B", "kB", "MB", "GB", "TB"];
 
 /** Format a size: 912 B, 4.3 MB. */
@@ -75,6 +76,18 @@ export function recordedViews({ topics }: Recording): readonly string[] {
     .map((each) => topicOf(each.topic))
     .filter((topic) => topic.startsWith("video/"))
     .map((topic) => topic.slice("video/".length));
+}
+
+/** Return the name under which a replay publishes a recorded view. */
+export function recordedView(view: string): string {
+  return RECORDED + view;
+}
+
+/** Return a replay's view in words. */
+export function viewName(view: string): string {
+  return view.startsWith(RECORDED)
+    ? r("recorded_view", { view: viewText(view.slice(RECORDED.length)) })
+    : viewText(view);
 }
 
 /** Return the console's address of a recording's file, or of a part of it. */

@@ -2,14 +2,11 @@
 
 import type { Description, Signal } from "../gen/robomesh_pb";
 import { DASH, fixed, jointTitle } from "./format";
-import { message, texts } from "./texts";
+import { message, signalsText as sg } from "./texts";
 import { shownUnit } from "./value-names";
 
 // Groups in the order in which they are shown: what people look for first.
 const GROUPS = ["safety", "robot", "program", "speed", "tool", "payload", "frame", "joint", "io", "counter", "cabinet"];
-
-/** Return a text of the signals in the page's language. */
-export const sg = texts("signals");
 
 /** Return the group of a signal: the first word of its name. */
 export function groupOf(name: string): string {

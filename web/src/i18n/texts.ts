@@ -91,7 +91,7 @@ export function compose(name: TextName, sentences: Values): string {
 }
 
 /** Return the function that returns the texts of a section. */
-export function texts<Section extends string>(section: Section): (name: NameIn<Section>, values?: Values) => string {
+function texts<Section extends string>(section: Section): (name: NameIn<Section>, values?: Values) => string {
   return (name, values = {}) => filled(message(keyIn(section, name)) ?? name, values);
 }
 
@@ -109,3 +109,24 @@ function keyIn(section: string, name: string): string {
 export function viewText(name: string): string {
   return message(`view_${name}`) ?? name;
 }
+
+/** Return a text of a section in the page's language. */
+export const accountText = texts("account");
+export const cellText = texts("cell");
+export const dayText = texts("day");
+export const defineText = texts("define");
+export const eventsText = texts("events");
+export const fleetText = texts("fleet");
+export const notesText = texts("notes");
+export const plotsText = texts("plots");
+export const programText = texts("program");
+export const recordingsText = texts("recordings");
+export const settingsText = texts("settings");
+export const signalsText = texts("signals");
+export const storedText = texts("stored_programs");
+export const viewPageText = texts("view");
+export const wallText = texts("wall");
+
+/** A text that follows the page's language while it is shown. */
+export type Words = () => string;
+export const noWords: Words = () => "";

@@ -1,7 +1,7 @@
 // The signed-in account of this page, and requests to the console about it.
 
 import { computed, signal } from "@preact/signals";
-import { a } from "../i18n/account";
+import { accountText as a } from "../i18n/texts";
 import { hello } from "./connection";
 import { RefusedRequest, readRefusal } from "./refusal";
 

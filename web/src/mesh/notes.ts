@@ -9,7 +9,7 @@ import {
   NoteQuerySchema,
   NoteRequestSchema,
 } from "../gen/robomesh_pb";
-import { n } from "../i18n/notes";
+import { notesText as n } from "../i18n/texts";
 import { isAdministrator, mayAct } from "./account";
 import { asker } from "./alarms";
 import { AskError, ask } from "./connection";

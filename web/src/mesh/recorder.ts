@@ -2,7 +2,7 @@
 
 import type { Recording } from "../gen/robomesh_pb";
 import { RecorderRequest_Action as Action, RecorderRequestSchema, RecordingSchema } from "../gen/robomesh_pb";
-import { r } from "../i18n/recordings";
+import { recordingsText as r } from "../i18n/texts";
 import { AskError, ask } from "./connection";
 
 // Closing rewrites the file.

@@ -1,7 +1,7 @@
 // A form for the account's new password.
 
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
-import { a } from "../i18n/account";
+import { accountText as a } from "../i18n/texts";
 import type { Me } from "../mesh/account";
 import { me, post } from "../mesh/account";
 import { RefusedRequest } from "../mesh/refusal";

@@ -2,8 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
-import { n } from "../i18n/notes";
-import { t } from "../i18n/texts";
+import { notesText as n, t } from "../i18n/texts";
 import { mayAct } from "../mesh/account";
 import { asker } from "../mesh/alarms";
 import { hello } from "../mesh/connection";

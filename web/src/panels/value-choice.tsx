@@ -1,14 +1,14 @@
 // Choice of plotted values by topic.
 
 import { useState } from "preact/hooks";
-import type { RecordingsText } from "../i18n/recordings";
-import { r } from "../i18n/recordings";
+import type { NameIn } from "../i18n/texts";
+import { recordingsText as r } from "../i18n/texts";
 import { labelOf } from "../i18n/value-names";
 import { TextInput } from "../ui/text-input";
 import "./value-choice.css";
 
 /** The most wanted values, by topic. */
-const GROUPS: Partial<Record<string, RecordingsText>> = {
+const GROUPS: Partial<Record<string, NameIn<"recordings">>> = {
   joints: "joints",
   kinematics: "tool_and_margins",
   signals: "signals",

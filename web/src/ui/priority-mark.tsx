@@ -1,11 +1,11 @@
 // An alarm's priority: a shape, a colour and a word, never the colour alone.
 
 import { Alarm_Priority as Priority } from "../gen/robomesh_pb";
-import type { EventsTextName } from "../i18n/events";
-import { e } from "../i18n/events";
+import type { NameIn } from "../i18n/texts";
+import { eventsText as e } from "../i18n/texts";
 import "./priority-mark.css";
 
-const WORDS: Partial<Record<Priority, [EventsTextName, string]>> = {
+const WORDS: Partial<Record<Priority, [NameIn<"events">, string]>> = {
   [Priority.PRIORITY_UNSPECIFIED]: ["priority_low", "low"],
   [Priority.LOW]: ["priority_low", "low"],
   [Priority.MEDIUM]: ["priority_medium", "medium"],

@@ -1,7 +1,7 @@
 // The account menu in the bar: name and role, sign-out, new password.
 
 import { useRef, useState } from "preact/hooks";
-import { a, roleText } from "../../i18n/account";
+import { accountText as a, textIn } from "../../i18n/texts";
 import { commandSuspended, isMonitor, me, signOut } from "../../mesh/account";
 import { hello } from "../../mesh/connection";
 import { ChangePassword } from "../../panels/change-password";
@@ -20,11 +20,12 @@ export function AccountMenu() {
   const who = me.value;
   if (!who?.account) return null;
   const { account, role } = who;
+  const roleName = textIn("account", `role_${role}`) ?? role;
   const operator = hello.value?.operator || who.operator;
   return (
     <details ref={menu} class="account-menu" aria-label={a("account")}>
-      <summary title={a("menu", { account, role: roleText(role) })}>
-        <span class="account-name">{account}</span> <span class="account-role dim">{roleText(role)}</span>
+      <summary title={a("menu", { account, role: roleName })}>
+        <span class="account-name">{account}</span> <span class="account-role dim">{roleName}</span>
       </summary>
       <div class="account-sheet">
         {changing ? (
@@ -32,7 +33,7 @@ export function AccountMenu() {
         ) : (
           <>
             <p>
-              <strong>{account}</strong> <span class="dim">{roleText(role)}</span>
+              <strong>{account}</strong> <span class="dim">{roleName}</span>
             </p>
             <p class="dim">
               {isMonitor.value ? a("may_watch") : commandSuspended.value ? a("rests") : a("may_command", { operator })}

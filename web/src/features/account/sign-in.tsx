@@ -1,9 +1,8 @@
 // The sign-in page: the console's name, how the page reaches it, name and password.
 
 import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
-import { a, endText } from "../../i18n/account";
 import { reasonText, withValue } from "../../i18n/reasons";
-import { switchLanguage, t } from "../../i18n/texts";
+import { accountText as a, switchLanguage, t, textIn } from "../../i18n/texts";
 import { endedBy, me, signIn } from "../../mesh/account";
 import { RefusedRequest } from "../../mesh/refusal";
 import { Button } from "../../ui/button";
@@ -53,7 +52,7 @@ export function SignIn() {
         <h1>{how ? a("to_site", { site: how.site }) : "\u00a0"}</h1>
         {endedBy.value && (
           <div class={`sign-in-ended ${endedBy.value === "signed_out" ? "" : "warning"}`} role="status">
-            <p>{endText(endedBy.value)}</p>
+            <p>{textIn("account", `out_${endedBy.value}`) ?? a("out_signed_out")}</p>
             {endedBy.value !== "signed_out" && <p class="dim">{a("out_nothing_live")}</p>}
           </div>
         )}

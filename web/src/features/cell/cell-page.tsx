@@ -3,7 +3,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
 import { CellStateSchema, ControllerStateSchema, DescriptionSchema } from "../../gen/robomesh_pb";
-import { c } from "../../i18n/cell";
+import { cellText as c } from "../../i18n/texts";
 import type { RobotName } from "../../mesh/robot-name";
 import { stateWord } from "../../mesh/robot-state";
 import { useShownState } from "../../mesh/sight";

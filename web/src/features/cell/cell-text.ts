@@ -2,7 +2,7 @@
 
 import type { CellChange, CellFixture, CellFloor, Vector3 } from "../../gen/robomesh_pb";
 import { CellChange_Kind as Kind } from "../../gen/robomesh_pb";
-import { c } from "../../i18n/cell";
+import { cellText as c } from "../../i18n/texts";
 import { numberText } from "../../ui/number-text";
 
 /** The unit in which people read and type a quantity, and its factor from SI. */

@@ -2,8 +2,8 @@
 
 import { useState } from "preact/hooks";
 import type { CellAnswer } from "../../gen/robomesh_pb";
-import { c } from "../../i18n/cell";
 import { reasonText } from "../../i18n/reasons";
+import { cellText as c } from "../../i18n/texts";
 import { isEngineer } from "../../mesh/account";
 import { reasonOf } from "../../mesh/control";
 import { Button } from "../../ui/button";

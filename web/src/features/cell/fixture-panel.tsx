@@ -2,7 +2,7 @@
 
 import { useId, useState } from "preact/hooks";
 import type { CellFixture, CellFloor } from "../../gen/robomesh_pb";
-import { c } from "../../i18n/cell";
+import { cellText as c } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import { Choice, Toggle } from "../../ui/choice";
 import { Panel } from "../../ui/panel";

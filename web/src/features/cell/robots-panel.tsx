@@ -2,7 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import type { CellMember } from "../../gen/robomesh_pb";
-import { c } from "../../i18n/cell";
+import { cellText as c } from "../../i18n/texts";
 import { Panel } from "../../ui/panel";
 import { lengthText, vectorText } from "./cell-text";
 

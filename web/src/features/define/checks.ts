@@ -1,7 +1,7 @@
 // The server's problems with the draft while the user types, and the tool's position.
 
 import { computed, effect, signal } from "@preact/signals";
-import { d } from "../../i18n/define";
+import { defineText as d } from "../../i18n/texts";
 import { RefusedRequest } from "../../mesh/refusal";
 import { bodies } from "./description";
 import type { Draft } from "./draft";

@@ -1,8 +1,8 @@
 // How each pair of links is checked, or why it is ignored; the user may ignore more.
 
 import { useEffect } from "preact/hooks";
-import type { DefineText } from "../../i18n/define";
-import { d } from "../../i18n/define";
+import type { NameIn } from "../../i18n/texts";
+import { defineText as d } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import { Warning } from "../../ui/warning";
 import type { PairRow } from "./collision-plan";
@@ -20,12 +20,12 @@ import { draft, editDraft } from "./draft";
 import { ProblemWords } from "./fields";
 import type { PairKind } from "./server-requests";
 
-const KIND_TEXTS: Readonly<Partial<Record<PairKind, DefineText>>> = {
+const KIND_TEXTS: Readonly<Partial<Record<PairKind, NameIn<"define">>>> = {
   collision_meshes: "way_collision_meshes",
   visual_meshes: "way_visual_meshes",
   false_contacts: "way_collision_meshes",
 };
-const REASONS: Readonly<Record<PairKind, DefineText | null>> = {
+const REASONS: Readonly<Record<PairKind, NameIn<"define"> | null>> = {
   adjacent: "pair_adjacent",
   description: "pair_description",
   always: "pair_always",

@@ -2,7 +2,7 @@
 
 import { signal } from "@preact/signals";
 import { useEffect, useLayoutEffect } from "preact/hooks";
-import { d } from "../../i18n/define";
+import { defineText as d } from "../../i18n/texts";
 import { startChecking } from "./checks";
 import { CollisionsTab } from "./collisions-tab";
 import { DhTable } from "./dh-table";

@@ -1,7 +1,7 @@
 // Columns of the D-H table: the row's four parameters, then the joint's limits, speed and acceleration.
 
-import type { DefineText } from "../../i18n/define";
-import { d } from "../../i18n/define";
+import type { NameIn } from "../../i18n/texts";
+import { defineText as d } from "../../i18n/texts";
 import { angleUnit, type Joint, jointUnit, type Range, type Units } from "./description";
 
 export type ColumnKey = "a" | "alpha" | "d" | "theta" | "lower" | "upper" | "max_speed" | "max_acceleration";
@@ -23,7 +23,13 @@ const parameter = (key: "a" | "alpha" | "d" | "theta", head: string): Column => 
   head: () => head,
   title: () => d(`dh_${key}`),
 });
-const motion = (key: ColumnKey, path: string, step: number, head: DefineText, title: DefineText): Column => ({
+const motion = (
+  key: ColumnKey,
+  path: string,
+  step: number,
+  head: NameIn<"define">,
+  title: NameIn<"define">,
+): Column => ({
   ...{ key, path, group: "motion", step },
   head: () => d(head),
   title: () => d(title),

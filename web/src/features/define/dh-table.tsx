@@ -1,7 +1,7 @@
 // All D-H rows in an editable table, with the limits, speed and acceleration of each joint.
 
 import { useId } from "preact/hooks";
-import { d } from "../../i18n/define";
+import { defineText as d } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import { Warning } from "../../ui/warning";
 import { problemsAt } from "./checks";

@@ -1,7 +1,7 @@
 // Dropped or chosen files: uploaded, and used as links, companion files or a URDF's robot.
 
 import { signal } from "@preact/signals";
-import { d } from "../../i18n/define";
+import { defineText as d } from "../../i18n/texts";
 import type { Body, Description } from "./description";
 import { complete, empty, radians, tidy } from "./description";
 import type { Draft, Identity } from "./draft";

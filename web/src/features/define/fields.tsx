@@ -2,7 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useId } from "preact/hooks";
-import { d } from "../../i18n/define";
+import { defineText as d } from "../../i18n/texts";
 import { NumberInput } from "../../ui/number-input";
 import { Select } from "../../ui/select";
 import { TextInput } from "../../ui/text-input";

@@ -1,7 +1,7 @@
 // Named frames on links, and limits on sums of joint positions.
 
 import type { ComponentChildren } from "preact";
-import { d } from "../../i18n/define";
+import { defineText as d } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import type { Description } from "./description";
 import { jointUnit, linkNames } from "./description";

@@ -1,6 +1,6 @@
 // Missing files that other files refer to, until they are added or skipped.
 
-import { d } from "../../i18n/define";
+import { defineText as d } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import { FileButton } from "../../ui/file-button";
 import { chosen, continueWithoutMissing, skippedFiles, takeFiles, waitingUrdf } from "./dropped-files";

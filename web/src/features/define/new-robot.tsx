@@ -1,8 +1,8 @@
 // The ways to begin, while there is no draft.
 
 import { useEffect } from "preact/hooks";
-import { d } from "../../i18n/define";
 import { whenText } from "../../i18n/format";
+import { defineText as d } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import { FileButton } from "../../ui/file-button";
 import { empty } from "./description";

@@ -1,7 +1,7 @@
 // Opening of a robot to define: as saved, or its unsaved draft.
 
 import { signal } from "@preact/signals";
-import { d } from "../../i18n/define";
+import { defineText as d } from "../../i18n/texts";
 import { complete } from "./description";
 import { closeDraft, deleteDraft, identity, isOpen, openDraft, restoreDraft } from "./draft";
 import { fileNotices, waitingUrdf } from "./dropped-files";

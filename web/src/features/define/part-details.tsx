@@ -1,6 +1,6 @@
 // The chosen part: a joint's motion, a link's appearance, the tool's pose.
 
-import { d } from "../../i18n/define";
+import { defineText as d } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import { Choice } from "../../ui/choice";
 import { FileButton } from "../../ui/file-button";

@@ -2,7 +2,7 @@
 
 import { signal } from "@preact/signals";
 import { useEffect, useId, useMemo, useRef, useState } from "preact/hooks";
-import { d } from "../../i18n/define";
+import { defineText as d } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import { Choice } from "../../ui/choice";
 import { numberText } from "../../ui/number-text";

@@ -1,7 +1,7 @@
 // Sliders of the joints, and the server's position of the tool.
 
 import { Matrix4 } from "three";
-import { d } from "../../i18n/define";
+import { defineText as d } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import { numberText } from "../../ui/number-text";
 import { Unit } from "../../ui/unit";

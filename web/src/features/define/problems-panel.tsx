@@ -1,6 +1,6 @@
 // The draft's problems in the server's words; a click opens the field.
 
-import { d } from "../../i18n/define";
+import { defineText as d } from "../../i18n/texts";
 import { checkError, checked, checking, problems, readingShapes } from "./checks";
 import { openField } from "./selection";
 

@@ -1,7 +1,7 @@
 // Values of the whole robot: name, source of its dimensions, units.
 
 import { Fragment } from "preact";
-import { d } from "../../i18n/define";
+import { defineText as d } from "../../i18n/texts";
 import type { Units } from "./description";
 import { editDraft } from "./draft";
 import { setUnits } from "./edits";

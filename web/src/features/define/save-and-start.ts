@@ -1,7 +1,7 @@
 // Save, download and start, and their outcome.
 
 import { signal } from "@preact/signals";
-import { d } from "../../i18n/define";
+import { defineText as d } from "../../i18n/texts";
 import { RefusedRequest } from "../../mesh/refusal";
 import { saveFile } from "../../ui/save-file";
 import { checked, invalidNumbers } from "./checks";

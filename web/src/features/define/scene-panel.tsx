@@ -3,8 +3,7 @@
 import { signal } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { Matrix4 } from "three";
-import { d } from "../../i18n/define";
-import { t, viewText } from "../../i18n/texts";
+import { defineText as d, t, viewText } from "../../i18n/texts";
 import { linkPlacements } from "../../scene/forward-kinematics";
 import type { CameraPose } from "../../scene/viewpoint";
 import { Choice, Toggle } from "../../ui/choice";

@@ -1,9 +1,8 @@
 // The toolbar: name, undo and redo, save, download, start; and the outcome of actions.
 
 import { useState } from "preact/hooks";
-import { d } from "../../i18n/define";
 import { whenText } from "../../i18n/format";
-import { t } from "../../i18n/texts";
+import { defineText as d, t } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import { outcomeRole } from "../../ui/notice-line";
 import { robotLink } from "../../ui/route";

@@ -1,8 +1,7 @@
 // Named views for the video and the 3-D panel, set from this page's camera.
 
 import { useState } from "preact/hooks";
-import { d } from "../../i18n/define";
-import { viewText } from "../../i18n/texts";
+import { defineText as d, viewText } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import type { View } from "./description";
 import { draft, editDraft, setValue } from "./draft";

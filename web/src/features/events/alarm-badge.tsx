@@ -1,7 +1,7 @@
 // The alarm badge of every page: the most urgent unacknowledged alarms, in words; grey without alarms.
 
 import { useEffect } from "preact/hooks";
-import { e } from "../../i18n/events";
+import { eventsText as e } from "../../i18n/texts";
 import { anyWatch, counts, followAlarms, silentSites } from "../../mesh/alarms";
 import { startSound } from "../../panels/alarm-sound";
 import { PriorityMark, priorityWord } from "../../ui/priority-mark";

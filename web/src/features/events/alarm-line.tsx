@@ -2,16 +2,16 @@
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { alarmAdvice, alarmText } from "../../i18n/alarm-text";
-import type { EventsTextName } from "../../i18n/events";
-import { e } from "../../i18n/events";
 import { stampFull, stampTime, stampWhen } from "../../i18n/format";
+import type { NameIn } from "../../i18n/texts";
+import { eventsText as e } from "../../i18n/texts";
 import type { Alarm } from "../../mesh/alarms";
 import { isUnacknowledged, nameOf, State } from "../../mesh/alarms";
 import { Button } from "../../ui/button";
 import { PriorityMark } from "../../ui/priority-mark";
 import { robotLink } from "../../ui/route";
 
-const STATE_WORDS: Partial<Record<State, EventsTextName>> = {
+const STATE_WORDS: Partial<Record<State, NameIn<"events">>> = {
   [State.STATE_UNSPECIFIED]: "state_unacknowledged",
   [State.UNACKNOWLEDGED]: "state_unacknowledged",
   [State.ACKNOWLEDGED]: "state_acknowledged",

@@ -3,9 +3,8 @@
 import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
 import { alarmText } from "../../i18n/alarm-text";
-import type { EventsTextName } from "../../i18n/events";
-import { e } from "../../i18n/events";
-import { t } from "../../i18n/texts";
+import type { NameIn } from "../../i18n/texts";
+import { eventsText as e, t } from "../../i18n/texts";
 import { mayAct } from "../../mesh/account";
 import type { Alarm } from "../../mesh/alarms";
 import {
@@ -40,7 +39,7 @@ type Shown = (typeof SHOWN)[number];
 const LEAST = { any_priority: Priority.LOW, from_medium: Priority.MEDIUM, from_high: Priority.HIGH } as const;
 const MOST_SHOWN = 200; // more are of no use to an operator; these are the most urgent
 
-const DONE = new Map<Action, EventsTextName>([
+const DONE = new Map<Action, NameIn<"events">>([
   [Action.ACKNOWLEDGE, "acknowledged"],
   [Action.SHELVE, "shelved"],
   [Action.UNSHELVE, "unshelved"],

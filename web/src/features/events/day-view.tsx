@@ -1,22 +1,22 @@
 // The history of one robot's day in sentences, by hour, with how long it was stopped, without a link, or in a program.
 
 import { useEffect, useState } from "preact/hooks";
-import type { DayTextName } from "../../i18n/day";
-import { d, lastedText } from "../../i18n/day";
 import { count, DASH, dateOf, timeOfDay, timeText, whenText, zoneOf } from "../../i18n/format";
+import type { NameIn } from "../../i18n/texts";
+import { dayText as d } from "../../i18n/texts";
 import { lostAt } from "../../mesh/connection";
 import { Button } from "../../ui/button";
 import { saveFile } from "../../ui/save-file";
 import { Warning } from "../../ui/warning";
 import type { DayLine, Totals } from "./day";
-import { exported, linesOf, spanOfDay, totalsOf, wordsOf } from "./day";
+import { exported, lastedText, linesOf, spanOfDay, totalsOf, wordsOf } from "./day";
 import type { DayAnswers } from "./day-sources";
 import { eventsAbout, knownFrom, readDay } from "./day-sources";
 import type { EventEntry } from "./entries";
 import "./day-view.css";
 
 const REFRESH_MS = 10_000;
-const TOTALS: readonly (keyof Totals & DayTextName)[] = ["program", "stopped", "offline", "unknown"];
+const TOTALS: readonly (keyof Totals & NameIn<"day">)[] = ["program", "stopped", "offline", "unknown"];
 
 export function DayView({ robotKey, events }: { robotKey: string; events: readonly EventEntry[] }) {
   const [date, setDate] = useState(() => dateOf(Date.now()));

@@ -5,9 +5,9 @@ import type { AuditEntry, Event, Recording } from "../../gen/robomesh_pb";
 import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "../../gen/robomesh_pb";
 import { alarmTitle } from "../../i18n/alarm-text";
 import { entrySentence, entryText } from "../../i18n/audit-text";
-import { d, lastedText } from "../../i18n/day";
 import { eventText } from "../../i18n/event-text";
 import { durationS, startMs } from "../../i18n/recording-format";
+import { dayText as d } from "../../i18n/texts";
 import { WITHDRAWN, WRITTEN, withdrawnIds } from "../../mesh/notes";
 
 export const KINDS = ["control", "program", "stop", "alarm", "recording", "note"] as const;
@@ -244,3 +244,11 @@ export function exported(
 }
 
 export const wordsOf = ({ text, withdrawn }: DayLine): string => (withdrawn ? `${text} (${d("withdrawn")})` : text);
+
+/** Format a duration [ms]: "3 h 12 min", "4 min 10 s", "9 s". */
+export function lastedText(ms: number): string {
+  const seconds = Math.round(Math.max(0, ms) / 1000);
+  const minutes = Math.floor(seconds / 60);
+  if (minutes >= 60) return d("hours", { hours: Math.floor(minutes / 60), minutes: minutes % 60 });
+  return minutes ? d("minutes", { minutes, seconds: seconds % 60 }) : d("seconds", { seconds });
+}

@@ -6,9 +6,8 @@ import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "../..
 import { alarmTitle } from "../../i18n/alarm-text";
 import { entrySentence, entryText } from "../../i18n/audit-text";
 import { eventText } from "../../i18n/event-text";
-import { e } from "../../i18n/events";
 import { count, dateOf, stampFull, timeOfDay } from "../../i18n/format";
-import { n } from "../../i18n/notes";
+import { eventsText as e, notesText as n } from "../../i18n/texts";
 import type { Notice } from "../../mesh/control";
 import { reasonOf } from "../../mesh/control";
 import { fleetRobots } from "../../mesh/known-robots";

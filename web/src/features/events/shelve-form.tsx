@@ -2,7 +2,7 @@
 
 import { useState } from "preact/hooks";
 import { alarmText } from "../../i18n/alarm-text";
-import { e } from "../../i18n/events";
+import { eventsText as e } from "../../i18n/texts";
 import type { Alarm } from "../../mesh/alarms";
 import { Choice } from "../../ui/choice";
 import { ReasonForm } from "../../ui/reason-form";

@@ -2,9 +2,8 @@
 
 import { signal, useComputed } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
-import { f } from "../../i18n/fleet";
 import { ageText } from "../../i18n/format";
-import { t } from "../../i18n/texts";
+import { fleetText as f, t } from "../../i18n/texts";
 import { alarmsOf } from "../../mesh/alarms";
 import { lostAt } from "../../mesh/connection";
 import { fleetRobots } from "../../mesh/known-robots";

@@ -4,7 +4,7 @@ import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { ReplayState } from "../../gen/robomesh_pb";
 import { ReplayStateSchema } from "../../gen/robomesh_pb";
 import { momentText } from "../../i18n/recording-format";
-import { r } from "../../i18n/recordings";
+import { recordingsText as r } from "../../i18n/texts";
 import { ageOf, isStale, useTopics } from "../../mesh/topics";
 import { ReplayTag } from "../../ui/replay-tag";
 import { recordingsLink, robotLink } from "../../ui/route";

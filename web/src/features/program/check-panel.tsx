@@ -2,9 +2,8 @@
 
 import type { CheckAnswer } from "../../gen/robomesh_pb";
 import { whenText } from "../../i18n/format";
-import { p } from "../../i18n/program";
 import { reasonText } from "../../i18n/reasons";
-import { t } from "../../i18n/texts";
+import { programText as p, t } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import { Panel } from "../../ui/panel";
 import { Warning } from "../../ui/warning";

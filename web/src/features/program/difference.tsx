@@ -2,7 +2,7 @@
 
 import { useMemo, useState } from "preact/hooks";
 import { count } from "../../i18n/format";
-import { s } from "../../i18n/stored-programs";
+import { storedText as s } from "../../i18n/texts";
 import { Choice } from "../../ui/choice";
 import type { Row } from "./diff";
 import { diffRows, sideBySide } from "./diff";

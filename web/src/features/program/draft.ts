@@ -3,7 +3,7 @@
 // The text field's undo takes seconds for a thousand lines, and loses what the page writes.
 
 import { computed, effect, signal } from "@preact/signals";
-import { p } from "../../i18n/program";
+import { programText as p } from "../../i18n/texts";
 import { saveFile } from "../../ui/save-file";
 
 export interface Draft {

@@ -2,7 +2,7 @@
 
 import { Component } from "preact";
 import { useLayoutEffect, useRef } from "preact/hooks";
-import { p } from "../../i18n/program";
+import { programText as p } from "../../i18n/texts";
 import { Panel } from "../../ui/panel";
 import { lineAtMoment } from "./checked-motion";
 import { draft, insert, LINE_PX, recordTyping, redo, setField, storageError, undo } from "./draft";

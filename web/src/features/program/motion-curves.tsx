@@ -4,7 +4,7 @@ import { useEffect, useRef } from "preact/hooks";
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { jointTitle, jointUnit } from "../../i18n/format";
-import { p } from "../../i18n/program";
+import { programText as p } from "../../i18n/texts";
 import { plotAppearance } from "../../ui/plot-appearance";
 import { theme } from "../../ui/theme";
 import { moment, path } from "./checked-motion";

@@ -1,8 +1,8 @@
 // The text's points: show with the ghost, rename, delete.
 
 import { useState } from "preact/hooks";
-import type { Words } from "../../i18n/program";
-import { p } from "../../i18n/program";
+import type { Words } from "../../i18n/texts";
+import { programText as p } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import { draft, goToLine, replace } from "./draft";
 import { description, livePositions } from "./program-robot";

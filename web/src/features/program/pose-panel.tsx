@@ -2,7 +2,7 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { DASH, fixed } from "../../i18n/format";
-import { p } from "../../i18n/program";
+import { programText as p } from "../../i18n/texts";
 import { Choice } from "../../ui/choice";
 import { TextInput } from "../../ui/text-input";
 import { dropRequestedPose, poseNumbers, poseOf, taughtPose, teachPose } from "./taught-pose";

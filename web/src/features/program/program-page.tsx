@@ -9,9 +9,8 @@ import {
   ProgramListSchema,
   ProgramStateSchema,
 } from "../../gen/robomesh_pb";
-import type { Words } from "../../i18n/program";
-import { noWords, p } from "../../i18n/program";
-import { t } from "../../i18n/texts";
+import type { Words } from "../../i18n/texts";
+import { noWords, programText as p, t } from "../../i18n/texts";
 import { handleLease } from "../../mesh/control";
 import { fleetRobots } from "../../mesh/known-robots";
 import type { RobotName } from "../../mesh/robot-name";

@@ -3,8 +3,7 @@
 import { useState } from "preact/hooks";
 import type { ProgramContent, ProgramVersion } from "../../gen/robomesh_pb";
 import { ProgramVersion_Change as Change } from "../../gen/robomesh_pb";
-import { s } from "../../i18n/stored-programs";
-import { t } from "../../i18n/texts";
+import { storedText as s, t } from "../../i18n/texts";
 import { mayAct } from "../../mesh/account";
 import { Button } from "../../ui/button";
 import { ReasonForm } from "../../ui/reason-form";

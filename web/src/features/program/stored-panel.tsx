@@ -1,9 +1,7 @@
 // The programs that the site stores, in place of the text: their list, their versions, and differences.
 
 import { useState } from "preact/hooks";
-import { p } from "../../i18n/program";
-import { s } from "../../i18n/stored-programs";
-import { t } from "../../i18n/texts";
+import { programText as p, storedText as s, t } from "../../i18n/texts";
 import { mayAct } from "../../mesh/account";
 import { Button } from "../../ui/button";
 import { Toggle } from "../../ui/choice";

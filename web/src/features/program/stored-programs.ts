@@ -12,9 +12,8 @@ import {
   ProgramRequestSchema,
 } from "../../gen/robomesh_pb";
 import { stampFull } from "../../i18n/format";
-import type { Words } from "../../i18n/program";
-import { noWords, p } from "../../i18n/program";
-import { s } from "../../i18n/stored-programs";
+import type { Words } from "../../i18n/texts";
+import { noWords, programText as p, storedText as s } from "../../i18n/texts";
 import { mayAct } from "../../mesh/account";
 import { ask, inOwnName } from "../../mesh/connection";
 import { reasonOf } from "../../mesh/control";

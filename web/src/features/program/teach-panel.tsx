@@ -2,8 +2,8 @@
 
 import { useState } from "preact/hooks";
 import { jointText, jointTitle, jointUnit } from "../../i18n/format";
-import type { Words } from "../../i18n/program";
-import { noWords, p } from "../../i18n/program";
+import type { Words } from "../../i18n/texts";
+import { noWords, programText as p } from "../../i18n/texts";
 import { targetProblem } from "../../mesh/target-check";
 import { Button } from "../../ui/button";
 import { Choice } from "../../ui/choice";

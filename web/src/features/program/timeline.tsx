@@ -1,7 +1,7 @@
 // The checked motion over time: a slider that moves the ghost, and curves of joints and clearance.
 
 import { useEffect } from "preact/hooks";
-import { p } from "../../i18n/program";
+import { programText as p } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import { Panel } from "../../ui/panel";
 import { clearanceAtMoment, duration, lineAtMoment, moment, path, playing } from "./checked-motion";

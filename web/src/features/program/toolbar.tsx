@@ -1,8 +1,7 @@
 // The toolbar above the text: name, saving, the site's programs, files, undo and redo; and the saved state.
 
-import type { Words } from "../../i18n/program";
-import { p } from "../../i18n/program";
-import { s } from "../../i18n/stored-programs";
+import type { Words } from "../../i18n/texts";
+import { programText as p, storedText as s } from "../../i18n/texts";
 import { mayAct } from "../../mesh/account";
 import { Button } from "../../ui/button";
 import { FileButton } from "../../ui/file-button";

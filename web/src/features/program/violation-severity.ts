@@ -1,14 +1,14 @@
 // Level and name of violations.
 
 import type { CheckAnswer_Violation } from "../../gen/robomesh_pb";
-import type { ProgramText } from "../../i18n/program";
+import type { NameIn } from "../../i18n/texts";
 
 /** Return the level: an alarm if the gateway requires checks and refuses it, otherwise a warning. */
 export function severityOf({ refuses }: CheckAnswer_Violation): "warning" | "alarm" {
   return refuses ? "alarm" : "warning";
 }
 
-const KINDS: Record<string, ProgramText> = {
+const KINDS: Record<string, NameIn<"program">> = {
   program: "kind_program",
   limit: "kind_limit",
   speed: "kind_speed",
@@ -19,4 +19,4 @@ const KINDS: Record<string, ProgramText> = {
 };
 
 /** Return the text of a kind; null: a newer check's kind, shown unchanged. */
-export const kindText = (kind: string): ProgramText | null => KINDS[kind] ?? null;
+export const kindText = (kind: string): NameIn<"program"> | null => KINDS[kind] ?? null;

@@ -2,7 +2,7 @@
 
 import type { Signal } from "@preact/signals";
 import { sizeText } from "../../i18n/recording-format";
-import { r } from "../../i18n/recordings";
+import { recordingsText as r } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import type { Row } from "./recordings-of-sites";
 

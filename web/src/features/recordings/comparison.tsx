@@ -2,7 +2,7 @@
 
 import { eventText } from "../../i18n/event-text";
 import { momentText } from "../../i18n/recording-format";
-import { r } from "../../i18n/recordings";
+import { recordingsText as r } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import type { RecordingName } from "../../ui/route";
 import { recordingsLink } from "../../ui/route";

@@ -3,8 +3,8 @@
 import { useState } from "preact/hooks";
 import type { Recording } from "../../gen/robomesh_pb";
 import { count } from "../../i18n/format";
-import { durationS, lostText, sizeText, startedText, topicOf } from "../../i18n/recording-format";
-import { r, viewName } from "../../i18n/recordings";
+import { durationS, lostText, sizeText, startedText, topicOf, viewName } from "../../i18n/recording-format";
+import { recordingsText as r } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import { Panel } from "../../ui/panel";
 import type { RecordingName } from "../../ui/route";

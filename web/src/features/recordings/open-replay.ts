@@ -4,7 +4,7 @@ import type { Signal } from "@preact/signals";
 import { useSignal } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
 import { PlayRequestSchema, ReplayStateSchema } from "../../gen/robomesh_pb";
-import { r } from "../../i18n/recordings";
+import { recordingsText as r } from "../../i18n/texts";
 import { AskError, ask, hello, presence } from "../../mesh/connection";
 import { reasonOf } from "../../mesh/control";
 import { Replay } from "../../mesh/replay";

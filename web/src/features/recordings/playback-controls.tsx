@@ -5,7 +5,7 @@ import type { ReadonlySignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { timeText } from "../../i18n/format";
 import { momentText } from "../../i18n/recording-format";
-import { r } from "../../i18n/recordings";
+import { recordingsText as r } from "../../i18n/texts";
 import { heldLease } from "../../mesh/control";
 import type { Replay } from "../../mesh/replay";
 import { SPEEDS } from "../../mesh/replay";

@@ -3,7 +3,7 @@
 import type { ReadonlySignal } from "@preact/signals";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import type { Recording, SeriesAnswer_Series as Series } from "../../gen/robomesh_pb";
-import { r } from "../../i18n/recordings";
+import { recordingsText as r } from "../../i18n/texts";
 import { ValueChoice } from "../../panels/value-choice";
 import { Toggle } from "../../ui/choice";
 import { Panel } from "../../ui/panel";

@@ -18,7 +18,7 @@ import {
 } from "../../gen/robomesh_pb";
 import { entryText } from "../../i18n/audit-text";
 import { durationS, startMs, topicOf } from "../../i18n/recording-format";
-import { r } from "../../i18n/recordings";
+import { recordingsText as r } from "../../i18n/texts";
 import { AskError, ask, inOwnName, lostAt, watch } from "../../mesh/connection";
 import { reasonOf } from "../../mesh/control";
 import { readNotes, timeOfNote, WRITTEN, withdrawnIds } from "../../mesh/notes";

@@ -17,7 +17,7 @@ import {
   startedText,
   startMs,
 } from "../../i18n/recording-format";
-import { r } from "../../i18n/recordings";
+import { recordingsText as r } from "../../i18n/texts";
 import { mayAct } from "../../mesh/account";
 import { reasonOf } from "../../mesh/control";
 import { Action, askRecorder } from "../../mesh/recorder";

@@ -1,7 +1,7 @@
 // A form for a recording's name, note and tags, and for its deletion.
 
 import { useState } from "preact/hooks";
-import { r } from "../../i18n/recordings";
+import { recordingsText as r } from "../../i18n/texts";
 import { reasonOf } from "../../mesh/control";
 import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";

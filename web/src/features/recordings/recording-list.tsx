@@ -3,7 +3,7 @@
 import { signal } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
 import { robotsOf, sizeText, startMs } from "../../i18n/recording-format";
-import { r } from "../../i18n/recordings";
+import { recordingsText as r } from "../../i18n/texts";
 import type { Notice } from "../../mesh/control";
 import { reasonOf } from "../../mesh/control";
 import { fleetRobots } from "../../mesh/known-robots";

@@ -6,7 +6,7 @@ import { useEffect } from "preact/hooks";
 import type { Recording, RecordingList } from "../../gen/robomesh_pb";
 import { RecordingListSchema, RecordingSchema } from "../../gen/robomesh_pb";
 import { startMs } from "../../i18n/recording-format";
-import { r } from "../../i18n/recordings";
+import { recordingsText as r } from "../../i18n/texts";
 import { AskError, ask, hello, lostAt, presence } from "../../mesh/connection";
 import { reasonOf } from "../../mesh/control";
 import { ageOf, isStale, useTopics } from "../../mesh/topics";

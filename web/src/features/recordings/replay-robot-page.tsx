@@ -5,7 +5,7 @@ import { useEffect, useState } from "preact/hooks";
 import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
 import type { ReplayState } from "../../gen/robomesh_pb";
 import { DescriptionSchema, KinematicStateSchema, ReplayStateSchema } from "../../gen/robomesh_pb";
-import { r } from "../../i18n/recordings";
+import { recordingsText as r } from "../../i18n/texts";
 import { Replay } from "../../mesh/replay";
 import { useMomentState } from "../../mesh/replay-moment";
 import type { RobotName } from "../../mesh/robot-name";

@@ -2,8 +2,8 @@
 
 import { useState } from "preact/hooks";
 import type { Description } from "../../gen/robomesh_pb";
-import { r, viewName } from "../../i18n/recordings";
-import { t } from "../../i18n/texts";
+import { viewName } from "../../i18n/recording-format";
+import { recordingsText as r, t } from "../../i18n/texts";
 import type { Replay } from "../../mesh/replay";
 import type { MomentState } from "../../mesh/replay-moment";
 import { useMomentState } from "../../mesh/replay-moment";

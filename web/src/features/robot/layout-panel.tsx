@@ -2,7 +2,7 @@
 
 import { signal } from "@preact/signals";
 import { useMemo, useState } from "preact/hooks";
-import { p } from "../../i18n/plots";
+import { plotsText as p } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import type { Layout, LayoutProblem } from "../../ui/layout";
 import { DEFAULT_LAYOUT, layoutText, PANELS, readLayout } from "../../ui/layout";

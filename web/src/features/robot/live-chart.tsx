@@ -4,7 +4,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { dateOf, timeOfDay } from "../../i18n/format";
-import { p } from "../../i18n/plots";
+import { plotsText as p } from "../../i18n/texts";
 import type { shownUnit } from "../../i18n/value-names";
 import { ageClock } from "../../mesh/age-clock";
 import { plotAppearance } from "../../ui/plot-appearance";

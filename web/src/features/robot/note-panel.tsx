@@ -2,7 +2,7 @@
 
 import { signal } from "@preact/signals";
 import { useState } from "preact/hooks";
-import { n } from "../../i18n/notes";
+import { notesText as n } from "../../i18n/texts";
 import type { NoteTime } from "../../mesh/notes";
 import { NoteForm } from "../../panels/note-form";
 import { Choice } from "../../ui/choice";

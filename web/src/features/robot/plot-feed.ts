@@ -4,7 +4,7 @@ import { timestampFromMs } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
 import type { Description } from "../../gen/robomesh_pb";
 import { SeriesAnswerSchema, SeriesRequestSchema } from "../../gen/robomesh_pb";
-import { p } from "../../i18n/plots";
+import { plotsText as p } from "../../i18n/texts";
 import { ageClock } from "../../mesh/age-clock";
 import { AskError, ask, inOwnName, presence, watch } from "../../mesh/connection";
 import { reasonOf } from "../../mesh/control";

@@ -3,8 +3,8 @@
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
 import type { Description } from "../../gen/robomesh_pb";
 import { ageText, DASH, fixed, jointTitle, whenText } from "../../i18n/format";
-import { p, partText, rangeText } from "../../i18n/plots";
 import { fullSignalText } from "../../i18n/signals";
+import { message, plotsText as p } from "../../i18n/texts";
 import { commonOf, shownUnit } from "../../i18n/value-names";
 import { ageClock } from "../../mesh/age-clock";
 import { hello, watch } from "../../mesh/connection";
@@ -317,4 +317,15 @@ function useSentValues(robotKey: string): readonly string[] {
     };
   }, [robotKey, topic]);
   return names;
+}
+
+/** Return a part of a field's name in words; the catalogues have the usual ones. */
+function partText(part: string): string {
+  return message(`plot_part.${part}`) ?? part.replaceAll("_", " ");
+}
+
+/** Return a time range in words. */
+function rangeText(seconds: number): string {
+  if (seconds < 120) return p("seconds", { count: seconds });
+  return seconds < 3600 ? p("minutes", { count: seconds / 60 }) : p("hours", { count: seconds / 3600 });
 }

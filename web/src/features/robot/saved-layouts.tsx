@@ -4,7 +4,7 @@ import { useEffect, useState } from "preact/hooks";
 import type { StoredLayout } from "../../gen/robomesh_pb";
 import { LayoutRequest_Action as Action, LayoutListSchema, LayoutRequestSchema } from "../../gen/robomesh_pb";
 import { stampFull } from "../../i18n/format";
-import { p } from "../../i18n/plots";
+import { plotsText as p } from "../../i18n/texts";
 import { mayAct } from "../../mesh/account";
 import { asker } from "../../mesh/alarms";
 import { ask } from "../../mesh/connection";

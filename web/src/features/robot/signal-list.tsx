@@ -3,7 +3,8 @@
 import { useState } from "preact/hooks";
 import type { Description, Signal, Signals } from "../../gen/robomesh_pb";
 import { ageText } from "../../i18n/format";
-import { groupOf, groupRank, groupTitle, sg, signalText, signalValue } from "../../i18n/signals";
+import { groupOf, groupRank, groupTitle, signalText, signalValue } from "../../i18n/signals";
+import { signalsText as sg } from "../../i18n/texts";
 import type { Latest } from "../../mesh/topics";
 import { ageOf, isStale } from "../../mesh/topics";
 import { Age } from "../../ui/state";

@@ -1,6 +1,6 @@
 // The product and its licence.
 
-import { s } from "../../i18n/settings";
+import { settingsText as s } from "../../i18n/texts";
 import { Panel } from "../../ui/panel";
 
 export function About() {

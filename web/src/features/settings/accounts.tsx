@@ -2,7 +2,7 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { timeText } from "../../i18n/format";
-import { s } from "../../i18n/settings";
+import { settingsText as s } from "../../i18n/texts";
 import { me, post } from "../../mesh/account";
 import type { Notice } from "../../mesh/control";
 import { Button } from "../../ui/button";

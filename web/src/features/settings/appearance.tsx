@@ -1,7 +1,6 @@
 // Language and theme, kept in this browser only.
 
-import { s } from "../../i18n/settings";
-import { LANGUAGES, language, languageName, switchLanguage } from "../../i18n/texts";
+import { LANGUAGES, language, languageName, settingsText as s, switchLanguage } from "../../i18n/texts";
 import { setSound, sound } from "../../panels/alarm-sound";
 import { Choice } from "../../ui/choice";
 import { Panel } from "../../ui/panel";

@@ -1,6 +1,6 @@
 // Attached clients besides the services: monitors, consoles, operators in control.
 
-import { s } from "../../i18n/settings";
+import { settingsText as s } from "../../i18n/texts";
 import { presence } from "../../mesh/connection";
 import { OPERATOR } from "../../mesh/known-robots";
 import { robotSnapshot } from "../../mesh/robot-snapshots";

@@ -1,7 +1,7 @@
 // Expiry of the certificates of the mesh's processes, as they report it; nothing without certificates.
 
 import { ageText } from "../../i18n/format";
-import { s } from "../../i18n/settings";
+import { settingsText as s } from "../../i18n/texts";
 import { useMesh } from "../../mesh/site-health";
 import { Panel } from "../../ui/panel";
 import { Marked } from "./this-console";

@@ -1,7 +1,7 @@
 // Delays from a publisher to the watch: a line a hop, on one scale.
 
 import type { MeshState_Hop as Hop } from "../../gen/robomesh_pb";
-import { s } from "../../i18n/settings";
+import { settingsText as s } from "../../i18n/texts";
 import { milliseconds } from "./process-row";
 
 export function DelayChart({ hops }: { hops: readonly Hop[] }) {

@@ -2,7 +2,7 @@
 
 import type { MeshState, MeshState_Seen as Seen } from "../../gen/robomesh_pb";
 import { ageText } from "../../i18n/format";
-import { s } from "../../i18n/settings";
+import { settingsText as s } from "../../i18n/texts";
 import { presence } from "../../mesh/connection";
 import { isMeshStale, useMesh } from "../../mesh/site-health";
 import type { Latest } from "../../mesh/topics";

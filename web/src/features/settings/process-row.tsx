@@ -3,7 +3,7 @@
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { MeshState, MeshState_Seen as Seen } from "../../gen/robomesh_pb";
 import { ageText, count, DASH, fixed, stampFull, whenText } from "../../i18n/format";
-import { s } from "../../i18n/settings";
+import { settingsText as s } from "../../i18n/texts";
 import { hello } from "../../mesh/connection";
 import { isClockOff, isSilent, reportAge } from "../../mesh/site-health";
 import type { Latest } from "../../mesh/topics";

@@ -2,7 +2,7 @@
 
 import type { ToPage_Hello as Hello } from "../../gen/robomesh_pb";
 import { DASH } from "../../i18n/format";
-import { s } from "../../i18n/settings";
+import { settingsText as s } from "../../i18n/texts";
 import { lostAt } from "../../mesh/connection";
 import { Panel } from "../../ui/panel";
 import { Facts } from "./facts";

@@ -2,8 +2,7 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { ControllerState, Description, ReplayState } from "../../gen/robomesh_pb";
-import { t, viewText } from "../../i18n/texts";
-import { w } from "../../i18n/wall";
+import { t, viewText, wallText as w } from "../../i18n/texts";
 import { isReplay } from "../../mesh/robot-name";
 import { problemOf, replayWord, stateText, stateWord } from "../../mesh/robot-state";
 import type { Latest } from "../../mesh/topics";

@@ -1,7 +1,6 @@
 // Choice of the wall's pictures: a row a robot, a button a view.
 
-import { viewText } from "../../i18n/texts";
-import { w } from "../../i18n/wall";
+import { viewText, wallText as w } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import { Toggle } from "../../ui/choice";
 import type { ViewName } from "../../ui/route";

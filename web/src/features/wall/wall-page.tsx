@@ -3,8 +3,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { Description } from "../../gen/robomesh_pb";
 import { ControllerStateSchema, DescriptionSchema, ReplayStateSchema } from "../../gen/robomesh_pb";
-import { t } from "../../i18n/texts";
-import { w } from "../../i18n/wall";
+import { t, wallText as w } from "../../i18n/texts";
 import { addKnownRobots, fleetRobots } from "../../mesh/known-robots";
 import { useTopics } from "../../mesh/topics";
 import { Button } from "../../ui/button";

@@ -1,7 +1,7 @@
 // Why this account cannot take control, and what it can do about it.
 
 import { useState } from "preact/hooks";
-import { a } from "../../i18n/account";
+import { accountText as a } from "../../i18n/texts";
 import { isMonitor, mayAct, me, unlock } from "../../mesh/account";
 import { Button } from "../../ui/button";
 import { PasswordField } from "../../ui/password-field";

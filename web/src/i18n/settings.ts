@@ -1,6 +1,0 @@
-// Texts of Settings.
-
-import { texts } from "./texts";
-
-/** Return a text of Settings in the page's language. */
-export const s = texts("settings");
