@@ -7,7 +7,7 @@ import type { Event, Note } from "../gen/robomesh_pb";
 import { Event_Severity as Severity } from "../gen/robomesh_pb";
 import { alarmTitle } from "./alarm-text";
 import { isolated } from "./foreign-text";
-import { stampWhen, whenText } from "./format";
+import { stampMs, stampWhen, whenText } from "./format";
 import { reasonText } from "./reasons";
 import { isSaid, operatorText } from "./stop-words";
 import { compose, filled, language, message, placeholders, t } from "./texts";
@@ -73,7 +73,7 @@ export function eventText(event: Event): string {
 
 /** Return the time that a note is on; empty: the one at which it was written. */
 function noteTime({ begin, end }: Note, written: Timestamp | undefined): string {
-  const [from, at] = [begin, written].map((stamp) => (stamp ? timestampMs(stamp) : 0)) as [number, number];
+  const [from, at] = [begin, written].map((stamp) => stampMs(stamp)) as [number, number];
   if (!end && Math.abs(at - from) < AT_ONCE_MS) return "";
   const first = whenText(from, at);
   return end ? `${first} – ${whenText(timestampMs(end), from)}` : first;

@@ -114,6 +114,11 @@ export function whenText(ms: number, now = Date.now()): string {
   return dateOf(ms) === dateOf(now) ? timeText(ms).slice("2026-11-29 ".length) : timeText(ms);
 }
 
+/** Return a time stamp [ms since the Unix epoch]; 0: not known. */
+export function stampMs(stamp: Timestamp | undefined): number {
+  return stamp ? timestampMs(stamp) : 0;
+}
+
 export function stampTime(stamp: Timestamp | undefined): string {
   return stamp ? timeOfDay(timestampMs(stamp)) : DASH;
 }

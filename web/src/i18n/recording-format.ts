@@ -1,8 +1,7 @@
 // Format of a recording's facts: size, times, losses, reason.
 
-import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Recording } from "../gen/robomesh_pb";
-import { count, fixed } from "./format";
+import { count, fixed, stampMs } from "./format";
 import { recordingsText as r, viewText } from "./texts";
 
 const RECORDED = "recorded-";
@@ -17,7 +16,7 @@ export function sizeText(bytes: number | bigint): string {
 }
 
 export function startMs({ start }: Recording): number {
-  return start ? timestampMs(start) : 0;
+  return stampMs(start);
 }
 
 export function durationS({ duration }: Recording): number {

@@ -1,7 +1,6 @@
 // Alarms of every site, after ISA-18.2, from each site's watch, and the operator's actions on them.
 
 import { fromBinary } from "@bufbuild/protobuf";
-import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { computed, signal } from "@preact/signals";
 import type { Alarm, AlarmList } from "../gen/robomesh_pb";
 import {
@@ -11,6 +10,7 @@ import {
   Alarm_Priority as Priority,
   Alarm_State as State,
 } from "../gen/robomesh_pb";
+import { stampMs } from "../i18n/format";
 import { ask, hello, watch } from "./connection";
 import { operator } from "./control";
 import type { Latest } from "./topics";
@@ -98,7 +98,7 @@ export const anyWatch = computed(() => lists.value.size > 0);
 
 export function lastMs({ last, since }: Alarm): number {
   const stamp = last ?? since;
-  return stamp ? timestampMs(stamp) : 0;
+  return stampMs(stamp);
 }
 
 /** Identify an alarm among those of all sites. */

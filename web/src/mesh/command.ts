@@ -7,9 +7,9 @@ import type { JogSchema, RecoverSchema } from "../gen/robomesh_pb";
 import { CommandRequest_Command as Command, CommandAnswerSchema, CommandRequestSchema } from "../gen/robomesh_pb";
 import { reasonText } from "../i18n/reasons";
 import { t } from "../i18n/texts";
-import { ask } from "./connection";
+import { ask, reasonOf } from "./connection";
 import type { Notice } from "./control";
-import { controlNotice, heldLease, reasonOf } from "./control";
+import { controlNotice, heldLease } from "./control";
 import { pageReport, whyFrozen } from "./sight";
 
 /** Values of a command beyond its name. */

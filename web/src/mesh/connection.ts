@@ -40,6 +40,13 @@ export class AskError extends Error {
   }
 }
 
+/** Return why a request failed, in words. */
+export function reasonOf(error: unknown): string {
+  if (!(error instanceof Error)) return String(error);
+  // Older gateways give only a sentence.
+  return error.message.replace(/^Not (sent|run): /, "");
+}
+
 type Listener = (sample: Sample) => void;
 
 // The console waits as long for this page. A cut connection or a sleeping machine sends no notice.

@@ -5,8 +5,6 @@
 // worker renews for a while (renewal.ts).
 // A browser that proved slow asks for longer leases, and shows a message if it was still too slow.
 
-import type { Timestamp } from "@bufbuild/protobuf/wkt";
-import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { computed, signal } from "@preact/signals";
 import type { Lease, LeaseAnswer } from "../gen/robomesh_pb";
 import {
@@ -15,10 +13,11 @@ import {
   LeaseAnswerSchema,
   LeaseRequestSchema,
 } from "../gen/robomesh_pb";
+import { stampMs } from "../i18n/format";
 import { reasonText } from "../i18n/reasons";
 import type { TextName } from "../i18n/texts";
 import { t } from "../i18n/texts";
-import { AskError, ask, hello, lostAt } from "./connection";
+import { AskError, ask, hello, lostAt, reasonOf } from "./connection";
 import { isSlow, measureStalls, wasStalled } from "./page-stalls";
 
 /** The outcome of an action, in words, shown next to the action. */
@@ -134,16 +133,6 @@ export function holds(robotKey: string): boolean {
   return heldLease.value?.robotKey === robotKey;
 }
 
-export function reasonOf(error: unknown): string {
-  if (!(error instanceof Error)) return String(error);
-  // Older gateways give only a sentence.
-  return error.message.replace(/^Not (sent|run): /, "");
-}
-
-export function ms(stamp: Timestamp | undefined): number {
-  return stamp ? timestampMs(stamp) : 0;
-}
-
 /** Return the operator's name if it is valid; otherwise show why it is not. */
 export function ownName(): string | null {
   const who = operator.value.trim();
@@ -234,16 +223,16 @@ async function say(
 }
 
 function leaseFrom(robotKey: string, who: string, answer: LeaseAnswer, requestedAt: number): HeldLease {
-  const ttlMs = ms(answer.until) - ms(answer.now) || ttlS() * 1000;
+  const ttlMs = stampMs(answer.until) - stampMs(answer.now) || ttlS() * 1000;
   return {
     robotKey,
     operator: who,
     lease: answer.lease,
-    clockMs: ms(answer.now) - performance.now(),
+    clockMs: stampMs(answer.now) - performance.now(),
     endsAt: requestedAt + ttlMs,
     requestedAt,
-    since: ms(answer.since),
-    saidAt: ms(answer.now),
+    since: stampMs(answer.since),
+    saidAt: stampMs(answer.now),
   };
 }
 
@@ -302,7 +291,7 @@ export function handleLease(robotKey: string, lease: Lease): void {
   if (before.phase !== "held" && before.phase !== "lost") return;
   const mine = before.lease;
   // Messages from before this lease began do not know it.
-  if (mine.robotKey !== robotKey || ms(lease.timestamp) <= mine.saidAt || isOf(mine, lease)) return;
+  if (mine.robotKey !== robotKey || stampMs(lease.timestamp) <= mine.saidAt || isOf(mine, lease)) return;
   if (before.phase === "held") {
     const slow = !TAKEN.includes(lease.endedReason?.code ?? "") && wasStalled(mine.endsAt - mine.requestedAt);
     lose(slow ? t("lost_slow") : "", slow);
@@ -312,7 +301,7 @@ export function handleLease(robotKey: string, lease: Lease): void {
   if (!state.explained && controlNotice.value?.kind === "lost")
     controlNotice.value = explanation(lease, state.offeredTo);
   state.explained = true;
-  const now = `${lease.holder} ${ms(lease.since)}`;
+  const now = `${lease.holder} ${stampMs(lease.since)}`;
   state.successor ||= now;
   if (state.successor === now) return;
   control.end();
@@ -327,7 +316,7 @@ function explanation(lease: Lease, offeredTo: string): Notice {
 }
 
 function isOf(mine: HeldLease, lease: Lease): boolean {
-  return lease.holder === mine.operator && ms(lease.since) === mine.since;
+  return lease.holder === mine.operator && stampMs(lease.since) === mine.since;
 }
 
 /** Release control when this tab is hidden; treat it as lost when the connection is.

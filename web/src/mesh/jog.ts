@@ -10,9 +10,9 @@ import { fixed, toDegrees } from "../i18n/format";
 import { reasonText } from "../i18n/reasons";
 import { t } from "../i18n/texts";
 import { Command, command, newestCommand } from "./command";
-import { AskError, ask } from "./connection";
+import { AskError, ask, reasonOf } from "./connection";
 import type { Notice } from "./control";
-import { heldLease, reasonOf } from "./control";
+import { heldLease } from "./control";
 import { frozenCause } from "./sight";
 
 export { Axis as JogAxis, Frame as JogFrame };

@@ -3,7 +3,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { AuditEntry, ControllerState } from "../gen/robomesh_pb";
 import { ControllerState_Activity as Activity, AuditEntry_Outcome as Outcome } from "../gen/robomesh_pb";
-import { ms } from "./control";
+import { stampMs } from "../i18n/format";
 import { moves } from "./robot-state";
 
 const MOTIONS = new Set(["HOME", "MOVE_ABSOLUTE", "MOVE_RELATIVE"]);
@@ -21,11 +21,12 @@ export function useMotionTimes(
     moved.current = moving;
     // Another end than rest at the target: a stop, a hold, a fault.
     if (!ended || !state || state.stop || state.activity !== Activity.IDLE) return;
-    const end = ms(state.timestamp);
+    const end = stampMs(state.timestamp);
     const last = audit.find(
-      ({ request, outcome, timestamp }) => MOTIONS.has(request) && outcome === Outcome.ACCEPTED && ms(timestamp) < end,
+      ({ request, outcome, timestamp }) =>
+        MOTIONS.has(request) && outcome === Outcome.ACCEPTED && stampMs(timestamp) < end,
     );
-    if (last) setTimes((known) => new Map([...known, [last.number, (end - ms(last.timestamp)) / 1000]]));
+    if (last) setTimes((known) => new Map([...known, [last.number, (end - stampMs(last.timestamp)) / 1000]]));
   }, [moving]);
   return times;
 }

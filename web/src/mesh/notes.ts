@@ -9,6 +9,7 @@ import {
   NoteQuerySchema,
   NoteRequestSchema,
 } from "../gen/robomesh_pb";
+import { stampMs } from "../i18n/format";
 import { notesText as n } from "../i18n/texts";
 import { isAdministrator, mayAct } from "./account";
 import { asker } from "./alarms";
@@ -26,7 +27,7 @@ export interface NoteTime {
 }
 
 export function timeOfNote({ begin, end }: Note): NoteTime {
-  const from = begin ? timestampMs(begin) : 0;
+  const from = stampMs(begin);
   return end ? { begin: from, end: timestampMs(end) } : { begin: from };
 }
 

@@ -6,8 +6,8 @@ import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
 import type { ReplayState } from "../gen/robomesh_pb";
 import { ReplayRequest_Action as Action, ReplayRequestSchema, ReplayStateSchema } from "../gen/robomesh_pb";
-import { ask, watch } from "./connection";
-import { reasonOf } from "./control";
+import { stampMs } from "../i18n/format";
+import { ask, reasonOf, watch } from "./connection";
 import { isStale, now } from "./topics";
 
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 20, 50, 100] as const;
@@ -61,7 +61,7 @@ export class Replay {
   /** The recorded time of the current position [ms since the Unix epoch]. */
   recordedMs(): number {
     const { start } = this.state.peek();
-    return (start ? timestampMs(start) : 0) + this.position() * 1000;
+    return stampMs(start) + this.position() * 1000;
   }
 
   /** How long it has played without a jump [ms]; 0: it is not playing. */

@@ -5,9 +5,9 @@ import { StopAnswerSchema, StopRequestSchema } from "../gen/robomesh_pb";
 import { whenText } from "../i18n/format";
 import { reasonText } from "../i18n/reasons";
 import { t } from "../i18n/texts";
-import { AskError, ask, reachable, reopenIfSilent } from "./connection";
+import { AskError, ask, reachable, reasonOf, reopenIfSilent } from "./connection";
 import type { Notice } from "./control";
-import { operator, reasonOf } from "./control";
+import { operator } from "./control";
 import { pageReport } from "./sight";
 
 const NOTICE_MS = 15_000; // how long the notice of a successful stop is shown

@@ -3,12 +3,12 @@
 import type { DescMessage, MessageShape } from "@bufbuild/protobuf";
 import { equals, fromBinary } from "@bufbuild/protobuf";
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
-import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Signal } from "@preact/signals";
 import { signal } from "@preact/signals";
 import { useEffect, useMemo } from "preact/hooks";
 import type { AuditEntry, ControllerState, Description, Event } from "../gen/robomesh_pb";
 import { AuditEntrySchema, AuditListSchema, EventListSchema, EventSchema } from "../gen/robomesh_pb";
+import { stampMs } from "../i18n/format";
 import { ageClock } from "./age-clock";
 import type { Sample } from "./connection";
 import { hello, watch } from "./connection";
@@ -122,7 +122,7 @@ export function useAudit(robotKey: string): readonly AuditEntry[] {
 interface Dated {
   timestamp?: Timestamp | undefined;
 }
-const timeOf = ({ timestamp }: Dated): number => (timestamp ? timestampMs(timestamp) : 0);
+const timeOf = ({ timestamp }: Dated): number => stampMs(timestamp);
 
 function useList<M extends Dated>(
   expressions: readonly string[],

@@ -1,10 +1,9 @@
 // The most urgent alarm, above the robot's page: an arm that does not obey its stop, or a critical event.
 
-import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { useState } from "preact/hooks";
 import type { ControllerState, Event } from "../gen/robomesh_pb";
 import { Event_Severity as Severity } from "../gen/robomesh_pb";
-import { stampFull, stampWhen } from "../i18n/format";
+import { stampFull, stampMs, stampWhen } from "../i18n/format";
 import { t } from "../i18n/texts";
 import { DISOBEYED, disobeys, msBefore } from "../mesh/robot-state";
 import { Button } from "../ui/button";
@@ -24,7 +23,7 @@ export function RobotAlarm({ state, events }: { state: ControllerState | undefin
     );
   }
   const event = events.find(({ severity }) => severity === Severity.CRITICAL);
-  const at = event?.timestamp ? timestampMs(event.timestamp) : 0;
+  const at = stampMs(event?.timestamp);
   if (!event || at <= dismissed || (state && msBefore(state, event.timestamp) > SHOWN_MS)) return null;
   const time = stampWhen(event.timestamp);
   return (

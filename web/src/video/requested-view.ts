@@ -2,8 +2,7 @@
 
 import type { View } from "../gen/robomesh_pb";
 import { ViewAnswerSchema, ViewRequestSchema } from "../gen/robomesh_pb";
-import { ask, inOwnName } from "../mesh/connection";
-import { reasonOf } from "../mesh/control";
+import { ask, inOwnName, reasonOf } from "../mesh/connection";
 
 /** The wanted picture; a width of 0: the renderer's standard size. */
 export interface RequestedView {

@@ -5,7 +5,7 @@ import type { CellAnswer } from "../../gen/robomesh_pb";
 import { reasonText } from "../../i18n/reasons";
 import { cellText as c } from "../../i18n/texts";
 import { isEngineer } from "../../mesh/account";
-import { reasonOf } from "../../mesh/control";
+import { reasonOf } from "../../mesh/connection";
 import { Button } from "../../ui/button";
 import { Panel } from "../../ui/panel";
 import { ReasonForm } from "../../ui/reason-form";

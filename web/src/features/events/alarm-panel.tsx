@@ -21,9 +21,9 @@ import {
   silentSites,
   sorted,
 } from "../../mesh/alarms";
-import { hello } from "../../mesh/connection";
+import { hello, reasonOf } from "../../mesh/connection";
 import type { Notice } from "../../mesh/control";
-import { operator, reasonOf, setOperator } from "../../mesh/control";
+import { operator, setOperator } from "../../mesh/control";
 import { setSound, sound } from "../../panels/alarm-sound";
 import { Button } from "../../ui/button";
 import { Choice, Toggle } from "../../ui/choice";

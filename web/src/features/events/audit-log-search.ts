@@ -2,8 +2,7 @@
 
 import { timestampFromMs } from "@bufbuild/protobuf/wkt";
 import { AuditListSchema, AuditQuerySchema } from "../../gen/robomesh_pb";
-import { ask } from "../../mesh/connection";
-import { reasonOf } from "../../mesh/control";
+import { ask, reasonOf } from "../../mesh/connection";
 import type { AuditLine } from "./entries";
 import { auditLines } from "./entries";
 

@@ -8,8 +8,8 @@ import {
   AuditEntry_Outcome as Outcome,
   RecordingListSchema,
 } from "../../gen/robomesh_pb";
-import { AskError, ask } from "../../mesh/connection";
-import { reasonOf } from "../../mesh/control";
+import { stampMs } from "../../i18n/format";
+import { AskError, ask, reasonOf } from "../../mesh/connection";
 import { readNotes } from "../../mesh/notes";
 import type { DaySources, Span } from "./day";
 import type { EventEntry } from "./entries";
@@ -84,8 +84,6 @@ export function eventsAbout(robotKey: string, events: readonly EventEntry[]): Ev
 
 /** Return the time from which the gateway's events are known [ms]; null: none is. */
 export function knownFrom(events: readonly Event[]): number | null {
-  const times = events
-    .filter(({ source }) => source === "gateway")
-    .map((event) => (event.timestamp ? timestampMs(event.timestamp) : 0));
+  const times = events.filter(({ source }) => source === "gateway").map((event) => stampMs(event.timestamp));
   return times.length ? Math.min(...times) : null;
 }

@@ -6,6 +6,7 @@ import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "../..
 import { alarmTitle } from "../../i18n/alarm-text";
 import { entrySentence, entryText } from "../../i18n/audit-text";
 import { eventText } from "../../i18n/event-text";
+import { stampMs } from "../../i18n/format";
 import { durationS, startMs } from "../../i18n/recording-format";
 import { dayText as d } from "../../i18n/texts";
 import { WITHDRAWN, WRITTEN, withdrawnIds } from "../../mesh/notes";
@@ -75,7 +76,7 @@ const LINK_GONE = new Set(["link.down", "link.lost", "link.silent"]);
 const AUDITED = /^(stop|program|lease)\./;
 const WATCHED = new Set(["alarm.acknowledged", "alarm.shelved", "alarm.unshelved"]);
 
-const ms = ({ timestamp }: { timestamp?: AuditEntry["timestamp"] }): number => (timestamp ? timestampMs(timestamp) : 0);
+const ms = ({ timestamp }: { timestamp?: AuditEntry["timestamp"] }): number => stampMs(timestamp);
 
 /** Return the day's sentences, oldest first. */
 export function linesOf(sources: DaySources): DayLine[] {

@@ -1,12 +1,12 @@
 // Events and audit entries of every robot and service, newest first, without repeats, up to a maximum.
 
 import { fromBinary } from "@bufbuild/protobuf";
-import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Signal } from "@preact/signals";
 import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import type { AuditEntry, Event } from "../../gen/robomesh_pb";
 import { AuditEntrySchema, AuditListSchema, EventListSchema, EventSchema } from "../../gen/robomesh_pb";
+import { stampMs } from "../../i18n/format";
 import type { Sample } from "../../mesh/connection";
 import { watch } from "../../mesh/connection";
 
@@ -81,7 +81,7 @@ function takeEvents(sample: Sample): void {
 export function eventEntries(key: string, received: readonly Event[]): EventEntry[] {
   const [, site = "", robot = ""] = key.split("/");
   return received.map((event) => {
-    const ms = event.timestamp ? timestampMs(event.timestamp) : 0;
+    const ms = stampMs(event.timestamp);
     const nanos = event.timestamp?.nanos ?? 0;
     return { id: `${key} ${ms} ${nanos} ${event.code} ${event.text}`, ms, site, robot, event };
   });
@@ -100,7 +100,7 @@ export function auditLines(site: string, robot: string, entries: readonly AuditE
   return entries.map((audit) => ({
     // A repeated entry has the same number.
     id: `${site}/${robot} ${audit.number} ${audit.repeatedCount}`,
-    ms: audit.timestamp ? timestampMs(audit.timestamp) : 0,
+    ms: stampMs(audit.timestamp),
     site,
     robot,
     audit,

@@ -1,8 +1,8 @@
 // Running replays, separate from the live robots.
 
-import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { ReplayState } from "../../gen/robomesh_pb";
 import { ReplayStateSchema } from "../../gen/robomesh_pb";
+import { stampMs } from "../../i18n/format";
 import { momentText } from "../../i18n/recording-format";
 import { recordingsText as r } from "../../i18n/texts";
 import { ageOf, isStale, useTopics } from "../../mesh/topics";
@@ -34,7 +34,7 @@ function Line({ site, state }: { site: string; state: ReplayState }) {
   return (
     <li class="replay-line">
       <a href={robotLink(site, state.robot)}>
-        <ReplayTag robot={state.ofRobot} start={state.start ? timestampMs(state.start) : 0} />
+        <ReplayTag robot={state.ofRobot} start={stampMs(state.start)} />
       </a>
       <span class="figure">
         {r("position_of", { position: momentText(state.positionS, 0), duration: momentText(state.durationS, 0) })}

@@ -15,8 +15,7 @@ import { stampFull } from "../../i18n/format";
 import type { Words } from "../../i18n/texts";
 import { noWords, programText as p, storedText as s } from "../../i18n/texts";
 import { mayAct } from "../../mesh/account";
-import { ask, inOwnName } from "../../mesh/connection";
-import { reasonOf } from "../../mesh/control";
+import { ask, inOwnName, reasonOf } from "../../mesh/connection";
 import type { Base } from "./draft";
 import { draft, replaceDraft, setBase } from "./draft";
 

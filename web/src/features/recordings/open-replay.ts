@@ -5,8 +5,7 @@ import { useSignal } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
 import { PlayRequestSchema, ReplayStateSchema } from "../../gen/robomesh_pb";
 import { recordingsText as r } from "../../i18n/texts";
-import { AskError, ask, hello, presence } from "../../mesh/connection";
-import { reasonOf } from "../../mesh/control";
+import { AskError, ask, hello, presence, reasonOf } from "../../mesh/connection";
 import { Replay } from "../../mesh/replay";
 import type { RecordingName } from "../../ui/route";
 

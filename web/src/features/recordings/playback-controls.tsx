@@ -1,9 +1,8 @@
 // Playback controls: play, pause, step, seek, speed, loop; and the events on the time line.
 
-import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { ReadonlySignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
-import { timeText } from "../../i18n/format";
+import { stampMs, timeText } from "../../i18n/format";
 import { momentText } from "../../i18n/recording-format";
 import { recordingsText as r } from "../../i18n/texts";
 import { heldLease } from "../../mesh/control";
@@ -28,7 +27,7 @@ export function PlaybackControls(props: {
   const { playing, speed, loop, durationS, start } = replay.state.value;
   const at = props.moment.value;
   useKeys(replay);
-  const recordedMs = (start ? timestampMs(start) : 0) + at * 1000;
+  const recordedMs = stampMs(start) + at * 1000;
   return (
     <section class="transport" aria-label={r("transport")}>
       <div class="transport-line">

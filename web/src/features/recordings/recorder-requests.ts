@@ -19,8 +19,7 @@ import {
 import { entryText } from "../../i18n/audit-text";
 import { durationS, startMs, topicOf } from "../../i18n/recording-format";
 import { recordingsText as r } from "../../i18n/texts";
-import { AskError, ask, inOwnName, lostAt, watch } from "../../mesh/connection";
-import { reasonOf } from "../../mesh/control";
+import { AskError, ask, inOwnName, lostAt, reasonOf, watch } from "../../mesh/connection";
 import { readNotes, timeOfNote, WRITTEN, withdrawnIds } from "../../mesh/notes";
 import type { RecordingName } from "../../ui/route";
 

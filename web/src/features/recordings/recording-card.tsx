@@ -19,7 +19,7 @@ import {
 } from "../../i18n/recording-format";
 import { recordingsText as r } from "../../i18n/texts";
 import { mayAct } from "../../mesh/account";
-import { reasonOf } from "../../mesh/control";
+import { reasonOf } from "../../mesh/connection";
 import { Action, askRecorder } from "../../mesh/recorder";
 import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";

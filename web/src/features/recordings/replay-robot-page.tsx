@@ -1,10 +1,10 @@
 // The page of a replayed robot: its recorded state and the playback controls, without commands.
 
-import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { useEffect, useState } from "preact/hooks";
 import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
 import type { ReplayState } from "../../gen/robomesh_pb";
 import { DescriptionSchema, KinematicStateSchema, ReplayStateSchema } from "../../gen/robomesh_pb";
+import { stampMs } from "../../i18n/format";
 import { recordingsText as r } from "../../i18n/texts";
 import { Replay } from "../../mesh/replay";
 import { useMomentState } from "../../mesh/replay-moment";
@@ -44,10 +44,7 @@ export function ReplayRobotPage({ site, robot }: RobotName) {
       <div class="player-head">
         <div class="headline">
           <h1>{robot}</h1>
-          <ReplayTag
-            robot={state?.ofRobot ?? description?.replay?.robot ?? ""}
-            start={state?.start ? timestampMs(state.start) : 0}
-          />
+          <ReplayTag robot={state?.ofRobot ?? description?.replay?.robot ?? ""} start={stampMs(state?.start)} />
           <span class="dim small">{r("replay_words")}</span>
           {state && (
             <a class="page-link" href={recordingsLink({ site, file: state.file })}>

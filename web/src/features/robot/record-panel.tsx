@@ -9,7 +9,7 @@ import { ageText, count } from "../../i18n/format";
 import { reasonText } from "../../i18n/reasons";
 import { durationS, lostText, messagesOf, momentText, sizeText, startedText } from "../../i18n/recording-format";
 import { recordingsText as r, viewText } from "../../i18n/texts";
-import { presence } from "../../mesh/connection";
+import { presence, reasonOf } from "../../mesh/connection";
 import { Action, askRecorder } from "../../mesh/recorder";
 import { ageOf, isStale, useTopic } from "../../mesh/topics";
 import { viewsOf } from "../../scene/scene-view";
@@ -19,7 +19,6 @@ import { Select } from "../../ui/select";
 import { TextInput } from "../../ui/text-input";
 import "../../ui/replay.css";
 import "./record-panel.css";
-import { reasonOf } from "../../mesh/control";
 
 const NO_VIDEO = "-";
 const AS_THE_SITE = "";

@@ -5,13 +5,13 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { ControllerState, Description, KinematicState, ProgramState } from "../../gen/robomesh_pb";
 import { ProgramState_Outcome as Outcome } from "../../gen/robomesh_pb";
-import { toRadians } from "../../i18n/format";
+import { stampMs, toRadians } from "../../i18n/format";
 import { reasonText } from "../../i18n/reasons";
 import { t } from "../../i18n/texts";
 import { Command, command } from "../../mesh/command";
 import { reachable } from "../../mesh/connection";
 import type { Notice } from "../../mesh/control";
-import { holds, ms } from "../../mesh/control";
+import { holds } from "../../mesh/control";
 import type { Pressed } from "../../mesh/jog";
 import { JogAxis, JogFrame, startJog } from "../../mesh/jog";
 import type { Motion } from "../../mesh/notice-expiry";
@@ -73,7 +73,7 @@ export function RobotTool(props: {
     send: async (step, tell) => {
       const what = nameOf(step);
       start.current = props.kinematics?.message.toolToBase;
-      const before = ms(program?.since);
+      const before = stampMs(program?.since);
       let warning: string | undefined;
       const values = { program: programOf(step, controller?.speedPercent), programName: what };
       const accepted = await command(robotKey, Command.RUN_PROGRAM, what, values, (told) => {
@@ -89,7 +89,7 @@ export function RobotTool(props: {
   }, [mine]);
 
   const sent = queue.going?.sent;
-  const begun = sent && program && ms(program.since) !== sent.before;
+  const begun = sent && program && stampMs(program.since) !== sent.before;
   const outcome = begun ? program.outcome : Outcome.OUTCOME_UNSPECIFIED;
   useEffect(() => {
     if (!sent || outcome === Outcome.RUNNING) return;

@@ -3,14 +3,13 @@
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { Lease, Lease_Asker } from "../../gen/robomesh_pb";
-import { ageText, stampFull, stampWhen } from "../../i18n/format";
+import { ageText, stampFull, stampMs, stampWhen } from "../../i18n/format";
 import { t } from "../../i18n/texts";
 import { hello, reachable } from "../../mesh/connection";
 import {
   accept,
   controlNotice,
   holds,
-  ms,
   offer,
   operator,
   ownName,
@@ -71,7 +70,7 @@ export function WhoControls(props: {
   const other = (!mine && (props.holder ?? lease?.holder)) || "";
   const [sheet, setSheet] = useState<"ask" | "take" | null>(null);
   // A reason typed for one operator must not go to another.
-  useEffect(() => setSheet(null), [other, ms(lease?.since)]);
+  useEffect(() => setSheet(null), [other, stampMs(lease?.since)]);
   const open = (which: "ask" | "take") => ownName() && setSheet(which);
   if (mayNotCommand() && !mine) return <NoControl />;
   return (
@@ -145,7 +144,7 @@ function useExpiredRequest(lease: Lease | undefined, mine: boolean): void {
   useEffect(() => {
     if (!lease) return;
     const { holder } = lease;
-    const since = ms(lease.since);
+    const since = stampMs(lease.since);
     const before = asked.current;
     const pending = me !== "" && lease.askedBy.some((asker) => asker.operator === me);
     asked.current = pending ? { by: me, holder, since } : null;
@@ -169,8 +168,8 @@ function Requests({ mine, robotKey, lease }: { mine: boolean; robotKey: string; 
   const me = operator.value.trim();
   const { holder, offeredTo } = lease;
   const [declined, setDeclined] = useState<readonly string[]>([]);
-  const idOf = (asker: Lease_Asker) => `${asker.operator} ${ms(asker.since)}`;
-  const age = (asker: Lease_Asker) => ageText(Math.max(0, ms(lease.timestamp) - ms(asker.since)) / 1000);
+  const idOf = (asker: Lease_Asker) => `${asker.operator} ${stampMs(asker.since)}`;
+  const age = (asker: Lease_Asker) => ageText(Math.max(0, stampMs(lease.timestamp) - stampMs(asker.since)) / 1000);
   // An offer that was withdrawn and repeated is a new one.
   useEffect(() => setDeclined((old) => old.filter((each) => each !== "offer")), [offeredTo]);
   const decline = (what: string) => setDeclined([...declined, what]);
