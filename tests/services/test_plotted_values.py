@@ -50,8 +50,8 @@ done(columns.map((column) => [...column].map((cell) => (cell === undefined ? "no
 def module(tmp_path_factory):
     return page_modules.bundle(
         tmp_path_factory.mktemp("values"),
-        values="mesh/values.ts",
-        connection="mesh/connection.ts",
+        values="mesh/state/values.ts",
+        connection="mesh/console/connection.ts",
         gen="gen/robomesh_pb.ts",
         layout="ui/layout.ts",
         buckets="features/robot/plot-buckets.ts",

@@ -5,7 +5,7 @@ import { useRef } from "preact/hooks";
 import { AccountMenu } from "../features/account/account-menu";
 import { AlarmBadge } from "../features/events/alarm-badge";
 import { switchLanguage, t } from "../i18n/texts";
-import { mustSignIn } from "../mesh/account";
+import { mustSignIn } from "../mesh/console/account";
 import { useDismissal } from "../ui/dismissal";
 import type { Route } from "../ui/route";
 import { robotOf, route } from "../ui/route";

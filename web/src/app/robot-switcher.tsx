@@ -2,12 +2,12 @@
 
 import { useEffect, useId, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { t } from "../i18n/texts";
-import { heldLease } from "../mesh/control";
-import { fleetRobots } from "../mesh/known-robots";
-import type { RobotName } from "../mesh/robot-name";
-import { robotSnapshot, useFleetSnapshots } from "../mesh/robot-snapshots";
-import { stateWord } from "../mesh/robot-state";
-import { ageOf, now } from "../mesh/topics";
+import { heldLease } from "../mesh/control/control";
+import { fleetRobots } from "../mesh/state/known-robots";
+import type { RobotName } from "../mesh/state/robot-name";
+import { robotSnapshot, useFleetSnapshots } from "../mesh/state/robot-snapshots";
+import { stateWord } from "../mesh/state/robot-state";
+import { ageOf, now } from "../mesh/state/topics";
 import { useDismissal } from "../ui/dismissal";
 import { programLink, robotLink } from "../ui/route";
 import { State } from "../ui/state";

@@ -5,7 +5,7 @@ import { render } from "preact";
 import { ViewPage } from "../features/view/view-page";
 import { isolateForeignTexts } from "../i18n/foreign-text";
 import { isLanguage, showLanguage } from "../i18n/texts";
-import { followView } from "../mesh/view-stream";
+import { followView } from "../mesh/console/view-stream";
 import { applyTheme, theme } from "../ui/theme";
 import "../ui/tokens.css";
 import "./base.css";

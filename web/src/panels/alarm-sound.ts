@@ -1,7 +1,7 @@
 // A short tone for a new unacknowledged alarm; off unless enabled in this browser.
 
 import { effect, signal } from "@preact/signals";
-import { anyWatch, nameOf, unacknowledged } from "../mesh/alarms";
+import { anyWatch, nameOf, unacknowledged } from "../mesh/services/alarms";
 
 const STORAGE_KEY = "robomesh.alarm-sound";
 const TONES_HZ = [880, 660];

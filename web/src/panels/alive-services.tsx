@@ -1,8 +1,8 @@
 // Live services of a robot or a site, by presence.
 
 import { t } from "../i18n/texts";
-import { presence } from "../mesh/connection";
-import { OPERATOR } from "../mesh/known-robots";
+import { presence } from "../mesh/console/connection";
+import { OPERATOR } from "../mesh/state/known-robots";
 
 /** `of`: `robomesh/<site>/<robot>`. */
 export function AliveServices({ of: key }: { of: string }) {

@@ -2,9 +2,9 @@
 
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { accountText as a } from "../i18n/texts";
-import type { Me } from "../mesh/account";
-import { me, post } from "../mesh/account";
-import { RefusedRequest } from "../mesh/refusal";
+import type { Me } from "../mesh/console/account";
+import { me, post } from "../mesh/console/account";
+import { RefusedRequest } from "../mesh/console/refusal";
 import { Button } from "../ui/button";
 import { PasswordField } from "../ui/password-field";
 import "./account-form.css";

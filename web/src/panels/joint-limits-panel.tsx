@@ -4,8 +4,8 @@ import type { ComponentChildren } from "preact";
 import type { Description, KinematicState } from "../gen/robomesh_pb";
 import { fixed, jointTitle, jointUnit, toDegrees } from "../i18n/format";
 import { t } from "../i18n/texts";
-import { distanceText, ownLevel, pairText, useClearanceLevel } from "../mesh/clearance";
-import type { Level } from "../mesh/robot-state";
+import { distanceText, ownLevel, pairText, useClearanceLevel } from "../mesh/state/clearance";
+import type { Level } from "../mesh/state/robot-state";
 import { Unit } from "../ui/unit";
 import { Warning } from "../ui/warning";
 

@@ -3,13 +3,13 @@
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { notesText as n, t } from "../i18n/texts";
-import { mayAct } from "../mesh/account";
-import { asker } from "../mesh/alarms";
-import { hello, reasonOf } from "../mesh/connection";
+import { mayAct } from "../mesh/console/account";
+import { hello, reasonOf } from "../mesh/console/connection";
 import type { Notice } from "../mesh/control";
 import { operator, setOperator } from "../mesh/control";
-import type { NoteTime } from "../mesh/notes";
-import { LONGEST_TEXT, writeNote } from "../mesh/notes";
+import { asker } from "../mesh/services/alarms";
+import type { NoteTime } from "../mesh/services/notes";
+import { LONGEST_TEXT, writeNote } from "../mesh/services/notes";
 import { Button } from "../ui/button";
 import { NoticeLine } from "../ui/notice-line";
 import { TextInput } from "../ui/text-input";

@@ -2,10 +2,10 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../i18n/texts";
-import { hello, lostAt } from "../mesh/connection";
-import { fleetRobots } from "../mesh/known-robots";
-import type { RobotName } from "../mesh/robot-name";
-import { isReplay } from "../mesh/robot-name";
+import { hello, lostAt } from "../mesh/console/connection";
+import { fleetRobots } from "../mesh/state/known-robots";
+import type { RobotName } from "../mesh/state/robot-name";
+import { isReplay } from "../mesh/state/robot-name";
 import { robotLink } from "../ui/route";
 
 /** How long a console may take to know every robot, just after its start. */

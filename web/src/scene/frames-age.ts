@@ -1,8 +1,8 @@
 // Age of the 3-D view's frames, measured without decoding them.
 
 import { useEffect, useState } from "preact/hooks";
-import { watch } from "../mesh/connection";
-import { now } from "../mesh/topics";
+import { watch } from "../mesh/console/connection";
+import { now } from "../mesh/state/topics";
 
 /** Return the age [s] of the newest frames; null: not known; undefined: none have arrived yet. */
 export function useFramesAge(robotKey: string, topic: string): number | null | undefined {

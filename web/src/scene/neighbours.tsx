@@ -3,10 +3,10 @@
 import { useEffect, useRef } from "preact/hooks";
 import type { Description } from "../gen/robomesh_pb";
 import { DescriptionSchema } from "../gen/robomesh_pb";
-import { watch } from "../mesh/connection";
-import { isStale, useTopics } from "../mesh/topics";
-import type { Arm } from "./arm";
+import { watch } from "../mesh/console/connection";
+import { isStale, useTopics } from "../mesh/state/topics";
 import { useFramesAge } from "./frames-age";
+import type { Arm } from "./parts/arm";
 import type { RobotScene } from "./robot-scene";
 
 /** The other robots of a cell. */

@@ -3,7 +3,7 @@
 import { useState } from "preact/hooks";
 import { whenText } from "../i18n/format";
 import { t, viewText } from "../i18n/texts";
-import { presence } from "../mesh/connection";
+import { presence } from "../mesh/console/connection";
 
 // A renderer that has just started has no picture yet.
 const RETRY_MS = 1000;

@@ -3,25 +3,33 @@
 import * as THREE from "three";
 import type { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Description, View } from "../gen/robomesh_pb";
-import { floorOf } from "../mesh/clearance";
-import type { Sample } from "../mesh/connection";
-import { watch } from "../mesh/connection";
-import type { Picture } from "../mesh/sight";
+import type { Sample } from "../mesh/console/connection";
+import { watch } from "../mesh/console/connection";
+import type { Picture } from "../mesh/control/display-freshness";
+import { floorOf } from "../mesh/state/clearance";
 import type { Camera } from "../ui/layout";
 import type { Theme } from "../ui/theme";
-import type { Failed } from "./arm";
-import { Arm, loadOrReport, meshUrl } from "./arm";
-import { DrawBudget, qualities } from "./draw-budget";
-import { DrawLoop } from "./draw-loop";
-import type { Forward } from "./forward-kinematics";
-import { forwardOf } from "./forward-kinematics";
-import { framesOfJoints } from "./frames-of-joints";
-import type { Nearest } from "./lines";
-import { Gap, Path, Trail } from "./lines";
-import { colourEdges, paint, withEdges } from "./models";
+import { DrawBudget, qualities } from "./canvas/draw-budget";
+import { DrawLoop } from "./canvas/draw-loop";
+import {
+  countFrame,
+  disposeScene,
+  drawsInSoftware,
+  makeRenderer,
+  observeSize,
+  parentSize,
+  toneMap,
+} from "./canvas/webgl";
+import type { Failed } from "./parts/arm";
+import { Arm, loadOrReport, meshUrl } from "./parts/arm";
+import type { Forward } from "./parts/forward-kinematics";
+import { forwardOf } from "./parts/forward-kinematics";
+import { framesOfJoints } from "./parts/frames-of-joints";
+import type { Nearest } from "./parts/lines";
+import { Gap, Path, Trail } from "./parts/lines";
+import { colourEdges, paint, withEdges } from "./parts/models";
+import { KEY_LIGHT, lights, palette, surround } from "./parts/surroundings";
 import { SceneCamera } from "./scene-camera";
-import { KEY_LIGHT, lights, palette, surround } from "./surroundings";
-import { countFrame, disposeScene, drawsInSoftware, makeRenderer, observeSize, parentSize, toneMap } from "./webgl";
 
 /** Interface for parts that other components add: see Program's gizmo. */
 export interface Stage {

@@ -5,7 +5,7 @@ import * as THREE from "three";
 import type { View, Vector3 as ViewPoint } from "../gen/robomesh_pb";
 import { View_Projection, ViewSchema } from "../gen/robomesh_pb";
 import type { Camera } from "../ui/layout";
-import { Viewpoint } from "./viewpoint";
+import { Viewpoint } from "./canvas/viewpoint";
 
 const REST_INTERVAL_MS = 500;
 

@@ -1,8 +1,8 @@
 // Choice of a robot's topics: for one at another site those that fit a slow link, unless the operator wants all.
 
 import { signal } from "@preact/signals";
-import { hello } from "../mesh/connection";
-import { isReplay } from "../mesh/robot-name";
+import { hello } from "../mesh/console/connection";
+import { isReplay } from "../mesh/state/robot-name";
 
 export const TOPIC_SELECTIONS = ["slow", "all"] as const;
 export type TopicSelection = (typeof TOPIC_SELECTIONS)[number];

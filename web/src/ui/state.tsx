@@ -2,8 +2,8 @@
 
 import { staleText } from "../i18n/format";
 import { t } from "../i18n/texts";
-import type { StateWord } from "../mesh/robot-state";
-import { stateText } from "../mesh/robot-state";
+import type { StateWord } from "../mesh/state/robot-state";
+import { stateText } from "../mesh/state/robot-state";
 
 /** A state with the shape and colour of its level; of several, their number. */
 export function State({ state, count, told }: { state: StateWord; count?: number; told?: boolean }) {

@@ -2,7 +2,7 @@
 
 import type { View } from "../gen/robomesh_pb";
 import { ViewAnswerSchema, ViewRequestSchema } from "../gen/robomesh_pb";
-import { ask, inOwnName, reasonOf } from "../mesh/connection";
+import { ask, inOwnName, reasonOf } from "../mesh/console/connection";
 
 /** The wanted picture; a width of 0: the renderer's standard size. */
 export interface RequestedView {

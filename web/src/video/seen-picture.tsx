@@ -9,8 +9,8 @@ import { RangeRequestSchema, RecordedMessagesSchema, RecordingListSchema } from 
 import { fixed, timeText } from "../i18n/format";
 import { durationS, startMs } from "../i18n/recording-format";
 import { t, viewText } from "../i18n/texts";
-import { ask, inOwnName, reasonOf } from "../mesh/connection";
-import { OWN_DRAWING } from "../mesh/sight";
+import { ask, inOwnName, reasonOf } from "../mesh/console/connection";
+import { OWN_DRAWING } from "../mesh/control/display-freshness";
 import { drawLast } from "./still";
 import "./seen-picture.css";
 

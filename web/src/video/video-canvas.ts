@@ -3,9 +3,9 @@
 import { fromBinary } from "@bufbuild/protobuf";
 import { CompressedVideoSchema } from "../gen/foxglove/CompressedVideo_pb";
 import { VideoFramesSchema } from "../gen/robomesh_pb";
-import type { Sample } from "../mesh/connection";
-import { watch } from "../mesh/connection";
-import type { Picture } from "../mesh/sight";
+import type { Sample } from "../mesh/console/connection";
+import { watch } from "../mesh/console/connection";
+import type { Picture } from "../mesh/control/display-freshness";
 import { codecName, isKeyFrame } from "./h264";
 
 /** Return whether this browser decodes video here (only over https, or on localhost). */

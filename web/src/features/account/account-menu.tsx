@@ -2,8 +2,8 @@
 
 import { useRef, useState } from "preact/hooks";
 import { accountText as a, textIn } from "../../i18n/texts";
-import { commandSuspended, isMonitor, me, signOut } from "../../mesh/account";
-import { hello } from "../../mesh/connection";
+import { commandSuspended, isMonitor, me, signOut } from "../../mesh/console/account";
+import { hello } from "../../mesh/console/connection";
 import { ChangePassword } from "../../panels/change-password";
 import { Button } from "../../ui/button";
 import { useDismissal } from "../../ui/dismissal";

@@ -3,8 +3,8 @@
 import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { reasonText, withValue } from "../../i18n/reasons";
 import { accountText as a, switchLanguage, t, textIn } from "../../i18n/texts";
-import { endedBy, me, signIn } from "../../mesh/account";
-import { RefusedRequest } from "../../mesh/refusal";
+import { endedBy, me, signIn } from "../../mesh/console/account";
+import { RefusedRequest } from "../../mesh/console/refusal";
 import { Button } from "../../ui/button";
 import { PasswordField } from "../../ui/password-field";
 import { TextInput } from "../../ui/text-input";

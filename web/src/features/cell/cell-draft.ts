@@ -4,8 +4,8 @@ import { clone, create, equals } from "@bufbuild/protobuf";
 import { computed, signal } from "@preact/signals";
 import type { CellAnswer, CellContent, CellFixture, CellState } from "../../gen/robomesh_pb";
 import { CellAnswerSchema, CellContentSchema, CellFixtureSchema, CellRequestSchema } from "../../gen/robomesh_pb";
-import { isEngineer } from "../../mesh/account";
-import { ask, hello, inOwnName } from "../../mesh/connection";
+import { isEngineer } from "../../mesh/console/account";
+import { ask, hello, inOwnName } from "../../mesh/console/connection";
 
 /** The gateway waits for kinematics and for its own checks. */
 const TIMEOUT_S = 60;

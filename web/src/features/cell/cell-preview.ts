@@ -5,11 +5,11 @@
 import { effect, signal } from "@preact/signals";
 import * as THREE from "three";
 import type { CellFixture, Description } from "../../gen/robomesh_pb";
-import { meshUrl } from "../../scene/arm";
-import { makeGizmo } from "../../scene/gizmo";
-import { loadModel } from "../../scene/models";
+import { meshUrl } from "../../scene/parts/arm";
+import { makeGizmo } from "../../scene/parts/gizmo";
+import { loadModel } from "../../scene/parts/models";
+import { palette } from "../../scene/parts/surroundings";
 import type { Stage } from "../../scene/robot-scene";
-import { palette } from "../../scene/surroundings";
 import { changeFixture, chosen, mayEdit, rows } from "./cell-draft";
 
 /** What dragging does; off: hidden. */

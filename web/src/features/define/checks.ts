@@ -2,7 +2,7 @@
 
 import { computed, effect, signal } from "@preact/signals";
 import { defineText as d } from "../../i18n/texts";
-import { RefusedRequest } from "../../mesh/refusal";
+import { RefusedRequest } from "../../mesh/console/refusal";
 import { bodies } from "./description";
 import type { Draft } from "./draft";
 import { draft, identity, parsePath } from "./draft";

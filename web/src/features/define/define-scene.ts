@@ -3,12 +3,8 @@
 import * as THREE from "three";
 import type { TransformControls } from "three/addons/controls/TransformControls.js";
 import { toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
-import { DrawLoop } from "../../scene/draw-loop";
-import type { DhRow } from "../../scene/forward-kinematics";
-import { makeGizmo } from "../../scene/gizmo";
-import { readGlb } from "../../scene/models";
-import { lights, palette, surround } from "../../scene/surroundings";
-import { Viewpoint } from "../../scene/viewpoint";
+import { DrawLoop } from "../../scene/canvas/draw-loop";
+import { Viewpoint } from "../../scene/canvas/viewpoint";
 import {
   countFrame,
   disposeScene,
@@ -17,7 +13,11 @@ import {
   makeRenderer,
   observeSize,
   toneMap,
-} from "../../scene/webgl";
+} from "../../scene/canvas/webgl";
+import type { DhRow } from "../../scene/parts/forward-kinematics";
+import { makeGizmo } from "../../scene/parts/gizmo";
+import { readGlb } from "../../scene/parts/models";
+import { lights, palette, surround } from "../../scene/parts/surroundings";
 import { Skeleton } from "./dh-skeleton";
 import { glb } from "./server-requests";
 

@@ -1,7 +1,7 @@
 // The D-H rows as lines: each joint's axis z, offset d along it, common normal a, and each link's frame.
 
 import * as THREE from "three";
-import { alongAxis, type DhRow } from "../../scene/forward-kinematics";
+import { alongAxis, type DhRow } from "../../scene/parts/forward-kinematics";
 
 const AXIS = "#4f9df0";
 const LETTERS = "#d5e8ff";

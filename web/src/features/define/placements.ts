@@ -1,7 +1,7 @@
 // Conversions between a draft's units and the metres and radians of its drawing.
 
 import { Euler, type Matrix4, Quaternion, Vector3 } from "three";
-import { type DhRow, transformOf } from "../../scene/forward-kinematics";
+import { type DhRow, transformOf } from "../../scene/parts/forward-kinematics";
 import type { Description, Joint, Pose, Triple, Units } from "./description";
 import { metres, radians, tidy } from "./description";
 

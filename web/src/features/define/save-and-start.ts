@@ -2,7 +2,7 @@
 
 import { signal } from "@preact/signals";
 import { defineText as d } from "../../i18n/texts";
-import { RefusedRequest } from "../../mesh/refusal";
+import { RefusedRequest } from "../../mesh/console/refusal";
 import { saveFile } from "../../ui/save-file";
 import { checked, invalidNumbers } from "./checks";
 import { draft, identity, isOpen, isUnsaved, markSaved, parsePath } from "./draft";

@@ -1,7 +1,7 @@
 // Requests of Define to the console's server.
 
 import { t } from "../../i18n/texts";
-import { RefusedRequest, readRefusal } from "../../mesh/refusal";
+import { RefusedRequest, readRefusal } from "../../mesh/console/refusal";
 import type { GivenDescription } from "./description";
 import { concise } from "./description";
 import type { Draft } from "./draft";

@@ -1,7 +1,7 @@
 // A description's cameras: its own, and top, front and left derived from the arm's reach.
 
 import { Vector3 } from "three";
-import type { CameraPose } from "../../scene/viewpoint";
+import type { CameraPose } from "../../scene/canvas/viewpoint";
 import type { Description, Triple, View } from "./description";
 import { metres, tidy } from "./description";
 import { reach } from "./placements";

@@ -5,8 +5,11 @@ import { useState } from "preact/hooks";
 import { alarmText } from "../../i18n/alarm-text";
 import type { NameIn } from "../../i18n/texts";
 import { eventsText as e, t } from "../../i18n/texts";
-import { mayAct } from "../../mesh/account";
-import type { Alarm } from "../../mesh/alarms";
+import { mayAct } from "../../mesh/console/account";
+import { hello, reasonOf } from "../../mesh/console/connection";
+import type { Notice } from "../../mesh/control/control";
+import { operator, setOperator } from "../../mesh/control/control";
+import type { Alarm } from "../../mesh/services/alarms";
 import {
   Action,
   ALARM_ORDERS,
@@ -20,10 +23,7 @@ import {
   State,
   silentSites,
   sorted,
-} from "../../mesh/alarms";
-import { hello, reasonOf } from "../../mesh/connection";
-import type { Notice } from "../../mesh/control";
-import { operator, setOperator } from "../../mesh/control";
+} from "../../mesh/services/alarms";
 import { setSound, sound } from "../../panels/alarm-sound";
 import { Button } from "../../ui/button";
 import { Choice, Toggle } from "../../ui/choice";

@@ -2,7 +2,7 @@
 
 import { timestampFromMs } from "@bufbuild/protobuf/wkt";
 import { AuditListSchema, AuditQuerySchema } from "../../gen/robomesh_pb";
-import { ask, reasonOf } from "../../mesh/connection";
+import { ask, reasonOf } from "../../mesh/console/connection";
 import type { AuditLine } from "./entries";
 import { auditLines } from "./entries";
 

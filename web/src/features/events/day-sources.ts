@@ -9,8 +9,8 @@ import {
   RecordingListSchema,
 } from "../../gen/robomesh_pb";
 import { stampMs } from "../../i18n/format";
-import { AskError, ask, reasonOf } from "../../mesh/connection";
-import { readNotes } from "../../mesh/notes";
+import { AskError, ask, reasonOf } from "../../mesh/console/connection";
+import { readNotes } from "../../mesh/services/notes";
 import type { DaySources, Span } from "./day";
 import type { EventEntry } from "./entries";
 

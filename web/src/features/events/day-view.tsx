@@ -4,7 +4,7 @@ import { useEffect, useState } from "preact/hooks";
 import { count, DASH, dateOf, timeOfDay, timeText, whenText, zoneOf } from "../../i18n/format";
 import type { NameIn } from "../../i18n/texts";
 import { dayText as d } from "../../i18n/texts";
-import { lostAt } from "../../mesh/connection";
+import { lostAt } from "../../mesh/console/connection";
 import { Button } from "../../ui/button";
 import { saveFile } from "../../ui/save-file";
 import { Warning } from "../../ui/warning";

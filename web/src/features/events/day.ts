@@ -9,7 +9,7 @@ import { eventText } from "../../i18n/event-text";
 import { stampMs } from "../../i18n/format";
 import { durationS, startMs } from "../../i18n/recording-format";
 import { dayText as d } from "../../i18n/texts";
-import { WITHDRAWN, WRITTEN, withdrawnIds } from "../../mesh/notes";
+import { WITHDRAWN, WRITTEN, withdrawnIds } from "../../mesh/services/notes";
 
 export const KINDS = ["control", "program", "stop", "alarm", "recording", "note"] as const;
 export type Kind = (typeof KINDS)[number];

@@ -7,8 +7,8 @@ import { useEffect } from "preact/hooks";
 import type { AuditEntry, Event } from "../../gen/robomesh_pb";
 import { AuditEntrySchema, AuditListSchema, EventListSchema, EventSchema } from "../../gen/robomesh_pb";
 import { stampMs } from "../../i18n/format";
-import type { Sample } from "../../mesh/connection";
-import { watch } from "../../mesh/connection";
+import type { Sample } from "../../mesh/console/connection";
+import { watch } from "../../mesh/console/connection";
 
 export const MAX_ENTRIES = 5000;
 const UPDATE_INTERVAL_MS = 250;

@@ -3,7 +3,7 @@
 import { useState } from "preact/hooks";
 import { alarmText } from "../../i18n/alarm-text";
 import { eventsText as e } from "../../i18n/texts";
-import type { Alarm } from "../../mesh/alarms";
+import type { Alarm } from "../../mesh/services/alarms";
 import { Choice } from "../../ui/choice";
 import { ReasonForm } from "../../ui/reason-form";
 

@@ -5,7 +5,7 @@ import { ReplayStateSchema } from "../../gen/robomesh_pb";
 import { stampMs } from "../../i18n/format";
 import { momentText } from "../../i18n/recording-format";
 import { recordingsText as r } from "../../i18n/texts";
-import { ageOf, isStale, useTopics } from "../../mesh/topics";
+import { ageOf, isStale, useTopics } from "../../mesh/state/topics";
 import { ReplayTag } from "../../ui/replay-tag";
 import { recordingsLink, robotLink } from "../../ui/route";
 import "../../ui/replay.css";

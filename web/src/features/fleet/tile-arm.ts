@@ -2,10 +2,10 @@
 
 import * as THREE from "three";
 import type { Description } from "../../gen/robomesh_pb";
-import { meshUrl } from "../../scene/arm";
-import type { Forward } from "../../scene/forward-kinematics";
-import { forwardOf } from "../../scene/forward-kinematics";
-import { loadModel } from "../../scene/models";
+import { meshUrl } from "../../scene/parts/arm";
+import type { Forward } from "../../scene/parts/forward-kinematics";
+import { forwardOf } from "../../scene/parts/forward-kinematics";
+import { loadModel } from "../../scene/parts/models";
 import { simplifyMeshes } from "./simplify-mesh";
 
 const STALE = new THREE.MeshLambertMaterial({ color: "#7d8387", transparent: true, opacity: 0.45 });

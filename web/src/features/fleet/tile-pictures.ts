@@ -3,10 +3,10 @@
 import { effect } from "@preact/signals";
 import * as THREE from "three";
 import type { Description } from "../../gen/robomesh_pb";
-import { floorOf } from "../../mesh/clearance";
-import { DrawLoop } from "../../scene/draw-loop";
-import { palette } from "../../scene/surroundings";
-import { countFrame, drawsInSoftware, makeRenderer } from "../../scene/webgl";
+import { floorOf } from "../../mesh/state/clearance";
+import { DrawLoop } from "../../scene/canvas/draw-loop";
+import { countFrame, drawsInSoftware, makeRenderer } from "../../scene/canvas/webgl";
+import { palette } from "../../scene/parts/surroundings";
 import { theme } from "../../ui/theme";
 import { type TileArm, tileArmOf } from "./tile-arm";
 

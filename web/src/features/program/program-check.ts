@@ -3,7 +3,7 @@
 import { effect, signal } from "@preact/signals";
 import type { CheckAnswer, CheckAnswer_Violation } from "../../gen/robomesh_pb";
 import { CheckAnswerSchema, CheckRequestSchema } from "../../gen/robomesh_pb";
-import { ask, inOwnName, reasonOf } from "../../mesh/connection";
+import { ask, inOwnName, reasonOf } from "../../mesh/console/connection";
 import { draft } from "./draft";
 
 const TYPING_ENDS_MS = 800;

@@ -11,12 +11,12 @@ import {
 } from "../../gen/robomesh_pb";
 import type { Words } from "../../i18n/texts";
 import { noWords, programText as p, t } from "../../i18n/texts";
-import { handleLease } from "../../mesh/control";
-import { fleetRobots } from "../../mesh/known-robots";
-import type { RobotName } from "../../mesh/robot-name";
-import { disobeys, stateWord, stoppedByItself } from "../../mesh/robot-state";
-import { useShownState } from "../../mesh/sight";
-import { ageOf, isStale, jointsAge, useEvents, useTopic } from "../../mesh/topics";
+import { handleLease } from "../../mesh/control/control";
+import { useShownState } from "../../mesh/control/display-freshness";
+import { fleetRobots } from "../../mesh/state/known-robots";
+import type { RobotName } from "../../mesh/state/robot-name";
+import { disobeys, stateWord, stoppedByItself } from "../../mesh/state/robot-state";
+import { ageOf, isStale, jointsAge, useEvents, useTopic } from "../../mesh/state/topics";
 import { ControlPanel } from "../../panels/control/control-panel";
 import { ControlRequests } from "../../panels/control/who-controls";
 import { Messages } from "../../panels/messages";

@@ -3,7 +3,7 @@
 import { computed, signal } from "@preact/signals";
 import { Matrix4 } from "three";
 import type { Description } from "../../gen/robomesh_pb";
-import { forwardOf } from "../../scene/forward-kinematics";
+import { forwardOf } from "../../scene/parts/forward-kinematics";
 
 export const robotKey = signal("");
 export const description = signal<Description | undefined>(undefined);

@@ -4,7 +4,7 @@ import { useState } from "preact/hooks";
 import type { ProgramContent, ProgramVersion } from "../../gen/robomesh_pb";
 import { ProgramVersion_Change as Change } from "../../gen/robomesh_pb";
 import { storedText as s, t } from "../../i18n/texts";
-import { mayAct } from "../../mesh/account";
+import { mayAct } from "../../mesh/console/account";
 import { Button } from "../../ui/button";
 import { ReasonForm } from "../../ui/reason-form";
 import { TextInput } from "../../ui/text-input";

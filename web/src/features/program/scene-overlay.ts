@@ -2,8 +2,8 @@
 
 import { effect, signal } from "@preact/signals";
 import type { CheckAnswer_Violation } from "../../gen/robomesh_pb";
-import { checkTarget, targetParts } from "../../mesh/target-check";
-import { ghostAt, redLinks, toolPath } from "../../scene/ghost";
+import { checkTarget, targetParts } from "../../mesh/control/target-check";
+import { ghostAt, redLinks, toolPath } from "../../scene/overlays";
 import { duration, moment, path, playing, positionsAt, violatingLinks } from "./checked-motion";
 import { checked } from "./program-check";
 import { description, robotKey } from "./program-robot";

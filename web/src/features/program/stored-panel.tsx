@@ -2,7 +2,7 @@
 
 import { useState } from "preact/hooks";
 import { programText as p, storedText as s, t } from "../../i18n/texts";
-import { mayAct } from "../../mesh/account";
+import { mayAct } from "../../mesh/console/account";
 import { Button } from "../../ui/button";
 import { Toggle } from "../../ui/choice";
 import { FileButton } from "../../ui/file-button";

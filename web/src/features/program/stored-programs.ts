@@ -14,8 +14,8 @@ import {
 import { stampFull } from "../../i18n/format";
 import type { Words } from "../../i18n/texts";
 import { noWords, programText as p, storedText as s } from "../../i18n/texts";
-import { mayAct } from "../../mesh/account";
-import { ask, inOwnName, reasonOf } from "../../mesh/connection";
+import { mayAct } from "../../mesh/console/account";
+import { ask, inOwnName, reasonOf } from "../../mesh/console/connection";
 import type { Base } from "./draft";
 import { draft, replaceDraft, setBase } from "./draft";
 

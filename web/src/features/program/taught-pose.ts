@@ -4,7 +4,7 @@ import { computed, signal } from "@preact/signals";
 import { InverseAnswerSchema, InverseRequestSchema, InverseRequest_Task as Task } from "../../gen/robomesh_pb";
 import { rollPitchYaw, toDegrees, toRadians } from "../../i18n/format";
 import { reasonText } from "../../i18n/reasons";
-import { ask, reasonOf } from "../../mesh/connection";
+import { ask, reasonOf } from "../../mesh/console/connection";
 import { robotKey, toolAt } from "./program-robot";
 
 const TIMEOUT_S = 5;

@@ -2,7 +2,7 @@
 
 import { effect, signal } from "@preact/signals";
 import { Group, Matrix4, Object3D } from "three";
-import { makeGizmo } from "../../scene/gizmo";
+import { makeGizmo } from "../../scene/parts/gizmo";
 import type { Stage } from "../../scene/robot-scene";
 import { taughtPose, teachPose } from "./taught-pose";
 

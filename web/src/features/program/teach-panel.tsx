@@ -4,7 +4,7 @@ import { useState } from "preact/hooks";
 import { jointText, jointTitle, jointUnit } from "../../i18n/format";
 import type { Words } from "../../i18n/texts";
 import { noWords, programText as p } from "../../i18n/texts";
-import { targetProblem } from "../../mesh/target-check";
+import { targetProblem } from "../../mesh/control/target-check";
 import { Button } from "../../ui/button";
 import { Choice } from "../../ui/choice";
 import { JointTrack } from "../../ui/joint-track";

@@ -2,7 +2,7 @@
 
 import type { Words } from "../../i18n/texts";
 import { programText as p, storedText as s } from "../../i18n/texts";
-import { mayAct } from "../../mesh/account";
+import { mayAct } from "../../mesh/console/account";
 import { Button } from "../../ui/button";
 import { FileButton } from "../../ui/file-button";
 import { TextInput } from "../../ui/text-input";

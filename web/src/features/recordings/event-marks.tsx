@@ -8,7 +8,7 @@ import { eventText } from "../../i18n/event-text";
 import { count, timeText } from "../../i18n/format";
 import { momentText } from "../../i18n/recording-format";
 import { notesText as n, recordingsText as r, t } from "../../i18n/texts";
-import { WRITTEN } from "../../mesh/notes";
+import { WRITTEN } from "../../mesh/services/notes";
 import { NoteForm, Withdrawable } from "../../panels/note-form";
 import { Button } from "../../ui/button";
 import { Choice } from "../../ui/choice";

@@ -5,8 +5,8 @@ import { useSignal } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
 import { PlayRequestSchema, ReplayStateSchema } from "../../gen/robomesh_pb";
 import { recordingsText as r } from "../../i18n/texts";
-import { AskError, ask, hello, presence, reasonOf } from "../../mesh/connection";
-import { Replay } from "../../mesh/replay";
+import { AskError, ask, hello, presence, reasonOf } from "../../mesh/console/connection";
+import { Replay } from "../../mesh/services/replay";
 import type { RecordingName } from "../../ui/route";
 
 const TIMEOUT_S = 15; // the player first reads a long file

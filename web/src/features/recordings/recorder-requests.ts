@@ -19,8 +19,8 @@ import {
 import { entryText } from "../../i18n/audit-text";
 import { durationS, startMs, topicOf } from "../../i18n/recording-format";
 import { recordingsText as r } from "../../i18n/texts";
-import { AskError, ask, inOwnName, lostAt, reasonOf, watch } from "../../mesh/connection";
-import { readNotes, timeOfNote, WRITTEN, withdrawnIds } from "../../mesh/notes";
+import { AskError, ask, inOwnName, lostAt, reasonOf, watch } from "../../mesh/console/connection";
+import { readNotes, timeOfNote, WRITTEN, withdrawnIds } from "../../mesh/services/notes";
 import type { RecordingName } from "../../ui/route";
 
 const TIMEOUT_S = 20;

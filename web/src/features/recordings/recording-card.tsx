@@ -18,9 +18,9 @@ import {
   startMs,
 } from "../../i18n/recording-format";
 import { recordingsText as r } from "../../i18n/texts";
-import { mayAct } from "../../mesh/account";
-import { reasonOf } from "../../mesh/connection";
-import { Action, askRecorder } from "../../mesh/recorder";
+import { mayAct } from "../../mesh/console/account";
+import { reasonOf } from "../../mesh/console/connection";
+import { Action, askRecorder } from "../../mesh/services/recorder";
 import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import type { RecordingName } from "../../ui/route";

@@ -3,7 +3,7 @@
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import type { Recording } from "../../gen/robomesh_pb";
 import { RecordingRequest_Action as Action, RecordingRequestSchema, RecordingSchema } from "../../gen/robomesh_pb";
-import { ask, inOwnName } from "../../mesh/connection";
+import { ask, inOwnName } from "../../mesh/console/connection";
 import type { Row } from "./recordings-of-sites";
 import { refreshSite } from "./recordings-of-sites";
 

@@ -2,7 +2,7 @@
 
 import { useState } from "preact/hooks";
 import { recordingsText as r } from "../../i18n/texts";
-import { reasonOf } from "../../mesh/connection";
+import { reasonOf } from "../../mesh/console/connection";
 import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import { ReasonForm } from "../../ui/reason-form";

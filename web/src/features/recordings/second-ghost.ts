@@ -5,9 +5,9 @@ import { useEffect } from "preact/hooks";
 import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
 import type { Description } from "../../gen/robomesh_pb";
 import { DescriptionSchema } from "../../gen/robomesh_pb";
-import { watch } from "../../mesh/connection";
-import { useTopic } from "../../mesh/topics";
-import { ghostAt } from "../../scene/ghost";
+import { watch } from "../../mesh/console/connection";
+import { useTopic } from "../../mesh/state/topics";
+import { ghostAt } from "../../scene/overlays";
 
 const names = (description: Description | undefined) => description?.joints.map((joint) => joint.name).join(" ") ?? "";
 

@@ -2,7 +2,7 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../../i18n/texts";
-import { readRefusal } from "../../mesh/refusal";
+import { readRefusal } from "../../mesh/console/refusal";
 import { saveFile } from "../../ui/save-file";
 
 // A browser keeps the recording in memory.

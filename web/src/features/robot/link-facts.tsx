@@ -5,9 +5,9 @@ import { ControllerState_Known as Known, Capabilities_Stops as Stops } from "../
 import { count, fixed } from "../../i18n/format";
 import type { TextName } from "../../i18n/texts";
 import { t } from "../../i18n/texts";
-import { Command } from "../../mesh/command";
-import type { Latest } from "../../mesh/topics";
-import { ageOf, isStale } from "../../mesh/topics";
+import { Command } from "../../mesh/control/command";
+import type { Latest } from "../../mesh/state/topics";
+import { ageOf, isStale } from "../../mesh/state/topics";
 import { recoveryNames } from "../../panels/control/recover";
 import { Unit } from "../../ui/unit";
 

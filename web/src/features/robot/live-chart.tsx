@@ -6,7 +6,7 @@ import "uplot/dist/uPlot.min.css";
 import { dateOf, timeOfDay } from "../../i18n/format";
 import { plotsText as p } from "../../i18n/texts";
 import type { shownUnit } from "../../i18n/value-names";
-import { ageClock } from "../../mesh/age-clock";
+import { ageClock } from "../../mesh/console/age-clock";
 import { plotAppearance } from "../../ui/plot-appearance";
 import { theme } from "../../ui/theme";
 import type { Columns } from "./plot-buckets";

@@ -1,7 +1,7 @@
 // A robot at another site: choice of topics, and a warning about that site's clocks.
 
 import { t } from "../../i18n/texts";
-import { isClockOff, useMesh } from "../../mesh/site-health";
+import { isClockOff, useMesh } from "../../mesh/state/site-health";
 import { isRemote, selectTopics, TOPIC_SELECTIONS, topicSelection } from "../../scene/topic-selection";
 import { Choice } from "../../ui/choice";
 import { Warning } from "../../ui/warning";

@@ -3,7 +3,7 @@
 import { signal } from "@preact/signals";
 import { useState } from "preact/hooks";
 import { notesText as n } from "../../i18n/texts";
-import type { NoteTime } from "../../mesh/notes";
+import type { NoteTime } from "../../mesh/services/notes";
 import { NoteForm } from "../../panels/note-form";
 import { Choice } from "../../ui/choice";
 import "./record-panel.css";

@@ -5,10 +5,10 @@ import { signal } from "@preact/signals";
 import type { Description } from "../../gen/robomesh_pb";
 import { SeriesAnswerSchema, SeriesRequestSchema } from "../../gen/robomesh_pb";
 import { plotsText as p } from "../../i18n/texts";
-import { ageClock } from "../../mesh/age-clock";
-import { AskError, ask, inOwnName, presence, reasonOf, watch } from "../../mesh/connection";
-import { staleAfter } from "../../mesh/topics";
-import { learnUnit, readerOf, topicOf, topicsOfValues } from "../../mesh/values";
+import { ageClock } from "../../mesh/console/age-clock";
+import { AskError, ask, inOwnName, presence, reasonOf, watch } from "../../mesh/console/connection";
+import { staleAfter } from "../../mesh/state/topics";
+import { learnUnit, readerOf, topicOf, topicsOfValues } from "../../mesh/state/values";
 import { Buckets } from "./plot-buckets";
 
 /** The page always keeps so much of each plotted value [s]. */

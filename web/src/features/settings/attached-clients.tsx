@@ -1,9 +1,9 @@
 // Attached clients besides the services: monitors, consoles, operators in control.
 
 import { settingsText as s } from "../../i18n/texts";
-import { presence } from "../../mesh/connection";
-import { OPERATOR } from "../../mesh/known-robots";
-import { robotSnapshot } from "../../mesh/robot-snapshots";
+import { presence } from "../../mesh/console/connection";
+import { OPERATOR } from "../../mesh/state/known-robots";
+import { robotSnapshot } from "../../mesh/state/robot-snapshots";
 import { Panel } from "../../ui/panel";
 import { robotLink } from "../../ui/route";
 

@@ -2,7 +2,7 @@
 
 import { ageText } from "../../i18n/format";
 import { settingsText as s } from "../../i18n/texts";
-import { useMesh } from "../../mesh/site-health";
+import { useMesh } from "../../mesh/state/site-health";
 import { Panel } from "../../ui/panel";
 import { Marked } from "./this-console";
 

@@ -3,10 +3,10 @@
 import type { MeshState, MeshState_Seen as Seen } from "../../gen/robomesh_pb";
 import { ageText } from "../../i18n/format";
 import { settingsText as s } from "../../i18n/texts";
-import { presence } from "../../mesh/connection";
-import { isMeshStale, useMesh } from "../../mesh/site-health";
-import type { Latest } from "../../mesh/topics";
-import { ageOf } from "../../mesh/topics";
+import { presence } from "../../mesh/console/connection";
+import { isMeshStale, useMesh } from "../../mesh/state/site-health";
+import type { Latest } from "../../mesh/state/topics";
+import { ageOf } from "../../mesh/state/topics";
 import { AliveServices } from "../../panels/alive-services";
 import { Panel } from "../../ui/panel";
 import { DelayChart } from "./delay-chart";

@@ -4,9 +4,9 @@ import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { MeshState, MeshState_Seen as Seen } from "../../gen/robomesh_pb";
 import { ageText, count, DASH, fixed, stampFull, whenText } from "../../i18n/format";
 import { settingsText as s } from "../../i18n/texts";
-import { hello } from "../../mesh/connection";
-import { isClockOff, isSilent, reportAge } from "../../mesh/site-health";
-import type { Latest } from "../../mesh/topics";
+import { hello } from "../../mesh/console/connection";
+import { isClockOff, isSilent, reportAge } from "../../mesh/state/site-health";
+import type { Latest } from "../../mesh/state/topics";
 import { Marked } from "./this-console";
 
 export const COLUMNS = [

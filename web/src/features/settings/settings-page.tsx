@@ -1,8 +1,8 @@
 // The settings page: health of the mesh, presence, this browser, and the console's accounts.
 
 import { t } from "../../i18n/texts";
-import { me } from "../../mesh/account";
-import { hello } from "../../mesh/connection";
+import { me } from "../../mesh/console/account";
+import { hello } from "../../mesh/console/connection";
 import { About } from "./about";
 import { Accounts } from "./accounts";
 import { Appearance } from "./appearance";

@@ -3,9 +3,9 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { ControllerState, Description, ReplayState } from "../../gen/robomesh_pb";
 import { t, viewText, wallText as w } from "../../i18n/texts";
-import { isReplay } from "../../mesh/robot-name";
-import { problemOf, replayWord, stateText, stateWord } from "../../mesh/robot-state";
-import type { Latest } from "../../mesh/topics";
+import { isReplay } from "../../mesh/state/robot-name";
+import { problemOf, replayWord, stateText, stateWord } from "../../mesh/state/robot-state";
+import type { Latest } from "../../mesh/state/topics";
 import type { ViewName } from "../../ui/route";
 import { robotLink } from "../../ui/route";
 import { Age, State } from "../../ui/state";

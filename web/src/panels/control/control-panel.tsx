@@ -4,17 +4,23 @@ import { useState } from "preact/hooks";
 import type { ControllerState, Description, Lease } from "../../gen/robomesh_pb";
 import { ControllerState_Activity as Activity, ControllerState_Known as Known } from "../../gen/robomesh_pb";
 import { t } from "../../i18n/texts";
-import { isMonitor } from "../../mesh/account";
-import type { CommandValues } from "../../mesh/command";
-import { Command, command } from "../../mesh/command";
-import { reachable } from "../../mesh/connection";
+import { isMonitor } from "../../mesh/console/account";
+import { reachable } from "../../mesh/console/connection";
 import { controlNotice, holds } from "../../mesh/control";
-import type { Motion } from "../../mesh/notice-expiry";
-import { useNoticeExpiry } from "../../mesh/notice-expiry";
-import { isOnlyWatched, stoppedByItself, whyNoCommand, whyNoMotion, whyNoNewMotion } from "../../mesh/robot-state";
-import { whyFrozen } from "../../mesh/sight";
-import type { Latest } from "../../mesh/topics";
-import { now } from "../../mesh/topics";
+import type { CommandValues } from "../../mesh/control/command";
+import { Command, command } from "../../mesh/control/command";
+import { whyFrozen } from "../../mesh/control/display-freshness";
+import type { Motion } from "../../mesh/control/notice-expiry";
+import { useNoticeExpiry } from "../../mesh/control/notice-expiry";
+import {
+  isOnlyWatched,
+  stoppedByItself,
+  whyNoCommand,
+  whyNoMotion,
+  whyNoNewMotion,
+} from "../../mesh/state/robot-state";
+import type { Latest } from "../../mesh/state/topics";
+import { now } from "../../mesh/state/topics";
 import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";

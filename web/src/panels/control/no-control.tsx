@@ -2,7 +2,7 @@
 
 import { useState } from "preact/hooks";
 import { accountText as a } from "../../i18n/texts";
-import { isMonitor, mayAct, me, unlock } from "../../mesh/account";
+import { isMonitor, mayAct, me, unlock } from "../../mesh/console/account";
 import { Button } from "../../ui/button";
 import { PasswordField } from "../../ui/password-field";
 import "../account-form.css";

@@ -4,9 +4,9 @@ import { useState } from "preact/hooks";
 import type { ControllerState } from "../../gen/robomesh_pb";
 import { Recover_Recovery as Recovery } from "../../gen/robomesh_pb";
 import { t } from "../../i18n/texts";
-import { Command, command } from "../../mesh/command";
-import { reachable } from "../../mesh/connection";
-import { moves } from "../../mesh/robot-state";
+import { reachable } from "../../mesh/console/connection";
+import { Command, command } from "../../mesh/control/command";
+import { moves } from "../../mesh/state/robot-state";
 import { ReasonForm } from "../../ui/reason-form";
 
 const NAMES = {

@@ -6,10 +6,10 @@ import { stampFull } from "../../i18n/format";
 import { reasonText } from "../../i18n/reasons";
 import { isSaid } from "../../i18n/stop-words";
 import { t } from "../../i18n/texts";
-import type { CommandValues } from "../../mesh/command";
-import { Command } from "../../mesh/command";
-import { reachable } from "../../mesh/connection";
-import { moves, stopText } from "../../mesh/robot-state";
+import { reachable } from "../../mesh/console/connection";
+import type { CommandValues } from "../../mesh/control/command";
+import { Command } from "../../mesh/control/command";
+import { moves, stopText } from "../../mesh/state/robot-state";
 import { Button } from "../../ui/button";
 
 export function Stopped(props: {

@@ -5,7 +5,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import type { Lease, Lease_Asker } from "../../gen/robomesh_pb";
 import { ageText, stampFull, stampMs, stampWhen } from "../../i18n/format";
 import { t } from "../../i18n/texts";
-import { hello, reachable } from "../../mesh/connection";
+import { hello, reachable } from "../../mesh/console/connection";
 import {
   accept,
   controlNotice,
