@@ -1,7 +1,7 @@
 // The outcome of an action, in one line.
 
 import { t } from "../i18n/texts";
-import type { Notice } from "../mesh/control";
+import type { Notice } from "../mesh/control/control";
 import { Warning } from "./warning";
 
 /** Return the role and the name of an outcome: a refusal interrupts a screen reader, all else waits. */

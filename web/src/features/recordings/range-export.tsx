@@ -7,7 +7,7 @@ import { ReasonSchema } from "../../gen/robomesh_pb";
 import { fileUrl, momentText, viewName } from "../../i18n/recording-format";
 import { recordingsText as r } from "../../i18n/texts";
 import { RefusedRequest, readRefusal } from "../../mesh/console/refusal";
-import type { Notice } from "../../mesh/control";
+import type { Notice } from "../../mesh/control/control";
 import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import type { RecordingName } from "../../ui/route";

@@ -5,7 +5,7 @@ import { useEffect, useState } from "preact/hooks";
 import { robotsOf, sizeText, startMs } from "../../i18n/recording-format";
 import { recordingsText as r } from "../../i18n/texts";
 import { reasonOf } from "../../mesh/console/connection";
-import type { Notice } from "../../mesh/control";
+import type { Notice } from "../../mesh/control/control";
 import { Action, askRecorder } from "../../mesh/services/recorder";
 import { fleetRobots } from "../../mesh/state/known-robots";
 import { Button } from "../../ui/button";

@@ -7,7 +7,7 @@ import { stampFull } from "../../i18n/format";
 import { plotsText as p } from "../../i18n/texts";
 import { mayAct } from "../../mesh/console/account";
 import { ask, reasonOf } from "../../mesh/console/connection";
-import type { Notice } from "../../mesh/control";
+import type { Notice } from "../../mesh/control/control";
 import { asker } from "../../mesh/services/alarms";
 import { useTopic } from "../../mesh/state/topics";
 import { Button } from "../../ui/button";

@@ -4,7 +4,7 @@ import { useEffect, useState } from "preact/hooks";
 import { timeText } from "../../i18n/format";
 import { settingsText as s } from "../../i18n/texts";
 import { me, post } from "../../mesh/console/account";
-import type { Notice } from "../../mesh/control";
+import type { Notice } from "../../mesh/control/control";
 import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";

@@ -6,9 +6,9 @@ import { ControllerState_Activity as Activity, ControllerState_Known as Known } 
 import { t } from "../../i18n/texts";
 import { isMonitor } from "../../mesh/console/account";
 import { reachable } from "../../mesh/console/connection";
-import { controlNotice, holds } from "../../mesh/control";
 import type { CommandValues } from "../../mesh/control/command";
 import { Command, command } from "../../mesh/control/command";
+import { controlNotice, holds } from "../../mesh/control/control";
 import { whyFrozen } from "../../mesh/control/display-freshness";
 import type { Motion } from "../../mesh/control/notice-expiry";
 import { useNoticeExpiry } from "../../mesh/control/notice-expiry";

@@ -18,7 +18,7 @@ import {
   setOperator,
   take,
   takeOver,
-} from "../../mesh/control";
+} from "../../mesh/control/control";
 import { Button } from "../../ui/button";
 import { ReasonForm } from "../../ui/reason-form";
 import { TextInput } from "../../ui/text-input";
