@@ -43,7 +43,7 @@ function onDemand<Props>(load: () => Promise<ComponentType<Props>>) {
   };
 }
 
-/** The message for a page whose files a newer console no longer has. */
+/** The message for a page that cannot be loaded, because a newer console no longer has its files. */
 function NotLoaded() {
   return (
     <div class="empty" role="alert">

@@ -7,7 +7,7 @@ import { fixed, jointText, jointTitle } from "./format";
 import { reasonText } from "./reasons";
 import { filled, message, placeholders, t } from "./texts";
 
-/** Requests whose outcome says more than their name: an end of control or of a program, a stop that was sent again. */
+/** Requests with an outcome that says more than their name: an end of control or of a program, a stop that was sent again. */
 const OUTCOME_SAYS_ALL = new Set(["EXPIRE", "REVOKE", "PROGRAM_END", "JOG_END", "STOP_AGAIN", "ROTATE"]);
 
 /** Return the reason's sentence; entries of older gateways have only the gateway's text. */

@@ -69,7 +69,7 @@ export function startedText({ startedBy }: Recording): string {
   return startedBy === "request" ? r("by_request") : startedBy;
 }
 
-/** Return the views whose video it holds. */
+/** Return the views with recorded video. */
 export function recordedViews({ topics }: Recording): readonly string[] {
   return topics
     .map((each) => topicOf(each.topic))

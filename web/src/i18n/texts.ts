@@ -39,8 +39,8 @@ function preferredLanguage(): Language {
   return LANGUAGES.find((each) => navigator.language.toLowerCase().startsWith(each)) ?? "en";
 }
 
-/** Show the page in a language, by default in the one that the person or the browser prefers; without its
- * catalogue, as of an older console's page, it stays as it is. */
+/** Show the page in a language, by default the preferred one. The language stays if its catalogue cannot be loaded,
+ * for example because a newer console has another one. */
 export async function showLanguage(name = preferredLanguage()): Promise<void> {
   wanted = name;
   try {

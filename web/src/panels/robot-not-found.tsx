@@ -21,7 +21,7 @@ export function useRobotSearch(robotKey: string, known: boolean): Search {
   if (known || fleetRobots.value.includes(robotKey)) found.current = robotKey;
   const there = found.current === robotKey;
   const connected = lostAt.value === null && hello.value?.connected === true;
-  // A replay has no presence of its own.
+  // A replay announces no presence.
   const complete = hello.value?.presenceKnown === true && !isReplay(robotKey.split("/")[2] ?? "");
   useEffect(() => {
     setWaited(false);

@@ -132,7 +132,7 @@ export class RobotScene {
     this.resize();
   }
 
-  /** Show a state; what equals the last one stays as it is. */
+  /** Show a state; only differences from the last one are drawn again. */
   update(state: SceneState): void {
     const before = this.state;
     this.state = state;

@@ -53,7 +53,7 @@ const RETRY_MS = 100;
 const LATE_MS = 500;
 /** Ends that another person caused, also if this page was slow at the time. */
 const TAKEN = ["lease.ended.taken", "lease.ended.handed_over", "lease.ended.no_right", "lease.ended.signed_out"];
-/** Refusals of a renewal after which somebody else, or another window, has control. */
+/** Refusals of a renewal after which another operator, or another window, has control. */
 const HELD = ["lease.held", "lease.other"];
 const OPERATOR = "robomesh.operator";
 const OPERATOR_NAME = /^[A-Za-z0-9][A-Za-z0-9_.-]*$/;

@@ -88,7 +88,7 @@ export const counts = computed(() =>
   })).filter(({ count }) => count > 0),
 );
 
-/** Sites whose alarms were known and no longer are. */
+/** Sites that no longer report their alarms. */
 export function silentSites(): string[] {
   return [...lists.value].filter(([, list]) => isStale("alarms", ageOf(list))).map(([site]) => site);
 }

@@ -12,7 +12,7 @@ const CHECK_INTERVAL_MS = 50;
 /** Time for messages to arrive, during which a fast replay advances far [s]. */
 const ON_ITS_WAY_S = 0.5;
 
-/** Follow a replay's topic whose messages are valid for a time [s]; an empty topic is absent. */
+/** Follow a replay's topic with messages that are valid for a time [s]; an empty topic is absent. */
 export function useMomentState(replay: Replay | null, topic: string, holdsS: number): MomentState {
   const [state, setState] = useState<MomentState>("coming");
   useEffect(() => {

@@ -108,7 +108,7 @@ export function stateWord(controller: Latest<ControllerState> | undefined, event
   return ACTIVITIES[activity] ?? { word: "state_unknown", level: "warning", detail: String(activity) };
 }
 
-/** Return the state of an arm whose program runs: even at rest it can move without a new command. */
+/** Return the state of an arm with a running program: even at rest it can move without a new command. */
 function programWord(program: ControllerState_Program, activity: Activity): StateWord {
   if (program.held) return ACTIVITIES[Activity.HOLDING];
   const running = { word: "state_running", level: "motion" } as const;
@@ -216,7 +216,7 @@ export function moves(state: ControllerState | undefined): boolean {
   return state !== undefined && MOVES.has(state.activity);
 }
 
-/** Describe what is wrong: only the reason of this state. */
+/** Describe the problem: only the reason of this state. */
 export function problemOf({ word }: StateWord, state: ControllerState | undefined): string {
   switch (word) {
     case "state_stale":

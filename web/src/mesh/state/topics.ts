@@ -188,7 +188,7 @@ export function jointsAge(
   return controller.sample.arrived >= joints.sample.arrived ? Math.max(own, reported) : own;
 }
 
-// Topics with the joints, and with what is computed from them: a robot may have another stale time.
+// Topics with the joints, and those computed from them: a robot may have another stale time.
 const OF_ARM: readonly string[] = ["joints", "joints/slow", "frames", "kinematics"];
 
 /** Return the age [s] at which a robot's topic is stale; infinite if it does not expire. */
