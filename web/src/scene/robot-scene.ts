@@ -1,7 +1,6 @@
 // The live 3-D picture of one robot, drawn only after a change.
 
 import * as THREE from "three";
-import type { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Description, View } from "../gen/robomesh_pb";
 import type { Sample } from "../mesh/console/connection";
 import { watch } from "../mesh/console/connection";
@@ -28,22 +27,9 @@ import { framesOfJoints } from "./parts/frames-of-joints";
 import type { Nearest } from "./parts/lines";
 import { Gap, Path, Trail } from "./parts/lines";
 import { colourEdges, paint, withEdges } from "./parts/models";
+import type { Stage } from "./parts/stage";
 import { KEY_LIGHT, lights, palette, surround } from "./parts/surroundings";
 import { SceneCamera } from "./scene-camera";
-
-/** Interface for parts that other components add: see Program's gizmo. */
-export interface Stage {
-  scene: THREE.Scene;
-  canvas: HTMLCanvasElement;
-  /** The robot's base in the site's frame. */
-  base: () => THREE.Matrix4;
-  /** Current camera and controls: each view replaces them. */
-  camera: () => THREE.Camera;
-  controls: () => OrbitControls;
-  /** The current camera as a view for the renderer. */
-  view: () => View;
-  changed: () => void;
-}
 
 /** What the scene shows of its robot, and how. */
 export interface SceneState {

@@ -17,8 +17,9 @@ import { useFramesAge } from "./frames-age";
 import { Neighbours } from "./neighbours";
 import { ghost, redLinks, toolPath } from "./overlays";
 import type { Nearest } from "./parts/lines";
+import type { Stage } from "./parts/stage";
 import { Poster } from "./poster";
-import type { RobotScene, SceneState, Stage } from "./robot-scene";
+import type { RobotScene, SceneState } from "./robot-scene";
 import { framesTopic } from "./topic-selection";
 
 // Eye of the free camera relative to its target, in multiples of the arm's reach.

@@ -10,7 +10,7 @@ import { stateWord } from "../../mesh/state/robot-state";
 import { isStale, jointsAge, useEvents, useTopic } from "../../mesh/state/topics";
 import { RobotAlarm } from "../../panels/robot-alarm";
 import { NoRobot, useRobotSearch } from "../../panels/robot-not-found";
-import type { Stage } from "../../scene/robot-scene";
+import type { Stage } from "../../scene/parts/stage";
 import { SceneView } from "../../scene/scene-view";
 import { robotLink } from "../../ui/route";
 import { State } from "../../ui/state";

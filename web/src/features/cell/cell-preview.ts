@@ -6,10 +6,10 @@ import { effect, signal } from "@preact/signals";
 import * as THREE from "three";
 import type { CellFixture, Description } from "../../gen/robomesh_pb";
 import { meshUrl } from "../../scene/parts/arm";
-import { makeGizmo } from "../../scene/parts/gizmo";
 import { loadModel } from "../../scene/parts/models";
+import type { Stage } from "../../scene/parts/stage";
+import { addGizmo } from "../../scene/parts/stage";
 import { palette } from "../../scene/parts/surroundings";
-import type { Stage } from "../../scene/robot-scene";
 import { changeFixture, chosen, mayEdit, rows } from "./cell-draft";
 
 /** What dragging does; off: hidden. */
@@ -25,24 +25,13 @@ const ROUND_RAD = Math.PI / 1800; // 0.1 degrees
 /** Add the preview to a scene; the returned function removes it. */
 export function addPreview(stage: Stage, prefix: string, description: Description): () => void {
   const ending = new AbortController();
-  const controls = makeGizmo(stage.camera(), stage.canvas, ending.signal);
+  const controls = addGizmo(stage, ending.signal);
   controls.setSpace("world");
-  const helper = controls.getHelper();
-  const update = helper.updateMatrixWorld.bind(helper);
-  // Each view has its own camera, which the gizmo must use.
-  helper.updateMatrixWorld = (force) => {
-    controls.camera = stage.camera();
-    update(force);
-  };
   const group = new THREE.Group();
   const handle = new THREE.Object3D();
   const meshes = new Map<string, THREE.Group>();
-  stage.scene.add(group, handle, helper);
+  stage.scene.add(group, handle);
 
-  controls.addEventListener("change", stage.changed);
-  controls.addEventListener("dragging-changed", ({ value }) => {
-    stage.controls().enabled = value !== true;
-  });
   controls.addEventListener("objectChange", () => {
     const { position, rotation } = handle;
     const angles = new THREE.Euler().setFromQuaternion(handle.quaternion, ORDER);
@@ -58,11 +47,7 @@ export function addPreview(stage: Stage, prefix: string, description: Descriptio
     if (!published || meshes.has(name)) return;
     meshes.set(name, new THREE.Group());
     const url = meshUrl(prefix, published.mesh, published.meshSha256);
-    const model = await loadModel(
-      url,
-      () => !ending.signal.aborted,
-      () => undefined,
-    ).catch(() => null);
+    const model = await loadModel(url, () => !ending.signal.aborted).catch(() => null);
     if (!model) return;
     meshes.set(name, model);
     show();
@@ -99,9 +84,7 @@ export function addPreview(stage: Stage, prefix: string, description: Descriptio
   return () => {
     end();
     ending.abort();
-    controls.detach();
-    controls.dispose();
-    stage.scene.remove(group, handle, helper);
+    stage.scene.remove(group, handle);
   };
 }
 

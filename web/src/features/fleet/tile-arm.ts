@@ -34,11 +34,7 @@ export class TileArm {
     void Promise.all(
       links.map(async ({ name, mesh, meshSha256, color }) => {
         if (!mesh) return;
-        const model = await loadModel(
-          meshUrl(prefix, mesh, meshSha256),
-          () => true,
-          () => undefined,
-        );
+        const model = await loadModel(meshUrl(prefix, mesh, meshSha256));
         const group = new THREE.Group();
         group.matrixAutoUpdate = false;
         if (model) group.add(withTileMaterial(model, color));

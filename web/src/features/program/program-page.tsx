@@ -19,10 +19,9 @@ import { disobeys, stateWord, stoppedByItself } from "../../mesh/state/robot-sta
 import { ageOf, isStale, jointsAge, useEvents, useTopic } from "../../mesh/state/topics";
 import { ControlPanel } from "../../panels/control/control-panel";
 import { ControlRequests } from "../../panels/control/who-controls";
-import { Messages } from "../../panels/messages";
 import { RobotAlarm } from "../../panels/robot-alarm";
 import { NoRobot, useRobotSearch } from "../../panels/robot-not-found";
-import type { Stage } from "../../scene/robot-scene";
+import type { Stage } from "../../scene/parts/stage";
 import { SceneView } from "../../scene/scene-view";
 import { programLink, robotLink } from "../../ui/route";
 import { State } from "../../ui/state";
@@ -39,7 +38,7 @@ import { isRunning, program } from "./running-program";
 import { startOverlay } from "./scene-overlay";
 import { StoredPanel } from "./stored-panel";
 import { lastAction, say, showHash, shown, stored } from "./stored-programs";
-import { addGizmo } from "./teach-gizmo";
+import { addTeachGizmo } from "./teach-gizmo";
 import { TeachPanel } from "./teach-panel";
 import { Timeline } from "./timeline";
 import { Toolbar } from "./toolbar";
@@ -85,7 +84,7 @@ function ProgramOfRobot({ site, robot, sha256 }: RobotName & { sha256: string })
   const events = useEvents(key);
   const [outcome, setOutcome] = useOutcome();
   const [stage, setStage] = useState<Stage | null>(null);
-  useEffect(() => (stage ? addGizmo(stage) : undefined), [stage]);
+  useEffect(() => (stage ? addTeachGizmo(stage) : undefined), [stage]);
   const age = jointsAge(joints, controller);
   const stale = isStale("joints", age, description?.message);
   useShownState(key, joints, controller);
@@ -170,9 +169,9 @@ function ProgramOfRobot({ site, robot, sha256 }: RobotName & { sha256: string })
           <CheckPanel moved={!isRunning() && hasMoved(positions)} />
         </div>
         <div class="program-middle">
-          <Messages>
+          <div class="messages">
             <ControlRequests robotKey={key} holder={holder} lease={lease?.message} />
-          </Messages>
+          </div>
           <SceneView
             robotKey={key}
             description={description?.message}

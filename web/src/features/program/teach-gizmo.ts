@@ -2,34 +2,23 @@
 
 import { effect, signal } from "@preact/signals";
 import { Group, Matrix4, Object3D } from "three";
-import { makeGizmo } from "../../scene/parts/gizmo";
-import type { Stage } from "../../scene/robot-scene";
+import type { Stage } from "../../scene/parts/stage";
+import { addGizmo } from "../../scene/parts/stage";
 import { taughtPose, teachPose } from "./taught-pose";
 
 /** What dragging does; off: hidden. */
 export const gizmoMode = signal<"off" | "translate" | "rotate">("off");
 
 /** Add the gizmo to a scene; the returned function removes it. */
-export function addGizmo(stage: Stage): () => void {
+export function addTeachGizmo(stage: Stage): () => void {
   const ending = new AbortController();
-  const controls = makeGizmo(stage.camera(), stage.canvas, ending.signal);
-  const helper = controls.getHelper();
+  const controls = addGizmo(stage, ending.signal);
   const inBase = new Group();
   const tool = new Object3D();
   inBase.matrixAutoUpdate = false;
   inBase.add(tool);
-  // Each view has its own camera, which the gizmo must use for its size and its drags.
-  const update = helper.updateMatrixWorld.bind(helper);
-  helper.updateMatrixWorld = (force) => {
-    controls.camera = stage.camera();
-    update(force);
-  };
-  stage.scene.add(inBase, helper);
+  stage.scene.add(inBase);
 
-  controls.addEventListener("change", stage.changed);
-  controls.addEventListener("dragging-changed", ({ value }) => {
-    stage.controls().enabled = value !== true;
-  });
   controls.addEventListener("objectChange", () => {
     tool.updateMatrix();
     teachPose(tool.matrix.clone().transpose().elements);
@@ -53,8 +42,6 @@ export function addGizmo(stage: Stage): () => void {
   return () => {
     end();
     ending.abort();
-    controls.detach();
-    controls.dispose();
-    stage.scene.remove(inBase, helper);
+    stage.scene.remove(inBase);
   };
 }

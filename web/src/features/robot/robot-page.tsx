@@ -27,10 +27,9 @@ import type { Latest } from "../../mesh/state/topics";
 import { ageOf, isStale, jointsAge, useEvents, useTopic } from "../../mesh/state/topics";
 import { ControlPanel } from "../../panels/control/control-panel";
 import { ControlRequests } from "../../panels/control/who-controls";
-import { Messages } from "../../panels/messages";
 import { RobotAlarm } from "../../panels/robot-alarm";
 import { NoRobot, useRobotSearch } from "../../panels/robot-not-found";
-import type { Stage } from "../../scene/robot-scene";
+import type { Stage } from "../../scene/parts/stage";
 import { SceneView } from "../../scene/scene-view";
 import { jointsTopic } from "../../scene/topic-selection";
 import { RobotTags } from "../../ui/robot-tags";
@@ -100,14 +99,14 @@ export function RobotPage({ site, robot }: RobotName) {
           camera={layout.camera}
           setCamera={(camera) => change({ camera })}
         />
-        <Messages>
+        <div class="messages">
           <Troubles site={site} controller={controller} events={events} />
           {isShown(program, events) && program.message.outcome === Outcome.ENDED && <ProgramLine latest={program} />}
           <ControlRequests robotKey={key} holder={holder} lease={lease?.message} />
           <RecordPanel robotKey={key} description={description?.message} />
           <NotePanel robotKey={key} />
           <LayoutPanel site={site} layout={layout} problem={problem} change={change} />
-        </Messages>
+        </div>
         <div class="side">
           <ControlPanel
             robotKey={key}

@@ -75,7 +75,7 @@ const listeners = new Map<string, Set<Listener>>();
 const newest = new Map<string, Sample>();
 /** Presence changes that subscribers have not received yet. */
 const changes = new Map<string, boolean>();
-const pending = new Map<bigint, { resolve: (payload: Uint8Array) => void; reject: (error: AskError) => void }>();
+const pending = new Map<bigint, PromiseWithResolvers<Uint8Array>>();
 let socket: WebSocket | null = null;
 /** Nothing precedes a stop on this connection: the console reads it before the page's other requests. */
 let stopSocket: WebSocket | null = null;
@@ -225,25 +225,31 @@ export async function ask<Q extends DescMessage, A extends DescMessage>(
   const id = ++lastAsk;
   const payload = toBinary(requestSchema, create(requestSchema, request));
   const message = { case: "ask", value: { id, key, payload, timeoutS } } as const;
-  const answer = new Promise<Uint8Array>((resolve, reject) => {
-    if (key.endsWith("/stop") && send(message, stopSocket)) {
-      setTimeout(() => pending.has(id) && send(message), STOP_AGAIN_MS);
-    } else if (!send(message)) {
-      reject(new AskError(t("not_connected"), true));
-      return;
-    }
-    // The server reports a timeout itself; this one is for a server that no longer answers.
-    const timer = setTimeout(
-      () => takePending(id)?.reject(new AskError(t("timed_out", { seconds: timeoutS }), true)),
-      timeoutS * 1000 + 1000,
-    );
-    const done = () => clearTimeout(timer);
-    pending.set(id, {
-      resolve: (bytes) => (done(), resolve(bytes)),
-      reject: (error) => (done(), reject(error)),
-    });
-  });
-  return fromBinary(answerSchema, await answer);
+  if (key.endsWith("/stop") && send(message, stopSocket)) {
+    setTimeout(() => pending.has(id) && send(message), STOP_AGAIN_MS);
+  } else if (!send(message)) throw new AskError(t("not_connected"), true);
+  const answer = Promise.withResolvers<Uint8Array>();
+  pending.set(id, answer);
+  // The server reports a timeout itself; this one is for a server that no longer answers.
+  const timer = setTimeout(
+    () => answer.reject(new AskError(t("timed_out", { seconds: timeoutS }), true)),
+    timeoutS * 1000 + 1000,
+  );
+  try {
+    return fromBinary(answerSchema, await answer.promise);
+  } finally {
+    clearTimeout(timer);
+    pending.delete(id);
+  }
+}
+
+/** Return an answer; if none arrives, throw an error with a text of the request's own. */
+export async function askedOf<Answer>(answer: Promise<Answer>, noAnswer: string): Promise<Answer> {
+  try {
+    return await answer;
+  } catch (error) {
+    throw error instanceof AskError && error.noAnswer ? new Error(noAnswer) : error;
+  }
 }
 
 /** Return a request as a message, for another connection than this page's. */
@@ -257,12 +263,6 @@ export function askMessage<Q extends DescMessage>(
     FromPageSchema,
     create(FromPageSchema, { message: { case: "ask", value: { id: 1n, key, payload } } }),
   );
-}
-
-function takePending(id: bigint) {
-  const waiting = pending.get(id);
-  pending.delete(id);
-  return waiting;
 }
 
 function send(message: NonNullable<MessageInitShape<typeof FromPageSchema>["message"]>, over = socket): boolean {
@@ -286,7 +286,7 @@ export function receive(bytes: Uint8Array): void {
       break;
     }
     case "answer": {
-      const waiting = takePending(message.value.id);
+      const waiting = pending.get(message.value.id);
       if (message.value.ok) waiting?.resolve(message.value.payload);
       else waiting?.reject(new AskError(message.value.error, message.value.noAnswer, message.value.refusal));
       break;

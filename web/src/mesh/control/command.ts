@@ -56,15 +56,13 @@ export async function command(
   positions = name === Command.MOVE_ABSOLUTE ? values.jointPositions : undefined,
 ): Promise<boolean> {
   const mine = heldLease.value;
-  if (mine?.robotKey !== robotKey) {
-    tell({ kind: "refused", text: t("not_sent", { text: t("take_first") }) });
+  const refuse = (text: string) => {
+    tell({ kind: "refused", text: t("not_sent", { text }) });
     return false;
-  }
+  };
+  if (mine?.robotKey !== robotKey) return refuse(t("take_first"));
   const frozen = STARTS_MOTION.includes(name) ? whyFrozen(robotKey) : "";
-  if (frozen) {
-    tell({ kind: "refused", text: t("not_sent", { text: frozen }) });
-    return false;
-  }
+  if (frozen) return refuse(frozen);
   const page = pageReport(robotKey);
   tell({ kind: "busy", text: t("sending", { what }) });
   const [validMs, withinS] = name === Command.RUN_PROGRAM ? [CHECKED_S * 1000, CHECKED_S] : [VALID_MS, ANSWERED_S];
@@ -80,16 +78,14 @@ export async function command(
     const key = `${robotKey}/command/${mine.operator}`;
     const answer = await ask(key, CommandRequestSchema, request, CommandAnswerSchema, withinS);
     const target = positions && { what, positions, id: request.id };
-    if (answer.accepted && MOTIONS.includes(name)) newestMotion.value = request.id;
+    if (!answer.accepted) return refuse(answer.text);
+    if (MOTIONS.includes(name)) newestMotion.value = request.id;
     // Older gateways put the warning only into their sentence.
     const warning = reasonText(answer.warning, answer.text.split("; mind: ")[1]);
-    if (answer.accepted)
-      tell({ kind: "done", text: t("sent", { what }), ...(warning && { warning }), ...(target && { target }) });
-    else tell({ kind: "refused", text: t("not_sent", { text: answer.text }) });
-    return answer.accepted;
+    tell({ kind: "done", text: t("sent", { what }), ...(warning && { warning }), ...(target && { target }) });
+    return true;
   } catch (error) {
-    tell({ kind: "refused", text: t("not_sent", { text: ended(reasonOf(error)) }) });
-    return false;
+    return refuse(ended(reasonOf(error)));
   }
 }
 

@@ -47,14 +47,8 @@ export const ALARM_ORDERS = {
 
 /** Return alarms in an order. */
 export function sorted(some: readonly Alarm[], order: keyof typeof ALARM_ORDERS): Alarm[] {
-  const comparisons = ALARM_ORDERS[order];
-  return [...some].sort((a, b) => {
-    for (const compare of comparisons) {
-      const difference = compare(a, b);
-      if (difference !== 0) return difference;
-    }
-    return 0;
-  });
+  const comparisons: readonly (typeof byTime)[] = ALARM_ORDERS[order];
+  return [...some].sort((a, b) => comparisons.reduce((difference, compare) => difference || compare(a, b), 0));
 }
 
 /** Every alarm, most urgent first. */

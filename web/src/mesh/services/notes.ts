@@ -12,7 +12,7 @@ import {
 import { stampMs } from "../../i18n/format";
 import { notesText as n } from "../../i18n/texts";
 import { isAdministrator, mayAct } from "../console/account";
-import { AskError, ask } from "../console/connection";
+import { ask, askedOf } from "../console/connection";
 import { asker } from "./alarms";
 
 export const LONGEST_TEXT = 500;
@@ -72,7 +72,7 @@ export async function readNotes(robotKey: string, part: { since?: number; until?
     ...(part.until !== undefined && { until: timestampFromMs(Math.ceil(part.until)) }),
   };
   const answer = ask(`robomesh/${site}/-/notes/read`, NoteQuerySchema, query, EventListSchema, TIMEOUT_S);
-  return (await inWords(answer)).events;
+  return (await askedOf(answer, n("no_store"))).events;
 }
 
 /** Return the ids of withdrawn notes among events. */
@@ -83,13 +83,5 @@ export function withdrawnIds(events: readonly Event[]): ReadonlySet<string> {
 async function change(robotKey: string, request: string, values: object): Promise<void> {
   const [, site = "", robot = ""] = robotKey.split("/");
   const key = `robomesh/${site}/-/notes/${request}/${asker.value}`;
-  await inWords(ask(key, NoteRequestSchema, { robot, ...values }, EventSchema, TIMEOUT_S));
-}
-
-async function inWords<T>(answer: Promise<T>): Promise<T> {
-  try {
-    return await answer;
-  } catch (error) {
-    throw error instanceof AskError && error.noAnswer ? new Error(n("no_store")) : error;
-  }
+  await askedOf(ask(key, NoteRequestSchema, { robot, ...values }, EventSchema, TIMEOUT_S), n("no_store"));
 }

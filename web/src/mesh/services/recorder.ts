@@ -3,7 +3,7 @@
 import type { Recording } from "../../gen/robomesh_pb";
 import { RecorderRequest_Action as Action, RecorderRequestSchema, RecordingSchema } from "../../gen/robomesh_pb";
 import { recordingsText as r } from "../../i18n/texts";
-import { AskError, ask } from "../console/connection";
+import { ask, askedOf } from "../console/connection";
 
 // Closing rewrites the file.
 const TIMEOUT_S = 20;
@@ -16,17 +16,9 @@ export async function askRecorder(
   action: Action,
   values: { name?: string; views?: string[] } = {},
 ): Promise<Recording> {
-  try {
-    return await ask(
-      `${robotKey}/recorder/request`,
-      RecorderRequestSchema,
-      { action, ...values },
-      RecordingSchema,
-      TIMEOUT_S,
-    );
-  } catch (error) {
-    throw error instanceof AskError && error.noAnswer ? new Error(r("record_no_answer")) : error;
-  }
+  const request = { action, ...values };
+  const answer = ask(`${robotKey}/recorder/request`, RecorderRequestSchema, request, RecordingSchema, TIMEOUT_S);
+  return await askedOf(answer, r("record_no_answer"));
 }
 
 export { Action };

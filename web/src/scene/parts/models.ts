@@ -32,8 +32,8 @@ export type Kind = "arm" | "neighbour" | "fixture";
  * `failed` receives the reason for each retry. @throws Error with the reason if it can never be loaded. */
 export async function loadModel(
   url: string,
-  wanted: () => boolean,
-  failed: (why: string) => void,
+  wanted: () => boolean = () => true,
+  failed: (why: string) => void = () => undefined,
 ): Promise<THREE.Group | null> {
   let glb: ArrayBuffer | null = null;
   // The mesh service or the console may be starting or busy: report it immediately, and retry.
