@@ -1,6 +1,6 @@
 import "@preact/signals";
 import { render } from "preact";
-import { isolateForeignTexts } from "../i18n/foreign-text";
+import { isolateTexts } from "../i18n/text-isolation";
 import { showLanguage } from "../i18n/texts";
 import { fetchAccount, reportActivity, signedOut } from "../mesh/console/account";
 import { keepConnected } from "../mesh/console/connection";
@@ -10,7 +10,7 @@ import { applyTheme } from "../ui/theme";
 import { App } from "./app";
 import "./styles";
 
-isolateForeignTexts();
+isolateTexts();
 applyTheme();
 void showLanguage().then(start);
 

@@ -3,7 +3,7 @@
 import "@preact/signals";
 import { render } from "preact";
 import { ViewPage } from "../features/view/view-page";
-import { isolateForeignTexts } from "../i18n/foreign-text";
+import { isolateTexts } from "../i18n/text-isolation";
 import { isLanguage, showLanguage } from "../i18n/texts";
 import { followView } from "../mesh/console/view-stream";
 import { applyTheme, theme } from "../ui/theme";
@@ -18,7 +18,7 @@ const [, , site = "", robot = "", view = ""] = location.pathname.split("/");
 const wantedTheme = query.get("theme");
 const wantedLanguage = query.get("language");
 if (wantedTheme === "dark" || wantedTheme === "light") theme.value = wantedTheme;
-isolateForeignTexts();
+isolateTexts();
 applyTheme();
 const token = query.get("token");
 void showLanguage(isLanguage(wantedLanguage) ? wantedLanguage : undefined).then(() => {

@@ -2,9 +2,9 @@
 
 import type { AuditEntry, Description_Joint } from "../gen/robomesh_pb";
 import { AuditEntry_Outcome as Outcome } from "../gen/robomesh_pb";
-import { isolated } from "./foreign-text";
 import { fixed, jointText, jointTitle } from "./format";
 import { reasonText } from "./reasons";
+import { isolated } from "./text-isolation";
 import { filled, message, placeholders, t } from "./texts";
 
 /** Requests with an outcome that says more than their name: an end of control or of a program, a stop that was sent again. */

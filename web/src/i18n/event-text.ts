@@ -6,10 +6,10 @@ import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Event, Note } from "../gen/robomesh_pb";
 import { Event_Severity as Severity } from "../gen/robomesh_pb";
 import { alarmTitle } from "./alarm-text";
-import { isolated } from "./foreign-text";
 import { stampMs, stampWhen, whenText } from "./format";
 import { reasonText } from "./reasons";
 import { isSaid, operatorText } from "./stop-words";
+import { isolated } from "./text-isolation";
 import { compose, filled, language, message, placeholders, t } from "./texts";
 
 // A note on an earlier time names it.

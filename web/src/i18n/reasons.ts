@@ -3,8 +3,8 @@
 
 import OF_KINDS from "../gen/reasons-of-kinds.json";
 import type { Reason } from "../gen/robomesh_pb";
-import { isolated } from "./foreign-text";
 import { isSaid } from "./stop-words";
+import { isolated } from "./text-isolation";
 import { filled, language, message, placeholders, t } from "./texts";
 
 /** Translations of reasons that only one kind of controllers has, by language and the catalogue's key. */

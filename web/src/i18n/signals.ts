@@ -3,7 +3,7 @@
 import type { Description, Signal } from "../gen/robomesh_pb";
 import { DASH, fixed, jointTitle } from "./format";
 import { message, signalsText as sg } from "./texts";
-import { shownUnit } from "./value-names";
+import { shownUnit } from "./units";
 
 // Groups in the order in which they are shown: what people look for first.
 const GROUPS = ["safety", "robot", "program", "speed", "tool", "payload", "frame", "joint", "io", "counter", "cabinet"];

@@ -2,8 +2,8 @@
 
 import { computed, signal } from "@preact/signals";
 import en from "./en.json";
-import { isolated } from "./foreign-text";
 import { readStored } from "./stored";
+import { isolated } from "./text-isolation";
 
 type Key = keyof typeof en;
 type Catalogue = Readonly<Record<Key, string>>;

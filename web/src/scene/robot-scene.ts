@@ -25,7 +25,7 @@ import type { Forward } from "./parts/forward-kinematics";
 import { forwardOf } from "./parts/forward-kinematics";
 import { framesOfJoints } from "./parts/frames-of-joints";
 import type { Nearest } from "./parts/lines";
-import { Gap, Path, Trail } from "./parts/lines";
+import { ClearanceLine, Path, Trail } from "./parts/lines";
 import { colourEdges, paint, withEdges } from "./parts/models";
 import type { Stage } from "./parts/stage";
 import { KEY_LIGHT, lights, palette, surround } from "./parts/surroundings";
@@ -76,7 +76,7 @@ export class RobotScene {
   private readonly axes = new Map<string, THREE.AxesHelper>();
   private readonly trail = new Trail();
   private readonly path = new Path();
-  private readonly gap: Gap;
+  private readonly clearance: ClearanceLine;
   private readonly base = new THREE.Matrix4();
   private floorAt: number | null = null; // in the site's frame [m]
   private colours = palette();
@@ -109,8 +109,8 @@ export class RobotScene {
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
     toneMap(this.renderer);
     this.arm = new Arm(this.scene, this.prefix, "arm", this.changed);
-    this.gap = new Gap(label);
-    this.scene.add(...lights(), this.trail.line, this.path.line, this.gap.group);
+    this.clearance = new ClearanceLine(label);
+    this.scene.add(...lights(), this.trail.line, this.path.line, this.clearance.group);
     this.setColours();
     this.camera = new SceneCamera(canvas, this.base, this.changed);
     this.observer = observeSize(canvas, this.resize);
@@ -226,7 +226,7 @@ export class RobotScene {
       if (this.received.length > KEPT_SAMPLES) this.received.shift();
       const frames = topic === "frames" ? sample.payload : this.framesFrom(sample.payload);
       this.arm.placeFrames(frames, sample.sourceTime, sample.arrived);
-      if (this.gap.waits) this.loop.wake();
+      if (this.clearance.waits) this.loop.wake();
       this.reportPicture();
     });
   }
@@ -281,9 +281,9 @@ export class RobotScene {
   }
 
   private showNearest(found: SceneState["nearest"]): void {
-    if (found) this.gap.add(found.nearest, found.sourceTime);
-    else if (this.gap.hide()) this.changed();
-    if (this.gap.waits) this.loop.wake();
+    if (found) this.clearance.add(found.nearest, found.sourceTime);
+    else if (this.clearance.hide()) this.changed();
+    if (this.clearance.waits) this.loop.wake();
   }
 
   /** Turn the free camera by angles [rad] about the vertical and the horizontal, for the keyboard. */
@@ -309,7 +309,7 @@ export class RobotScene {
 
   private readonly drawn = (tookMs: number, at: number): void => {
     this.reportPicture();
-    this.gap.placeLabel(this.camera.viewpoint.camera, this.canvas.clientWidth, this.canvas.clientHeight);
+    this.clearance.placeLabel(this.camera.viewpoint.camera, this.canvas.clientWidth, this.canvas.clientHeight);
     countFrame(this.canvas);
     clearTimeout(this.restTimer);
     if (this.sharp) return; // a single frame says nothing about the machine's speed
@@ -330,7 +330,7 @@ export class RobotScene {
   private readonly draw = (at: number): boolean => {
     const placements = this.arm.placeAt(at);
     if (placements) this.place(placements);
-    if (this.gap.showAt(this.arm.player.shown, this.colours)) this.dirty = true;
+    if (this.clearance.showAt(this.arm.player.shown, this.colours)) this.dirty = true;
     const arms = [this.arm, ...this.neighbours];
     for (const neighbour of this.neighbours) if (neighbour.placeAt(at)) this.dirty = true;
     const { camera, controls } = this.camera.viewpoint;

@@ -7,7 +7,7 @@ import "uplot/dist/uPlot.min.css";
 import type { SeriesAnswer_Series as Series } from "../../gen/robomesh_pb";
 import { DASH, fixed } from "../../i18n/format";
 import { momentText } from "../../i18n/recording-format";
-import { commonOf, labelOf, shownUnit } from "../../i18n/value-names";
+import { commonOf, labelOf, shownUnit } from "../../i18n/units";
 import { plotAppearance } from "../../ui/plot-appearance";
 import { theme } from "../../ui/theme";
 import type { Window } from "./recorder-requests";

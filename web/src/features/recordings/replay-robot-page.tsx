@@ -86,7 +86,7 @@ function useReplay(key: string, state: ReplayState | undefined): Replay | null {
     const made = new Replay(key, state);
     setReplay(made);
     return () => {
-      made.letGo();
+      made.unfollow();
       setReplay(null);
     };
   }, [key, known]);

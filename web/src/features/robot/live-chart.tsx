@@ -5,7 +5,7 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { dateOf, timeOfDay } from "../../i18n/format";
 import { plotsText as p } from "../../i18n/texts";
-import type { shownUnit } from "../../i18n/value-names";
+import type { shownUnit } from "../../i18n/units";
 import { ageClock } from "../../mesh/console/age-clock";
 import { plotAppearance } from "../../ui/plot-appearance";
 import { theme } from "../../ui/theme";

@@ -5,7 +5,7 @@ import type { Description } from "../../gen/robomesh_pb";
 import { ageText, DASH, fixed, jointTitle, whenText } from "../../i18n/format";
 import { fullSignalText } from "../../i18n/signals";
 import { message, plotsText as p } from "../../i18n/texts";
-import { commonOf, shownUnit } from "../../i18n/value-names";
+import { commonOf, shownUnit } from "../../i18n/units";
 import { ageClock } from "../../mesh/console/age-clock";
 import { hello, watch } from "../../mesh/console/connection";
 import { now } from "../../mesh/state/topics";

@@ -83,9 +83,9 @@ let lastAsk = 0n;
 let retryMs = 250;
 /** When the last message arrived [ms], and a function that closes an idle connection. */
 let receivedAt = 0;
-let heardAt = performance.now();
-let checkedAt = heardAt;
-let giveUp: () => void = () => undefined;
+let lastMessageAt = performance.now();
+let checkedAt = lastMessageAt;
+let closeConnection: () => void = () => undefined;
 
 /** Connect, and reconnect for ever.
  *
@@ -111,7 +111,7 @@ function checkSilence(): void {
   // After a pause of this page, messages may wait behind this timer.
   const late = at - checkedAt > 2 * CHECK_INTERVAL_MS;
   checkedAt = at;
-  if (!late || silent.value) silent.value = at - heardAt > SILENT_MS;
+  if (!late || silent.value) silent.value = at - lastMessageAt > SILENT_MS;
 }
 
 /** Return the address of the console's WebSocket. */
@@ -125,12 +125,12 @@ function connect(reconnect: () => void, ended: (why: string) => void): void {
   let queriedAt = performance.now(); // opening counts as an answer
   receivedAt = 0;
   const received = () => {
-    receivedAt = heardAt = performance.now();
+    receivedAt = lastMessageAt = performance.now();
     silent.value = false;
   };
   const end = (code: number, reason: string) => {
     clearInterval(checkTimer);
-    giveUp = () => undefined;
+    closeConnection = () => undefined;
     opened.onopen = opened.onmessage = opened.onclose = null;
     socket = null;
     stopSocket?.close();
@@ -146,14 +146,14 @@ function connect(reconnect: () => void, ended: (why: string) => void): void {
     const at = performance.now();
     if (queriedAt > receivedAt) {
       if (at - queriedAt < ANSWER_TIMEOUT_MS) return;
-      giveUp();
+      closeConnection();
     } else if (at - receivedAt > QUIET_MS) {
       queriedAt = at;
       send({ case: "ask", value: { id: ++lastAsk, key: "" } }); // an invalid request is answered immediately
     }
   };
   const checkTimer = setInterval(checkConnection, CHECK_INTERVAL_MS);
-  giveUp = () => {
+  closeConnection = () => {
     opened.close(); // close() waits for the peer's close frame
     end(0, "");
   };
@@ -184,7 +184,7 @@ function openStopSocket(own: WebSocket): void {
 
 /** Reconnect if nothing was received since a time of `performance.now`. */
 export function reopenIfSilent(since: number): void {
-  if (socket && receivedAt < since) giveUp();
+  if (socket && receivedAt < since) closeConnection();
 }
 
 /** Receive every publication on a key expression until the returned function is called. */
@@ -244,7 +244,7 @@ export async function ask<Q extends DescMessage, A extends DescMessage>(
 }
 
 /** Return an answer; if none arrives, throw an error with a text of the request's own. */
-export async function askedOf<Answer>(answer: Promise<Answer>, noAnswer: string): Promise<Answer> {
+export async function withNoAnswerText<Answer>(answer: Promise<Answer>, noAnswer: string): Promise<Answer> {
   try {
     return await answer;
   } catch (error) {

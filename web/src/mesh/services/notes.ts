@@ -12,7 +12,7 @@ import {
 import { stampMs } from "../../i18n/format";
 import { notesText as n } from "../../i18n/texts";
 import { isAdministrator, mayAct } from "../console/account";
-import { ask, askedOf } from "../console/connection";
+import { ask, withNoAnswerText } from "../console/connection";
 import { asker } from "./alarms";
 
 export const LONGEST_TEXT = 500;
@@ -72,7 +72,7 @@ export async function readNotes(robotKey: string, part: { since?: number; until?
     ...(part.until !== undefined && { until: timestampFromMs(Math.ceil(part.until)) }),
   };
   const answer = ask(`robomesh/${site}/-/notes/read`, NoteQuerySchema, query, EventListSchema, TIMEOUT_S);
-  return (await askedOf(answer, n("no_store"))).events;
+  return (await withNoAnswerText(answer, n("no_store"))).events;
 }
 
 /** Return the ids of withdrawn notes among events. */
@@ -83,5 +83,5 @@ export function withdrawnIds(events: readonly Event[]): ReadonlySet<string> {
 async function change(robotKey: string, request: string, values: object): Promise<void> {
   const [, site = "", robot = ""] = robotKey.split("/");
   const key = `robomesh/${site}/-/notes/${request}/${asker.value}`;
-  await askedOf(ask(key, NoteRequestSchema, { robot, ...values }, EventSchema, TIMEOUT_S), n("no_store"));
+  await withNoAnswerText(ask(key, NoteRequestSchema, { robot, ...values }, EventSchema, TIMEOUT_S), n("no_store"));
 }

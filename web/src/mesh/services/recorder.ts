@@ -3,7 +3,7 @@
 import type { Recording } from "../../gen/robomesh_pb";
 import { RecorderRequest_Action as Action, RecorderRequestSchema, RecordingSchema } from "../../gen/robomesh_pb";
 import { recordingsText as r } from "../../i18n/texts";
-import { ask, askedOf } from "../console/connection";
+import { ask, withNoAnswerText } from "../console/connection";
 
 // Closing rewrites the file.
 const TIMEOUT_S = 20;
@@ -18,7 +18,7 @@ export async function askRecorder(
 ): Promise<Recording> {
   const request = { action, ...values };
   const answer = ask(`${robotKey}/recorder/request`, RecorderRequestSchema, request, RecordingSchema, TIMEOUT_S);
-  return await askedOf(answer, r("record_no_answer"));
+  return await withNoAnswerText(answer, r("record_no_answer"));
 }
 
 export { Action };

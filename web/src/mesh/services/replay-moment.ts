@@ -32,7 +32,7 @@ export function useMomentState(replay: Replay | null, topic: string, holdsS: num
     const stop = watch(`${replay.robotKey}/${topic}`, (sample) => {
       if (!sample.sourceTime) return;
       source = sample.sourceTime;
-      if (replay.steadyFor() > ARRIVAL_MS) offset = away(source); // during playback each arrives at its moment
+      if (replay.playedForMs() > ARRIVAL_MS) offset = away(source); // during playback each arrives at its moment
       update();
     });
     const timer = setInterval(update, CHECK_INTERVAL_MS);

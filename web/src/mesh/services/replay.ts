@@ -65,7 +65,7 @@ export class Replay {
   }
 
   /** How long it has played without a jump [ms]; 0: it is not playing. */
-  steadyFor(): number {
+  playedForMs(): number {
     const { playing, speed } = this.state.peek();
     return playing && speed === 1 && !this.seeking ? performance.now() - this.changedAt : 0;
   }
@@ -94,10 +94,10 @@ export class Replay {
   /** Seek to a time: at most one request is on its way, followed by the newest wish. */
   readonly seek = (to: number): void => {
     this.wanted = Math.min(this.state.peek().durationS, Math.max(this.firstS, to));
-    if (!this.seeking) void this.goThere();
+    if (!this.seeking) void this.sendSeeks();
   };
 
-  private async goThere(): Promise<void> {
+  private async sendSeeks(): Promise<void> {
     this.seeking = true;
     while (this.wanted !== null) {
       const positionS = this.wanted;
@@ -122,7 +122,7 @@ export class Replay {
   }
 
   /** Stop following it; it continues for other pages. */
-  letGo(): void {
+  unfollow(): void {
     this.stop();
   }
 

@@ -73,7 +73,7 @@ export interface Nearest {
 }
 
 /** A line between the two nearest points with a ball at each end and a label, in time with the arm's frames. */
-export class Gap {
+export class ClearanceLine {
   readonly group = new THREE.Group();
   private readonly line = line(2);
   private readonly material = new THREE.MeshBasicMaterial({ depthTest: false, transparent: true });

@@ -30,7 +30,7 @@ export function isolated(text: string): string {
 }
 
 /** Isolate every text that is rendered from now on. */
-export function isolateForeignTexts(): void {
+export function isolateTexts(): void {
   const before = options.vnode;
   options.vnode = (vnode) => {
     if (typeof vnode.type === "string") isolate(vnode as VNode<Record<string, unknown>>, vnode.type);
